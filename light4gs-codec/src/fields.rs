@@ -1,0 +1,75 @@
+//! Every number of a scene by name: whether it is finite, and whether two scenes agree to the bit.
+
+use std::slice::from_ref;
+
+use crate::{CodecError, SceneData, sections::SectionKind};
+
+/// One array of numbers of a scene.
+struct Field<'a> {
+    section: &'static str,
+    name: String,
+    values: &'a [f32],
+}
+
+/// All numbers of `scene`, in the order of the stream.
+fn fields(scene: &SceneData) -> Vec<Field<'_>> {
+    let SceneData { meta, gaussians, frame, hexplane, deformation } = scene;
+    let mut fields = Vec::new();
+    let mut add = |section, name: String, values| fields.push(Field { section, name, values });
+
+    add("meta", "fps".into(), from_ref(&meta.fps));
+    add("meta", "bounds".into(), meta.bounds.as_flattened());
+    add("meta", "background".into(), &meta.background);
+    add("meta", "fov_x".into(), from_ref(&meta.fov_x));
+
+    let section = SectionKind::Gaussians.name();
+    add(section, "means".into(), gaussians.means.as_flattened());
+    add(section, "log_scales".into(), gaussians.log_scales.as_flattened());
+    add(section, "quats".into(), gaussians.quats.as_flattened());
+    add(section, "opacity_logits".into(), &gaussians.opacity_logits);
+    add(section, "sh_dc".into(), gaussians.sh_dc.as_flattened());
+    add(SectionKind::Sh.name(), "sh_rest".into(), &gaussians.sh_rest);
+
+    let section = SectionKind::SceneFrame.name();
+    add(section, "mean".into(), &frame.mean);
+    add(section, "axes".into(), frame.axes.as_flattened());
+    add(section, "std".into(), &frame.std);
+
+    let section = SectionKind::Deformation.name();
+    for layer in &deformation.layers {
+        add(section, format!("{}.weight", layer.name), &layer.weight);
+        add(section, format!("{}.bias", layer.name), &layer.bias);
+    }
+
+    let section = SectionKind::HexPlanes.name();
+    for (index, plane) in hexplane.planes.iter().enumerate() {
+        add(section, format!("planes[{index}].values"), &plane.values);
+    }
+    fields
+}
+
+/// Refuses NaN and infinities.
+pub(crate) fn check_finite(scene: &SceneData) -> Result<(), CodecError> {
+    for Field { section, name, values } in fields(scene) {
+        if let Some(index) = values.iter().position(|value| !value.is_finite()) {
+            return Err(CodecError::NonFinite { section, field: name, index, value: values[index] });
+        }
+    }
+    Ok(())
+}
+
+/// Refuses a `decoded` scene that is not `given` to the last bit.
+pub(crate) fn check_same_bits(given: &SceneData, decoded: &SceneData) -> Result<(), CodecError> {
+    for (a, b) in fields(given).into_iter().zip(fields(decoded)) {
+        let same =
+            a.values.len() == b.values.len() && a.values.iter().zip(b.values).all(|(x, y)| x.to_bits() == y.to_bits());
+        if !same {
+            return Err(CodecError::SelfCheck { section: a.section, field: a.name });
+        }
+    }
+    // Names, counts and shapes. Numbers are equal by now, but for arrays that one side lacks.
+    if given != decoded {
+        return Err(CodecError::SelfCheck { section: "stream", field: "a name, a count or a shape".into() });
+    }
+    Ok(())
+}

@@ -1,0 +1,68 @@
+//! The `.l4gs` stream: plain arrays in, bytes out.
+//!
+//! A dynamic scene is a set of Gaussians, a frame that normalises their positions, a multiscale hexplane and a
+//! small deformation network. [`SceneData`] holds all of it as plain arrays, [`encode`] turns it into one byte
+//! stream and [`decode`] turns the stream back, bit for bit, on every machine. `docs/format.md` describes the
+//! stream byte by byte.
+//!
+//! ```
+//! use light4gs_codec::{GaussianArrays, SceneData, SceneFrameArrays, SceneMeta, decode, encode, info};
+//!
+//! let scene = SceneData {
+//!     meta: SceneMeta { name: "one grey ball".into(), frame_count: 1, fps: 30.0, ..Default::default() },
+//!     gaussians: GaussianArrays {
+//!         means: vec![[0.0, 0.5, 2.0]],
+//!         log_scales: vec![[-3.0; 3]],
+//!         quats: vec![[1.0, 0.0, 0.0, 0.0]],
+//!         opacity_logits: vec![2.0],
+//!         sh_dc: vec![[0.1; 3]],
+//!         sh_degree: 1,
+//!         sh_rest: vec![0.0; 9],
+//!     },
+//!     frame: SceneFrameArrays::default(), // no normalisation
+//!     ..Default::default()                // no hexplane, no network: a scene that does not move
+//! };
+//!
+//! let bytes = encode(&scene)?;
+//! assert_eq!(decode(&bytes)?, scene);
+//! assert_eq!(info(&bytes)?.gaussian_count, 1);
+//!
+//! // Damage is found, and named.
+//! let mut damaged = bytes.clone();
+//! *damaged.last_mut().unwrap() ^= 1;
+//! assert!(decode(&damaged).unwrap_err().to_string().contains("checksum"));
+//! # Ok::<(), light4gs_codec::CodecError>(())
+//! ```
+//!
+//! A reader trusts nothing: every length and every count is checked against the bytes that are there and against
+//! [`Limits`] before memory is taken, so hostile input gets a [`CodecError`], never a panic.
+//!
+//! [`encode`], [`decode`] and [`info`] use neither files nor threads and compile for `wasm32-unknown-unknown`, where the
+//! file functions (`read_file`, `write_file`, ...) are absent.
+
+#![forbid(unsafe_code)]
+
+mod container;
+mod error;
+mod fields;
+#[cfg(not(target_arch = "wasm32"))]
+mod file;
+mod info;
+mod limits;
+mod reader;
+mod scene;
+mod sections;
+mod stream;
+mod writer;
+
+pub use container::{Encoding, MAGIC, VERSION};
+pub use error::CodecError;
+#[cfg(not(target_arch = "wasm32"))]
+pub use file::{read_file, read_info, write_atomically, write_file};
+pub use info::{SectionInfo, StreamInfo, info};
+pub use limits::Limits;
+pub use scene::{
+    GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
+    SceneMeta, sh_rest_coefficients,
+};
+pub use stream::{decode, decode_with_limits, encode};

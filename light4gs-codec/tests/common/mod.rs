@@ -1,0 +1,126 @@
+//! A small scene that has something of everything.
+
+#![allow(dead_code, unreachable_pub)] // each test binary uses its part
+
+use light4gs_codec::{
+    GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
+    SceneMeta, sh_rest_coefficients,
+};
+
+/// Numbers that differ from each other, are exact in float32 and follow from their position alone.
+pub fn numbers(count: usize) -> Vec<f32> {
+    (0..count).map(|i| (i as f32 - 3.0) / 8.0).collect()
+}
+
+/// `count` groups of numbers.
+pub fn groups<const K: usize>(count: usize) -> Vec<[f32; K]> {
+    numbers(K * count).as_chunks().0.to_vec()
+}
+
+/// Gaussians with all arrays filled.
+pub fn gaussians(count: usize, sh_degree: u8) -> GaussianArrays {
+    GaussianArrays {
+        means: groups(count),
+        log_scales: groups(count),
+        quats: groups(count),
+        opacity_logits: numbers(count),
+        sh_dc: groups(count),
+        sh_degree,
+        sh_rest: numbers(count * sh_rest_coefficients(sh_degree) * 3),
+    }
+}
+
+/// A hexplane whose time axis is not multiplied.
+pub fn hexplane(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> HexPlaneArrays {
+    let mut planes = Vec::new();
+    for multiplier in multipliers {
+        let [x, y, z] = [0, 1, 2].map(|axis| resolution[axis] * multiplier);
+        let t = resolution[3];
+        for (width, height) in [(x, y), (x, z), (x, t), (y, z), (y, t), (z, t)] {
+            planes.push(Plane { height, width, values: numbers((channels * height * width) as usize) });
+        }
+    }
+    HexPlaneArrays { channels, resolution, multipliers: multipliers.to_vec(), planes }
+}
+
+/// One layer.
+pub fn layer(name: &str, inputs: u32, outputs: u32) -> LinearLayer {
+    LinearLayer {
+        name: name.into(),
+        inputs,
+        outputs,
+        weight: numbers((inputs * outputs) as usize),
+        bias: numbers(outputs as usize),
+    }
+}
+
+/// The scene.
+pub fn sample() -> SceneData {
+    SceneData {
+        meta: SceneMeta {
+            name: "tiny \u{1f3be}".into(),
+            frame_count: 7,
+            fps: 29.5,
+            bounds: [[-1.0, -2.0, -3.0], [1.0, 2.0, 3.5]],
+            background: [1.0, 0.5, -0.0],
+            config_digest: std::array::from_fn(|i| i as u8),
+            width: 800,
+            height: 600,
+            fov_x: 0.75,
+            extra: [("author".to_owned(), "a test".to_owned()), ("writer".to_owned(), String::new())].into(),
+        },
+        gaussians: gaussians(2, 1),
+        frame: SceneFrameArrays {
+            mean: [0.5, -0.25, 0.125],
+            axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+            std: [1.0, 2.0, 0.5],
+        },
+        hexplane: hexplane(1, [2, 1, 1, 3], &[1, 2]),
+        deformation: NetworkArrays {
+            width: 3,
+            depth: 1,
+            heads: HeadFlags { position: true, scale: false, rotation: true, opacity: false, sh: false },
+            layers: vec![layer("trunk.0", 2, 3), layer("position", 3, 1)],
+        },
+    }
+}
+
+/// Bytes of one entry of the table.
+pub const ENTRY: usize = 24;
+
+/// Where the table of a stream begins.
+pub fn table_at(bytes: &[u8]) -> usize {
+    32 + u32_at(bytes, 16) as usize
+}
+
+/// A number at an offset.
+pub fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+}
+
+/// A number at an offset.
+pub fn u64_at(bytes: &[u8], at: usize) -> u64 {
+    u64::from_le_bytes(bytes[at..at + 8].try_into().unwrap())
+}
+
+/// Overwrites bytes.
+pub fn put(bytes: &mut [u8], at: usize, new: &[u8]) {
+    bytes[at..at + new.len()].copy_from_slice(new);
+}
+
+/// Computes the header's checksum again, as somebody would who means harm.
+pub fn forge_header(bytes: &mut [u8]) {
+    let end = (table_at(bytes) + ENTRY * u32_at(bytes, 12) as usize).min(bytes.len());
+    let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes[..28]), &bytes[32..end]);
+    put(bytes, 28, &crc.to_le_bytes());
+}
+
+/// Computes the checksum of a section again, then the header's.
+pub fn forge_section(bytes: &mut [u8], index: usize) {
+    let entry = table_at(bytes) + ENTRY * index;
+    let start = u64_at(bytes, entry + 8) as usize;
+    let end = start + u64_at(bytes, entry + 16) as usize;
+    let crc = crc32c::crc32c(&bytes[start..end]);
+    put(bytes, entry + 4, &crc.to_le_bytes());
+    forge_header(bytes);
+}

@@ -1,0 +1,68 @@
+//! What the encoder does not write.
+
+mod common;
+
+use common::{layer, sample};
+use light4gs_codec::{CodecError, SceneData, encode};
+
+/// The message for the sample after `spoil`.
+fn message(spoil: impl FnOnce(&mut SceneData)) -> String {
+    let mut scene = sample();
+    spoil(&mut scene);
+    let error = encode(&scene).expect_err("spoilt");
+    assert!(!error.is_internal(), "{error}");
+    error.to_string()
+}
+
+#[test]
+fn arrays_of_other_lengths() {
+    let text = "expected 2 (one for each of the means)";
+    assert!(message(|scene| scene.gaussians.quats.truncate(1)).contains(text));
+    assert!(message(|scene| scene.gaussians.opacity_logits.push(0.0)).contains(text));
+    assert!(message(|scene| scene.gaussians.sh_dc.clear()).contains(text));
+    assert!(message(|scene| scene.gaussians.log_scales.clear()).contains("length of log_scales is 0"));
+    assert!(message(|scene| scene.gaussians.sh_rest.push(0.0)).contains("expected 18"));
+    assert!(message(|scene| scene.gaussians.sh_degree = 4).contains("degree is 4, expected 0, 1, 2 or 3"));
+    assert!(message(|scene| drop(scene.hexplane.planes.pop())).contains("length of planes is 11, expected 12"));
+    assert!(message(|scene| scene.hexplane.planes[7].values.push(0.0)).contains("planes[7].values"));
+    assert!(message(|scene| scene.deformation.layers[1].weight.clear()).contains("position.weight"));
+    assert!(message(|scene| scene.deformation.layers[1].bias.push(0.0)).contains("position.bias"));
+}
+
+#[test]
+fn shapes_that_contradict_each_other() {
+    assert!(message(|scene| scene.hexplane.resolution[0] = 5).contains("resolution 5 along x times multiplier 1"));
+    assert!(message(|scene| scene.hexplane.resolution[3] = 5).contains("or 5"));
+    assert!(message(|scene| scene.hexplane.multipliers[1] = 0).contains("more than 0"));
+    assert!(message(|scene| scene.hexplane.channels = 0).contains("channels is 0"));
+    assert!(message(|scene| scene.deformation.layers.push(layer("position", 1, 1))).contains("each name once"));
+    assert!(message(|scene| scene.deformation.layers[0].inputs = 0).contains("trunk.0.inputs is 0"));
+    assert!(message(|scene| scene.meta.bounds.reverse()).contains("bounds"));
+    assert!(message(|scene| scene.meta.fps = -1.0).contains("fps is -1"));
+}
+
+#[test]
+fn numbers_that_are_not_finite() {
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        assert!(message(|scene| scene.gaussians.means[1][2] = bad).starts_with("gaussians: value 5 of means is"));
+        assert!(message(|scene| scene.gaussians.sh_rest[3] = bad).starts_with("sh: value 3 of sh_rest is"));
+        assert!(message(|scene| scene.frame.axes[0][1] = bad).starts_with("scene_frame: value 1 of axes is"));
+        assert!(message(|scene| scene.hexplane.planes[3].values[0] = bad).contains("planes[3].values"));
+        assert!(message(|scene| scene.deformation.layers[0].bias[0] = bad).contains("trunk.0.bias"));
+        assert!(message(|scene| scene.meta.background[0] = bad).starts_with("meta: value 0 of background is"));
+    }
+}
+
+#[test]
+fn numbers_beyond_the_limits() {
+    let over = |spoil: fn(&mut SceneData)| {
+        let mut scene = sample();
+        spoil(&mut scene);
+        assert!(matches!(encode(&scene), Err(CodecError::OverLimit { .. })));
+    };
+    over(|scene| scene.meta.name = "n".repeat(70_000));
+    over(|scene| scene.meta.extra = (0..20).map(|i| (i.to_string(), "v".repeat(65_000))).collect());
+    over(|scene| scene.hexplane.channels = u32::MAX);
+    over(|scene| scene.hexplane.resolution[2] = u32::MAX);
+    over(|scene| scene.deformation.depth = u32::MAX);
+}

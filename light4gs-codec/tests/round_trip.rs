@@ -1,0 +1,134 @@
+//! What goes in comes out, to the last bit.
+
+mod common;
+
+use common::{gaussians, hexplane, layer, sample};
+use light4gs_codec::{HeadFlags, NetworkArrays, SceneData, SceneMeta, decode, encode, info};
+use proptest::{collection::btree_map, prelude::*};
+
+#[test]
+fn an_empty_scene() {
+    let scene = SceneData::default();
+    let bytes = encode(&scene).unwrap();
+    assert_eq!(decode(&bytes).unwrap(), scene);
+    assert_eq!(info(&bytes).unwrap().gaussian_count, 0);
+}
+
+#[test]
+fn the_sign_of_zero_and_the_smallest_numbers_survive() {
+    let mut scene = sample();
+    let odd = [-0.0, f32::from_bits(1), f32::MAX];
+    scene.gaussians.means[1] = odd;
+    let decoded = decode(&encode(&scene).unwrap()).unwrap();
+    assert_eq!(decoded.gaussians.means[1].map(f32::to_bits), odd.map(f32::to_bits));
+}
+
+#[test]
+fn time_may_be_multiplied() {
+    let mut scene = sample();
+    let multiplied = hexplane(1, [4, 2, 2, 6], &[1]);
+    scene.hexplane.planes.splice(6.., multiplied.planes);
+    assert_eq!(decode(&encode(&scene).unwrap()).unwrap(), scene);
+}
+
+#[test]
+fn info_tells_what_is_inside() {
+    let scene = sample();
+    let bytes = encode(&scene).unwrap();
+    let info = info(&bytes).unwrap();
+    assert_eq!(info.meta, scene.meta);
+    assert_eq!((info.version, info.flags, info.bytes), (1, 0, bytes.len() as u64));
+    assert_eq!((info.gaussian_count, info.sh_degree), (2, 1));
+    assert_eq!((info.hexplane_channels, info.hexplane_resolution), (1, [2, 1, 1, 3]));
+    assert_eq!((info.hexplane_multipliers, info.plane_count), (vec![1, 2], 12));
+    assert_eq!((info.network_width, info.network_depth, info.layer_count), (3, 1, 2));
+    assert_eq!(info.network_heads, scene.deformation.heads);
+    let names: Vec<_> = info.sections.iter().map(|section| section.name).collect();
+    assert_eq!(names, ["gaussians", "sh", "scene_frame", "deformation", "hexplanes"]);
+    assert!(info.sections.iter().all(|section| section.encoding.name() == "float32"));
+    assert_eq!(info.header_bytes + info.sections.iter().map(|section| section.bytes).sum::<u64>(), info.bytes);
+    for section in &info.sections {
+        let payload = &bytes[section.offset as usize..(section.offset + section.bytes) as usize];
+        assert_eq!(crc32c::crc32c(payload), section.crc);
+    }
+}
+
+prop_compose! {
+    fn metas()(
+        name in ".{0,12}",
+        counts in prop::array::uniform3(any::<u32>()),
+        fps in 0.0f32..1e6,
+        corner in prop::array::uniform3(-1e6f32..1e6),
+        size in prop::array::uniform3(0.0f32..1e6),
+        background in prop::array::uniform3(any::<f32>().prop_filter("finite", |x| x.is_finite())),
+        config_digest in any::<[u8; 32]>(),
+        fov_x in 0.0f32..3.0,
+        extra in btree_map(".{0,6}", ".{0,12}", 0..4),
+    ) -> SceneMeta {
+        let [frame_count, width, height] = counts;
+        let high = std::array::from_fn(|axis| corner[axis] + size[axis]);
+        SceneMeta {
+            name, frame_count, fps, bounds: [corner, high], background, config_digest, width, height, fov_x, extra,
+        }
+    }
+}
+
+prop_compose! {
+    fn scenes()(
+        meta in metas(),
+        count in 0usize..20,
+        sh_degree in 0u8..=3,
+        channels in 1u32..4,
+        resolution in prop::array::uniform4(1u32..5),
+        multipliers in prop::collection::vec(1u32..4, 0..=3),
+        bits in any::<[bool; 5]>(),
+        shapes in prop::collection::vec((1u32..6, 1u32..6), 0..5),
+        values in prop::collection::vec(any::<f32>().prop_filter("finite", |x| x.is_finite()), 1..64),
+    ) -> SceneData {
+        let [position, scale, rotation, opacity, sh] = bits;
+        let layers = shapes.iter().enumerate().map(|(i, &(inputs, outputs))| layer(&i.to_string(), inputs, outputs));
+        let mut scene = SceneData {
+            meta,
+            gaussians: gaussians(count, sh_degree),
+            frame: sample().frame,
+            hexplane: hexplane(channels, resolution, &multipliers),
+            deformation: NetworkArrays {
+                width: shapes.len() as u32 * 3,
+                depth: shapes.len() as u32,
+                heads: HeadFlags { position, scale, rotation, opacity, sh },
+                layers: layers.collect(),
+            },
+        };
+        // Any finite bit pattern may stand anywhere.
+        let mut random = values.iter().cycle();
+        let arrays = [scene.gaussians.means.as_flattened_mut(), scene.gaussians.sh_rest.as_mut_slice()];
+        let planes = scene.hexplane.planes.iter_mut().map(|plane| plane.values.as_mut_slice());
+        let weights = scene.deformation.layers.iter_mut().map(|layer| layer.weight.as_mut_slice());
+        for array in arrays.into_iter().chain(planes).chain(weights) {
+            array.fill_with(|| *random.next().unwrap());
+        }
+        scene
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_legal_scene(scene in scenes()) {
+        let bytes = encode(&scene).unwrap();
+        let decoded = decode(&bytes).unwrap();
+        prop_assert_eq!(&decoded, &scene);
+        // The same bits, not only equal numbers: the bytes are the same.
+        prop_assert_eq!(encode(&decoded).unwrap(), bytes.clone());
+        prop_assert_eq!(info(&bytes).unwrap().plane_count, scene.hexplane.planes.len());
+    }
+
+    #[test]
+    fn noise_is_refused(noise in prop::collection::vec(any::<u8>(), 0..200)) {
+        prop_assert!(decode(&noise).is_err());
+        let mut bytes = encode(&SceneData::default()).unwrap();
+        bytes.truncate(12);
+        bytes.extend(noise);
+        prop_assert!(decode(&bytes).is_err());
+        prop_assert!(info(&bytes).is_err());
+    }
+}

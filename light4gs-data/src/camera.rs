@@ -1,0 +1,308 @@
+//! The pinhole camera and its conversions.
+
+use glam::{DMat3, DVec3, Mat3, Mat4, Vec3, Vec4};
+
+/// How far `R^T R` may be from the identity before a pose is refused.
+const ROTATION_TOLERANCE: f64 = 1e-3;
+
+/// An OpenCV pinhole camera: +x right, +y down, +z forward; `x_cam = rotation * x_world + translation`.
+///
+/// Pixel `(i, j)` sees `u = fx * x / z + cx - 0.5`, compared with the integer `i` (and `v` likewise
+/// with `j`): the centre of the picture is at `cx = width / 2`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// World to camera rotation `[3, 3]` (orthonormal, determinant 1).
+    pub rotation: Mat3,
+    /// World to camera translation, world units.
+    pub translation: Vec3,
+    /// Horizontal focal length, pixels.
+    pub fx: f32,
+    /// Vertical focal length, pixels.
+    pub fy: f32,
+    /// Horizontal principal point, pixels from the picture's left edge.
+    pub cx: f32,
+    /// Vertical principal point, pixels from the picture's upper edge.
+    pub cy: f32,
+    /// Picture width, pixels.
+    pub width: u32,
+    /// Picture height, pixels.
+    pub height: u32,
+}
+
+/// Why four rows of numbers are not a camera pose.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum PoseError {
+    /// A matrix entry is NaN or infinite.
+    #[error("entry [{row}][{column}] is {value}, expected a finite number")]
+    NotFinite {
+        /// Row of the entry.
+        row: usize,
+        /// Column of the entry.
+        column: usize,
+        /// The entry.
+        value: f32,
+    },
+    /// The upper left 3×3 part is not a rotation.
+    #[error(
+        "the upper left 3x3 part is not a rotation (determinant {determinant:.4}, largest error of R^T R {error:.4}); expected orthonormal columns and determinant 1"
+    )]
+    NotRotation {
+        /// Its determinant.
+        determinant: f64,
+        /// Largest absolute entry of `R^T R - 1`.
+        error: f64,
+    },
+    /// The last row is not `0 0 0 1`.
+    #[error("the last row is {row:?}, expected [0, 0, 0, 1]")]
+    LastRow {
+        /// The row that was found.
+        row: [f32; 4],
+    },
+    /// The field of view is not between 0 and pi.
+    #[error("the horizontal field of view is {fov_x} rad, expected a value between 0 and pi")]
+    FieldOfView {
+        /// The angle that was given, radians.
+        fov_x: f32,
+    },
+    /// The picture has no pixels.
+    #[error("the picture is {width} x {height} pixels, expected at least 1 x 1")]
+    EmptyPicture {
+        /// Width, pixels.
+        width: u32,
+        /// Height, pixels.
+        height: u32,
+    },
+}
+
+impl Camera {
+    /// Centre of projection in world units.
+    pub fn center(&self) -> Vec3 {
+        -(self.rotation.transpose() * self.translation)
+    }
+
+    /// A camera from a Blender/NeRF pose: rows of a camera-to-world matrix in OpenGL axes
+    /// (+x right, +y up, looking along -z), with square pixels and a centred principal point.
+    ///
+    /// `fov_x` is the full horizontal field of view in radians.
+    ///
+    /// # Errors
+    /// [`PoseError`] when an entry is not finite, the matrix is not a rigid motion, the field of
+    /// view is not in (0, pi), or the picture is empty.
+    pub fn from_camera_to_world_opengl(
+        c2w: &[[f32; 4]; 4],
+        fov_x: f32,
+        width: u32,
+        height: u32,
+    ) -> Result<Self, PoseError> {
+        for (row, values) in c2w.iter().enumerate() {
+            for (column, &value) in values.iter().enumerate() {
+                if !value.is_finite() {
+                    return Err(PoseError::NotFinite { row, column, value });
+                }
+            }
+        }
+        let expected = [0.0, 0.0, 0.0, 1.0];
+        if c2w[3].iter().zip(expected).any(|(a, b)| (a - b).abs() > 1e-5) {
+            return Err(PoseError::LastRow { row: c2w[3] });
+        }
+        if !(fov_x > 0.0 && fov_x < std::f32::consts::PI) {
+            return Err(PoseError::FieldOfView { fov_x });
+        }
+        if width == 0 || height == 0 {
+            return Err(PoseError::EmptyPicture { width, height });
+        }
+        let column = |j: usize| DVec3::new(f64::from(c2w[0][j]), f64::from(c2w[1][j]), f64::from(c2w[2][j]));
+        let opengl = DMat3::from_cols(column(0), column(1), column(2));
+        let excess = opengl.transpose() * opengl - DMat3::IDENTITY;
+        let error = excess.to_cols_array().iter().fold(0.0f64, |worst, v| worst.max(v.abs()));
+        let determinant = opengl.determinant();
+        if error > ROTATION_TOLERANCE || determinant <= 0.0 {
+            return Err(PoseError::NotRotation { determinant, error });
+        }
+        // OpenGL -> OpenCV: y and z change sign. The inverse of a rotation is its transpose.
+        let rotation = DMat3::from_cols(column(0), -column(1), -column(2)).transpose();
+        let translation = -(rotation * column(3));
+        Ok(Self::centred(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height))
+    }
+
+    /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the picture.
+    ///
+    /// `fov_x` is the full horizontal field of view in radians; pixels are square. If `eye` equals
+    /// `target` the camera looks along +y; if `up` is parallel to the view, another axis stands in.
+    pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_x: f32, width: u32, height: u32) -> Self {
+        let (eye64, up64) = (eye.as_dvec3(), up.as_dvec3());
+        let forward = (target.as_dvec3() - eye64).try_normalize().unwrap_or(DVec3::Y);
+        let right = [up64, DVec3::Y, DVec3::X]
+            .iter()
+            .map(|axis| forward.cross(axis.normalize_or_zero()))
+            .find(|side| side.length() > 1e-9)
+            .unwrap_or(DVec3::X)
+            .normalize_or(DVec3::X);
+        let down = forward.cross(right);
+        let rotation = DMat3::from_cols(right, down, forward).transpose();
+        let translation = -(rotation * eye64);
+        Self::centred(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height)
+    }
+
+    /// Square pixels, principal point in the middle.
+    fn centred(rotation: Mat3, translation: Vec3, fov_x: f32, width: u32, height: u32) -> Self {
+        let focal = (f64::from(width) / (2.0 * (f64::from(fov_x) / 2.0).tan())) as f32;
+        Self {
+            rotation,
+            translation,
+            fx: focal,
+            fy: focal,
+            cx: width as f32 / 2.0,
+            cy: height as f32 / 2.0,
+            width,
+            height,
+        }
+    }
+
+    /// The same view for a picture of another size: focal lengths and principal point scale along.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        let sx = f64::from(width) / f64::from(self.width.max(1));
+        let sy = f64::from(height) / f64::from(self.height.max(1));
+        let scaled = |value: f32, by: f64| (f64::from(value) * by) as f32;
+        Self {
+            fx: scaled(self.fx, sx),
+            cx: scaled(self.cx, sx),
+            fy: scaled(self.fy, sy),
+            cy: scaled(self.cy, sy),
+            width,
+            height,
+            ..*self
+        }
+    }
+
+    /// `(tan(fov_x / 2), tan(fov_y / 2))`, taking the principal point to be in the middle.
+    pub fn tan_half_fov(&self) -> (f32, f32) {
+        (self.width as f32 / (2.0 * self.fx), self.height as f32 / (2.0 * self.fy))
+    }
+
+    /// Full fields of view `(fov_x, fov_y)`, radians.
+    pub fn fov(&self) -> (f32, f32) {
+        let (x, y) = self.tan_half_fov();
+        (2.0 * x.atan(), 2.0 * y.atan())
+    }
+
+    /// World to camera as a 4×4 matrix for column vectors.
+    pub fn view_matrix(&self) -> Mat4 {
+        let column = |v: Vec3| v.extend(0.0);
+        Mat4::from_cols(
+            column(self.rotation.x_axis),
+            column(self.rotation.y_axis),
+            column(self.rotation.z_axis),
+            self.translation.extend(1.0),
+        )
+    }
+
+    /// Camera to clip space for column vectors: x and y to [-1, 1] over the field of view, z to
+    /// [0, 1] between `near` and `far` (world units), w = z.
+    pub fn projection_matrix(&self, near: f32, far: f32) -> Mat4 {
+        let (tan_x, tan_y) = self.tan_half_fov();
+        let depth = far / (far - near);
+        Mat4::from_cols(
+            Vec4::new(1.0 / tan_x, 0.0, 0.0, 0.0),
+            Vec4::new(0.0, 1.0 / tan_y, 0.0, 0.0),
+            Vec4::new(0.0, 0.0, depth, 1.0),
+            Vec4::new(0.0, 0.0, -depth * near, 0.0),
+        )
+    }
+
+    /// A world point in pixels `(u, v)` (integers are pixel centres) and its depth along +z.
+    ///
+    /// Points with a depth of 0 or less are behind the camera: their `u`, `v` mean nothing.
+    pub fn project(&self, point: Vec3) -> (f32, f32, f32) {
+        let p = self.rotation * point + self.translation;
+        (self.fx * p.x / p.z + self.cx - 0.5, self.fy * p.y / p.z + self.cy - 0.5, p.z)
+    }
+
+    /// World direction (unit length) through pixel coordinates `(u, v)`; integers are pixel centres.
+    pub fn ray_direction(&self, u: f32, v: f32) -> Vec3 {
+        let in_camera = Vec3::new((u + 0.5 - self.cx) / self.fx, (v + 0.5 - self.cy) / self.fy, 1.0);
+        (self.rotation.transpose() * in_camera).normalize()
+    }
+
+    /// Rows of the camera-to-world matrix in OpenGL axes: what a Blender/NeRF transforms file holds.
+    pub fn camera_to_world_opengl(&self) -> [[f32; 4]; 4] {
+        let c2w = self.rotation.transpose();
+        let center = self.center();
+        let row = |i: usize| [c2w.x_axis[i], -c2w.y_axis[i], -c2w.z_axis[i], center[i]];
+        [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn example() -> Camera {
+        Camera::look_at(Vec3::new(3.0, -2.0, 1.5), Vec3::new(0.2, 0.1, 0.3), Vec3::Z, 0.7, 64, 48)
+    }
+
+    #[test]
+    fn look_at_puts_the_target_in_the_middle_and_up_upwards() {
+        let camera = example();
+        let (u, v, depth) = camera.project(Vec3::new(0.2, 0.1, 0.3));
+        assert!((u - 31.5).abs() < 1e-3 && (v - 23.5).abs() < 1e-3 && depth > 0.0);
+        let (_, higher, _) = camera.project(Vec3::new(0.2, 0.1, 0.4));
+        assert!(higher < v, "+y points down");
+        assert!((camera.center() - Vec3::new(3.0, -2.0, 1.5)).length() < 1e-5);
+        assert!((camera.rotation.determinant() - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn degenerate_look_at_is_still_a_camera() {
+        for (eye, up) in [(Vec3::ZERO, Vec3::Z), (Vec3::Z, Vec3::Z), (Vec3::Z, Vec3::ZERO)] {
+            let camera = Camera::look_at(eye, Vec3::ZERO, up, 0.7, 8, 8);
+            assert!((camera.rotation.determinant() - 1.0).abs() < 1e-5, "{eye} {up}");
+        }
+    }
+
+    #[test]
+    fn opengl_pose_round_trip() {
+        let camera = example();
+        let back = Camera::from_camera_to_world_opengl(&camera.camera_to_world_opengl(), 0.7, 64, 48).unwrap();
+        assert!((back.translation - camera.translation).length() < 1e-5);
+        assert!(back.rotation.abs_diff_eq(camera.rotation, 1e-6));
+        assert_eq!((back.fx, back.fy), (camera.fx, camera.fy));
+    }
+
+    #[test]
+    fn bad_poses_are_refused() {
+        let good = example().camera_to_world_opengl();
+        let pose = |change: &dyn Fn(&mut [[f32; 4]; 4])| {
+            let mut bad = good;
+            change(&mut bad);
+            Camera::from_camera_to_world_opengl(&bad, 0.7, 8, 8).unwrap_err()
+        };
+        assert!(matches!(pose(&|m| m[1][2] = f32::NAN), PoseError::NotFinite { row: 1, column: 2, .. }));
+        assert!(matches!(pose(&|m| m[0].iter_mut().for_each(|v| *v *= 2.0)), PoseError::NotRotation { .. }));
+        assert!(matches!(pose(&|m| m[..3].fill([0.0; 4])), PoseError::NotRotation { .. }));
+        assert!(matches!(pose(&|m| m[..3].iter_mut().for_each(|row| row[0] = -row[0])), PoseError::NotRotation { .. }));
+        assert!(matches!(pose(&|m| m[3][0] = 1.0), PoseError::LastRow { .. }));
+        for fov in [0.0, -1.0, 3.2, f32::NAN] {
+            assert!(matches!(
+                Camera::from_camera_to_world_opengl(&good, fov, 8, 8),
+                Err(PoseError::FieldOfView { .. })
+            ));
+        }
+        assert!(Camera::from_camera_to_world_opengl(&good, 0.7, 0, 8).is_err());
+    }
+
+    #[test]
+    fn resizing_keeps_the_field_of_view_and_the_ray() {
+        let camera = example();
+        let small = camera.resized(16, 12);
+        assert_eq!(small.fov(), camera.fov());
+        assert_eq!((small.cx, small.cy), (8.0, 6.0));
+        // The outer edge of the first pixel is the same world ray.
+        let a = camera.ray_direction(-0.5, -0.5);
+        let b = small.ray_direction(-0.5, -0.5);
+        assert!((a - b).length() < 1e-6);
+        let (u, v, _) = camera.project(camera.center() + a * 3.0);
+        assert!((u + 0.5).abs() < 1e-3 && (v + 0.5).abs() < 1e-3);
+    }
+}

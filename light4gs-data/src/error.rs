@@ -1,0 +1,113 @@
+//! The one error type of this crate: it says what is wrong, where, and what to do.
+
+use std::path::{Path, PathBuf};
+
+/// Why a dataset, a picture or a point cloud could not be read or written.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum DataError {
+    /// The operating system refused a read or a write.
+    #[error("cannot {action} {}: {source}", path.display())]
+    Io {
+        /// What was attempted: `read`, `write`, `create`...
+        action: &'static str,
+        /// The file or folder.
+        path: PathBuf,
+        /// The system's reason.
+        #[source]
+        source: std::io::Error,
+    },
+    /// A text file is not what its format says: no field can be named.
+    #[error("{}: not valid JSON: {source}; export the file again", path.display())]
+    Json {
+        /// The file.
+        path: PathBuf,
+        /// The parser's reason, with line and column.
+        #[source]
+        source: serde_json::Error,
+    },
+    /// One named field of a file is missing or has an unusable value.
+    #[error("{}: {field}: {problem}; {remedy}", path.display())]
+    Field {
+        /// The file.
+        path: PathBuf,
+        /// The field, such as `frames[3].time`.
+        field: String,
+        /// What was found and what was expected.
+        problem: String,
+        /// What the user can do about it.
+        remedy: String,
+    },
+    /// A picture is missing, damaged, or of another size than the rest.
+    #[error("picture {}: {problem}; {remedy}", path.display())]
+    Picture {
+        /// The picture's file.
+        path: PathBuf,
+        /// What was found and what was expected.
+        problem: String,
+        /// What the user can do about it.
+        remedy: String,
+    },
+    /// A PLY file is damaged or has another layout than expected.
+    #[error("PLY file {}: {problem}; {remedy}", path.display())]
+    Ply {
+        /// The file.
+        path: PathBuf,
+        /// What was found and what was expected.
+        problem: String,
+        /// What the user can do about it.
+        remedy: String,
+    },
+    /// A folder holds none of the known dataset layouts.
+    #[error("{}: no known dataset layout: {problem}; {remedy}", path.display())]
+    UnknownFormat {
+        /// The folder.
+        path: PathBuf,
+        /// What was looked for.
+        problem: String,
+        /// What the user can do about it.
+        remedy: String,
+    },
+    /// The output exists already, and nothing is ever overwritten silently.
+    #[error("{} exists already and is not empty; remove it or name another folder", path.display())]
+    Exists {
+        /// The folder or file that is in the way.
+        path: PathBuf,
+    },
+    /// An option of the caller is out of its range.
+    #[error("option {option}: {problem}")]
+    Options {
+        /// The option's name.
+        option: &'static str,
+        /// What was given and what was expected.
+        problem: String,
+    },
+}
+
+impl DataError {
+    /// A function for `map_err` that adds what was attempted, and on which file.
+    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+        let path = path.to_path_buf();
+        move |source| Self::Io { action, path, source }
+    }
+
+    /// A bad field of a text file.
+    pub(crate) fn field(
+        path: &Path,
+        field: impl Into<String>,
+        problem: impl Into<String>,
+        remedy: impl Into<String>,
+    ) -> Self {
+        Self::Field { path: path.to_path_buf(), field: field.into(), problem: problem.into(), remedy: remedy.into() }
+    }
+
+    /// A bad picture.
+    pub(crate) fn picture(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Picture { path: path.to_path_buf(), problem: problem.into(), remedy: remedy.into() }
+    }
+
+    /// A bad PLY file.
+    pub(crate) fn ply(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Ply { path: path.to_path_buf(), problem: problem.into(), remedy: remedy.into() }
+    }
+}

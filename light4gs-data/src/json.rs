@@ -1,0 +1,102 @@
+//! JSON files whose every bad field can be named.
+
+use crate::error::DataError;
+use serde_json::Value;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+
+/// A transforms file is kilobytes; whatever is larger than this is not one.
+const MAX_BYTES: u64 = 256 << 20;
+
+/// Reads a JSON file. The words `NaN`, `Infinity` and `-Infinity`, which Python writes though JSON
+/// has no such numbers, come back as strings, so that the check of the field can name it.
+pub(crate) fn read(path: &Path) -> Result<Value, DataError> {
+    let mut text = String::new();
+    File::open(path)
+        .and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text))
+        .map_err(DataError::io("read", path))?;
+    if text.len() as u64 > MAX_BYTES {
+        return Err(DataError::field(
+            path,
+            "(whole file)",
+            format!("it is larger than {} MiB", MAX_BYTES >> 20),
+            "this is not a transforms file: check the folder",
+        ));
+    }
+    serde_json::from_str(&text).or_else(|source| {
+        serde_json::from_str(&quote_non_finite(&text)).map_err(|_| DataError::Json { path: path.to_path_buf(), source })
+    })
+}
+
+/// Puts quotes around `NaN`, `Infinity`, `-Infinity` outside of strings.
+fn quote_non_finite(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 64);
+    let mut rest = text;
+    let mut in_string = false;
+    while let Some(c) = rest.chars().next() {
+        let word = ["NaN", "Infinity", "-Infinity"].into_iter().find(|word| !in_string && rest.starts_with(word));
+        let taken = if let Some(word) = word {
+            out.push('"');
+            out.push_str(word);
+            out.push('"');
+            word.len()
+        } else if in_string && c == '\\' {
+            let two = rest.char_indices().nth(2).map_or(rest.len(), |(i, _)| i);
+            out.push_str(&rest[..two]);
+            two
+        } else {
+            in_string ^= c == '"';
+            out.push(c);
+            c.len_utf8()
+        };
+        rest = &rest[taken..];
+    }
+    out
+}
+
+/// A short word for what a field holds, for messages.
+pub(crate) fn describe(value: Option<&Value>) -> String {
+    match value {
+        None => "missing".into(),
+        Some(Value::Array(items)) => format!("a list of {}", items.len()),
+        Some(Value::Object(_)) => "an object".into(),
+        Some(other) => other.to_string().chars().take(60).collect(),
+    }
+}
+
+/// A finite number, or an error that names the field and what was expected.
+pub(crate) fn finite(
+    path: &Path,
+    field: &str,
+    value: Option<&Value>,
+    expected: &str,
+    remedy: &str,
+) -> Result<f64, DataError> {
+    value.and_then(Value::as_f64).filter(|v| v.is_finite()).ok_or_else(|| {
+        let found = describe(value);
+        DataError::field(path, field, format!("{found}, expected {expected}"), remedy)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn non_finite_words_are_quoted_outside_of_strings_only() {
+        let text = r#"{"a": NaN, "b": [-Infinity, Infinity], "NaN \" NaN": "ä NaN\\", "c": NaN}"#;
+        let value: Value = serde_json::from_str(&quote_non_finite(text)).unwrap();
+        assert_eq!(value["a"], "NaN");
+        assert_eq!(value["b"][0], "-Infinity");
+        assert_eq!(value["NaN \" NaN"], "ä NaN\\");
+        assert_eq!(value["c"], "NaN");
+    }
+
+    #[test]
+    fn unfinished_escapes_do_not_panic() {
+        for text in ["\"\\", "\"\\ä", "\"", "-", "\"\\\\"] {
+            quote_non_finite(text);
+        }
+    }
+}

@@ -1,0 +1,62 @@
+//! Ray casting: one supersampled RGBA picture of the procedural scene.
+
+use super::shapes::sphere;
+use super::world::{Hit, World};
+use crate::camera::Camera;
+use glam::Vec3;
+
+/// Rays a pixel along each side.
+const SAMPLES: u32 = 4;
+/// Everything is within this distance of the origin.
+const WORLD_RADIUS: f32 = 1.3;
+
+/// Renders `[H, W, 4]` bytes with straight alpha: the share of rays that hit something.
+pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Vec<u8> {
+    let solids = world.at(time);
+    let eye = camera.center();
+    // A direction is linear in the pixel before it is normalised.
+    let axes = camera.rotation.transpose();
+    let direction = |u: f32, v: f32| {
+        let in_camera = Vec3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+        (axes * in_camera).normalize()
+    };
+    let mut rgba = Vec::with_capacity((camera.width * camera.height * 4) as usize);
+    for j in 0..camera.height {
+        for i in 0..camera.width {
+            let mut sum = Vec3::ZERO;
+            let mut hits = 0u32;
+            for sample in 0..SAMPLES * SAMPLES {
+                let within = |k: u32| (k as f32 + 0.5) / SAMPLES as f32;
+                let ray = direction(i as f32 + within(sample % SAMPLES), j as f32 + within(sample / SAMPLES));
+                if sphere(eye, ray, WORLD_RADIUS).is_none() {
+                    continue;
+                }
+                let mut nearest: Option<Hit> = None;
+                for solid in &solids {
+                    if solid.may_hit(eye, ray) {
+                        let limit = nearest.as_ref().map_or(f32::INFINITY, |hit| hit.distance);
+                        nearest = solid.hit(eye, ray, limit).or(nearest);
+                    }
+                }
+                if let Some(hit) = nearest {
+                    sum += shade(&hit, ray);
+                    hits += 1;
+                }
+            }
+            let color = if hits > 0 { sum / hits as f32 } else { Vec3::ZERO };
+            let alpha = hits as f32 / (SAMPLES * SAMPLES) as f32;
+            let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+            rgba.extend([color.x, color.y, color.z, alpha].map(byte));
+        }
+    }
+    rgba
+}
+
+/// Lambert with much ambient light, and a small broad highlight that spherical harmonics can follow.
+fn shade(hit: &Hit, ray: Vec3) -> Vec3 {
+    let light = Vec3::new(0.377, -0.472, 0.797);
+    let diffuse = 0.55 + 0.45 * hit.normal.dot(light).max(0.0);
+    let half = (light - ray).normalize();
+    let highlight = 0.12 * hit.normal.dot(half).max(0.0).powi(12);
+    hit.color * diffuse + Vec3::splat(highlight)
+}

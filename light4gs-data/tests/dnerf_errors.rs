@@ -1,0 +1,200 @@
+//! Every way in which a D-NeRF folder can be wrong gives an error that names file, field and remedy.
+
+use light4gs_data::{DataError, ImageStore, LoadOptions, PointCloud, Resolution, RgbImage8, Scene, ply::Encoding};
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+use tempfile::TempDir;
+
+fn picture(path: &Path, width: u32, height: u32) {
+    let pixels = (0..width * height * 3).map(|i| (i * 37 % 251) as u8).collect();
+    let image = RgbImage8 { width, height, pixels };
+    image.save_png(path).unwrap();
+}
+
+fn transforms(split: &str, frames: usize) -> Value {
+    let frames: Vec<Value> = (0..frames)
+        .map(|i| {
+            json!({
+                "file_path": format!("./{split}/r_{i:03}"),
+                "time": i as f64 * 0.5,
+                "transform_matrix":
+                    [[1, 0, 0, i], [0, 1, 0, 0.5], [0, 0, 1, 4], [0, 0, 0, 1]],
+            })
+        })
+        .collect();
+    json!({ "camera_angle_x": 0.7, "frames": frames })
+}
+
+/// A good scene: 5 training, 2 test, 2 validation frames of 32 × 24 pixels.
+fn scene() -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for (split, count) in [("train", 5), ("test", 2), ("val", 2)] {
+        fs::create_dir(folder.path().join(split)).unwrap();
+        for i in 0..count {
+            picture(&folder.path().join(format!("{split}/r_{i:03}.png")), 32, 24);
+        }
+        write(folder.path(), split, &transforms(split, count));
+    }
+    folder
+}
+
+fn write(root: &Path, split: &str, value: &Value) {
+    fs::write(root.join(format!("transforms_{split}.json")), value.to_string()).unwrap();
+}
+
+/// Opens the good scene after `change` to its training file; the error must contain all of `words`.
+fn refuses(change: impl FnOnce(&mut Value), words: &[&str]) {
+    let folder = scene();
+    let mut value = transforms("train", 5);
+    change(&mut value);
+    write(folder.path(), "train", &value);
+    expect(folder.path(), words);
+}
+
+fn expect(root: &Path, words: &[&str]) {
+    let error = Scene::open(root, &LoadOptions::default()).unwrap_err().to_string();
+    for word in words {
+        assert!(error.contains(word), "`{word}` is not in: {error}");
+    }
+    assert!(error.contains("; "), "no remedy in: {error}");
+}
+
+#[test]
+fn a_good_scene_opens() {
+    let folder = scene();
+    let options = LoadOptions { resolution: Resolution::MaxSide(16), ..Default::default() };
+    let scene = Scene::open(folder.path(), &options).unwrap();
+    assert_eq!((scene.train.len(), scene.test.len(), scene.val.len()), (5, 2, 2));
+    let times: Vec<f32> = scene.train.iter().map(|f| f.time).collect();
+    assert_eq!(times, [0.0, 0.25, 0.5, 0.75, 1.0]);
+    let camera = scene.train[0].camera;
+    assert_eq!((camera.width, camera.height, camera.cx, camera.cy), (16, 12, 8.0, 6.0));
+    assert!((camera.fov().0 - 0.7).abs() < 1e-6 && (camera.fx - camera.fy).abs() < 1e-5);
+    assert_eq!(camera.center().to_array(), [0.0, 0.5, 4.0]);
+    // Centres are 0, 1, 2, 3, 4 along x.
+    assert!((scene.extent - 2.2).abs() < 1e-6);
+    let image = ImageStore::new(&options, 1 << 20).get(&scene.train[1]).unwrap();
+    assert_eq!((image.width, image.height, image.pixels.len()), (16, 12, 576));
+}
+
+#[test]
+fn val_may_be_absent_and_later_than_the_rest() {
+    let folder = scene();
+    let mut late = transforms("val", 2);
+    late["frames"][1]["time"] = json!(7.0);
+    write(folder.path(), "val", &late);
+    let open = || Scene::open(folder.path(), &LoadOptions::default());
+    assert_eq!(open().unwrap().val[1].time, 1.0);
+    fs::remove_file(folder.path().join("transforms_val.json")).unwrap();
+    assert!(open().unwrap().val.is_empty());
+}
+
+#[test]
+fn points_beside_the_transforms_are_used() {
+    let folder = scene();
+    let cloud = PointCloud::random(17, 2.0, 1);
+    for name in ["fused.ply", "points3d.ply"] {
+        cloud.write_ply(&folder.path().join(name), Encoding::Ascii).unwrap();
+        let scene = Scene::open(folder.path(), &LoadOptions::default()).unwrap();
+        assert_eq!(scene.points.positions, cloud.positions);
+    }
+    fs::write(folder.path().join("points3d.ply"), "ply\nhm").unwrap();
+    expect(folder.path(), &["points3d.ply"]);
+}
+
+#[test]
+fn times() {
+    let field = ["transforms_train.json", "frames[3].time"];
+    let with = |word| [field[0], field[1], word];
+    refuses(|v| drop(v["frames"][3].as_object_mut().unwrap().remove("time")), &with("missing"));
+    refuses(|v| v["frames"][3]["time"] = json!("noon"), &with("noon"));
+    refuses(|v| v["frames"][3]["time"] = json!(-0.5), &with("-0.5"));
+}
+
+#[test]
+fn poses() {
+    let matrix = "frames[2].transform_matrix";
+    let with = |word| ["transforms_train.json", matrix, word];
+    let pose = |value: Value| move |v: &mut Value| v["frames"][2]["transform_matrix"] = value;
+    refuses(|v| drop(v["frames"][2].as_object_mut().unwrap().remove("transform_matrix")), &with("missing"));
+    let good = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]];
+    refuses(pose(json!(good[..3])), &with("4 rows of 4"));
+    refuses(pose(json!([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 0]])), &with("a list of 3"));
+    refuses(pose(json!(7)), &with("4 rows of 4"));
+    let scaled = [[2, 0, 0, 0], [0, 2, 0, 0], [0, 0, 2, 4], [0, 0, 0, 1]];
+    refuses(pose(json!(scaled)), &with("not a rotation"));
+    let zero = [[0, 0, 0, 0], [0, 0, 0, 0], [0, 0, 0, 4], [0, 0, 0, 1]];
+    refuses(pose(json!(zero)), &with("not a rotation"));
+    let mirrored = [[-1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]];
+    refuses(pose(json!(mirrored)), &with("not a rotation"));
+    let projective = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 1, 1]];
+    refuses(pose(json!(projective)), &with("last row"));
+    let huge = json!([[1e300, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 4], [0, 0, 0, 1]]);
+    refuses(pose(huge), &with("finite"));
+}
+
+#[test]
+fn python_nan_and_infinity_in_a_pose() {
+    for word in ["NaN", "Infinity", "-Infinity"] {
+        let folder = scene();
+        let mut value = transforms("train", 5);
+        value["frames"][2]["transform_matrix"][1][3] = json!("HERE");
+        let text = value.to_string().replace("\"HERE\"", word);
+        fs::write(folder.path().join("transforms_train.json"), text).unwrap();
+        expect(folder.path(), &["frames[2].transform_matrix[1][3]", word, "finite"]);
+    }
+}
+
+#[test]
+fn field_of_view() {
+    let field = ["transforms_train.json", "camera_angle_x"];
+    refuses(|v| drop(v.as_object_mut().unwrap().remove("camera_angle_x")), &field);
+    for bad in [json!(0), json!(-0.7), json!(3.2), json!(40), json!(null), json!(1e-300)] {
+        refuses(|v| v["camera_angle_x"] = bad, &field);
+    }
+}
+
+#[test]
+fn splits() {
+    refuses(|v| v["frames"] = json!([]), &["transforms_train.json", "frames", "at least one"]);
+    refuses(|v| *v = json!([1, 2]), &["transforms_train.json", "camera_angle_x"]);
+    let folder = scene();
+    write(folder.path(), "val", &json!({ "camera_angle_x": 0.7, "frames": [] }));
+    expect(folder.path(), &["transforms_val.json", "frames"]);
+    fs::write(folder.path().join("transforms_train.json"), "{\"frames\": [").unwrap();
+    expect(folder.path(), &["transforms_train.json", "JSON"]);
+    fs::remove_file(folder.path().join("transforms_test.json")).unwrap();
+    let folder = scene();
+    fs::remove_file(folder.path().join("transforms_test.json")).unwrap();
+    let error = Scene::open(folder.path(), &LoadOptions::default()).unwrap_err();
+    assert!(matches!(&error, DataError::Io { path, .. } if path.ends_with("transforms_test.json")));
+}
+
+#[test]
+fn pictures() {
+    let named = ["r_004.png", "frames[4].file_path"];
+    let folder = scene();
+    fs::remove_file(folder.path().join("train/r_004.png")).unwrap();
+    expect(folder.path(), &named);
+    refuses(|v| drop(v["frames"][4].as_object_mut().unwrap().remove("file_path")), &["frames[4].file_path", "missing"]);
+    // With an extension it works as well.
+    let folder = scene();
+    let mut value = transforms("train", 5);
+    value["frames"][4]["file_path"] = json!("train/r_004.png");
+    write(folder.path(), "train", &value);
+    let scene = Scene::open(folder.path(), &LoadOptions::default()).unwrap();
+    assert_eq!(scene.train[4].name, "r_004");
+    // Damage to the first one shows on opening, to others when they are needed.
+    let store = ImageStore::new(&LoadOptions::default(), 1 << 20);
+    let path = &scene.train[2].path;
+    let bytes = fs::read(path).unwrap();
+    fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
+    let truncated = store.get(&scene.train[2]).unwrap_err().to_string();
+    assert!(truncated.contains("r_002.png") && truncated.contains("truncated"), "{truncated}");
+    picture(path, 31, 24);
+    let other = store.get(&scene.train[2]).unwrap_err().to_string();
+    assert!(other.contains("31 x 24 pixels, expected 32 x 24"), "{other}");
+    fs::write(&scene.train[0].path, &bytes[..10]).unwrap();
+    expect(folder.path(), &["r_000.png", "header"]);
+}

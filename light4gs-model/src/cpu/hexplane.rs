@@ -1,0 +1,287 @@
+//! Bilinear queries of six planes and the product of the samples, forward and backward.
+//!
+//! Planes arrive as `[C, H, W]`. They are repacked to blocks of eight channels, `[C / 8][H · W][8]`, so that a sample is
+//! four vector loads; C is padded with zeros. The backward pass gives each block of channels to one task, which alone
+//! writes that block's gradients: no atomics, and the same sums whatever the number of threads.
+
+use rayon::prelude::*;
+
+use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
+
+/// The axes (x = 0, y = 1, z = 2, t = 3) of the six planes: first along the width, second along the height.
+pub(crate) const PLANE_AXES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// Points a forward task handles.
+const CHUNK: usize = 1024;
+
+type Block = [f32; LANES];
+
+/// Six planes of one scale, repacked.
+#[derive(Debug)]
+pub(crate) struct PackedPlanes {
+    channels: usize,
+    /// Cells along x, y, z, t.
+    resolution: [usize; 4],
+    /// For each plane, `[blocks][H · W]`.
+    planes: [Vec<Block>; 6],
+}
+
+impl PackedPlanes {
+    /// Repacks planes `[C, res[second], res[first]]` in the order xy, xz, xt, yz, yt, zt.
+    pub(crate) fn new(planes: [&[f32]; 6], channels: usize, resolution: [usize; 4]) -> Self {
+        let packed: Vec<Vec<Block>> = planes.into_par_iter().map(|plane| pack(plane, channels)).collect();
+        let planes = packed.try_into().expect("six planes in, six planes out");
+        Self { channels, resolution, planes }
+    }
+
+    fn blocks(&self) -> usize {
+        self.channels.div_ceil(LANES)
+    }
+
+    fn cells(&self, plane: usize) -> usize {
+        PLANE_AXES[plane].iter().map(|&axis| self.resolution[axis]).product()
+    }
+
+    fn block(&self, plane: usize, block: usize) -> &[Block] {
+        let cells = self.cells(plane);
+        &self.planes[plane][block * cells..(block + 1) * cells]
+    }
+}
+
+fn pack(plane: &[f32], channels: usize) -> Vec<Block> {
+    let cells = plane.len() / channels;
+    let mut packed = vec![[0.0; LANES]; cells * channels.div_ceil(LANES)];
+    for (channel, values) in plane.chunks_exact(cells).enumerate() {
+        let block = &mut packed[channel / LANES * cells..][..cells];
+        for (to, &from) in block.iter_mut().zip(values) {
+            to[channel % LANES] = from;
+        }
+    }
+    packed
+}
+
+fn unpack(blocks: &[&[Block]], channels: usize) -> Vec<f32> {
+    let cells = blocks[0].len();
+    let mut plane = vec![0.0; channels * cells];
+    for (channel, values) in plane.chunks_exact_mut(cells).enumerate() {
+        for (to, from) in values.iter_mut().zip(blocks[channel / LANES]) {
+            *to = from[channel % LANES];
+        }
+    }
+    plane
+}
+
+/// Where a coordinate falls on an axis.
+#[derive(Clone, Copy)]
+struct AxisSample {
+    low: usize,
+    high: usize,
+    fraction: f32,
+    /// Cells a unit of the coordinate, 0 where it is clamped to the border.
+    slope: f32,
+}
+
+impl AxisSample {
+    /// Align-corners: -1 is the first cell's centre, 1 the last one's; border clamp.
+    fn new(coordinate: f32, cells: usize) -> Self {
+        let last = (cells - 1) as f32;
+        let position = (coordinate + 1.0) * 0.5 * last;
+        let inside = position > 0.0 && position < last;
+        // `max` before `min`, so that NaN falls to 0 and cannot index.
+        let clamped = position.max(0.0).min(last);
+        let low = (clamped as usize).min(cells.saturating_sub(2));
+        Self {
+            low,
+            high: (low + 1).min(cells - 1),
+            fraction: clamped - low as f32,
+            slope: if inside { 0.5 * last } else { 0.0 },
+        }
+    }
+}
+
+/// The four cells of a bilinear sample and their weights.
+struct Corners {
+    index: [usize; 4],
+    weight: [f32; 4],
+}
+
+impl Corners {
+    #[inline(always)]
+    fn new(across: &AxisSample, down: &AxisSample, width: usize) -> Self {
+        let (x, y) = (across.fraction, down.fraction);
+        Self {
+            index: [
+                down.low * width + across.low,
+                down.low * width + across.high,
+                down.high * width + across.low,
+                down.high * width + across.high,
+            ],
+            weight: [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y],
+        }
+    }
+
+    #[inline(always)]
+    fn sample<L: Lanes>(&self, cells: &[Block]) -> L {
+        let mut value = L::load(&cells[self.index[0]]).mul(L::splat(self.weight[0]));
+        for k in 1..4 {
+            value = L::load(&cells[self.index[k]]).mul_add(L::splat(self.weight[k]), value);
+        }
+        value
+    }
+}
+
+fn samples(point: &[f32], resolution: [usize; 4]) -> [AxisSample; 4] {
+    std::array::from_fn(|axis| AxisSample::new(point[axis], resolution[axis]))
+}
+
+#[inline(always)]
+fn corners(axes: &[AxisSample; 4], resolution: [usize; 4]) -> [Corners; 6] {
+    PLANE_AXES.map(|[across, down]| Corners::new(&axes[across], &axes[down], resolution[across]))
+}
+
+struct Forward<'a> {
+    points: &'a [f32],
+    planes: &'a PackedPlanes,
+    out: &'a mut [f32],
+}
+
+impl LaneKernel for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let planes = self.planes;
+        let channels = planes.channels;
+        let blocks: Vec<[&[Block]; 6]> =
+            (0..planes.blocks()).map(|b| std::array::from_fn(|plane| planes.block(plane, b))).collect();
+        for (point, out) in self.points.chunks_exact(4).zip(self.out.chunks_exact_mut(channels)) {
+            let corners = corners(&samples(point, planes.resolution), planes.resolution);
+            for (cells, out) in blocks.iter().zip(out.chunks_mut(LANES)) {
+                let mut product = corners[0].sample::<L>(cells[0]);
+                for plane in 1..6 {
+                    product = product.mul(corners[plane].sample::<L>(cells[plane]));
+                }
+                let mut values = [0.0; LANES];
+                product.store(&mut values);
+                out.copy_from_slice(&values[..out.len()]);
+            }
+        }
+    }
+}
+
+/// Features `[N, C]` at points `[N, 4]` in [-1, 1].
+pub(crate) fn query(points: &[f32], planes: &PackedPlanes) -> Vec<f32> {
+    let mut out = vec![0.0; points.len() / 4 * planes.channels];
+    out.par_chunks_mut(CHUNK * planes.channels)
+        .zip(points.par_chunks(4 * CHUNK))
+        .for_each(|(out, points)| dispatch(Forward { points, planes, out }));
+    out
+}
+
+/// Gradients of [`query`].
+pub(crate) struct QueryGradients {
+    /// `[N, 4]`, absent if not asked for.
+    pub(crate) points: Option<Vec<f32>>,
+    /// Each `[C, H, W]`.
+    pub(crate) planes: [Vec<f32>; 6],
+}
+
+struct Backward<'a> {
+    points: &'a [f32],
+    planes: &'a PackedPlanes,
+    /// `[N, C]`
+    upstream: &'a [f32],
+    block: usize,
+    with_points: bool,
+}
+
+impl LaneKernel for Backward<'_> {
+    type Output = ([Vec<Block>; 6], Vec<f32>);
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let planes = self.planes;
+        let channels = planes.channels;
+        let cells: [&[Block]; 6] = std::array::from_fn(|plane| planes.block(plane, self.block));
+        let mut gradients: [Vec<Block>; 6] = std::array::from_fn(|plane| vec![[0.0; LANES]; cells[plane].len()]);
+        let mut point_gradients = vec![0.0; if self.with_points { self.points.len() } else { 0 }];
+        let first = self.block * LANES;
+        let own = LANES.min(channels - first);
+
+        for (n, (point, upstream)) in self.points.chunks_exact(4).zip(self.upstream.chunks_exact(channels)).enumerate()
+        {
+            let axes = samples(point, planes.resolution);
+            let corners = corners(&axes, planes.resolution);
+            let mut padded = [0.0; LANES];
+            padded[..own].copy_from_slice(&upstream[first..first + own]);
+            let upstream = L::load(&padded);
+            let values: [L; 6] = std::array::from_fn(|plane| corners[plane].sample::<L>(cells[plane]));
+
+            // Product of the others without dividing: upstream · prefix · suffix.
+            let mut prefix = [upstream; 6];
+            for plane in 1..6 {
+                prefix[plane] = prefix[plane - 1].mul(values[plane - 1]);
+            }
+            let mut suffix = L::splat(1.0);
+            let mut along = [L::splat(0.0); 4];
+            for plane in (0..6).rev() {
+                let gradient = prefix[plane].mul(suffix);
+                suffix = suffix.mul(values[plane]);
+                let Corners { index, weight } = &corners[plane];
+                for k in 0..4 {
+                    let cell = &mut gradients[plane][index[k]];
+                    gradient.mul_add(L::splat(weight[k]), L::load(cell)).store(cell);
+                }
+                if self.with_points {
+                    let [across, down] = PLANE_AXES[plane];
+                    let corner = index.map(|i| L::load(&cells[plane][i]));
+                    let (x, y) = (L::splat(axes[across].fraction), L::splat(axes[down].fraction));
+                    let lower = corner[1].sub(corner[0]);
+                    let upper = corner[3].sub(corner[2]);
+                    let by_across = upper.sub(lower).mul_add(y, lower);
+                    let left = corner[2].sub(corner[0]);
+                    let right = corner[3].sub(corner[1]);
+                    let by_down = right.sub(left).mul_add(x, left);
+                    along[across] = gradient.mul_add(by_across, along[across]);
+                    along[down] = gradient.mul_add(by_down, along[down]);
+                }
+            }
+            if self.with_points {
+                for axis in 0..4 {
+                    point_gradients[4 * n + axis] = along[axis].sum() * axes[axis].slope;
+                }
+            }
+        }
+        (gradients, point_gradients)
+    }
+}
+
+/// Gradients of the planes and, on request, of the points, from `upstream [N, C]`.
+pub(crate) fn query_backward(
+    points: &[f32],
+    planes: &PackedPlanes,
+    upstream: &[f32],
+    with_points: bool,
+) -> QueryGradients {
+    let blocks: Vec<([Vec<Block>; 6], Vec<f32>)> = (0..planes.blocks())
+        .into_par_iter()
+        .map(|block| dispatch(Backward { points, planes, upstream, block, with_points }))
+        .collect();
+    let unpacked: Vec<Vec<f32>> = (0..6)
+        .into_par_iter()
+        .map(|plane| {
+            let parts: Vec<&[Block]> = blocks.iter().map(|(gradients, _)| gradients[plane].as_slice()).collect();
+            unpack(&parts, planes.channels)
+        })
+        .collect();
+    let points = with_points.then(|| {
+        let mut sum = vec![0.0; points.len()];
+        for (_, part) in &blocks {
+            for (s, p) in sum.iter_mut().zip(part) {
+                *s += p;
+            }
+        }
+        sum
+    });
+    QueryGradients { points, planes: unpacked.try_into().expect("six planes in, six planes out") }
+}

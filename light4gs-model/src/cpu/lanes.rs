@@ -1,0 +1,281 @@
+//! Eight float32 lanes: one thin type for AVX2 + FMA, one for every other processor.
+//!
+//! The rasteriser's inner loops are generic over [`Lanes`]; [`dispatch`] picks the implementation once a call, at run
+//! time, so one binary serves old and new processors. Results of the two differ in the last bits (fused against
+//! separate multiply-add), never between two runs on one machine.
+
+/// Lanes in a vector.
+pub(crate) const LANES: usize = 8;
+
+/// Eight float32 values that are computed on together. A mask is a vector whose lanes are all ones or all zeros.
+pub(crate) trait Lanes: Copy {
+    fn splat(value: f32) -> Self;
+    fn load(from: &[f32; LANES]) -> Self;
+    fn store(self, to: &mut [f32; LANES]);
+    fn add(self, other: Self) -> Self;
+    fn sub(self, other: Self) -> Self;
+    fn mul(self, other: Self) -> Self;
+    fn div(self, other: Self) -> Self;
+    fn min(self, other: Self) -> Self;
+    fn max(self, other: Self) -> Self;
+    /// `self * b + c`
+    fn mul_add(self, b: Self, c: Self) -> Self;
+    /// Mask of `self >= other`.
+    fn at_least(self, other: Self) -> Self;
+    fn and(self, other: Self) -> Self;
+    /// `!self & other`
+    fn and_not(self, other: Self) -> Self;
+    /// Lanes of `yes` where the mask is set, else of `no`.
+    fn select(self, yes: Self, no: Self) -> Self;
+    fn any(self) -> bool;
+    /// 2^n for lanes that hold whole numbers in [-126, 127], plus their sum with the rounding constant removed.
+    fn exp2_of_rounded(self) -> Self;
+    fn sum(self) -> f32;
+
+    /// e^x for x in [-87, 0], relative error below 2e-7: Cody-Waite reduction by ln 2, then the Taylor polynomial of degree six.
+    #[inline(always)]
+    fn exp(self) -> Self {
+        // Adding 1.5 * 2^23 rounds to a whole number that stands in the low mantissa bits.
+        let magic = Self::splat(12_582_912.0);
+        let x = self.max(Self::splat(-87.0));
+        let shifted = x.mul_add(Self::splat(std::f32::consts::LOG2_E), magic);
+        let n = shifted.sub(magic);
+        let r = n.mul_add(Self::splat(-0.693_359_4), x);
+        let r = n.mul_add(Self::splat(2.121_944_4e-4), r);
+        let p = Self::splat(1.0 / 720.0);
+        let p = p.mul_add(r, Self::splat(1.0 / 120.0));
+        let p = p.mul_add(r, Self::splat(1.0 / 24.0));
+        let p = p.mul_add(r, Self::splat(1.0 / 6.0));
+        let p = p.mul_add(r, Self::splat(0.5));
+        let p = p.mul_add(r, Self::splat(1.0));
+        let p = p.mul_add(r, Self::splat(1.0));
+        p.mul(shifted.exp2_of_rounded())
+    }
+}
+
+/// A computation that is generic over the vector type.
+pub(crate) trait LaneKernel {
+    type Output;
+    fn run<L: Lanes>(self) -> Self::Output;
+}
+
+/// Runs the kernel with the best vectors of this processor.
+pub(crate) fn dispatch<K: LaneKernel>(kernel: K) -> K::Output {
+    #[cfg(target_arch = "x86_64")]
+    if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
+        // SAFETY: both features were just found on this processor.
+        return unsafe { avx2::run(kernel) };
+    }
+    kernel.run::<Portable>()
+}
+
+/// Plain arrays; the compiler makes of them what the target has.
+#[derive(Clone, Copy)]
+pub(crate) struct Portable([f32; LANES]);
+
+impl Portable {
+    #[inline(always)]
+    fn zip(self, other: Self, f: impl Fn(f32, f32) -> f32) -> Self {
+        Self(std::array::from_fn(|i| f(self.0[i], other.0[i])))
+    }
+
+    #[inline(always)]
+    fn zip_bits(self, other: Self, f: impl Fn(u32, u32) -> u32) -> Self {
+        self.zip(other, |a, b| f32::from_bits(f(a.to_bits(), b.to_bits())))
+    }
+}
+
+impl Lanes for Portable {
+    #[inline(always)]
+    fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+    #[inline(always)]
+    fn load(from: &[f32; LANES]) -> Self {
+        Self(*from)
+    }
+    #[inline(always)]
+    fn store(self, to: &mut [f32; LANES]) {
+        *to = self.0;
+    }
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    fn min(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a < b { a } else { b })
+    }
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
+    }
+    #[inline(always)]
+    fn mul_add(self, b: Self, c: Self) -> Self {
+        Self(std::array::from_fn(|i| self.0[i] * b.0[i] + c.0[i]))
+    }
+    #[inline(always)]
+    fn at_least(self, other: Self) -> Self {
+        self.zip(other, |a, b| f32::from_bits(if a >= b { u32::MAX } else { 0 }))
+    }
+    #[inline(always)]
+    fn and(self, other: Self) -> Self {
+        self.zip_bits(other, |a, b| a & b)
+    }
+    #[inline(always)]
+    fn and_not(self, other: Self) -> Self {
+        self.zip_bits(other, |a, b| !a & b)
+    }
+    #[inline(always)]
+    fn select(self, yes: Self, no: Self) -> Self {
+        self.and(yes).zip_bits(self.and_not(no), |a, b| a | b)
+    }
+    #[inline(always)]
+    fn any(self) -> bool {
+        self.0.iter().any(|lane| lane.to_bits() != 0)
+    }
+    #[inline(always)]
+    fn exp2_of_rounded(self) -> Self {
+        Self(self.0.map(|x| f32::from_bits((x.to_bits() << 23).wrapping_add(1.0f32.to_bits()))))
+    }
+    #[inline(always)]
+    fn sum(self) -> f32 {
+        let a = self.0;
+        ((a[0] + a[4]) + (a[2] + a[6])) + ((a[1] + a[5]) + (a[3] + a[7]))
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use super::{LANES, LaneKernel, Lanes};
+    use std::arch::x86_64::*;
+
+    /// # Safety
+    /// The processor must have AVX2 and FMA.
+    #[target_feature(enable = "avx2,fma")]
+    pub(super) unsafe fn run<K: LaneKernel>(kernel: K) -> K::Output {
+        kernel.run::<Avx2>()
+    }
+
+    /// Only [`run`] makes values of this type, so every intrinsic below runs where AVX2 and FMA were found.
+    #[derive(Clone, Copy)]
+    pub(super) struct Avx2(__m256);
+
+    // SAFETY of every block: see the type. Loads and stores go through references to whole arrays.
+    impl Lanes for Avx2 {
+        #[inline(always)]
+        fn splat(value: f32) -> Self {
+            Self(unsafe { _mm256_set1_ps(value) })
+        }
+        #[inline(always)]
+        fn load(from: &[f32; LANES]) -> Self {
+            Self(unsafe { _mm256_loadu_ps(from.as_ptr()) })
+        }
+        #[inline(always)]
+        fn store(self, to: &mut [f32; LANES]) {
+            unsafe { _mm256_storeu_ps(to.as_mut_ptr(), self.0) }
+        }
+        #[inline(always)]
+        fn add(self, other: Self) -> Self {
+            Self(unsafe { _mm256_add_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn sub(self, other: Self) -> Self {
+            Self(unsafe { _mm256_sub_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn mul(self, other: Self) -> Self {
+            Self(unsafe { _mm256_mul_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn div(self, other: Self) -> Self {
+            Self(unsafe { _mm256_div_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn min(self, other: Self) -> Self {
+            Self(unsafe { _mm256_min_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            Self(unsafe { _mm256_max_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn mul_add(self, b: Self, c: Self) -> Self {
+            Self(unsafe { _mm256_fmadd_ps(self.0, b.0, c.0) })
+        }
+        #[inline(always)]
+        fn at_least(self, other: Self) -> Self {
+            Self(unsafe { _mm256_cmp_ps::<_CMP_GE_OQ>(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn and(self, other: Self) -> Self {
+            Self(unsafe { _mm256_and_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn and_not(self, other: Self) -> Self {
+            Self(unsafe { _mm256_andnot_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        fn select(self, yes: Self, no: Self) -> Self {
+            Self(unsafe { _mm256_blendv_ps(no.0, yes.0, self.0) })
+        }
+        #[inline(always)]
+        fn any(self) -> bool {
+            unsafe { _mm256_movemask_ps(self.0) != 0 }
+        }
+        #[inline(always)]
+        fn exp2_of_rounded(self) -> Self {
+            Self(unsafe {
+                let shifted = _mm256_slli_epi32::<23>(_mm256_castps_si256(self.0));
+                _mm256_castsi256_ps(_mm256_add_epi32(shifted, _mm256_set1_epi32(0x3f80_0000)))
+            })
+        }
+        #[inline(always)]
+        fn sum(self) -> f32 {
+            unsafe {
+                let half = _mm_add_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let pair = _mm_add_ps(half, _mm_movehl_ps(half, half));
+                _mm_cvtss_f32(_mm_add_ss(pair, _mm_shuffle_ps::<1>(pair, pair)))
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct ExpError;
+    impl LaneKernel for ExpError {
+        type Output = f32;
+        fn run<L: Lanes>(self) -> f32 {
+            let mut worst = 0.0f32;
+            for i in 0..10_000 {
+                let x = -(i as f32) * 0.0087;
+                let mut out = [0.0; LANES];
+                L::splat(x).exp().store(&mut out);
+                let truth = (x as f64).exp();
+                worst = worst.max(((out[3] as f64 - truth) / truth).abs() as f32);
+            }
+            worst
+        }
+    }
+
+    #[test]
+    fn exp_is_accurate_on_every_vector_type() {
+        assert!(dispatch(ExpError) < 2e-7, "{}", dispatch(ExpError));
+        assert!(ExpError.run::<Portable>() < 3e-7, "{}", ExpError.run::<Portable>());
+    }
+}

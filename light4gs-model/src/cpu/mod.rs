@@ -1,0 +1,9 @@
+//! Kernels of the CPU back ends, on plain slices: they know nothing of Burn.
+
+pub(crate) mod adam;
+pub(crate) mod hexplane;
+pub(crate) mod lanes;
+pub(crate) mod project;
+pub(crate) mod rasterize;
+pub(crate) mod rasterize_backward;
+pub(crate) mod tiles;

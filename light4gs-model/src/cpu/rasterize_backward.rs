@@ -1,0 +1,224 @@
+//! Derivative of the blending by every splat, front to back like the forward pass.
+//!
+//! With `v_i` the splat's colour and depth weighed by the upstream gradient, the pixel's value is
+//! `S = sum_i w_i v_i + T_end · v_background`, and
+//! `dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i)`.
+//! `S` is known from the forward pass, so a running prefix is all that is needed: no second, reversed traversal and
+//! no division to recover the transmittance. Every (tile, Gaussian) pair writes its own sums; each Gaussian then adds
+//! up its tiles in a fixed order, so that the result does not depend on the threads.
+
+use rayon::prelude::*;
+
+use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
+use super::project::{GaussianSlices, SplatGradient, TILE, View, project_backward};
+use super::rasterize::{
+    MIN_TRANSMITTANCE, TILE_GROUPS, TilePixels, TilePlane, WideSplat, groups, initial_transmittance, pixel_columns,
+    rows, tile_of,
+};
+use super::tiles::TileLists;
+
+/// Sums of one splat over one tile's pixels: gradients of colour and depth, then the moments of
+/// `p = alpha · dS/dalpha`: p, p dx, p dy, p dx², p dx dy, p dy².
+type Sums = [f32; 10];
+
+struct BackwardTile<'a> {
+    lists: &'a TileLists,
+    view: &'a View,
+    tile: usize,
+    pixels: &'a TilePixels,
+    /// `[H, W, 5]`
+    upstream: &'a [f32],
+    sums: &'a mut [Sums],
+}
+
+impl LaneKernel for BackwardTile<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let view = self.view;
+        let (column, row) = (self.tile % view.tiles_across(), self.tile / view.tiles_across());
+        let (origin_x, origin_y) = ((column * TILE) as f32, (row * TILE) as f32);
+        let pixels_x = pixel_columns::<L>(origin_x);
+        let upstream = tile_of(self.upstream, view, column, row);
+        let mut open = initial_transmittance(view, column, row);
+        let mut rest = total_value::<L>(self.pixels, &upstream, view.background);
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+
+        let members = &self.lists.gaussians[self.lists.tile_range(self.tile)];
+        for (&i, sums) in members.iter().zip(self.sums) {
+            let splat = &self.lists.splats[i as usize];
+            let wide = WideSplat::<L>::new(splat);
+            let mut linear = [zero; 4];
+            let mut moments = [zero; 6];
+            for y in rows(splat, origin_y) {
+                let dy = splat.y - (origin_y + y as f32);
+                let (mut row_p, mut row_px, mut row_pxx) = (zero, zero, zero);
+                for group in groups(splat, origin_x, dy) {
+                    let footprint = wide.footprint(pixels_x[group], L::splat(dy));
+                    if !footprint.hit.any() {
+                        continue;
+                    }
+                    let at = y * TILE_GROUPS + group;
+                    let t = L::load(&open[at]);
+                    let after = t.sub(t.mul(footprint.alpha));
+                    let taken = footprint.hit.and(after.at_least(L::splat(MIN_TRANSMITTANCE)));
+                    footprint.hit.select(taken.and(after), t).store(&mut open[at]);
+
+                    let weight = taken.and(t.mul(footprint.alpha));
+                    let up: [L; 5] = std::array::from_fn(|c| L::load(&upstream[c][at]));
+                    for c in 0..3 {
+                        linear[c] = weight.mul_add(up[c], linear[c]);
+                    }
+                    linear[3] = weight.mul_add(up[4], linear[3]);
+                    let value = wide.color[0].mul_add(
+                        up[0],
+                        wide.color[1].mul_add(up[1], wide.color[2].mul_add(up[2], wide.depth.mul(up[4]))),
+                    );
+                    let left = L::load(&rest[at]).sub(weight.mul(value));
+                    left.store(&mut rest[at]);
+                    // alpha · dS/dalpha, with alpha folded into the weight.
+                    let behind = footprint.alpha.mul(left).div(one.sub(footprint.alpha));
+                    let p = taken.and(footprint.free).and(weight.mul(value).sub(behind));
+                    let px = p.mul(footprint.dx);
+                    row_p = row_p.add(p);
+                    row_px = row_px.add(px);
+                    row_pxx = px.mul_add(footprint.dx, row_pxx);
+                }
+                let dy = L::splat(dy);
+                let row_py = row_p.mul(dy);
+                moments[0] = moments[0].add(row_p);
+                moments[1] = moments[1].add(row_px);
+                moments[2] = moments[2].add(row_py);
+                moments[3] = moments[3].add(row_pxx);
+                moments[4] = row_px.mul_add(dy, moments[4]);
+                moments[5] = row_py.mul_add(dy, moments[5]);
+            }
+            for (sum, lanes) in sums.iter_mut().zip(linear.into_iter().chain(moments)) {
+                *sum = lanes.sum();
+            }
+        }
+    }
+}
+
+/// `S` of every pixel: the finished sums weighed by the upstream gradient.
+#[inline(always)]
+fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; 5], background: [f32; 3]) -> TilePlane {
+    let mut total = [[0.0; LANES]; TILE * TILE_GROUPS];
+    for at in 0..total.len() {
+        let up: [L; 5] = std::array::from_fn(|c| L::load(&upstream[c][at]));
+        // The background's value; alpha is 1 - T, hence the minus.
+        let mut behind = L::splat(0.0).sub(up[3]);
+        let mut value = up[4].mul(L::load(&pixels.depth[at]));
+        for c in 0..3 {
+            behind = up[c].mul_add(L::splat(background[c]), behind);
+            value = up[c].mul_add(L::load(&pixels.color[c][at]), value);
+        }
+        L::load(&pixels.transmittance[at]).mul_add(behind, value).store(&mut total[at]);
+    }
+    total
+}
+
+/// Gradients of all inputs, in the layouts of [`GaussianSlices`].
+pub(crate) struct GaussianGradients {
+    pub(crate) means: Vec<f32>,
+    pub(crate) quats: Vec<f32>,
+    pub(crate) scales: Vec<f32>,
+    pub(crate) opacities: Vec<f32>,
+    pub(crate) sh_dc: Vec<f32>,
+    pub(crate) sh_rest: Vec<f32>,
+    pub(crate) screen_offsets: Vec<f32>,
+}
+
+/// Chain rule from the picture's gradient `[H, W, 5]` to the Gaussians.
+pub(crate) fn splat_backward(
+    gaussians: &GaussianSlices,
+    view: &View,
+    lists: &TileLists,
+    pixels: &[TilePixels],
+    upstream: &[f32],
+) -> GaussianGradients {
+    let mut sums: Vec<Sums> = vec![[0.0; 10]; lists.gaussians.len()];
+    let mut by_tile = Vec::with_capacity(pixels.len());
+    let mut remaining = sums.as_mut_slice();
+    for tile in 0..pixels.len() {
+        let (own, others) = remaining.split_at_mut(lists.tile_range(tile).len());
+        by_tile.push(own);
+        remaining = others;
+    }
+    by_tile.into_par_iter().enumerate().for_each(|(tile, sums)| {
+        dispatch(BackwardTile { lists, view, tile, pixels: &pixels[tile], upstream, sums });
+    });
+
+    let count = gaussians.len();
+    let rest = gaussians.sh_rest.len() / count.max(1);
+    let mut out = GaussianGradients {
+        means: vec![0.0; 3 * count],
+        quats: vec![0.0; 4 * count],
+        scales: vec![0.0; 3 * count],
+        opacities: vec![0.0; count],
+        sh_dc: vec![0.0; 3 * count],
+        sh_rest: vec![0.0; rest * count],
+        screen_offsets: vec![0.0; 2 * count],
+    };
+    const CHUNK: usize = 256;
+    let rest_chunks: Vec<&mut [f32]> = if rest == 0 {
+        (0..count.div_ceil(CHUNK)).map(|_| &mut [][..]).collect()
+    } else {
+        out.sh_rest.chunks_mut(rest * CHUNK).collect()
+    };
+    out.means
+        .par_chunks_mut(3 * CHUNK)
+        .zip(out.quats.par_chunks_mut(4 * CHUNK))
+        .zip(out.scales.par_chunks_mut(3 * CHUNK))
+        .zip(out.opacities.par_chunks_mut(CHUNK))
+        .zip(out.sh_dc.par_chunks_mut(3 * CHUNK))
+        .zip(rest_chunks)
+        .zip(out.screen_offsets.par_chunks_mut(2 * CHUNK))
+        .enumerate()
+        .for_each(|(chunk, ((((((means, quats), scales), opacities), dc), sh_rest), offsets))| {
+            for (k, opacity) in opacities.iter_mut().enumerate() {
+                let i = chunk * CHUNK + k;
+                let intersections = lists.gaussian_range(i);
+                if intersections.is_empty() {
+                    continue;
+                }
+                let mut total: Sums = [0.0; 10];
+                for &place in &lists.tile_order[intersections] {
+                    for (t, s) in total.iter_mut().zip(&sums[place as usize]) {
+                        *t += s;
+                    }
+                }
+                let splat = &lists.splats[i];
+                let gradient = splat_gradient(splat.conic, splat.opacity, total);
+                *opacity = gradient.opacity;
+                let attributes = project_backward(
+                    gaussians,
+                    i,
+                    view,
+                    splat,
+                    &gradient,
+                    &mut dc[3 * k..3 * k + 3],
+                    &mut sh_rest[rest * k..rest * (k + 1)],
+                );
+                attributes.mean.write_to_slice(&mut means[3 * k..]);
+                quats[4 * k..4 * k + 4].copy_from_slice(&attributes.quat);
+                attributes.scale.write_to_slice(&mut scales[3 * k..]);
+                attributes.screen_offset.write_to_slice(&mut offsets[2 * k..]);
+            }
+        });
+    out
+}
+
+/// From moments of `p` to the gradient of the splat: `p` is the gradient of the exponent
+/// `-(a dx² + c dy²)/2 - b dx dy`, and `alpha` is proportional to the opacity.
+fn splat_gradient([a, b, c]: [f32; 3], opacity: f32, sums: Sums) -> SplatGradient {
+    let [red, green, blue, depth, p, px, py, pxx, pxy, pyy] = sums;
+    SplatGradient {
+        position: [-a * px - b * py, -b * px - c * py],
+        conic: [-0.5 * pxx, -pxy, -0.5 * pyy],
+        opacity: p / opacity,
+        color: [red, green, blue],
+        depth,
+    }
+}

@@ -1,0 +1,174 @@
+//! The hexplane query as a Burn operation: six bilinear samples and their product, one scale at a time.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use burn::backend::autodiff::checkpoint::base::Checkpointer;
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
+
+use super::host::{HostBackend, HostTensor};
+use crate::cpu::hexplane::{PackedPlanes, query, query_backward};
+
+/// Points and the planes of one scale.
+#[derive(ExtensionType)]
+pub struct QueryInputs<B: Backend> {
+    /// `[N, 4]`: x, y, z, t in [-1, 1]; what lies outside is clamped to the border.
+    pub points: FloatTensor<B>,
+    /// `[C, res y, res x]`.
+    pub xy: FloatTensor<B>,
+    /// `[C, res z, res x]`.
+    pub xz: FloatTensor<B>,
+    /// `[C, res t, res x]`.
+    pub xt: FloatTensor<B>,
+    /// `[C, res z, res y]`.
+    pub yz: FloatTensor<B>,
+    /// `[C, res t, res y]`.
+    pub yt: FloatTensor<B>,
+    /// `[C, res t, res z]`.
+    pub zt: FloatTensor<B>,
+}
+
+const INPUTS: usize = 7;
+
+impl<B: Backend> QueryInputs<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.points, self.xy, self.xz, self.xt, self.yz, self.yt, self.zt]
+    }
+
+    pub(crate) fn from_array([points, xy, xz, xt, yz, yt, zt]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { points, xy, xz, xt, yz, yt, zt }
+    }
+}
+
+/// Gradients of a query.
+pub struct QueryGradients<B: Backend> {
+    /// `[N, 4]`, absent if it was not asked for.
+    pub points: Option<FloatTensor<B>>,
+    /// In the shapes of the planes.
+    pub planes: [FloatTensor<B>; 6],
+}
+
+/// A back end's kernels. [`HexPlaneOps`] adds the dispatch and the tape.
+pub trait HexPlaneKernels: Backend {
+    /// What the backward pass wants to see again.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Features `[N, C]`.
+    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, Self::Saved);
+
+    /// Gradients of planes and, if `with_points`, of the points.
+    fn query_backward(saved: Self::Saved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self>;
+}
+
+/// The query on every back end that has [`HexPlaneKernels`], differentiable under [`Autodiff`].
+#[backend_extension(NdArray, Flex, Autodiff)]
+pub trait HexPlaneOps: Backend {
+    /// Features `[N, C]`: the product over the six planes of their bilinear samples (align-corners, border clamp).
+    fn hexplane_query(#[extension_type] inputs: QueryInputs<Self>) -> FloatTensor<Self>;
+}
+
+impl HexPlaneOps for NdArray {
+    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
+        Self::query_forward(inputs).0
+    }
+}
+
+impl HexPlaneOps for Flex {
+    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
+        Self::query_forward(inputs).0
+    }
+}
+
+impl<B: HexPlaneOps + HexPlaneKernels, C: CheckpointStrategy> HexPlaneOps for Autodiff<B, C> {
+    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
+        #[derive(Debug)]
+        struct Query;
+
+        impl<B: HexPlaneKernels> Backward<B, INPUTS> for Query {
+            type State = B::Saved;
+
+            fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
+                let gradient = grads.consume::<B>(&ops.node);
+                let [points, planes @ ..] = ops.parents;
+                let gradients = B::query_backward(ops.state, gradient, points.is_some());
+                if let (Some(node), Some(gradient)) = (points, gradients.points) {
+                    grads.register::<B>(node.id, gradient);
+                }
+                for (parent, gradient) in planes.into_iter().zip(gradients.planes) {
+                    if let Some(node) = parent {
+                        grads.register::<B>(node.id, gradient);
+                    }
+                }
+            }
+        }
+
+        let inputs = inputs.into_array();
+        let nodes = inputs.each_ref().map(|input| input.node());
+        let inner = QueryInputs::from_array(inputs.map(|input| input.into_primitive()));
+        let (features, saved) = B::query_forward(inner);
+        match Query.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(saved, features),
+            OpsKind::UnTracked(prep) => prep.finish(features),
+        }
+    }
+}
+
+/// State of the CPU back ends between forward and backward.
+#[derive(Clone, Debug)]
+pub struct CpuSaved {
+    points: HostTensor,
+    planes: Arc<PackedPlanes>,
+    shapes: [[usize; 3]; 6],
+}
+
+fn forward_on_cpu<B: HostBackend>(inputs: QueryInputs<B>) -> (FloatTensor<B>, CpuSaved) {
+    let [points, planes @ ..] = inputs.into_array();
+    let shapes = planes.each_ref().map(|plane| plane.shape().dims::<3>());
+    let [channels, res_y, res_x] = shapes[0];
+    let [_, res_t, res_z] = shapes[5];
+    let points = B::to_host(points);
+    let planes = planes.map(B::to_host);
+    let packed = PackedPlanes::new(planes.each_ref().map(|p| p.as_slice()), channels, [res_x, res_y, res_z, res_t]);
+    let features = query(points.as_slice(), &packed);
+    let count = points.as_slice().len() / 4;
+    (B::from_values(features, [count, channels]), CpuSaved { points, planes: Arc::new(packed), shapes })
+}
+
+fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>, with_points: bool) -> QueryGradients<B> {
+    let upstream = B::to_host(gradient);
+    let points = saved.points.as_slice();
+    let gradients = query_backward(points, &saved.planes, upstream.as_slice(), with_points);
+    let mut shapes = saved.shapes.into_iter();
+    QueryGradients {
+        points: gradients.points.map(|values| B::from_values(values, [points.len() / 4, 4])),
+        planes: gradients.planes.map(|values| B::from_values(values, shapes.next().expect("six shapes"))),
+    }
+}
+
+impl HexPlaneKernels for NdArray {
+    type Saved = CpuSaved;
+
+    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, CpuSaved) {
+        forward_on_cpu(inputs)
+    }
+
+    fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self> {
+        backward_on_cpu(saved, gradient, with_points)
+    }
+}
+
+impl HexPlaneKernels for Flex {
+    type Saved = CpuSaved;
+
+    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, CpuSaved) {
+        forward_on_cpu(inputs)
+    }
+
+    fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self> {
+        backward_on_cpu(saved, gradient, with_points)
+    }
+}

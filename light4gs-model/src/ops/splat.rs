@@ -1,0 +1,189 @@
+//! Gaussian splatting as a Burn operation: project, bin, sort, blend, and the derivative of it all.
+
+use std::fmt::Debug;
+use std::sync::Arc;
+
+use burn::backend::autodiff::checkpoint::base::Checkpointer;
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::tensor::{FloatTensor, IntTensor};
+use burn::backend::{Autodiff, Backend, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
+use burn::tensor::TensorData;
+
+use super::host::{HostBackend, HostTensor};
+use crate::cpu::project::{GaussianSlices, View};
+use crate::cpu::rasterize::{CHANNELS, TilePixels, assemble, rasterize};
+use crate::cpu::rasterize_backward::splat_backward;
+use crate::cpu::tiles::TileLists;
+
+/// The differentiable inputs, in the order that gradients are registered in.
+#[derive(ExtensionType)]
+pub struct SplatInputs<B: Backend> {
+    /// `[N, 3]`, world units.
+    pub means: FloatTensor<B>,
+    /// `[N, 4]` as (w, x, y, z), normalised inside.
+    pub quats: FloatTensor<B>,
+    /// `[N, 3]`, standard deviations in world units.
+    pub scales: FloatTensor<B>,
+    /// `[N, 1]` in [0, 1].
+    pub opacities: FloatTensor<B>,
+    /// `[N, 1, 3]`.
+    pub sh_dc: FloatTensor<B>,
+    /// `[N, K, 3]`, K >= (degree + 1)^2 - 1.
+    pub sh_rest: FloatTensor<B>,
+    /// `[N, 2]`, added to the screen position in units of half the picture.
+    pub screen_offsets: FloatTensor<B>,
+}
+
+const INPUTS: usize = 7;
+
+impl<B: Backend> SplatInputs<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.means, self.quats, self.scales, self.opacities, self.sh_dc, self.sh_rest, self.screen_offsets]
+    }
+
+    fn from_array([means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
+    }
+}
+
+/// What the operation returns.
+#[derive(ExtensionType)]
+pub struct SplatOutputs<B: Backend> {
+    /// `[H, W, 5]`: red, green, blue over the background, alpha, depth.
+    pub picture: FloatTensor<B>,
+    /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
+    pub radii: IntTensor<B>,
+}
+
+/// A back end's kernels. [`SplatOps`] adds the dispatch and the tape.
+pub trait SplatKernels: Backend {
+    /// What the backward pass wants to see again.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Draws the picture.
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, Self::Saved);
+
+    /// Gradients of all inputs from that of the picture `[H, W, 5]`.
+    fn splat_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self>;
+}
+
+/// Camera, background and active SH degree of one picture.
+#[derive(Clone, Copy, Debug)]
+pub struct SplatView(pub(crate) View);
+
+/// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
+#[backend_extension(NdArray, Flex, Autodiff)]
+pub trait SplatOps: Backend {
+    /// Draws Gaussians.
+    fn splat(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self>;
+}
+
+impl SplatOps for NdArray {
+    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
+        Self::splat_forward(inputs, view).0
+    }
+}
+
+impl SplatOps for Flex {
+    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
+        Self::splat_forward(inputs, view).0
+    }
+}
+
+impl<B: SplatOps + SplatKernels, C: CheckpointStrategy> SplatOps for Autodiff<B, C> {
+    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
+        #[derive(Debug)]
+        struct Splat;
+
+        impl<B: SplatKernels> Backward<B, INPUTS> for Splat {
+            type State = B::Saved;
+
+            fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
+                let gradient = grads.consume::<B>(&ops.node);
+                let gradients = B::splat_backward(ops.state, gradient).into_array();
+                for (parent, gradient) in ops.parents.into_iter().zip(gradients) {
+                    if let Some(parent) = parent {
+                        grads.register::<B>(parent.id, gradient);
+                    }
+                }
+            }
+        }
+
+        let inputs = inputs.into_array();
+        let nodes = inputs.each_ref().map(|input| input.node());
+        let inner = SplatInputs::from_array(inputs.map(|input| input.into_primitive()));
+        let (outputs, saved) = B::splat_forward(inner, view);
+        let picture = match Splat.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(saved, outputs.picture),
+            OpsKind::UnTracked(prep) => prep.finish(outputs.picture),
+        };
+        SplatOutputs { picture, radii: outputs.radii }
+    }
+}
+
+/// State of the CPU back ends between forward and backward.
+#[derive(Clone, Debug)]
+pub struct CpuSaved {
+    inputs: [HostTensor; INPUTS],
+    shapes: [Vec<usize>; INPUTS],
+    view: View,
+    lists: Arc<TileLists>,
+    pixels: Arc<Vec<TilePixels>>,
+}
+
+fn slices(inputs: &[HostTensor; INPUTS]) -> GaussianSlices<'_> {
+    let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.each_ref().map(|i| i.as_slice());
+    GaussianSlices { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
+}
+
+fn forward_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): SplatView) -> (SplatOutputs<B>, CpuSaved) {
+    let inputs = inputs.into_array();
+    let device = inputs[0].device();
+    let shapes = inputs.each_ref().map(|input| input.shape().iter().copied().collect());
+    let inputs = inputs.map(B::to_host);
+    let lists = TileLists::build(&slices(&inputs), &view);
+    let pixels = rasterize(&lists, &view);
+    let picture = assemble(&pixels, &view);
+    let radii: Vec<i32> = lists.splats.iter().map(|splat| splat.radius).collect();
+    let outputs = SplatOutputs {
+        picture: B::from_values(picture, [view.camera.height as usize, view.camera.width as usize, CHANNELS]),
+        radii: B::int_from_data(TensorData::new(radii, [lists.splats.len()]), &device),
+    };
+    (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })
+}
+
+fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SplatInputs<B> {
+    let upstream = B::to_host(gradient);
+    let g = splat_backward(&slices(&saved.inputs), &saved.view, &saved.lists, &saved.pixels, upstream.as_slice());
+    let values = [g.means, g.quats, g.scales, g.opacities, g.sh_dc, g.sh_rest, g.screen_offsets];
+    let mut shapes = saved.shapes.into_iter();
+    SplatInputs::from_array(
+        values.map(|values| B::from_values(values, shapes.next().expect("a shape for every input"))),
+    )
+}
+
+impl SplatKernels for NdArray {
+    type Saved = CpuSaved;
+
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
+        forward_on_cpu(inputs, view)
+    }
+
+    fn splat_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
+        backward_on_cpu(saved, gradient)
+    }
+}
+
+impl SplatKernels for Flex {
+    type Saved = CpuSaved;
+
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
+        forward_on_cpu(inputs, view)
+    }
+
+    fn splat_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
+        backward_on_cpu(saved, gradient)
+    }
+}

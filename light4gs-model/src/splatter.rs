@@ -1,0 +1,129 @@
+//! Differentiable rendering of Gaussians (3DGS, Kerbl et al. 2023).
+
+use burn::backend::Dispatch;
+use burn::tensor::activation::sigmoid;
+use burn::tensor::{Bool, Int, Tensor, s};
+use light4gs_data::Camera;
+
+use crate::cpu::project::View;
+use crate::gaussians::GaussianTensors;
+use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
+
+/// A picture and what the optimiser wants to know of it.
+#[derive(Clone, Debug)]
+pub struct Rendering {
+    /// `[H, W, 3]`, over the background; not clamped above.
+    pub image: Tensor<3>,
+    /// `[H, W]`, in [0, 1].
+    pub alpha: Tensor<2>,
+    /// `[H, W]`: sum of view depth times blending weight, world units, not divided by alpha.
+    pub depth: Tensor<2>,
+    /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the picture; -1 for Gaussians that are not
+    /// finite or have no orientation, which are not drawn.
+    pub radii: Tensor<1, Int>,
+}
+
+impl Rendering {
+    /// `[N]`: which Gaussians are on the screen.
+    pub fn visible(&self) -> Tensor<1, Bool> {
+        self.radii.clone().greater_elem(0)
+    }
+
+    /// How many Gaussians could not be drawn because they are not finite or have no orientation.
+    pub fn invalid_count(&self) -> usize {
+        self.radii.clone().equal_elem(-1).int().sum().into_scalar::<i64>() as usize
+    }
+}
+
+/// Renders Gaussians over a background.
+///
+/// ```
+/// use burn::tensor::{Device, Tensor};
+/// use light4gs_data::{Camera, PointCloud};
+/// use light4gs_model::{GaussiansConfig, Splatter};
+///
+/// let device = Device::flex();
+/// let cloud = PointCloud { positions: vec![[0.0; 3], [0.3, 0.0, 0.0]], colors: vec![[1.0, 0.0, 0.0]; 2] };
+/// let gaussians = GaussiansConfig::new().init(&cloud, &device);
+/// let camera = Camera::look_at([0.0, -4.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 40, 30);
+/// let picture = Splatter::new([1.0; 3], 3).render(gaussians.tensors(), &camera, None);
+/// assert_eq!(picture.image.dims(), [30, 40, 3]);
+/// ```
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splatter {
+    background: [f32; 3],
+    sh_degree: usize,
+}
+
+impl Splatter {
+    /// `sh_degree` is the active degree: coefficients above it are ignored, and a degree above the Gaussians' own
+    /// means theirs.
+    pub fn new(background: [f32; 3], sh_degree: usize) -> Self {
+        Self { background, sh_degree }
+    }
+
+    /// Renders raw attributes (the activations happen here) through a camera.
+    ///
+    /// `screen_offsets [N, 2]`, normally zeros, are added to the projected positions in units of half the picture;
+    /// their gradient is the screen-space gradient that drives densification.
+    pub fn render(&self, gaussians: GaussianTensors, camera: &Camera, screen_offsets: Option<Tensor<2>>) -> Rendering {
+        self.render_activated(
+            gaussians.means,
+            gaussians.quats,
+            gaussians.log_scales.exp(),
+            sigmoid(gaussians.opacity_logits),
+            gaussians.sh_dc,
+            gaussians.sh_rest,
+            camera,
+            screen_offsets,
+        )
+    }
+
+    /// Renders activated attributes: standard deviations `scales [N, 3]` and `opacities [N, 1]` in [0, 1].
+    ///
+    /// # Panics
+    /// If the shapes do not belong together; the message names the tensor.
+    pub fn render_activated(
+        &self,
+        means: Tensor<2>,
+        quats: Tensor<2>,
+        scales: Tensor<2>,
+        opacities: Tensor<2>,
+        sh_dc: Tensor<3>,
+        sh_rest: Tensor<3>,
+        camera: &Camera,
+        screen_offsets: Option<Tensor<2>>,
+    ) -> Rendering {
+        let count = means.dims()[0];
+        let rest = sh_rest.dims()[1];
+        assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
+        assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");
+        assert_eq!(scales.dims(), [count, 3], "scales must be [N, 3]");
+        assert_eq!(opacities.dims(), [count, 1], "opacities must be [N, 1]");
+        assert_eq!(sh_dc.dims(), [count, 1, 3], "sh_dc must be [N, 1, 3]");
+        assert_eq!(sh_rest.dims(), [count, rest, 3], "sh_rest must be [N, K, 3]");
+        let screen_offsets = screen_offsets.unwrap_or_else(|| Tensor::zeros([count, 2], &means.device()));
+        assert_eq!(screen_offsets.dims(), [count, 2], "screen_offsets must be [N, 2]");
+
+        let sh_degree = self.sh_degree.min((rest + 1).isqrt() - 1);
+        let view = SplatView(View { camera: *camera, background: self.background, sh_degree });
+        let inputs = SplatInputs {
+            means: means.into_dispatch(),
+            quats: quats.into_dispatch(),
+            scales: scales.into_dispatch(),
+            opacities: opacities.into_dispatch(),
+            sh_dc: sh_dc.into_dispatch(),
+            sh_rest: sh_rest.into_dispatch(),
+            screen_offsets: screen_offsets.into_dispatch(),
+        };
+        let outputs = Dispatch::splat(inputs, view);
+        let picture = Tensor::<3>::from_dispatch(outputs.picture);
+        let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
+        Rendering {
+            image: picture.clone().slice(s![.., .., 0..3]),
+            alpha: picture.clone().slice(s![.., .., 3..4]).squeeze_dim(2),
+            depth: picture.slice(s![.., .., 4..5]).squeeze_dim(2),
+            radii,
+        }
+    }
+}

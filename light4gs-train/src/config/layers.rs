@@ -1,0 +1,159 @@
+//! From a name to a configuration: reads a layer, follows `extends`, merges from the bottom up.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use toml::{Table, Value};
+
+use super::{Config, ConfigError, Origin, overrides, presets, schema};
+
+/// The key by which a layer names the one below it.
+const EXTENDS: &str = "extends";
+
+/// Reads the layer at `top` and all below it, lays the overrides on top, and validates.
+pub(super) fn resolve(top: &Origin, override_texts: &[String]) -> Result<Config, ConfigError> {
+    let mut layers = Vec::new();
+    collect(top, None, &mut Vec::new(), &mut layers)?;
+    layers.reverse();
+    for text in override_texts {
+        layers.push(overrides::parse(text)?);
+    }
+    build(layers)
+}
+
+/// The same for text, whose `extends` may name a preset or a path relative to the working folder.
+pub(super) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigError> {
+    let origin = Origin::Text(origin.to_owned());
+    let (layer, extends) = parse(text, &origin)?;
+    let mut layers = vec![(origin.clone(), layer)];
+    if let Some(below) = extends {
+        collect(
+            &named(&below, None),
+            Some(&origin),
+            &mut Vec::new(),
+            &mut layers,
+        )?;
+    }
+    layers.reverse();
+    build(layers)
+}
+
+/// What `name` means: a preset, or a path relative to `folder`.
+pub(super) fn named(name: &str, folder: Option<&Path>) -> Origin {
+    let path = folder.unwrap_or(Path::new("")).join(name);
+    let plain = !name.ends_with(".toml") && !name.contains(['/', '\\']);
+    let preset = plain && (presets::text(name).is_some() || !path.is_file());
+    if preset {
+        Origin::Preset(name.to_owned())
+    } else {
+        Origin::File(path)
+    }
+}
+
+/// Appends the layer at `origin` and those below it, the topmost first. `above` is the chain that led here.
+fn collect(
+    origin: &Origin,
+    by: Option<&Origin>,
+    above: &mut Vec<Origin>,
+    into: &mut Vec<(Origin, Table)>,
+) -> Result<(), ConfigError> {
+    let (identity, text) = read(origin, by)?;
+    if let Some(start) = above.iter().position(|seen| *seen == identity) {
+        let mut chain = above.split_off(start);
+        chain.push(identity);
+        return Err(ConfigError::Cycle { chain });
+    }
+    above.push(identity);
+    let (layer, extends) = parse(&text, origin)?;
+    into.push((origin.clone(), layer));
+    let Some(below) = extends else { return Ok(()) };
+    let below = match origin {
+        // The binary must not depend on the folder in which it runs.
+        Origin::Preset(_) => Origin::Preset(below),
+        Origin::File(path) => named(&below, path.parent()),
+        Origin::Text(_) => named(&below, None),
+    };
+    collect(&below, Some(origin), above, into)
+}
+
+/// The text of a layer, and what tells it from all others (one file has many paths).
+fn read(origin: &Origin, by: Option<&Origin>) -> Result<(Origin, String), ConfigError> {
+    match origin {
+        Origin::Preset(name) => {
+            let text = presets::text(name).ok_or_else(|| ConfigError::UnknownPreset {
+                name: name.clone(),
+                by: by.cloned(),
+                nearest: presets::nearest(name).to_owned(),
+            })?;
+            Ok((origin.clone(), text.to_owned()))
+        }
+        Origin::File(path) => {
+            let failed = |source| ConfigError::Read {
+                path: path.clone(),
+                source,
+            };
+            let identity: PathBuf = fs::canonicalize(path).map_err(failed)?;
+            let text = fs::read_to_string(path).map_err(failed)?;
+            Ok((Origin::File(identity), text))
+        }
+        Origin::Text(text) => Ok((origin.clone(), text.clone())),
+    }
+}
+
+/// Parses and checks one layer; returns it without `extends`, and what that says.
+fn parse(text: &str, origin: &Origin) -> Result<(Table, Option<String>), ConfigError> {
+    let mut layer: Table = toml::from_str(text).map_err(|error| ConfigError::Syntax {
+        origin: origin.clone(),
+        message: error.to_string(),
+    })?;
+    let extends = match layer.remove(EXTENDS) {
+        None => None,
+        Some(Value::String(name)) => Some(name),
+        Some(other) => {
+            return Err(ConfigError::WrongType {
+                origin: origin.clone(),
+                line: None,
+                key: EXTENDS.to_owned(),
+                expected: "a string, the name of a preset or a path".to_owned(),
+                found: other.to_string(),
+            });
+        }
+    };
+    schema::check(&layer, text, origin)?;
+    Ok((layer, extends))
+}
+
+/// Merges the layers, the lowest first. Each must leave something that fits the structs, so that an error is
+/// laid to the right one.
+fn build(layers: Vec<(Origin, Table)>) -> Result<Config, ConfigError> {
+    let mut merged = Table::new();
+    let mut config = Config::default();
+    for (origin, layer) in layers {
+        merge(&mut merged, layer);
+        config = merged
+            .clone()
+            .try_into()
+            .map_err(|error: toml::de::Error| ConfigError::Value {
+                origin,
+                message: one_line(&error.to_string()),
+            })?;
+    }
+    config.validate()?;
+    Ok(config)
+}
+
+fn one_line(message: &str) -> String {
+    message.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+/// Lays `top` over `base`: tables are merged, everything else is replaced.
+fn merge(base: &mut Table, top: Table) {
+    for (key, value) in top {
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(base)), Value::Table(top)) => merge(base, top),
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+}

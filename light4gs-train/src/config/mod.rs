@@ -1,0 +1,117 @@
+//! The TOML configuration of a run: one struct, presets, inheritance, overrides.
+//!
+//! A configuration is layered. Below everything stand the defaults of the structs in this module; a file or a
+//! built-in preset is laid over them, after whatever it `extends`; overrides from the command line come last.
+//! Every layer is checked on its own, so that an unknown key or a wrong type is reported with the file, the line and
+//! the full key path. `docs/configuration.md` lists every key.
+//!
+//! ```toml
+//! extends = "dnerf-small"      # a built-in preset, or a path relative to this file
+//!
+//! [train]
+//! fine_iterations = 2000
+//! ```
+
+mod data;
+mod error;
+mod eval;
+mod layers;
+mod model;
+mod optional;
+mod overrides;
+mod presets;
+mod schema;
+mod train;
+mod validate;
+
+#[cfg(test)]
+mod tests;
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+pub use data::DataConfig;
+pub use error::{ConfigError, Origin, Problem};
+pub use eval::EvalConfig;
+pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
+pub use presets::preset_names;
+pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
+
+/// The devices that `device` may name.
+pub const DEVICES: &[&str] = &["ndarray", "flex"];
+
+/// The complete configuration of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Config {
+    /// Seed of everything random in a run.
+    pub seed: u64,
+    /// Back end that computes, one of [`DEVICES`].
+    pub device: String,
+    /// What is trained on.
+    pub data: DataConfig,
+    /// What is trained.
+    pub model: ModelConfig,
+    /// How it is trained.
+    pub train: TrainConfig,
+    /// How it is measured.
+    pub eval: EvalConfig,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            device: "ndarray".to_owned(),
+            data: DataConfig::default(),
+            model: ModelConfig::default(),
+            train: TrainConfig::default(),
+            eval: EvalConfig::default(),
+        }
+    }
+}
+
+impl Config {
+    /// Reads a TOML file, with everything that it extends, and validates the result.
+    pub fn from_file(path: impl AsRef<Path>) -> Result<Self, ConfigError> {
+        layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[])
+    }
+
+    /// The built-in preset called `name` (see [`preset_names`]), validated.
+    pub fn from_preset(name: &str) -> Result<Self, ConfigError> {
+        layers::resolve(&Origin::Preset(name.to_owned()), &[])
+    }
+
+    /// What a command line gives: a preset's name or a file's path, and overrides such as
+    /// `train.fine_iterations=200`, each one a line of TOML (a bare word is taken as a string).
+    ///
+    /// A name without a folder and without `.toml` is a preset, unless only a file has that name.
+    pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
+        layers::resolve(&layers::named(name_or_path, None), overrides)
+    }
+
+    /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.
+    pub fn from_toml(text: &str, origin: &str) -> Result<Self, ConfigError> {
+        layers::resolve_text(text, origin)
+    }
+
+    /// The whole configuration, every key written out. Reading it back gives an equal configuration.
+    ///
+    /// # Panics
+    /// If an integer is above `i64::MAX`, which TOML cannot hold and [`Config::validate`] refuses.
+    pub fn to_toml(&self) -> String {
+        toml::to_string(self).expect("a validated configuration holds only what TOML can")
+    }
+
+    /// SHA-256 of [`Config::to_toml`]: two runs with the same digest were configured alike.
+    pub fn digest(&self) -> [u8; 32] {
+        Sha256::digest(self.to_toml().as_bytes()).into()
+    }
+
+    /// Checks every range. All problems are reported at once.
+    pub fn validate(&self) -> Result<(), ConfigError> {
+        validate::validate(self)
+    }
+}

@@ -1,0 +1,84 @@
+//! `[model]`: what is trained.
+
+use serde::{Deserialize, Serialize};
+
+/// Sizes and switches of the model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ModelConfig {
+    /// Highest degree of the spherical harmonics, 0 to 3.
+    pub sh_degree: u8,
+    /// The feature planes.
+    pub hexplane: HexPlaneConfig,
+    /// The network that turns features into motion.
+    pub deformation: DeformationConfig,
+}
+
+/// Sizes of the multiscale hexplane.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct HexPlaneConfig {
+    /// Features a plane.
+    pub channels: usize,
+    /// Resolution along x, y, z, t at the lowest scale; every one a multiple of 4.
+    pub resolution: [usize; 4],
+    /// One scale for each: its spatial resolution is the base times this. Time keeps its resolution.
+    pub multipliers: Vec<usize>,
+}
+
+/// Sizes and heads of the deformation network.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DeformationConfig {
+    /// Width of the hidden layers.
+    pub width: usize,
+    /// Layers before the heads; 0 means the same as 1.
+    pub depth: usize,
+    /// Whether positions move.
+    pub position: bool,
+    /// Whether scales change.
+    pub scale: bool,
+    /// Whether rotations change.
+    pub rotation: bool,
+    /// Whether opacities change.
+    pub opacity: bool,
+    /// Whether spherical harmonics change.
+    pub sh: bool,
+    /// Whether positions get a gradient through the hexplane query as well.
+    pub differentiate_points: bool,
+}
+
+impl Default for ModelConfig {
+    fn default() -> Self {
+        Self {
+            sh_degree: 3,
+            hexplane: HexPlaneConfig::default(),
+            deformation: DeformationConfig::default(),
+        }
+    }
+}
+
+impl Default for HexPlaneConfig {
+    fn default() -> Self {
+        Self {
+            channels: 32,
+            resolution: [64, 64, 64, 24],
+            multipliers: vec![1, 2],
+        }
+    }
+}
+
+impl Default for DeformationConfig {
+    fn default() -> Self {
+        Self {
+            width: 64,
+            depth: 1,
+            position: true,
+            scale: true,
+            rotation: true,
+            opacity: false,
+            sh: false,
+            differentiate_points: true,
+        }
+    }
+}

@@ -1,0 +1,46 @@
+//! The files of `configs/`, embedded so that the binary alone is enough.
+
+macro_rules! presets {
+    ($($name:literal),* $(,)?) => {
+        /// Name and text of every preset, sorted by name.
+        pub(super) const PRESETS: &[(&str, &str)] =
+            &[$(($name, include_str!(concat!("../../../configs/", $name, ".toml")))),*];
+    };
+}
+
+presets![
+    "base",
+    "dnerf",
+    "dnerf-bouncing",
+    "dnerf-bouncing-small",
+    "dnerf-dancer",
+    "dnerf-dancer-small",
+    "dnerf-flag",
+    "dnerf-flag-small",
+    "dnerf-lego",
+    "dnerf-lego-small",
+    "dnerf-small",
+    "quickstart",
+];
+
+/// The names of the built-in presets, sorted.
+pub fn preset_names() -> Vec<&'static str> {
+    PRESETS.iter().map(|(name, _)| *name).collect()
+}
+
+/// The text of a preset.
+pub(super) fn text(name: &str) -> Option<&'static str> {
+    PRESETS
+        .iter()
+        .find(|(known, _)| *known == name)
+        .map(|(_, text)| *text)
+}
+
+/// The preset whose name is most like `name`.
+pub(super) fn nearest(name: &str) -> &'static str {
+    PRESETS
+        .iter()
+        .map(|(known, _)| *known)
+        .min_by_key(|known| strsim::damerau_levenshtein(known, name))
+        .unwrap_or("base")
+}

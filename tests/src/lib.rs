@@ -1,0 +1,7 @@
+//! What the cross-crate tests share.
+
+// Burn 0.22 deprecates its `ndarray` back end in favour of `flex`; we serve both.
+#![allow(deprecated)]
+
+pub mod golden;
+pub mod raster;
