@@ -1,8 +1,18 @@
 //! Training, evaluation and the command line of Light4GS.
 
+pub mod checkpoint;
 pub mod config;
+pub mod densification;
+pub mod device;
+pub mod error;
+pub mod loss;
 pub mod metrics_log;
+pub mod optimizer;
+pub mod parameters;
 pub mod report;
+pub mod run_folder;
+pub mod schedule;
 pub mod table;
 pub mod tensorboard;
+pub mod trainer;
 pub mod video;

@@ -82,3 +82,25 @@ impl Default for DeformationConfig {
         }
     }
 }
+
+impl ModelConfig {
+    /// The Burn configuration that this stands for.
+    pub fn build(&self) -> light4gs_model::DynamicSceneConfig {
+        use light4gs_model as model;
+        let HexPlaneConfig { channels, resolution, multipliers } = self.hexplane.clone();
+        let network = &self.deformation;
+        let hexplane =
+            model::HexPlaneConfig::new().with_channels(channels).with_resolution(resolution).with_multipliers(multipliers);
+        let deformation = model::DeformationConfig::new(channels * self.hexplane.multipliers.len())
+            .with_width(network.width)
+            .with_depth(network.depth)
+            .with_position(network.position)
+            .with_scale(network.scale)
+            .with_rotation(network.rotation)
+            .with_opacity(network.opacity)
+            .with_sh(network.sh);
+        let gaussians = model::GaussiansConfig::new().with_sh_degree(usize::from(self.sh_degree));
+        model::DynamicSceneConfig::new(gaussians, hexplane, deformation)
+            .with_differentiate_points(network.differentiate_points)
+    }
+}

@@ -1,0 +1,66 @@
+//! What can go wrong in a run.
+
+use std::path::PathBuf;
+
+use light4gs_codec::CodecError;
+use light4gs_data::DataError;
+use light4gs_model::ModelError;
+
+use crate::config::ConfigError;
+
+/// An error of training, evaluation or the command line.
+#[derive(Debug, thiserror::Error)]
+pub enum TrainError {
+    /// A dataset, a picture or a file.
+    #[error(transparent)]
+    Data(#[from] DataError),
+    /// A configuration.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// A `.l4gs` file.
+    #[error(transparent)]
+    Codec(#[from] CodecError),
+    /// A decoded file whose parts do not make a model.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// The user asked for something that cannot be done; the text says what to do instead.
+    #[error("{0}")]
+    Input(String),
+    /// A folder holds a run already.
+    #[error("{} holds a run already; give --overwrite to replace it, or `light4gs resume` to continue it", .0.display())]
+    RunExists(PathBuf),
+    /// A checkpoint that cannot be read.
+    #[error("checkpoint {}: {problem}; resume from another one, or train anew", path.display())]
+    Checkpoint {
+        /// The file.
+        path: PathBuf,
+        /// What was found and expected.
+        problem: String,
+    },
+    /// The loss is not finite.
+    #[error(
+        "the loss became {loss} in the {stage} stage at iteration {iteration}; last good checkpoint: {checkpoint}. \
+         Lower the learning rates and resume from it"
+    )]
+    NotFinite {
+        /// Stage by name.
+        stage: &'static str,
+        /// Iteration, from 1.
+        iteration: usize,
+        /// As found.
+        loss: f32,
+        /// Path, or `none`.
+        checkpoint: String,
+    },
+}
+
+impl TrainError {
+    /// Whether the program itself is at fault (exit code 1), rather than its input (exit code 2).
+    pub fn is_internal(&self) -> bool {
+        match self {
+            Self::Codec(error) => error.is_internal(),
+            Self::NotFinite { .. } => true,
+            _ => false,
+        }
+    }
+}

@@ -1,0 +1,76 @@
+//! Adam with a state by parameter name, and row surgery for parameters whose rows come and go.
+
+use std::collections::BTreeMap;
+
+use burn::module::Param;
+use burn::tensor::{Gradients, Int, Tensor};
+use light4gs_model::ops::adam::{AdamStep, adam_step};
+
+/// Moments of one parameter.
+#[derive(Clone, Debug)]
+pub struct AdamState {
+    /// First moment, flattened.
+    pub first: Tensor<1>,
+    /// Second moment, flattened.
+    pub second: Tensor<1>,
+    /// Steps taken.
+    pub time: u32,
+}
+
+/// Adam with the betas of the field (0.9, 0.999) and epsilon 1e-15; the learning rate comes with every step.
+#[derive(Clone, Debug, Default)]
+pub struct Adam {
+    /// By parameter name.
+    pub states: BTreeMap<String, AdamState>,
+}
+
+impl Adam {
+    /// Steps a parameter along its gradient. One without a gradient keeps its value and its step count.
+    pub fn step<const D: usize>(
+        &mut self,
+        name: &str,
+        parameter: &mut Param<Tensor<D>>,
+        gradients: &mut Gradients,
+        learning_rate: f64,
+    ) {
+        let Some(gradient) = parameter.val().grad_remove(gradients) else { return };
+        let id = parameter.id;
+        // Take the tensor out, so that nobody shares it and the step can be made in place.
+        let empty = Param::initialized(id, Tensor::empty([0; D], &gradient.device()));
+        let value = std::mem::replace(parameter, empty).into_value().inner();
+        let shape = value.dims();
+        let (first, second, time) = match self.states.remove(name) {
+            Some(AdamState { first, second, time }) => (first, second, time + 1),
+            None => {
+                let zeros = || Tensor::zeros([shape.iter().product::<usize>()], &gradient.device());
+                (zeros(), zeros(), 1)
+            }
+        };
+        let step =
+            AdamStep { learning_rate: learning_rate as f32, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time };
+        let [value, first, second] =
+            adam_step([value.flatten(0, D - 1), first, second], gradient.flatten(0, D - 1), step);
+        self.states.insert(name.to_owned(), AdamState { first, second, time });
+        *parameter = Param::initialized(id, Tensor::from_inner(value.reshape(shape)).require_grad());
+    }
+
+    /// Lets the moments follow rows: row k of the result is row `rows[k]`, or zeros where `fresh[k]`.
+    /// `rows` and `fresh` are `[M]` tensors, `count` is the number of rows before.
+    pub fn select_rows(&mut self, name: &str, rows: &Tensor<1, Int>, fresh: &Tensor<1>, count: usize) {
+        let Some(state) = self.states.get_mut(name) else { return };
+        let keep = fresh.clone().neg().add_scalar(1.0).unsqueeze_dim::<2>(1);
+        for moment in [&mut state.first, &mut state.second] {
+            let columns = moment.dims()[0] / count.max(1);
+            let matrix = moment.clone().reshape([count, columns]).select(0, rows.clone());
+            *moment = (matrix * keep.clone()).flatten(0, 1);
+        }
+    }
+
+    /// Zeroes the moments of a parameter and keeps its step count.
+    pub fn reset_moments(&mut self, name: &str) {
+        if let Some(state) = self.states.get_mut(name) {
+            state.first = state.first.zeros_like();
+            state.second = state.second.zeros_like();
+        }
+    }
+}

@@ -1,0 +1,478 @@
+//! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
+
+use std::time::Instant;
+
+use burn::module::Param;
+use burn::tensor::{Device, Gradients, Tensor, TensorData};
+use indicatif::{ProgressBar, ProgressStyle};
+use light4gs_codec::SceneMeta;
+use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
+use light4gs_model::{DynamicScene, Splatter, regularizer};
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::checkpoint::{self, Checkpoint};
+use crate::config::{Config, TrainConfig};
+use crate::densification::{
+    DensifyMasks, DensityStatistics, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
+};
+use crate::device::device_by_name;
+use crate::error::TrainError;
+use crate::loss::{photometric, psnr};
+use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
+use crate::optimizer::Adam;
+use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::run_folder::{RunFolder, RunRecord};
+use crate::schedule::ExponentialDecay;
+use crate::tensorboard::TensorBoard;
+
+/// Gaussians larger than this on the screen, in pixels, are dropped once opacities have been reset.
+const MAX_SCREEN_RADIUS: f32 = 20.0;
+/// Gaussians larger than this share of the scene's extent are dropped once opacities have been reset.
+const MAX_EXTENT_SHARE: f32 = 0.1;
+
+/// How a dataset is opened for a configuration.
+pub fn load_options(config: &Config) -> LoadOptions {
+    LoadOptions {
+        resolution: config.data.resolution.map_or(Resolution::Native, Resolution::MaxSide),
+        background: config.data.background,
+        seed: config.seed,
+        random_points: config.data.initial_points,
+        random_half_size: config.data.initial_box,
+        ..LoadOptions::default()
+    }
+}
+
+/// A run in progress.
+pub struct Trainer {
+    config: Config,
+    device: Device,
+    data: Scene,
+    images: ImageStore,
+    folder: RunFolder,
+    state: Checkpoint,
+    metrics: MetricsLog,
+    events: TensorBoard,
+    quiet: bool,
+}
+
+impl Trainer {
+    /// Begins a run in a fresh folder.
+    pub fn start(config: Config, folder: RunFolder, record: &RunRecord, quiet: bool) -> Result<Self, TrainError> {
+        let device = device_by_name(&config.device)?.autodiff();
+        device.seed(config.seed);
+        let data = Scene::open(&record.scene, &load_options(&config))?;
+        let scene = config.model.build().init(&data.points, &device);
+        let state = Checkpoint {
+            statistics: DensityStatistics::new(scene.gaussians.len(), &device.clone().inner()),
+            scene,
+            adam: Adam::default(),
+            stage: Stage::Coarse,
+            iteration: 0,
+            seconds: 0.0,
+        };
+        Self::assemble(config, device, data, folder, state, quiet)
+    }
+
+    /// Continues a run from its newest checkpoint, or from the beginning if it has none.
+    pub fn resume(config: Config, folder: RunFolder, record: &RunRecord, quiet: bool) -> Result<Self, TrainError> {
+        let Some(path) = folder.last_checkpoint() else {
+            let mut trainer = Self::start(config, folder, record, quiet)?;
+            trainer.metrics.truncate_after(Stage::Coarse, 0)?;
+            return Ok(trainer);
+        };
+        let device = device_by_name(&config.device)?.autodiff();
+        let data = Scene::open(&record.scene, &load_options(&config))?;
+        let state = Checkpoint::load(&path, &config, &device)?;
+        let (stage, iteration) = (state.stage, state.iteration);
+        let mut trainer = Self::assemble(config, device, data, folder, state, quiet)?;
+        trainer.metrics.truncate_after(stage, iteration)?;
+        Ok(trainer)
+    }
+
+    fn assemble(
+        config: Config,
+        device: Device,
+        data: Scene,
+        folder: RunFolder,
+        state: Checkpoint,
+        quiet: bool,
+    ) -> Result<Self, TrainError> {
+        let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
+        images.prefetch(&data.train);
+        let metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
+        let step = global_step(&config.train, state.stage, state.iteration) as u64;
+        let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
+        Ok(Self { config, device, data, images, folder, state, metrics, events, quiet })
+    }
+
+    /// The dataset.
+    pub fn data(&self) -> &Scene {
+        &self.data
+    }
+
+    /// Seconds of training so far, over all sessions.
+    pub fn seconds(&self) -> f64 {
+        self.state.seconds
+    }
+
+    /// Trains to the end and writes `scene.l4gs`; returns its size in bytes.
+    pub fn run(&mut self) -> Result<u64, TrainError> {
+        if self.state.stage == Stage::Coarse {
+            self.run_stage(Stage::Coarse, self.config.train.coarse_iterations)?;
+            self.begin_fine_stage();
+        }
+        self.run_stage(Stage::Fine, self.config.train.fine_iterations)?;
+        let meta = scene_meta(&self.config, &self.data);
+        Ok(light4gs_codec::write_file(&self.folder.stream(), &self.state.scene.to_arrays(meta))?)
+    }
+
+    /// The fine stage starts with a new optimiser and new statistics.
+    fn begin_fine_stage(&mut self) {
+        self.state.stage = Stage::Fine;
+        self.state.iteration = 0;
+        self.state.adam = Adam::default();
+        self.reset_statistics();
+    }
+
+    fn reset_statistics(&mut self) {
+        self.state.statistics = DensityStatistics::new(self.state.scene.gaussians.len(), &self.device.clone().inner());
+    }
+
+    fn run_stage(&mut self, stage: Stage, iterations: usize) -> Result<(), TrainError> {
+        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(iterations as u64) };
+        let style = "{prefix:>6} {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}  {msg}";
+        bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
+        bar.set_prefix(stage.name());
+        bar.set_position(self.state.iteration as u64);
+        bar.reset_eta();
+        let mut lap = (Instant::now(), self.state.iteration);
+        while self.state.iteration < iterations {
+            let iteration = self.state.iteration + 1;
+            let begin = Instant::now();
+            let picture = self.step(stage, iteration)?;
+            self.control_density(stage, iteration);
+            self.state.iteration = iteration;
+            self.state.seconds += begin.elapsed().as_secs_f64();
+            bar.inc(1);
+
+            if iteration % self.config.train.log_interval == 0 || iteration == iterations {
+                let rate = (iteration - lap.1) as f64 / lap.0.elapsed().as_secs_f64();
+                lap = (Instant::now(), iteration);
+                let psnr = psnr(picture.image, picture.truth);
+                let count = self.state.scene.gaussians.len();
+                bar.set_message(format!("{psnr:.2} dB  {count} Gaussians"));
+                let mut record = MetricsRecord::new(stage, iteration, self.state.seconds, count);
+                record.loss = Some(f64::from(picture.loss));
+                record.psnr = Some(psnr);
+                record.iterations_per_second = Some(rate);
+                record.test_psnr = self.test_psnr(stage, iteration, iterations)?;
+                self.log(&record)?;
+            }
+            let interval = self.config.train.checkpoint_interval;
+            if (interval > 0 && iteration % interval == 0) || iteration == iterations {
+                self.save_checkpoint()?;
+                lap = (Instant::now(), iteration);
+            }
+        }
+        bar.finish();
+        Ok(())
+    }
+
+    fn log(&mut self, record: &MetricsRecord) -> Result<(), TrainError> {
+        self.metrics.append(record)?;
+        let step = global_step(&self.config.train, record.stage, record.iteration) as u64;
+        let mut scalars = vec![("gaussians", record.gaussians as f32)];
+        let optional = [
+            ("loss", record.loss),
+            ("psnr/train", record.psnr),
+            ("psnr/test", record.test_psnr),
+            ("iterations_per_second", record.iterations_per_second),
+        ];
+        scalars.extend(optional.into_iter().filter_map(|(name, value)| Some((name, value? as f32))));
+        Ok(self.events.scalars(step, &scalars)?)
+    }
+
+    fn save_checkpoint(&mut self) -> Result<(), TrainError> {
+        let name = Checkpoint::file_name(self.state.stage, self.state.iteration);
+        let folder = self.folder.checkpoints();
+        self.state.save(&folder.join(name))?;
+        let all = checkpoint::list(&folder);
+        for old in &all[..all.len().saturating_sub(self.config.train.keep_checkpoints.max(1))] {
+            // A checkpoint too many does no harm.
+            let _ = std::fs::remove_file(old);
+        }
+        Ok(())
+    }
+
+    /// Forward, backward, and one optimiser step.
+    fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
+        let config = &self.config.train;
+        let splatter = self.splatter(stage, iteration);
+        let scene = &self.state.scene;
+        let count = scene.gaussians.len();
+        let batch = config.batch_size.max(1);
+        let mut loss: Option<Tensor<1>> = None;
+        let mut picture = None;
+        let mut views = Vec::with_capacity(batch);
+        for k in 0..batch {
+            let frame = self.frame(stage, (iteration - 1) * batch + k);
+            let gaussians = match stage {
+                Stage::Coarse => scene.gaussians.tensors(),
+                Stage::Fine => scene.at(frame.time),
+            };
+            let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
+            let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
+            let truth = image_tensor(&*self.images.get(frame)?, &self.device);
+            let term = photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim) / batch as f32;
+            loss = Some(match loss {
+                Some(sum) => sum + term,
+                None => term,
+            });
+            views.push((offsets, rendering.radii));
+            picture = Some((rendering.image.inner(), truth.inner()));
+        }
+        let mut loss = loss.expect("a batch has at least one picture");
+        if stage == Stage::Fine {
+            loss = loss + regularization(scene, config);
+        }
+        let value: f32 = loss.clone().into_scalar();
+        if !value.is_finite() {
+            let checkpoint = self.folder.last_checkpoint().map_or("none".into(), |path| path.display().to_string());
+            return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss: value, checkpoint });
+        }
+        let mut gradients = loss.backward();
+        drop(loss);
+
+        if iteration <= self.config.train.densify.until {
+            for (offsets, radii) in views {
+                if let Some(gradient) = offsets.grad_remove(&mut gradients) {
+                    // The loss is a mean over the batch; thresholds are meant for one picture.
+                    self.state.statistics.add(gradient * batch as f32, radii);
+                }
+            }
+        }
+        let rates = GroupRates::new(&self.config.train, stage, iteration, self.data.extent);
+        let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
+        visit_parameters(&mut self.state.scene, &mut step);
+        let (image, truth) = picture.expect("a batch has at least one picture");
+        Ok(StepPicture { loss: value, image, truth })
+    }
+
+    fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
+        let step = global_step(&self.config.train, stage, iteration);
+        let degree = (step / self.config.train.sh_degree_interval.max(1)).min(usize::from(self.config.model.sh_degree));
+        Splatter::new(self.config.data.background, degree)
+    }
+
+    /// Frames in an order that is shuffled anew each time all have been seen; depends on seed and position alone.
+    fn frame(&self, stage: Stage, position: usize) -> &Frame {
+        let count = self.data.train.len();
+        let mut order: Vec<usize> = (0..count).collect();
+        order.shuffle(&mut self.generator(Purpose::FrameOrder, stage, position / count));
+        &self.data.train[order[position % count]]
+    }
+
+    fn generator(&self, purpose: Purpose, stage: Stage, position: usize) -> ChaCha8Rng {
+        let mut generator = ChaCha8Rng::seed_from_u64(self.config.seed);
+        let stage = if stage == Stage::Coarse { 0 } else { 1 };
+        generator.set_stream((purpose as u64) << 62 | stage << 61 | position as u64);
+        generator
+    }
+
+    fn control_density(&mut self, stage: Stage, iteration: usize) {
+        let config = self.config.train.densify.clone();
+        if iteration > config.until {
+            return;
+        }
+        let progress = iteration as f32 / config.until.max(1) as f32;
+        let between = |from: f32, to: f32| from + (to - from) * progress;
+        let (threshold, min_opacity) = match stage {
+            Stage::Coarse => (config.grad_threshold_coarse, config.opacity_threshold),
+            Stage::Fine => (
+                between(config.grad_threshold_fine_init, config.grad_threshold_fine_final),
+                between(config.opacity_threshold_fine_init, config.opacity_threshold_fine_final),
+            ),
+        };
+        let due = |from: usize, interval: usize| interval > 0 && iteration > from && iteration % interval == 0;
+        let extent = self.data.extent;
+
+        let count = self.state.scene.gaussians.len();
+        if due(config.prune_from, config.prune_interval) && count > config.prune_above {
+            let size_limit = (config.opacity_reset_interval > 0 && iteration > config.opacity_reset_interval)
+                .then_some(SizeLimit { max_radius: MAX_SCREEN_RADIUS, max_scale: MAX_EXTENT_SHARE * extent });
+            let gaussians = &self.state.scene.gaussians;
+            let keep = survivors(gaussians, min_opacity, size_limit, &self.state.statistics.largest_radius);
+            // Never everything: an empty scene has no gradient to come back from.
+            if keep.contains(&true) && keep.contains(&false) {
+                prune(&mut self.state.scene.gaussians, &mut self.state.adam, &keep);
+                self.state.statistics.keep(&keep);
+            }
+        }
+        if due(config.from, config.interval) && self.state.scene.gaussians.len() < config.max_gaussians {
+            let gaussians = &self.state.scene.gaussians;
+            let masks = DensifyMasks::new(
+                &self.state.statistics.mean_gradients(),
+                &largest_scales(gaussians),
+                threshold,
+                config.percent_dense * extent,
+            );
+            let mut generator = self.generator(Purpose::Split, stage, iteration);
+            let normals: Vec<f32> = (0..masks.normals_needed()).map(|_| standard_normal(&mut generator)).collect();
+            densify(&mut self.state.scene.gaussians, &mut self.state.adam, &masks, &normals);
+            self.reset_statistics();
+        }
+        if due(0, config.opacity_reset_interval) && iteration < config.until {
+            reset_opacity(&mut self.state.scene.gaussians, &mut self.state.adam);
+        }
+    }
+
+    /// PSNR of a few test views by the model in memory, when it is due.
+    fn test_psnr(&self, stage: Stage, iteration: usize, last: usize) -> Result<Option<f64>, TrainError> {
+        let eval = &self.config.eval;
+        let frames = self.data.frames(Split::Test);
+        let due = eval.interval > 0 && (iteration % eval.interval == 0 || iteration == last);
+        if !due || eval.views == 0 || frames.is_empty() {
+            return Ok(None);
+        }
+        let splatter = self.splatter(stage, iteration);
+        let stride = frames.len().div_ceil(eval.views);
+        let mut values = Vec::new();
+        for frame in frames.iter().step_by(stride) {
+            let gaussians = match stage {
+                Stage::Coarse => self.state.scene.gaussians.tensors(),
+                Stage::Fine => self.state.scene.at(frame.time),
+            };
+            let image = splatter.render(gaussians, &frame.camera, None).image.inner().clamp(0.0, 1.0);
+            values.push(psnr(image, image_tensor(&*self.images.get(frame)?, &self.device.clone().inner())));
+        }
+        Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
+    }
+}
+
+/// What a random number is drawn for.
+#[derive(Clone, Copy)]
+enum Purpose {
+    FrameOrder,
+    Split,
+}
+
+/// Box-Muller, one of the pair.
+fn standard_normal(generator: &mut ChaCha8Rng) -> f32 {
+    let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
+    ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
+}
+
+/// Iterations done over both stages.
+fn global_step(config: &TrainConfig, stage: Stage, iteration: usize) -> usize {
+    match stage {
+        Stage::Coarse => iteration,
+        Stage::Fine => config.coarse_iterations + iteration,
+    }
+}
+
+/// The last picture of a batch, off the tape.
+struct StepPicture {
+    loss: f32,
+    image: Tensor<3>,
+    truth: Tensor<3>,
+}
+
+/// `[H, W, 3]` in [0, 1].
+pub(crate) fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
+    let values: Vec<f32> = image.pixels.iter().map(|byte| f32::from(*byte) / 255.0).collect();
+    Tensor::from_data(TensorData::new(values, [image.height as usize, image.width as usize, 3]), device)
+}
+
+fn regularization(scene: &DynamicScene, config: &TrainConfig) -> Tensor<1> {
+    let weights = &config.regularizer;
+    regularizer::weighted_sum(&scene.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1)
+}
+
+/// Learning rates of one iteration.
+struct GroupRates {
+    means: f64,
+    grid: f64,
+    deformation: f64,
+    sh_dc: f64,
+    sh_rest: f64,
+    opacity: f64,
+    scale: f64,
+    rotation: f64,
+}
+
+impl GroupRates {
+    fn new(config: &TrainConfig, stage: Stage, iteration: usize, extent: f32) -> Self {
+        let rates = &config.learning_rate;
+        let length = match stage {
+            Stage::Coarse => config.coarse_iterations,
+            Stage::Fine => config.fine_iterations,
+        };
+        let steps = rates.schedule_steps.unwrap_or(length);
+        let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
+        let decay =
+            |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
+        Self {
+            means: decay(rates.means_init, rates.means_final),
+            grid: decay(rates.grid_init, rates.grid_final),
+            deformation: decay(rates.deformation_init, rates.deformation_final),
+            sh_dc: rates.sh_dc,
+            sh_rest: rates.sh_dc / rates.sh_rest_divisor,
+            opacity: rates.opacity,
+            scale: rates.scale,
+            rotation: rates.rotation,
+        }
+    }
+
+    fn of(&self, group: ParameterGroup) -> f64 {
+        match group {
+            ParameterGroup::Means => self.means,
+            ParameterGroup::LogScales => self.scale,
+            ParameterGroup::Quats => self.rotation,
+            ParameterGroup::Opacity => self.opacity,
+            ParameterGroup::ShDc => self.sh_dc,
+            ParameterGroup::ShRest => self.sh_rest,
+            ParameterGroup::Grid => self.grid,
+            ParameterGroup::Deformation => self.deformation,
+        }
+    }
+}
+
+struct AdamVisitor<'a> {
+    adam: &'a mut Adam,
+    gradients: &'a mut Gradients,
+    rates: GroupRates,
+}
+
+impl ParameterVisitor for AdamVisitor<'_> {
+    fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
+        self.adam.step(name, parameter, self.gradients, self.rates.of(group));
+    }
+}
+
+/// What the file says about the scene it was made from.
+pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
+    let positions = &data.points.positions;
+    let bound = |pick: fn(f32, f32) -> f32, start: f32| {
+        std::array::from_fn(|axis| positions.iter().map(|p| p[axis]).fold(start, pick))
+    };
+    let bounds =
+        if positions.is_empty() { [[0.0; 3]; 2] } else { [bound(f32::min, f32::MAX), bound(f32::max, f32::MIN)] };
+    let camera = data.train[0].camera;
+    let mut times: Vec<f32> = data.train.iter().map(|frame| frame.time).collect();
+    times.sort_by(f32::total_cmp);
+    times.dedup();
+    SceneMeta {
+        name: data.name.clone(),
+        frame_count: times.len() as u32,
+        fps: 30.0,
+        bounds,
+        background: data.background,
+        config_digest: config.digest(),
+        width: camera.width,
+        height: camera.height,
+        fov_x: camera.fov().0,
+        ..SceneMeta::default()
+    }
+}
