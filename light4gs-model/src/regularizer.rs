@@ -42,5 +42,8 @@ pub fn weighted_sum(hexplane: &HexPlane, plane: f32, time: f32, l1: f32) -> Tens
     let terms: [(f32, fn(&HexPlane) -> Tensor<1>); 3] =
         [(plane, plane_smoothness), (time, time_smoothness), (l1, time_l1)];
     let zero = Tensor::zeros([1], &hexplane.planes[0].device());
-    terms.into_iter().filter(|(weight, _)| *weight != 0.0).fold(zero, |sum, (weight, term)| sum + term(hexplane) * weight)
+    terms
+        .into_iter()
+        .filter(|(weight, _)| *weight != 0.0)
+        .fold(zero, |sum, (weight, term)| sum + term(hexplane) * weight)
 }

@@ -65,7 +65,8 @@ impl Checkpoint {
         visit_parameters(&mut self.scene, &mut collect);
         let mut entries = collect.0;
         let Pca { mean, axes, std } = self.scene.frame.pca();
-        let frame: Vec<u8> = [mean.as_slice(), axes.as_flattened(), &std].concat().iter().flat_map(|v| v.to_le_bytes()).collect();
+        let frame: Vec<u8> =
+            [mean.as_slice(), axes.as_flattened(), &std].concat().iter().flat_map(|v| v.to_le_bytes()).collect();
         entries.insert("frame".into(), (vec![5, 3], frame));
         let mut metadata = HashMap::from([
             ("stage".to_owned(), self.stage.name().to_owned()),
@@ -100,8 +101,8 @@ impl Checkpoint {
     /// # Errors
     /// [`TrainError::Checkpoint`] naming the tensor that is missing or of another shape.
     pub fn load(path: &Path, config: &Config, device: &Device) -> Result<Self, TrainError> {
-        let bytes = std::fs::read(path)
-            .map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
+        let bytes =
+            std::fs::read(path).map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
         let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
         let file = SafeTensors::deserialize(&bytes).map_err(|error| failed(error.to_string()))?;
         let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| failed(error.to_string()))?;
@@ -125,9 +126,11 @@ impl Checkpoint {
         let frame = load.values("frame", Some(15));
         let mut adam = Adam::default();
         for (key, time) in metadata.iter().filter_map(|(key, value)| Some((key.strip_prefix("time.")?, value))) {
-            let (first, second) = (load.values(&format!("first.{key}"), None), load.values(&format!("second.{key}"), None));
+            let (first, second) =
+                (load.values(&format!("first.{key}"), None), load.values(&format!("second.{key}"), None));
             let time = number(time).map_err(failed)?;
-            let vector = |values: Vec<f32>| Tensor::<1>::from_data(TensorData::new(values.clone(), [values.len()]), &inner);
+            let vector =
+                |values: Vec<f32>| Tensor::<1>::from_data(TensorData::new(values.clone(), [values.len()]), &inner);
             adam.states.insert(key.to_owned(), AdamState { first: vector(first), second: vector(second), time });
         }
         let count = scene.gaussians.len();

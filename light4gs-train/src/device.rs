@@ -16,6 +16,9 @@ pub fn device_by_name(name: &str) -> Result<Device, TrainError> {
     match name {
         "ndarray" => Ok(Device::ndarray()),
         "flex" => Ok(Device::flex()),
-        _ => Err(TrainError::Input(format!("unknown device `{name}`; this program was built with {}", DEVICES.join(", ")))),
+        _ => Err(TrainError::Input(format!(
+            "unknown device `{name}`; this program was built with {}",
+            DEVICES.join(", ")
+        ))),
     }
 }

@@ -1,10 +1,14 @@
 //! Training, evaluation and the command line of Light4GS.
 
+pub mod benchmark;
 pub mod checkpoint;
+pub mod cli;
 pub mod config;
 pub mod densification;
 pub mod device;
 pub mod error;
+pub mod evaluation;
+pub mod finish;
 pub mod loss;
 pub mod metrics_log;
 pub mod optimizer;

@@ -29,8 +29,7 @@ pub fn psnr(image: Tensor<3>, truth: Tensor<3>) -> f64 {
 
 fn gaussian(device: &Device, shape: [usize; 4]) -> Tensor<4> {
     let center = (WINDOW / 2) as f32;
-    let weights: Vec<f32> =
-        (0..WINDOW).map(|i| (-(i as f32 - center).powi(2) / (2.0 * SIGMA * SIGMA)).exp()).collect();
+    let weights: Vec<f32> = (0..WINDOW).map(|i| (-(i as f32 - center).powi(2) / (2.0 * SIGMA * SIGMA)).exp()).collect();
     let sum: f32 = weights.iter().sum();
     let normalised = weights.iter().map(|w| w / sum).collect::<Vec<_>>();
     Tensor::from_data(TensorData::new(normalised, shape), device)

@@ -86,21 +86,12 @@ impl MetricsRecord {
     fn finite(&self) -> Self {
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
         Self {
-            seconds: if self.seconds.is_finite() {
-                self.seconds
-            } else {
-                0.0
-            },
+            seconds: if self.seconds.is_finite() { self.seconds } else { 0.0 },
             loss: finite(self.loss),
             psnr: finite(self.psnr),
             test_psnr: finite(self.test_psnr),
             iterations_per_second: finite(self.iterations_per_second),
-            extra: self
-                .extra
-                .iter()
-                .filter(|(_, value)| value.is_finite())
-                .map(|(k, v)| (k.clone(), *v))
-                .collect(),
+            extra: self.extra.iter().filter(|(_, value)| value.is_finite()).map(|(k, v)| (k.clone(), *v)).collect(),
             ..self.clone()
         }
     }
@@ -122,10 +113,7 @@ impl MetricsLog {
         if path.exists() {
             keep_lines(path, |_| true)?;
         }
-        Ok(Self {
-            path: path.to_path_buf(),
-            file: open_to_append(path)?,
-        })
+        Ok(Self { path: path.to_path_buf(), file: open_to_append(path)? })
     }
 
     /// Appends a record and hands it to the system.
@@ -133,13 +121,10 @@ impl MetricsLog {
     /// # Errors
     /// [`DataError::Io`] naming the file.
     pub fn append(&mut self, record: &MetricsRecord) -> Result<(), DataError> {
-        let mut line = serde_json::to_string(&record.finite())
-            .map_err(|error| failed("write", &self.path)(error.into()))?;
+        let mut line =
+            serde_json::to_string(&record.finite()).map_err(|error| failed("write", &self.path)(error.into()))?;
         line.push('\n');
-        self.file
-            .write_all(line.as_bytes())
-            .and_then(|()| self.file.flush())
-            .map_err(failed("write", &self.path))
+        self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(failed("write", &self.path))
     }
 
     /// Drops every record after this place in the run: for a run that resumes there.
@@ -149,9 +134,7 @@ impl MetricsLog {
     /// # Errors
     /// As [`MetricsLog::open`].
     pub fn truncate_after(&mut self, stage: Stage, iteration: usize) -> Result<(), DataError> {
-        keep_lines(&self.path, |record| {
-            (record.stage, record.iteration) <= (stage, iteration)
-        })?;
+        keep_lines(&self.path, |record| (record.stage, record.iteration) <= (stage, iteration))?;
         self.file = open_to_append(&self.path)?;
         Ok(())
     }
@@ -162,11 +145,7 @@ impl MetricsLog {
 /// # Errors
 /// [`DataError`] naming the file, and the line where another one is damaged.
 pub fn read_metrics(path: &Path) -> Result<Vec<MetricsRecord>, DataError> {
-    Ok(read_lines(path)?
-        .lines
-        .into_iter()
-        .map(|(_, record)| record)
-        .collect())
+    Ok(read_lines(path)?.lines.into_iter().map(|(_, record)| record).collect())
 }
 
 /// The records of a file beside their text.
@@ -201,43 +180,26 @@ fn read_lines(path: &Path) -> Result<Lines, DataError> {
         }
     }
     let length: usize = lines.iter().map(|(line, _)| line.len() + 1).sum();
-    Ok(Lines {
-        has_rest: length != bytes.len(),
-        lines,
-    })
+    Ok(Lines { has_rest: length != bytes.len(), lines })
 }
 
 /// Replaces the file by the lines whose record `keep` accepts, if that changes it.
 fn keep_lines(path: &Path, keep: impl Fn(&MetricsRecord) -> bool) -> Result<(), DataError> {
     let Lines { lines, has_rest } = read_lines(path)?;
-    let kept: Vec<&String> = lines
-        .iter()
-        .filter(|(_, record)| keep(record))
-        .map(|(line, _)| line)
-        .collect();
+    let kept: Vec<&String> = lines.iter().filter(|(_, record)| keep(record)).map(|(line, _)| line).collect();
     if kept.len() == lines.len() && !has_rest {
         return Ok(());
     }
-    write_atomically(path, |out| {
-        kept.iter().try_for_each(|line| writeln!(out, "{line}"))
-    })
+    write_atomically(path, |out| kept.iter().try_for_each(|line| writeln!(out, "{line}")))
 }
 
 fn open_to_append(path: &Path) -> Result<File, DataError> {
-    OpenOptions::new()
-        .create(true)
-        .append(true)
-        .open(path)
-        .map_err(failed("open", path))
+    OpenOptions::new().create(true).append(true).open(path).map_err(failed("open", path))
 }
 
 fn failed(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> DataError {
     let path = path.to_path_buf();
-    move |source| DataError::Io {
-        action,
-        path,
-        source,
-    }
+    move |source| DataError::Io { action, path, source }
 }
 
 #[cfg(test)]
@@ -245,8 +207,7 @@ mod tests {
     use super::*;
 
     fn record(stage: Stage, iteration: usize) -> MetricsRecord {
-        let mut record =
-            MetricsRecord::new(stage, iteration, iteration as f64 / 10.0, 100 + iteration);
+        let mut record = MetricsRecord::new(stage, iteration, iteration as f64 / 10.0, 100 + iteration);
         record.loss = Some(0.1 / (iteration + 1) as f64);
         record.extra.insert("l1".to_owned(), 0.25);
         record
@@ -254,12 +215,7 @@ mod tests {
 
     fn write(path: &Path) {
         let mut log = MetricsLog::open(path).expect("a log");
-        for (stage, iteration) in [
-            (Stage::Coarse, 10),
-            (Stage::Coarse, 20),
-            (Stage::Fine, 10),
-            (Stage::Fine, 20),
-        ] {
+        for (stage, iteration) in [(Stage::Coarse, 10), (Stage::Coarse, 20), (Stage::Fine, 10), (Stage::Fine, 20)] {
             log.append(&record(stage, iteration)).expect("a line");
         }
     }
@@ -282,20 +238,8 @@ mod tests {
         let mut log = MetricsLog::open(&path).expect("a log");
         log.truncate_after(Stage::Fine, 10).expect("truncated");
         log.append(&record(Stage::Fine, 11)).expect("a line");
-        let places: Vec<_> = read_metrics(&path)
-            .expect("records")
-            .iter()
-            .map(|r| (r.stage, r.iteration))
-            .collect();
-        assert_eq!(
-            places,
-            [
-                (Stage::Coarse, 10),
-                (Stage::Coarse, 20),
-                (Stage::Fine, 10),
-                (Stage::Fine, 11)
-            ]
-        );
+        let places: Vec<_> = read_metrics(&path).expect("records").iter().map(|r| (r.stage, r.iteration)).collect();
+        assert_eq!(places, [(Stage::Coarse, 10), (Stage::Coarse, 20), (Stage::Fine, 10), (Stage::Fine, 11)]);
         assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1);
     }
 
@@ -305,29 +249,14 @@ mod tests {
         let path = folder.path().join("metrics.jsonl");
         write(&path);
         let whole = fs::read(&path).expect("bytes");
-        let third_end = whole
-            .iter()
-            .enumerate()
-            .filter(|(_, byte)| **byte == b'\n')
-            .nth(2)
-            .expect("lines")
-            .0
-            + 1;
+        let third_end = whole.iter().enumerate().filter(|(_, byte)| **byte == b'\n').nth(2).expect("lines").0 + 1;
         for length in third_end..whole.len() {
             fs::write(&path, &whole[..length]).expect("cut");
             let expected = if length + 1 == whole.len() { 4 } else { 3 };
-            assert_eq!(
-                read_metrics(&path).expect("records").len(),
-                expected,
-                "cut at {length}"
-            );
+            assert_eq!(read_metrics(&path).expect("records").len(), expected, "cut at {length}");
             let mut log = MetricsLog::open(&path).expect("a log");
             log.append(&record(Stage::Fine, 30)).expect("a line");
-            assert_eq!(
-                read_metrics(&path).expect("records").len(),
-                expected + 1,
-                "cut at {length}"
-            );
+            assert_eq!(read_metrics(&path).expect("records").len(), expected + 1, "cut at {length}");
         }
     }
 
@@ -336,17 +265,10 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("metrics.jsonl");
         write(&path);
-        let text = fs::read_to_string(&path).expect("text").replacen(
-            "\"stage\":\"fine\"",
-            "\"stage\":\"final\"",
-            1,
-        );
+        let text = fs::read_to_string(&path).expect("text").replacen("\"stage\":\"fine\"", "\"stage\":\"final\"", 1);
         fs::write(&path, text).expect("damage");
         let message = read_metrics(&path).expect_err("damage").to_string();
-        assert!(
-            message.contains("metrics.jsonl") && message.contains("line 3"),
-            "{message}"
-        );
+        assert!(message.contains("metrics.jsonl") && message.contains("line 3"), "{message}");
     }
 
     #[test]
@@ -356,13 +278,7 @@ mod tests {
         let mut bad = record(Stage::Coarse, 1);
         bad.psnr = Some(f64::INFINITY);
         bad.extra.insert("rate".to_owned(), f64::NAN);
-        MetricsLog::open(&path)
-            .expect("a log")
-            .append(&bad)
-            .expect("a line");
-        assert_eq!(
-            read_metrics(&path).expect("records"),
-            [record(Stage::Coarse, 1)]
-        );
+        MetricsLog::open(&path).expect("a log").append(&bad).expect("a line");
+        assert_eq!(read_metrics(&path).expect("records"), [record(Stage::Coarse, 1)]);
     }
 }

@@ -46,8 +46,7 @@ impl Adam {
                 (zeros(), zeros(), 1)
             }
         };
-        let step =
-            AdamStep { learning_rate: learning_rate as f32, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time };
+        let step = AdamStep { learning_rate: learning_rate as f32, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time };
         let [value, first, second] =
             adam_step([value.flatten(0, D - 1), first, second], gradient.flatten(0, D - 1), step);
         self.states.insert(name.to_owned(), AdamState { first, second, time });

@@ -123,23 +123,11 @@ pub fn write_report(path: &Path, report: &Report) -> Result<(), DataError> {
 
 fn page(path: &Path, report: &Report) -> Result<String, DataError> {
     let sections = [
-        section(
-            "views",
-            "Ground truth, render, error",
-            picture::section(path, &report.pictures)?,
-        ),
+        section("views", "Ground truth, render, error", picture::section(path, &report.pictures)?),
         section("quality", "Quality", quality::section(&report.splits)),
-        section(
-            "size",
-            "Bytes of the file",
-            sizes::section(&report.sections),
-        ),
+        section("size", "Bytes of the file", sizes::section(&report.sections)),
         section("curves", "Training", curves::section(&report.metrics)),
-        section(
-            "configuration",
-            "Configuration",
-            configuration(&report.config_toml),
-        ),
+        section("configuration", "Configuration", configuration(&report.config_toml)),
     ];
     Ok(fill(
         PAGE,
@@ -159,18 +147,12 @@ fn section(id: &str, heading: &str, content: String) -> String {
     if content.is_empty() {
         return String::new();
     }
-    format!(
-        "<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{heading}</h2>\n{content}</section>\n"
-    )
+    format!("<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{heading}</h2>\n{content}</section>\n")
 }
 
 fn about(report: &Report) -> String {
     let parts = [&report.created, &report.device];
-    let parts: Vec<String> = parts
-        .into_iter()
-        .filter(|part| !part.is_empty())
-        .map(|part| escape(part))
-        .collect();
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).map(|part| escape(part)).collect();
     parts.join(" &middot; ")
 }
 
@@ -181,10 +163,7 @@ fn tiles(tiles: &[SummaryTile]) -> String {
     let mut html = String::from("<dl class=\"tiles\">\n");
     for tile in tiles {
         let (label, value, hint) = (escape(&tile.label), escape(&tile.value), escape(&tile.hint));
-        let _ = writeln!(
-            html,
-            "<div><dt>{label}</dt><dd>{value}<small>{hint}</small></dd></div>"
-        );
+        let _ = writeln!(html, "<div><dt>{label}</dt><dd>{value}<small>{hint}</small></dd></div>");
     }
     html.push_str("</dl>\n");
     html

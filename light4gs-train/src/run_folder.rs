@@ -46,7 +46,9 @@ impl RunFolder {
             }
             if !folder.path("run.json").exists() {
                 let root = root.display();
-                return Err(TrainError::Input(format!("{root} holds files but no run; --overwrite replaces runs only")));
+                return Err(TrainError::Input(format!(
+                    "{root} holds files but no run; --overwrite replaces runs only"
+                )));
             }
             for name in ["run.json", "config.toml", "metrics.jsonl", "scene.l4gs", "eval.json", "report.html"] {
                 remove(&folder.path(name), |path| fs::remove_file(path))?;
@@ -72,7 +74,10 @@ impl RunFolder {
         let folder = Self { root: root.to_owned() };
         let path = folder.path("run.json");
         if !path.exists() {
-            return Err(TrainError::Input(format!("{} is not the folder of a run: it has no run.json", root.display())));
+            return Err(TrainError::Input(format!(
+                "{} is not the folder of a run: it has no run.json",
+                root.display()
+            )));
         }
         let text = fs::read_to_string(&path).map_err(io("read", &path))?;
         let record = serde_json::from_str(&text).map_err(|source| DataError::Json { path, source })?;

@@ -43,15 +43,8 @@ enum Row {
 impl Table {
     /// A table with these columns and no rows.
     pub fn new<T: Into<String>>(columns: impl IntoIterator<Item = (T, Align)>) -> Self {
-        let (header, align) = columns
-            .into_iter()
-            .map(|(name, align)| (name.into(), align))
-            .unzip();
-        Self {
-            header,
-            align,
-            rows: Vec::new(),
-        }
+        let (header, align) = columns.into_iter().map(|(name, align)| (name.into(), align)).unzip();
+        Self { header, align, rows: Vec::new() }
     }
 
     /// Appends a row. Missing cells stay empty; cells beyond the last column are dropped.
@@ -85,24 +78,16 @@ impl fmt::Display for Table {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let widths = self.widths();
         let line = |cells: &[String]| {
-            let padded = cells
-                .iter()
-                .zip(&self.align)
-                .zip(&widths)
-                .map(|((cell, align), most)| {
-                    let space = " ".repeat(most.saturating_sub(width(cell)));
-                    match align {
-                        Align::Left => format!("{cell}{space}"),
-                        Align::Right => format!("{space}{cell}"),
-                    }
-                });
+            let padded = cells.iter().zip(&self.align).zip(&widths).map(|((cell, align), most)| {
+                let space = " ".repeat(most.saturating_sub(width(cell)));
+                match align {
+                    Align::Left => format!("{cell}{space}"),
+                    Align::Right => format!("{space}{cell}"),
+                }
+            });
             padded.collect::<Vec<_>>().join("  ")
         };
-        let rule = widths
-            .iter()
-            .map(|most| "-".repeat(*most))
-            .collect::<Vec<_>>()
-            .join("  ");
+        let rule = widths.iter().map(|most| "-".repeat(*most)).collect::<Vec<_>>().join("  ");
         writeln!(formatter, "{}", line(&self.header).trim_end())?;
         writeln!(formatter, "{rule}")?;
         for row in &self.rows {
@@ -128,10 +113,7 @@ mod tests {
     fn short_and_long_rows_fit() {
         let mut table = Table::new([("a", Align::Right), ("name", Align::Left)]);
         table.row(["1"]).rule().row(["22", "grün", "dropped"]);
-        assert_eq!(
-            table.to_string(),
-            " a  name\n--  ----\n 1\n--  ----\n22  grün\n"
-        );
+        assert_eq!(table.to_string(), " a  name\n--  ----\n 1\n--  ----\n22  grün\n");
     }
 
     #[test]

@@ -29,19 +29,10 @@ impl TensorBoard {
     pub fn create(folder: &Path, resume_step: Option<u64>) -> Result<Self, DataError> {
         fs::create_dir_all(folder).map_err(failed("create", folder))?;
         let (path, file) = new_file(folder)?;
-        let mut writer = Self {
-            path,
-            out: BufWriter::new(file),
-        };
-        writer.record(&Event {
-            text_version: Some("brain.Event:2"),
-            ..Event::now(0)
-        })?;
+        let mut writer = Self { path, out: BufWriter::new(file) };
+        writer.record(&Event { text_version: Some("brain.Event:2"), ..Event::now(0) })?;
         if let Some(step) = resume_step {
-            writer.record(&Event {
-                session_start: true,
-                ..Event::now(step)
-            })?;
+            writer.record(&Event { session_start: true, ..Event::now(step) })?;
         }
         writer.flush()?;
         Ok(writer)
@@ -57,17 +48,12 @@ impl TensorBoard {
     /// # Errors
     /// [`DataError::Io`] naming the file.
     pub fn scalars(&mut self, step: u64, values: &[(&str, f32)]) -> Result<(), DataError> {
-        self.record(&Event {
-            scalars: values,
-            ..Event::now(step)
-        })?;
+        self.record(&Event { scalars: values, ..Event::now(step) })?;
         self.flush()
     }
 
     fn record(&mut self, event: &Event) -> Result<(), DataError> {
-        self.out
-            .write_all(&framed(&event.encode()))
-            .map_err(failed("write", &self.path))
+        self.out.write_all(&framed(&event.encode())).map_err(failed("write", &self.path))
     }
 
     fn flush(&mut self) -> Result<(), DataError> {
@@ -96,23 +82,12 @@ fn host() -> String {
         .or_else(|| std::env::var("HOSTNAME").ok())
         .or_else(|| std::env::var("COMPUTERNAME").ok())
         .unwrap_or_default();
-    let name: String = name
-        .trim()
-        .chars()
-        .filter(|c| c.is_ascii_alphanumeric() || *c == '-')
-        .collect();
-    if name.is_empty() {
-        "localhost".to_owned()
-    } else {
-        name
-    }
+    let name: String = name.trim().chars().filter(|c| c.is_ascii_alphanumeric() || *c == '-').collect();
+    if name.is_empty() { "localhost".to_owned() } else { name }
 }
 
 fn wall_time() -> f64 {
-    SystemTime::now()
-        .duration_since(UNIX_EPOCH)
-        .map(|since| since.as_secs_f64())
-        .unwrap_or(0.0)
+    SystemTime::now().duration_since(UNIX_EPOCH).map(|since| since.as_secs_f64()).unwrap_or(0.0)
 }
 
 /// The fields of TensorFlow's `Event` that we use.
@@ -127,11 +102,7 @@ struct Event<'a> {
 
 impl Event<'_> {
     fn now(step: u64) -> Self {
-        Self {
-            wall_time: wall_time(),
-            step,
-            ..Self::default()
-        }
+        Self { wall_time: wall_time(), step, ..Self::default() }
     }
 
     fn encode(&self) -> Vec<u8> {
@@ -203,18 +174,12 @@ fn framed(message: &[u8]) -> Vec<u8> {
 
 /// CRC-32C, turned and shifted as TFRecord asks, so that the checksum of data that holds checksums stays good.
 fn masked_checksum(bytes: &[u8]) -> u32 {
-    crc32c::crc32c(bytes)
-        .rotate_right(15)
-        .wrapping_add(0xa282_ead8)
+    crc32c::crc32c(bytes).rotate_right(15).wrapping_add(0xa282_ead8)
 }
 
 fn failed(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> DataError {
     let path = path.to_path_buf();
-    move |source| DataError::Io {
-        action,
-        path,
-        source,
-    }
+    move |source| DataError::Io { action, path, source }
 }
 
 #[cfg(test)]
@@ -253,18 +218,14 @@ mod tests {
             let number = key >> 3;
             fields.push(match key & 7 {
                 0 => Field::Number(number, take_varint(&mut message)),
-                1 => Field::Number(
-                    number,
-                    u64::from_le_bytes(take(&mut message, 8).try_into().expect("8 bytes")),
-                ),
+                1 => Field::Number(number, u64::from_le_bytes(take(&mut message, 8).try_into().expect("8 bytes"))),
                 2 => {
                     let length = take_varint(&mut message) as usize;
                     Field::Bytes(number, take(&mut message, length))
                 }
-                5 => Field::Number(
-                    number,
-                    u32::from_le_bytes(take(&mut message, 4).try_into().expect("4 bytes")).into(),
-                ),
+                5 => {
+                    Field::Number(number, u32::from_le_bytes(take(&mut message, 4).try_into().expect("4 bytes")).into())
+                }
                 other => panic!("wire type {other}"),
             });
         }
@@ -276,10 +237,7 @@ mod tests {
         while !file.is_empty() {
             let length = take(&mut file, 8);
             assert_eq!(take(&mut file, 4), masked_checksum(length).to_le_bytes());
-            let message = take(
-                &mut file,
-                u64::from_le_bytes(length.try_into().expect("8 bytes")) as usize,
-            );
+            let message = take(&mut file, u64::from_le_bytes(length.try_into().expect("8 bytes")) as usize);
             assert_eq!(take(&mut file, 4), masked_checksum(message).to_le_bytes());
             records.push(message);
         }
@@ -290,34 +248,19 @@ mod tests {
     fn a_file_reads_back() {
         let folder = tempfile::tempdir().expect("a folder");
         let mut board = TensorBoard::create(folder.path(), Some(300)).expect("a writer");
-        board
-            .scalars(300, &[("loss/total", 0.5), ("psnr", 31.25)])
-            .expect("an event");
+        board.scalars(300, &[("loss/total", 0.5), ("psnr", 31.25)]).expect("an event");
         let file = fs::read(board.path()).expect("bytes");
         let records = records(&file);
         assert_eq!(records.len(), 3);
         assert!(fields(records[0]).contains(&Field::Bytes(3, b"brain.Event:2")));
-        assert_eq!(
-            &fields(records[1])[1..],
-            [Field::Number(2, 300), Field::Bytes(7, &[8, 1])]
-        );
+        assert_eq!(&fields(records[1])[1..], [Field::Number(2, 300), Field::Bytes(7, &[8, 1])]);
         let event = fields(records[2]);
         assert!(matches!(event[0], Field::Number(1, bits) if f64::from_bits(bits) > 1e9));
         assert_eq!(event[1], Field::Number(2, 300));
-        let Field::Bytes(5, summary) = event[2] else {
-            panic!("a summary")
-        };
+        let Field::Bytes(5, summary) = event[2] else { panic!("a summary") };
         let values: Vec<_> = fields(summary);
-        let Field::Bytes(1, first) = values[0] else {
-            panic!("a value")
-        };
-        assert_eq!(
-            fields(first),
-            [
-                Field::Bytes(1, b"loss/total"),
-                Field::Number(2, 0.5_f32.to_bits().into())
-            ]
-        );
+        let Field::Bytes(1, first) = values[0] else { panic!("a value") };
+        assert_eq!(fields(first), [Field::Bytes(1, b"loss/total"), Field::Number(2, 0.5_f32.to_bits().into())]);
         assert_eq!(values.len(), 2);
     }
 
@@ -336,9 +279,6 @@ mod tests {
     fn the_checksum_is_crc_32c() {
         // RFC 3720, B.4: 32 bytes of zeros.
         assert_eq!(crc32c::crc32c(&[0; 32]), 0x8a91_36aa);
-        assert_eq!(
-            masked_checksum(&[0; 32]),
-            0x8a91_36aa_u32.rotate_right(15).wrapping_add(0xa282_ead8)
-        );
+        assert_eq!(masked_checksum(&[0; 32]), 0x8a91_36aa_u32.rotate_right(15).wrapping_add(0xa282_ead8));
     }
 }

@@ -44,9 +44,7 @@ pub fn write_gif<E: From<DataError>>(
         return Err(E::from(DataError::Field {
             path: path.to_path_buf(),
             field: "fps".to_owned(),
-            problem: format!(
-                "{fps} frames a second, where a GIF has more than 0 and up to {MAX_GIF_FPS}"
-            ),
+            problem: format!("{fps} frames a second, where a GIF has more than 0 and up to {MAX_GIF_FPS}"),
             remedy: "choose another rate, or write PNG files".to_owned(),
         }));
     }
@@ -62,11 +60,7 @@ pub fn write_gif<E: From<DataError>>(
             })
             .map_err(io::Error::other)?;
         for frame in frames {
-            let checked = frame.and_then(|frame| {
-                check(path, &frame, &mut size)
-                    .map(|()| frame)
-                    .map_err(E::from)
-            });
+            let checked = frame.and_then(|frame| check(path, &frame, &mut size).map(|()| frame).map_err(E::from));
             let frame = match checked {
                 Ok(frame) => frame,
                 Err(error) => {
@@ -78,11 +72,7 @@ pub fn write_gif<E: From<DataError>>(
             encoder.encode_frame(shown).map_err(io::Error::other)?;
             count += 1;
         }
-        if count == 0 {
-            Err(io::Error::other("there is no frame to write"))
-        } else {
-            Ok(())
-        }
+        if count == 0 { Err(io::Error::other("there is no frame to write")) } else { Ok(()) }
     });
     match stopped {
         Some(error) => Err(error),
@@ -99,13 +89,8 @@ pub fn write_png_sequence<E: From<DataError>>(
     folder: &Path,
     frames: impl IntoIterator<Item = Result<RgbImage8, E>>,
 ) -> Result<Vec<PathBuf>, E> {
-    std::fs::create_dir_all(folder).map_err(|source| {
-        E::from(DataError::Io {
-            action: "create",
-            path: folder.to_path_buf(),
-            source,
-        })
-    })?;
+    std::fs::create_dir_all(folder)
+        .map_err(|source| E::from(DataError::Io { action: "create", path: folder.to_path_buf(), source }))?;
     let mut files = Vec::new();
     for (number, frame) in frames.into_iter().enumerate() {
         let path = folder.join(format!("{number:04}.png"));
@@ -125,15 +110,12 @@ fn check(path: &Path, frame: &RgbImage8, size: &mut Option<(u32, u32)>) -> Resul
     let (width, height) = (frame.width, frame.height);
     let bytes = u64::from(width) * u64::from(height) * 3;
     if bytes == 0 || frame.pixels.len() as u64 != bytes {
-        return Err(wrong(format!(
-            "a frame of {width}x{height} pixels has {} bytes",
-            frame.pixels.len()
-        )));
+        return Err(wrong(format!("a frame of {width}x{height} pixels has {} bytes", frame.pixels.len())));
     }
     match *size {
-        Some((w, h)) if (w, h) != (width, height) => Err(wrong(format!(
-            "a frame of {width}x{height} pixels follows one of {w}x{h}"
-        ))),
+        Some((w, h)) if (w, h) != (width, height) => {
+            Err(wrong(format!("a frame of {width}x{height} pixels follows one of {w}x{h}")))
+        }
         _ => {
             *size = Some((width, height));
             Ok(())
@@ -142,13 +124,8 @@ fn check(path: &Path, frame: &RgbImage8, size: &mut Option<(u32, u32)>) -> Resul
 }
 
 fn with_alpha(frame: RgbImage8) -> io::Result<RgbaImage> {
-    let pixels = frame
-        .pixels
-        .chunks_exact(3)
-        .flat_map(|p| [p[0], p[1], p[2], u8::MAX])
-        .collect();
-    RgbaImage::from_raw(frame.width, frame.height, pixels)
-        .ok_or_else(|| io::Error::other("a frame lacks pixels"))
+    let pixels = frame.pixels.chunks_exact(3).flat_map(|p| [p[0], p[1], p[2], u8::MAX]).collect();
+    RgbaImage::from_raw(frame.width, frame.height, pixels).ok_or_else(|| io::Error::other("a frame lacks pixels"))
 }
 
 /// How long frame `index` stays, in whole hundredths of a second that add up to the rate.
@@ -164,11 +141,7 @@ mod tests {
     use image::codecs::gif::GifDecoder;
 
     fn frame(width: u32, height: u32, value: u8) -> RgbImage8 {
-        RgbImage8 {
-            width,
-            height,
-            pixels: vec![value; (width * height * 3) as usize],
-        }
+        RgbImage8 { width, height, pixels: vec![value; (width * height * 3) as usize] }
     }
 
     #[test]
@@ -176,22 +149,12 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.gif");
         let frames = (0..30).map(|i| Ok::<_, DataError>(frame(8, 6, i * 8)));
-        assert_eq!(
-            write_gif(&path, frames, 30.0, Looping::Forever).expect("a GIF"),
-            30
-        );
+        assert_eq!(write_gif(&path, frames, 30.0, Looping::Forever).expect("a GIF"), 30);
         let file = io::BufReader::new(std::fs::File::open(&path).expect("a file"));
-        let frames = GifDecoder::new(file)
-            .expect("a GIF")
-            .into_frames()
-            .collect_frames()
-            .expect("frames");
+        let frames = GifDecoder::new(file).expect("a GIF").into_frames().collect_frames().expect("frames");
         assert_eq!(frames.len(), 30);
-        let total: f64 = frames
-            .iter()
-            .map(|f| f.delay().numer_denom_ms())
-            .map(|(n, d)| f64::from(n) / f64::from(d))
-            .sum();
+        let total: f64 =
+            frames.iter().map(|f| f.delay().numer_denom_ms()).map(|(n, d)| f64::from(n) / f64::from(d)).sum();
         assert!((total - 1000.0).abs() < 1e-6, "{total}");
         assert_eq!(frames[9].buffer().get_pixel(3, 3).0, [72, 72, 72, 255]);
     }
@@ -201,43 +164,22 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.gif");
         let none: [Result<RgbImage8, DataError>; 0] = [];
-        let message = write_gif(&path, none, 10.0, Looping::Once)
-            .expect_err("no frame")
-            .to_string();
+        let message = write_gif(&path, none, 10.0, Looping::Once).expect_err("no frame").to_string();
         assert!(message.contains("no frame"), "{message}");
         let sizes = [frame(4, 4, 0), frame(4, 5, 0)].map(Ok::<_, DataError>);
-        let message = write_gif(&path, sizes, 10.0, Looping::Once)
-            .expect_err("sizes")
-            .to_string();
-        assert!(
-            message.contains("4x5 pixels follows one of 4x4"),
-            "{message}"
-        );
+        let message = write_gif(&path, sizes, 10.0, Looping::Once).expect_err("sizes").to_string();
+        assert!(message.contains("4x5 pixels follows one of 4x4"), "{message}");
         for fps in [0.0, -1.0, f32::NAN, f32::INFINITY, 51.0] {
-            let message = write_gif(
-                &path,
-                [Ok::<_, DataError>(frame(4, 4, 0))],
-                fps,
-                Looping::Once,
-            );
+            let message = write_gif(&path, [Ok::<_, DataError>(frame(4, 4, 0))], fps, Looping::Once);
             assert!(message.expect_err("a rate").to_string().contains("fps"));
         }
         let stopped = [
             Ok(frame(4, 4, 0)),
-            Err(DataError::Io {
-                action: "read",
-                path: "x".into(),
-                source: io::Error::other("gone"),
-            }),
+            Err(DataError::Io { action: "read", path: "x".into(), source: io::Error::other("gone") }),
         ];
-        let message = write_gif(&path, stopped, 10.0, Looping::Once)
-            .expect_err("stopped")
-            .to_string();
+        let message = write_gif(&path, stopped, 10.0, Looping::Once).expect_err("stopped").to_string();
         assert!(message.contains("gone"), "{message}");
-        assert_eq!(
-            std::fs::read_dir(folder.path()).expect("a folder").count(),
-            0
-        );
+        assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
     }
 
     #[test]
@@ -246,12 +188,7 @@ mod tests {
         let frames = [frame(3, 2, 10), frame(3, 2, 20)].map(Ok::<_, DataError>);
         let files = write_png_sequence(&folder.path().join("new"), frames).expect("files");
         assert_eq!(files.len(), 2);
-        let picture = image::open(folder.path().join("new/0001.png"))
-            .expect("a picture")
-            .to_rgb8();
-        assert_eq!(
-            (picture.dimensions(), picture.get_pixel(2, 1).0),
-            ((3, 2), [20; 3])
-        );
+        let picture = image::open(folder.path().join("new/0001.png")).expect("a picture").to_rgb8();
+        assert_eq!((picture.dimensions(), picture.get_pixel(2, 1).0), ((3, 2), [20; 3]));
     }
 }

@@ -23,12 +23,6 @@ pub struct DataConfig {
 
 impl Default for DataConfig {
     fn default() -> Self {
-        Self {
-            resolution: None,
-            background: [1.0; 3],
-            memory_limit_mib: 1024,
-            initial_points: 2000,
-            initial_box: 1.3,
-        }
+        Self { resolution: None, background: [1.0; 3], memory_limit_mib: 1024, initial_points: 2000, initial_box: 1.3 }
     }
 }

@@ -123,7 +123,5 @@ fn at_line(line: Option<usize>) -> String {
 }
 
 fn asked_by(by: &Option<Origin>) -> String {
-    by.as_ref()
-        .map(|origin| format!(" (asked for by {origin})"))
-        .unwrap_or_default()
+    by.as_ref().map(|origin| format!(" (asked for by {origin})")).unwrap_or_default()
 }

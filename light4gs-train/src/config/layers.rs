@@ -27,12 +27,7 @@ pub(super) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigErr
     let (layer, extends) = parse(text, &origin)?;
     let mut layers = vec![(origin.clone(), layer)];
     if let Some(below) = extends {
-        collect(
-            &named(&below, None),
-            Some(&origin),
-            &mut Vec::new(),
-            &mut layers,
-        )?;
+        collect(&named(&below, None), Some(&origin), &mut Vec::new(), &mut layers)?;
     }
     layers.reverse();
     build(layers)
@@ -43,11 +38,7 @@ pub(super) fn named(name: &str, folder: Option<&Path>) -> Origin {
     let path = folder.unwrap_or(Path::new("")).join(name);
     let plain = !name.ends_with(".toml") && !name.contains(['/', '\\']);
     let preset = plain && (presets::text(name).is_some() || !path.is_file());
-    if preset {
-        Origin::Preset(name.to_owned())
-    } else {
-        Origin::File(path)
-    }
+    if preset { Origin::Preset(name.to_owned()) } else { Origin::File(path) }
 }
 
 /// Appends the layer at `origin` and those below it, the topmost first. `above` is the chain that led here.
@@ -88,10 +79,7 @@ fn read(origin: &Origin, by: Option<&Origin>) -> Result<(Origin, String), Config
             Ok((origin.clone(), text.to_owned()))
         }
         Origin::File(path) => {
-            let failed = |source| ConfigError::Read {
-                path: path.clone(),
-                source,
-            };
+            let failed = |source| ConfigError::Read { path: path.clone(), source };
             let identity: PathBuf = fs::canonicalize(path).map_err(failed)?;
             let text = fs::read_to_string(path).map_err(failed)?;
             Ok((Origin::File(identity), text))
@@ -102,10 +90,8 @@ fn read(origin: &Origin, by: Option<&Origin>) -> Result<(Origin, String), Config
 
 /// Parses and checks one layer; returns it without `extends`, and what that says.
 fn parse(text: &str, origin: &Origin) -> Result<(Table, Option<String>), ConfigError> {
-    let mut layer: Table = toml::from_str(text).map_err(|error| ConfigError::Syntax {
-        origin: origin.clone(),
-        message: error.to_string(),
-    })?;
+    let mut layer: Table = toml::from_str(text)
+        .map_err(|error| ConfigError::Syntax { origin: origin.clone(), message: error.to_string() })?;
     let extends = match layer.remove(EXTENDS) {
         None => None,
         Some(Value::String(name)) => Some(name),
@@ -133,10 +119,7 @@ fn build(layers: Vec<(Origin, Table)>) -> Result<Config, ConfigError> {
         config = merged
             .clone()
             .try_into()
-            .map_err(|error: toml::de::Error| ConfigError::Value {
-                origin,
-                message: one_line(&error.to_string()),
-            })?;
+            .map_err(|error: toml::de::Error| ConfigError::Value { origin, message: one_line(&error.to_string()) })?;
     }
     config.validate()?;
     Ok(config)

@@ -50,21 +50,13 @@ pub struct DeformationConfig {
 
 impl Default for ModelConfig {
     fn default() -> Self {
-        Self {
-            sh_degree: 3,
-            hexplane: HexPlaneConfig::default(),
-            deformation: DeformationConfig::default(),
-        }
+        Self { sh_degree: 3, hexplane: HexPlaneConfig::default(), deformation: DeformationConfig::default() }
     }
 }
 
 impl Default for HexPlaneConfig {
     fn default() -> Self {
-        Self {
-            channels: 32,
-            resolution: [64, 64, 64, 24],
-            multipliers: vec![1, 2],
-        }
+        Self { channels: 32, resolution: [64, 64, 64, 24], multipliers: vec![1, 2] }
     }
 }
 
@@ -89,8 +81,10 @@ impl ModelConfig {
         use light4gs_model as model;
         let HexPlaneConfig { channels, resolution, multipliers } = self.hexplane.clone();
         let network = &self.deformation;
-        let hexplane =
-            model::HexPlaneConfig::new().with_channels(channels).with_resolution(resolution).with_multipliers(multipliers);
+        let hexplane = model::HexPlaneConfig::new()
+            .with_channels(channels)
+            .with_resolution(resolution)
+            .with_multipliers(multipliers);
         let deformation = model::DeformationConfig::new(channels * self.hexplane.multipliers.len())
             .with_width(network.width)
             .with_depth(network.depth)

@@ -6,10 +6,7 @@ use super::{ConfigError, Origin, schema};
 
 /// One override as a layer.
 pub(super) fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {
-    let wrong = |message: String| ConfigError::Override {
-        text: text.to_owned(),
-        message,
-    };
+    let wrong = |message: String| ConfigError::Override { text: text.to_owned(), message };
     let (key, value) = text
         .split_once('=')
         .ok_or_else(|| wrong("expected key=value, such as train.fine_iterations=200".to_owned()))?;
@@ -21,15 +18,8 @@ pub(super) fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {
     let quoted = || toml::Value::String(value.to_owned()).to_string();
     let layer = toml::from_str::<Table>(&format!("{key} = {value}"))
         .or_else(|error| {
-            let word = !value.is_empty()
-                && value
-                    .chars()
-                    .all(|c| c.is_alphanumeric() || "-_./".contains(c));
-            if word {
-                toml::from_str(&format!("{key} = {}", quoted()))
-            } else {
-                Err(error)
-            }
+            let word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_./".contains(c));
+            if word { toml::from_str(&format!("{key} = {}", quoted())) } else { Err(error) }
         })
         .map_err(|error| wrong(format!("not valid TOML: {}", error.message())))?;
     if layer.contains_key("extends") {

@@ -30,10 +30,7 @@ pub fn preset_names() -> Vec<&'static str> {
 
 /// The text of a preset.
 pub(super) fn text(name: &str) -> Option<&'static str> {
-    PRESETS
-        .iter()
-        .find(|(known, _)| *known == name)
-        .map(|(_, text)| *text)
+    PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
 /// The preset whose name is most like `name`.

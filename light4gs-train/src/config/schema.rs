@@ -13,16 +13,7 @@ pub(super) fn defaults() -> Table {
 /// Checks that `layer` has only known keys, with values of the right types. `text` gives the line numbers.
 pub(super) fn check(layer: &Table, text: &str, origin: &Origin) -> Result<(), ConfigError> {
     let known = defaults();
-    check_table(
-        &known,
-        layer,
-        &mut Vec::new(),
-        &Context {
-            known: &known,
-            text,
-            origin,
-        },
-    )
+    check_table(&known, layer, &mut Vec::new(), &Context { known: &known, text, origin })
 }
 
 struct Context<'a> {
@@ -34,20 +25,11 @@ struct Context<'a> {
 impl Context<'_> {
     /// Overrides are one line long: a number would say nothing.
     fn line(&self, path: &[String]) -> Option<usize> {
-        if matches!(self.origin, Origin::Text(_)) {
-            None
-        } else {
-            line_of(self.text, path)
-        }
+        if matches!(self.origin, Origin::Text(_)) { None } else { line_of(self.text, path) }
     }
 }
 
-fn check_table(
-    known: &Table,
-    layer: &Table,
-    path: &mut Vec<String>,
-    context: &Context,
-) -> Result<(), ConfigError> {
+fn check_table(known: &Table, layer: &Table, path: &mut Vec<String>, context: &Context) -> Result<(), ConfigError> {
     for (key, value) in layer {
         path.push(key.clone());
         match (known.get(key), value) {
@@ -59,9 +41,7 @@ fn check_table(
                     nearest: nearest(context.known, path),
                 });
             }
-            (Some(Value::Table(known)), Value::Table(layer)) => {
-                check_table(known, layer, path, context)?
-            }
+            (Some(Value::Table(known)), Value::Table(layer)) => check_table(known, layer, path, context)?,
             (Some(expected), value) => {
                 if let Some((expected, found)) = mismatch(expected, value) {
                     return Err(ConfigError::WrongType {
@@ -87,14 +67,9 @@ fn mismatch(expected: &Value, found: &Value) -> Option<(String, String)> {
         (Value::Float(_), Value::Integer(_)) => true,
         (Value::Array(expected), Value::Array(found)) => {
             let element = expected.first()?;
-            return found.iter().find_map(|value| mismatch(element, value)).map(
-                |(expected, found)| {
-                    (
-                        format!("an array whose every element is {expected}"),
-                        format!("{found} among its elements"),
-                    )
-                },
-            );
+            return found.iter().find_map(|value| mismatch(element, value)).map(|(expected, found)| {
+                (format!("an array whose every element is {expected}"), format!("{found} among its elements"))
+            });
         }
         _ => expected.same_type(found),
     };
@@ -125,22 +100,15 @@ fn describe(value: &Value) -> String {
 fn nearest(known: &Table, path: &[String]) -> String {
     let mut candidates = Vec::new();
     collect(known, &mut Vec::new(), &mut candidates);
-    let (last, parents) = path
-        .split_last()
-        .map(|(last, parents)| (last.as_str(), parents))
-        .unwrap_or(("", &[]));
+    let (last, parents) = path.split_last().map(|(last, parents)| (last.as_str(), parents)).unwrap_or(("", &[]));
     let whole = path.join(".");
     candidates
         .into_iter()
         .min_by_key(|candidate| {
-            let elsewhere =
-                candidate.len() != path.len() || candidate[..candidate.len() - 1] != *parents;
+            let elsewhere = candidate.len() != path.len() || candidate[..candidate.len() - 1] != *parents;
             let name = candidate.last().map(String::as_str).unwrap_or("");
             let distance = strsim::damerau_levenshtein(name, last) + usize::from(elsewhere);
-            (
-                distance,
-                strsim::damerau_levenshtein(&candidate.join("."), &whole),
-            )
+            (distance, strsim::damerau_levenshtein(&candidate.join("."), &whole))
         })
         .unwrap_or_default()
         .join(".")
@@ -162,18 +130,10 @@ fn line_of(text: &str, path: &[String]) -> Option<usize> {
     let root = DeTable::parse(text).ok()?;
     let mut table = root.get_ref();
     for (depth, name) in path.iter().enumerate() {
-        let (key, value) = table
-            .iter()
-            .find(|(key, _)| key.get_ref().as_ref() == name.as_str())?;
+        let (key, value) = table.iter().find(|(key, _)| key.get_ref().as_ref() == name.as_str())?;
         if depth + 1 == path.len() {
             let start = key.span().start.min(text.len());
-            return Some(
-                text.as_bytes()[..start]
-                    .iter()
-                    .filter(|byte| **byte == b'\n')
-                    .count()
-                    + 1,
-            );
+            return Some(text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count() + 1);
         }
         match value.get_ref() {
             DeValue::Table(inner) => table = inner,

@@ -18,8 +18,7 @@ fn every_preset_loads_and_survives_a_round_trip() {
     for name in preset_names() {
         let config = Config::from_preset(name).unwrap_or_else(|error| panic!("{name}: {error}"));
         let text = config.to_toml();
-        let back = Config::from_toml(&text, "round trip")
-            .unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
+        let back = Config::from_toml(&text, "round trip").unwrap_or_else(|error| panic!("{name}: {error}\n{text}"));
         assert_eq!(config, back, "{name}");
         assert_eq!(text, back.to_toml(), "{name}");
         assert_eq!(config.digest(), back.digest(), "{name}");
@@ -32,10 +31,7 @@ fn every_file_of_configs_is_a_preset() {
     let mut names: Vec<String> = fs::read_dir(folder)
         .expect("reading configs")
         .map(|entry| entry.expect("an entry").path())
-        .filter(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "toml")
-        })
+        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
         .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
         .collect();
     names.sort();
@@ -44,10 +40,7 @@ fn every_file_of_configs_is_a_preset() {
 
 #[test]
 fn base_is_the_default_and_writes_every_key() {
-    assert_eq!(
-        Config::from_preset("base").expect("base"),
-        Config::default()
-    );
+    assert_eq!(Config::from_preset("base").expect("base"), Config::default());
     let base: toml::Table = toml::from_str(presets::text("base").expect("base")).expect("TOML");
     fn keys(table: &toml::Table, prefix: &str) -> Vec<String> {
         table
@@ -61,19 +54,13 @@ fn base_is_the_default_and_writes_every_key() {
     assert_eq!(keys(&base, ""), keys(&schema::defaults(), ""));
     let guide = include_str!("../../../docs/configuration.md");
     for key in keys(&base, "") {
-        assert!(
-            guide.contains(&format!("| `{key}` |")),
-            "docs/configuration.md lacks {key}"
-        );
+        assert!(guide.contains(&format!("| `{key}` |")), "docs/configuration.md lacks {key}");
     }
 }
 
 #[test]
 fn an_unknown_key_is_named_with_file_line_and_nearest_key() {
-    let folder = folder_with(
-        "mine.toml",
-        "extends = \"dnerf\"\n\n[train.densify]\nintervall = 50\n",
-    );
+    let folder = folder_with("mine.toml", "extends = \"dnerf\"\n\n[train.densify]\nintervall = 50\n");
     let path = folder.path().join("mine.toml");
     assert_eq!(
         problem_text(Config::from_file(&path)),
@@ -89,29 +76,20 @@ fn an_unknown_key_below_is_laid_to_the_file_that_has_it() {
     let folder = folder_with("below.toml", "[trian]\nbatch_size = 2\n");
     fs::write(folder.path().join("top.toml"), "extends = \"below.toml\"").expect("writing a file");
     let text = problem_text(Config::from_file(folder.path().join("top.toml")));
-    assert!(
-        text.contains("below.toml:1: unknown key `trian`; the nearest known key is `train`"),
-        "{text}"
-    );
+    assert!(text.contains("below.toml:1: unknown key `trian`; the nearest known key is `train`"), "{text}");
 }
 
 #[test]
 fn a_key_in_the_wrong_table_finds_its_home() {
     let text = problem_text(Config::from_toml("fine_iterations = 3", "text"));
-    assert_eq!(
-        text,
-        "text: unknown key `fine_iterations`; the nearest known key is `train.fine_iterations`"
-    );
+    assert_eq!(text, "text: unknown key `fine_iterations`; the nearest known key is `train.fine_iterations`");
 }
 
 #[test]
 fn wrong_types_name_key_and_line() {
     let folder = folder_with("mine.toml", "[data]\nbackground = [1, 1, \"white\"]\n");
     let text = problem_text(Config::from_file(folder.path().join("mine.toml")));
-    assert!(
-        text.contains("mine.toml:2: `data.background` must be an array"),
-        "{text}"
-    );
+    assert!(text.contains("mine.toml:2: `data.background` must be an array"), "{text}");
     for (bad, key) in [
         ("train.batch_size = -1", "train.batch_size"),
         ("train.batch_size = 1.5", "train.batch_size"),
@@ -119,16 +97,9 @@ fn wrong_types_name_key_and_line() {
         ("model.sh_degree = true", "model.sh_degree"),
     ] {
         let text = problem_text(Config::from_toml(bad, "text"));
-        assert!(
-            text.starts_with(&format!("text: `{key}` must be ")),
-            "{text}"
-        );
+        assert!(text.starts_with(&format!("text: `{key}` must be ")), "{text}");
     }
-    for bad in [
-        "model.sh_degree = 300",
-        "model.hexplane.resolution = [1, 2, 3]",
-        "data.background = [1, 1, 1, 1]",
-    ] {
+    for bad in ["model.sh_degree = 300", "model.hexplane.resolution = [1, 2, 3]", "data.background = [1, 1, 1, 1]"] {
         let text = problem_text(Config::from_toml(bad, "text"));
         assert!(text.starts_with("text: ") && text.contains('`'), "{text}");
     }
@@ -139,24 +110,15 @@ fn extends_in_a_circle_is_refused() {
     let folder = folder_with("a.toml", "extends = \"b.toml\"");
     fs::write(folder.path().join("b.toml"), "extends = \"./a.toml\"").expect("writing a file");
     let error = Config::from_file(folder.path().join("a.toml")).expect_err("a circle");
-    assert!(
-        matches!(&error, ConfigError::Cycle { chain } if chain.len() == 3),
-        "{error:?}"
-    );
+    assert!(matches!(&error, ConfigError::Cycle { chain } if chain.len() == 3), "{error:?}");
     let folder = folder_with("self.toml", "extends = \"self.toml\"");
     let error = Config::from_file(folder.path().join("self.toml")).expect_err("a circle");
-    assert!(
-        matches!(&error, ConfigError::Cycle { chain } if chain.len() == 2),
-        "{error:?}"
-    );
+    assert!(matches!(&error, ConfigError::Cycle { chain } if chain.len() == 2), "{error:?}");
 }
 
 #[test]
 fn tables_merge_deeply_and_the_top_wins() {
-    let folder = folder_with(
-        "mine.toml",
-        "extends = \"dnerf-small\"\n[model.hexplane]\nmultipliers = [1]\n",
-    );
+    let folder = folder_with("mine.toml", "extends = \"dnerf-small\"\n[model.hexplane]\nmultipliers = [1]\n");
     let mine = Config::from_file(folder.path().join("mine.toml")).expect("a configuration");
     let small = Config::from_preset("dnerf-small").expect("a preset");
     assert_eq!(mine.model.hexplane.multipliers, [1]);
@@ -166,23 +128,14 @@ fn tables_merge_deeply_and_the_top_wins() {
 
 #[test]
 fn overrides_come_last() {
-    let overrides = [
-        "train.fine_iterations=200",
-        "device = flex",
-        "data.resolution=0",
-        "eval.splits=[\"val\"]",
-    ];
-    let config =
-        Config::load("dnerf-small", &overrides.map(str::to_owned)).expect("a configuration");
+    let overrides = ["train.fine_iterations=200", "device = flex", "data.resolution=0", "eval.splits=[\"val\"]"];
+    let config = Config::load("dnerf-small", &overrides.map(str::to_owned)).expect("a configuration");
     assert_eq!(config.train.fine_iterations, 200);
     assert_eq!(config.device, "flex");
     assert_eq!(config.data.resolution, None);
     assert_eq!(config.eval.splits, ["val"]);
     for (bad, part) in [
-        (
-            "train.fine_iteration=200",
-            "the nearest known key is `train.fine_iterations`",
-        ),
+        ("train.fine_iteration=200", "the nearest known key is `train.fine_iterations`"),
         ("train.fine_iterations", "expected key=value"),
         ("train.fine_iterations=", "not valid TOML"),
         ("train.fine_iterations=many", "must be a whole number"),
@@ -191,73 +144,34 @@ fn overrides_come_last() {
         ("=1", "not valid TOML"),
     ] {
         let text = problem_text(Config::load("dnerf", &[bad.to_owned()]));
-        assert!(
-            text.starts_with("override `") && text.contains(part),
-            "{text}"
-        );
+        assert!(text.starts_with("override `") && text.contains(part), "{text}");
     }
 }
 
 #[test]
 fn unknown_presets_and_missing_files_are_named() {
     let text = problem_text(Config::load("dnerf-smal", &[]));
-    assert!(
-        text.contains("\"dnerf-smal\"") && text.contains("the nearest preset is \"dnerf-small\""),
-        "{text}"
-    );
+    assert!(text.contains("\"dnerf-smal\"") && text.contains("the nearest preset is \"dnerf-small\""), "{text}");
     let text = problem_text(Config::load("nowhere/mine.toml", &[]));
-    assert!(
-        text.starts_with("nowhere/mine.toml: cannot read the configuration"),
-        "{text}"
-    );
+    assert!(text.starts_with("nowhere/mine.toml: cannot read the configuration"), "{text}");
     let folder = folder_with("mine.toml", "extends = \"dnref\"");
     let text = problem_text(Config::from_file(folder.path().join("mine.toml")));
-    assert!(
-        text.contains("mine.toml)") && text.contains("\"dnerf\""),
-        "{text}"
-    );
+    assert!(text.contains("mine.toml)") && text.contains("\"dnerf\""), "{text}");
 }
 
 #[test]
 fn plane_sizes_must_be_multiples_of_four() {
     for (resolution, nearest) in [
-        (
-            "[64, 64, 64, 25]",
-            "25 along t; it must be a multiple of 4, the nearest is 24",
-        ),
-        (
-            "[62, 64, 64, 24]",
-            "62 along x; it must be a multiple of 4, the nearest is 60 or 64",
-        ),
-        (
-            "[64, 0, 64, 24]",
-            "0 along y; it must be a multiple of 4, the nearest is 4",
-        ),
-        (
-            "[64, 64, 3, 24]",
-            "3 along z; it must be a multiple of 4, the nearest is 4",
-        ),
+        ("[64, 64, 64, 25]", "25 along t; it must be a multiple of 4, the nearest is 24"),
+        ("[62, 64, 64, 24]", "62 along x; it must be a multiple of 4, the nearest is 60 or 64"),
+        ("[64, 0, 64, 24]", "0 along y; it must be a multiple of 4, the nearest is 4"),
+        ("[64, 64, 3, 24]", "3 along z; it must be a multiple of 4, the nearest is 4"),
     ] {
-        let text = problem_text(Config::from_toml(
-            &format!("model.hexplane.resolution = {resolution}"),
-            "text",
-        ));
-        assert!(
-            text.contains("`model.hexplane.resolution`") && text.contains(nearest),
-            "{text}"
-        );
+        let text = problem_text(Config::from_toml(&format!("model.hexplane.resolution = {resolution}"), "text"));
+        assert!(text.contains("`model.hexplane.resolution`") && text.contains(nearest), "{text}");
     }
-    for multipliers in [
-        "[]",
-        "[0, 1]",
-        "[2, 1]",
-        "[1, 1]",
-        "[1, 9223372036854775807]",
-    ] {
-        problem_text(Config::from_toml(
-            &format!("model.hexplane.multipliers = {multipliers}"),
-            "text",
-        ));
+    for multipliers in ["[]", "[0, 1]", "[2, 1]", "[1, 1]", "[1, 9223372036854775807]"] {
+        problem_text(Config::from_toml(&format!("model.hexplane.multipliers = {multipliers}"), "text"));
     }
 }
 
@@ -265,13 +179,8 @@ fn plane_sizes_must_be_multiples_of_four() {
 fn all_ranges_are_reported_at_once() {
     let bad = "device = 'cuda'\n[train]\nbatch_size = 0\nlambda_dssim = 1.5\n[train.learning_rate]\nopacity = 0\n\
                means_init = nan\n[train.densify]\nfrom = 9\nuntil = 8\n[eval]\nsplits = ['tset']\n";
-    let Err(ConfigError::Invalid { problems }) = Config::from_toml(bad, "text") else {
-        panic!("must be refused")
-    };
-    let keys: Vec<&str> = problems
-        .iter()
-        .map(|problem| problem.key.as_str())
-        .collect();
+    let Err(ConfigError::Invalid { problems }) = Config::from_toml(bad, "text") else { panic!("must be refused") };
+    let keys: Vec<&str> = problems.iter().map(|problem| problem.key.as_str()).collect();
     let expected = [
         "device",
         "train.batch_size",

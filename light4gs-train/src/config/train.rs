@@ -175,10 +175,6 @@ impl Default for DensifyConfig {
 
 impl Default for RegularizerConfig {
     fn default() -> Self {
-        Self {
-            plane_tv: 1e-4,
-            time_smoothness: 1e-2,
-            time_l1: 1e-4,
-        }
+        Self { plane_tv: 1e-4, time_smoothness: 1e-2, time_l1: 1e-4 }
     }
 }

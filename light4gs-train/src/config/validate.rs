@@ -1,8 +1,8 @@
 //! Ranges: what the types alone let through.
 
 use super::{
-    Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig,
-    LearningRates, ModelConfig, Problem, RegularizerConfig, TrainConfig,
+    Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates, ModelConfig,
+    Problem, RegularizerConfig, TrainConfig,
 };
 
 /// Planes are halved twice by the context model and predicted scale by scale.
@@ -18,21 +18,13 @@ const SPLITS: &[&str] = &["train", "test", "val"];
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check::default();
-    check.that("seed", i64::try_from(config.seed).is_ok(), || {
-        format!("must be at most {} (TOML's limit)", i64::MAX)
-    });
+    check.that("seed", i64::try_from(config.seed).is_ok(), || format!("must be at most {} (TOML's limit)", i64::MAX));
     check.one_of("device", &config.device, DEVICES);
     data(&mut check, &config.data);
     model(&mut check, &config.model);
     train(&mut check, &config.train);
     eval(&mut check, &config.eval);
-    if check.problems.is_empty() {
-        Ok(())
-    } else {
-        Err(ConfigError::Invalid {
-            problems: check.problems,
-        })
-    }
+    if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
 }
 
 fn data(check: &mut Check, data: &DataConfig) {
@@ -41,17 +33,10 @@ fn data(check: &mut Check, data: &DataConfig) {
             format!("is {width}; it must be 0 (leave pictures as they are) or 8 to {MAX_PICTURE_WIDTH} pixels")
         });
     }
-    check.that(
-        "data.background",
-        data.background.iter().all(|c| (0.0..=1.0).contains(c)),
-        || format!("is {:?}; every channel must lie in 0 to 1", data.background),
-    );
-    check.range(
-        "data.memory_limit_mib",
-        data.memory_limit_mib as usize,
-        16,
-        1 << 24,
-    );
+    check.that("data.background", data.background.iter().all(|c| (0.0..=1.0).contains(c)), || {
+        format!("is {:?}; every channel must lie in 0 to 1", data.background)
+    });
+    check.range("data.memory_limit_mib", data.memory_limit_mib as usize, 16, 1 << 24);
     check.range("data.initial_points", data.initial_points, 4, MAX_GAUSSIANS);
     check.positive("data.initial_box", f64::from(data.initial_box));
 }
@@ -59,18 +44,8 @@ fn data(check: &mut Check, data: &DataConfig) {
 fn model(check: &mut Check, model: &ModelConfig) {
     check.range("model.sh_degree", model.sh_degree.into(), 0, 3);
     hexplane(check, &model.hexplane);
-    check.range(
-        "model.deformation.width",
-        model.deformation.width,
-        1,
-        MAX_WIDTH,
-    );
-    check.range(
-        "model.deformation.depth",
-        model.deformation.depth,
-        0,
-        MAX_DEPTH,
-    );
+    check.range("model.deformation.width", model.deformation.width, 1, MAX_WIDTH);
+    check.range("model.deformation.depth", model.deformation.depth, 0, MAX_DEPTH);
 }
 
 fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
@@ -79,13 +54,12 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     let legal = |size: usize| size >= PLANE_MULTIPLE && size.is_multiple_of(PLANE_MULTIPLE);
     for (axis, size) in ["x", "y", "z", "t"].into_iter().zip(planes.resolution) {
         check.that("model.hexplane.resolution", legal(size), || {
-            format!("is {size} along {axis}; it must be a multiple of {PLANE_MULTIPLE}, the nearest is {}", nearest(size))
+            format!(
+                "is {size} along {axis}; it must be a multiple of {PLANE_MULTIPLE}, the nearest is {}",
+                nearest(size)
+            )
         });
-        for &multiplier in if axis == "t" {
-            &[1][..]
-        } else {
-            &planes.multipliers[..]
-        } {
+        for &multiplier in if axis == "t" { &[1][..] } else { &planes.multipliers[..] } {
             let scaled = size.saturating_mul(multiplier);
             check.that("model.hexplane.resolution", scaled <= MAX_PLANE_RESOLUTION, || {
                 format!("is {size} along {axis}, times {multiplier} it is over the limit of {MAX_PLANE_RESOLUTION}")
@@ -115,25 +89,13 @@ fn train(check: &mut Check, train: &TrainConfig) {
     const MOST: usize = 100_000_000;
     check.range("train.coarse_iterations", train.coarse_iterations, 0, MOST);
     check.range("train.fine_iterations", train.fine_iterations, 0, MOST);
-    check.that(
-        "train.fine_iterations",
-        train.coarse_iterations > 0 || train.fine_iterations > 0,
-        || "and `train.coarse_iterations` are both 0: nothing would be trained".to_owned(),
-    );
+    check.that("train.fine_iterations", train.coarse_iterations > 0 || train.fine_iterations > 0, || {
+        "and `train.coarse_iterations` are both 0: nothing would be trained".to_owned()
+    });
     check.range("train.batch_size", train.batch_size, 1, 1024);
     check.share("train.lambda_dssim", train.lambda_dssim);
-    check.range(
-        "train.sh_degree_interval",
-        train.sh_degree_interval,
-        1,
-        MOST,
-    );
-    check.range(
-        "train.checkpoint_interval",
-        train.checkpoint_interval,
-        1,
-        MOST,
-    );
+    check.range("train.sh_degree_interval", train.sh_degree_interval, 1, MOST);
+    check.range("train.checkpoint_interval", train.checkpoint_interval, 1, MOST);
     check.range("train.log_interval", train.log_interval, 1, MOST);
     check.range("train.keep_checkpoints", train.keep_checkpoints, 1, MOST);
     learning_rates(check, &train.learning_rate);
@@ -157,19 +119,13 @@ fn learning_rates(check: &mut Check, rates: &LearningRates) {
     ] {
         check.positive(&format!("train.learning_rate.{name}"), rate);
     }
-    check.toml_integer(
-        "train.learning_rate.schedule_steps",
-        rates.schedule_steps.unwrap_or(0),
-    );
+    check.toml_integer("train.learning_rate.schedule_steps", rates.schedule_steps.unwrap_or(0));
 }
 
 fn densify(check: &mut Check, densify: &DensifyConfig) {
     let key = |name: &str| format!("train.densify.{name}");
     check.that("train.densify.from", densify.from <= densify.until, || {
-        format!(
-            "is {}, after `train.densify.until`, which is {}",
-            densify.from, densify.until
-        )
+        format!("is {}, after `train.densify.until`, which is {}", densify.from, densify.until)
     });
     for (name, value) in [
         ("from", densify.from),
@@ -189,46 +145,28 @@ fn densify(check: &mut Check, densify: &DensifyConfig) {
     for (name, value) in [
         ("grad_threshold_coarse", densify.grad_threshold_coarse),
         ("grad_threshold_fine_init", densify.grad_threshold_fine_init),
-        (
-            "grad_threshold_fine_final",
-            densify.grad_threshold_fine_final,
-        ),
+        ("grad_threshold_fine_final", densify.grad_threshold_fine_final),
         ("percent_dense", densify.percent_dense),
     ] {
         check.positive(&key(name), value.into());
     }
-    check.range(
-        &key("max_gaussians"),
-        densify.max_gaussians,
-        1,
-        MAX_GAUSSIANS,
-    );
+    check.range(&key("max_gaussians"), densify.max_gaussians, 1, MAX_GAUSSIANS);
     for (name, value) in [
         ("opacity_threshold", densify.opacity_threshold),
-        (
-            "opacity_threshold_fine_init",
-            densify.opacity_threshold_fine_init,
-        ),
-        (
-            "opacity_threshold_fine_final",
-            densify.opacity_threshold_fine_final,
-        ),
+        ("opacity_threshold_fine_init", densify.opacity_threshold_fine_init),
+        ("opacity_threshold_fine_final", densify.opacity_threshold_fine_final),
     ] {
         check.share(&key(name), value);
     }
 }
 
 fn regularizer(check: &mut Check, weights: &RegularizerConfig) {
-    for (name, weight) in [
-        ("plane_tv", weights.plane_tv),
-        ("time_smoothness", weights.time_smoothness),
-        ("time_l1", weights.time_l1),
-    ] {
-        check.that(
-            &format!("train.regularizer.{name}"),
-            weight.is_finite() && weight >= 0.0,
-            || format!("is {weight}; it must be finite and at least 0"),
-        );
+    for (name, weight) in
+        [("plane_tv", weights.plane_tv), ("time_smoothness", weights.time_smoothness), ("time_l1", weights.time_l1)]
+    {
+        check.that(&format!("train.regularizer.{name}"), weight.is_finite() && weight >= 0.0, || {
+            format!("is {weight}; it must be finite and at least 0")
+        });
     }
 }
 
@@ -254,17 +192,12 @@ struct Check {
 impl Check {
     fn that(&mut self, key: &str, holds: bool, message: impl FnOnce() -> String) {
         if !holds {
-            self.problems.push(Problem {
-                key: key.to_owned(),
-                message: message(),
-            });
+            self.problems.push(Problem { key: key.to_owned(), message: message() });
         }
     }
 
     fn range(&mut self, key: &str, value: usize, least: usize, most: usize) {
-        self.that(key, (least..=most).contains(&value), || {
-            format!("is {value}; it must be {least} to {most}")
-        });
+        self.that(key, (least..=most).contains(&value), || format!("is {value}; it must be {least} to {most}"));
     }
 
     fn toml_integer(&mut self, key: &str, value: usize) {
@@ -272,20 +205,14 @@ impl Check {
     }
 
     fn positive(&mut self, key: &str, value: f64) {
-        self.that(key, value.is_finite() && value > 0.0, || {
-            format!("is {value}; it must be finite and above 0")
-        });
+        self.that(key, value.is_finite() && value > 0.0, || format!("is {value}; it must be finite and above 0"));
     }
 
     fn share(&mut self, key: &str, value: f32) {
-        self.that(key, (0.0..=1.0).contains(&value), || {
-            format!("is {value}; it must lie in 0 to 1")
-        });
+        self.that(key, (0.0..=1.0).contains(&value), || format!("is {value}; it must lie in 0 to 1"));
     }
 
     fn one_of(&mut self, key: &str, value: &str, known: &[&str]) {
-        self.that(key, known.contains(&value), || {
-            format!("is \"{value}\"; it must be one of {}", known.join(", "))
-        });
+        self.that(key, known.contains(&value), || format!("is \"{value}\"; it must be one of {}", known.join(", ")));
     }
 }

@@ -62,17 +62,8 @@ impl Chart {
             if one.mark != Mark::FaintLine {
                 if let Some((_, last)) = one.points.last() {
                     let line = matches!(one.mark, Mark::Line | Mark::DottedLine);
-                    let last = if line {
-                        format!(" <b>{}</b>", short(*last))
-                    } else {
-                        String::new()
-                    };
-                    let _ = write!(
-                        legend,
-                        "<span class=\"key s{}\">{}{last}</span>",
-                        color % 3,
-                        escape(&one.label)
-                    );
+                    let last = if line { format!(" <b>{}</b>", short(*last)) } else { String::new() };
+                    let _ = write!(legend, "<span class=\"key s{}\">{}{last}</span>", color % 3, escape(&one.label));
                 }
                 color += 1;
             }
@@ -90,19 +81,9 @@ impl Chart {
         let mut text = format!("{} over {}.", self.title, self.x_label);
         for one in series.iter().filter(|one| one.mark != Mark::FaintLine) {
             let values = || one.points.iter().map(|(_, y)| *y);
-            let (least, most) = (
-                values().fold(f64::INFINITY, f64::min),
-                values().fold(f64::NEG_INFINITY, f64::max),
-            );
+            let (least, most) = (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max));
             let last = values().next_back().unwrap_or(f64::NAN);
-            let _ = write!(
-                text,
-                " {}: {} to {}, last {}.",
-                one.label,
-                short(least),
-                short(most),
-                short(last)
-            );
+            let _ = write!(text, " {}: {} to {}, last {}.", one.label, short(least), short(most), short(last));
         }
         text
     }
@@ -121,10 +102,7 @@ impl Axes {
         let all = || series.iter().flat_map(|one| &one.points);
         all().next()?;
         let range = |values: &mut dyn Iterator<Item = f64>| {
-            values.fold(
-                (f64::INFINITY, f64::NEG_INFINITY),
-                |(least, most), value| (least.min(value), most.max(value)),
-            )
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), value| (least.min(value), most.max(value)))
         };
         let mut x = range(&mut all().map(|(x, _)| *x));
         if chart.border.is_some() {
@@ -135,33 +113,15 @@ impl Axes {
         }
         let y = range(&mut all().map(|(_, y)| *y));
         if chart.logarithmic && y.0 > 0.0 {
-            let y = if y.0 == y.1 {
-                (y.0 / 2.0, y.1 * 2.0)
-            } else {
-                y
-            };
-            return Some(Self {
-                x,
-                y,
-                logarithmic: true,
-                y_ticks: log_ticks(y.0, y.1),
-            });
+            let y = if y.0 == y.1 { (y.0 / 2.0, y.1 * 2.0) } else { y };
+            return Some(Self { x, y, logarithmic: true, y_ticks: log_ticks(y.0, y.1) });
         }
         let low = if chart.from_zero { y.0.min(0.0) } else { y.0 };
-        let (low, high) = if low == y.1 {
-            (low - 0.5, y.1 + 0.5)
-        } else {
-            (low, y.1)
-        };
+        let (low, high) = if low == y.1 { (low - 0.5, y.1 + 0.5) } else { (low, y.1) };
         let step = nice_step(low, high, 5);
         // The axis ends on ticks.
         let y = ((low / step).floor() * step, (high / step).ceil() * step);
-        Some(Self {
-            x,
-            y,
-            logarithmic: false,
-            y_ticks: ticks(y.0, y.1, step),
-        })
+        Some(Self { x, y, logarithmic: false, y_ticks: ticks(y.0, y.1, step) })
     }
 
     fn place_x(&self, x: f64) -> f64 {
@@ -220,25 +180,12 @@ impl Axes {
     }
 
     fn draw_series(&self, svg: &mut String, series: &Series, color: usize) {
-        let places = || {
-            series
-                .points
-                .iter()
-                .map(|(x, y)| (self.place_x(*x), self.place_y(*y)))
-        };
+        let places = || series.points.iter().map(|(x, y)| (self.place_x(*x), self.place_y(*y)));
         let line = series.mark != Mark::Dots && series.points.len() > 1;
         if line {
             let path: Vec<String> = places().map(|(x, y)| format!("{x:.1},{y:.1}")).collect();
-            let faint = if series.mark == Mark::FaintLine {
-                " faint"
-            } else {
-                ""
-            };
-            let _ = writeln!(
-                svg,
-                "<polyline class=\"s{color}{faint}\" points=\"{}\"/>",
-                path.join(" ")
-            );
+            let faint = if series.mark == Mark::FaintLine { " faint" } else { "" };
+            let _ = writeln!(svg, "<polyline class=\"s{color}{faint}\" points=\"{}\"/>", path.join(" "));
         }
         if !line || series.mark == Mark::DottedLine {
             for ((cx, cy), (x, y)) in places().zip(&series.points) {
@@ -257,11 +204,7 @@ impl Axes {
 fn nice_step(low: f64, high: f64, count: usize) -> f64 {
     let least = ((high - low) / count as f64).max(f64::MIN_POSITIVE);
     let power = 10_f64.powf(least.log10().floor());
-    [1.0, 2.0, 5.0]
-        .into_iter()
-        .map(|factor| factor * power)
-        .find(|step| *step >= least)
-        .unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0].into_iter().map(|factor| factor * power).find(|step| *step >= least).unwrap_or(10.0 * power)
 }
 
 /// Multiples of `step` in the range.
@@ -278,13 +221,8 @@ fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
 fn log_ticks(low: f64, high: f64) -> Vec<f64> {
     let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
     let candidates = |factors: &'static [f64]| -> Vec<f64> {
-        let all = powers.clone().flat_map(|power| {
-            factors
-                .iter()
-                .map(move |factor| factor * 10_f64.powi(power))
-        });
-        all.filter(|tick| (low * 0.999..=high * 1.001).contains(tick))
-            .collect()
+        let all = powers.clone().flat_map(|power| factors.iter().map(move |factor| factor * 10_f64.powi(power)));
+        all.filter(|tick| (low * 0.999..=high * 1.001).contains(tick)).collect()
     };
     let fine = candidates(&[1.0, 2.0, 5.0]);
     match fine.len() {

@@ -39,9 +39,6 @@ pub(super) fn inferno(value: f32) -> [u8; 3] {
 
 /// The map as a CSS gradient.
 pub(super) fn css_gradient() -> String {
-    let stops: Vec<String> = INFERNO
-        .iter()
-        .map(|[r, g, b]| format!("rgb({r},{g},{b})"))
-        .collect();
+    let stops: Vec<String> = INFERNO.iter().map(|[r, g, b]| format!("rgb({r},{g},{b})")).collect();
     format!("linear-gradient(90deg,{})", stops.join(","))
 }

@@ -18,12 +18,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_nan() {
         "\u{2013}".to_owned()
     } else if value.is_infinite() {
-        if value > 0.0 {
-            "\u{221e}"
-        } else {
-            "\u{2212}\u{221e}"
-        }
-        .to_owned()
+        if value > 0.0 { "\u{221e}" } else { "\u{2212}\u{221e}" }.to_owned()
     } else {
         format!("{value:.decimals$}")
     }

@@ -18,20 +18,13 @@ pub(super) fn escape(text: &str) -> String {
 
 /// Replaces each `{{name}}` of a template by its value. Values are not searched again, whatever they hold.
 pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
-    let mut filled = String::with_capacity(
-        template.len() + values.iter().map(|(_, value)| value.len()).sum::<usize>(),
-    );
+    let mut filled = String::with_capacity(template.len() + values.iter().map(|(_, value)| value.len()).sum::<usize>());
     let mut rest = template;
     while let Some((before, after)) = rest.split_once("{{") {
         filled.push_str(before);
         match after.split_once("}}") {
             Some((name, after)) => {
-                filled.push_str(
-                    values
-                        .iter()
-                        .find(|(known, _)| *known == name)
-                        .map_or("", |(_, value)| value),
-                );
+                filled.push_str(values.iter().find(|(known, _)| *known == name).map_or("", |(_, value)| value));
                 rest = after;
             }
             None => {

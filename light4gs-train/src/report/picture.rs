@@ -49,11 +49,7 @@ fn figure(html: &mut String, path: &Path, view: &ViewPictures) -> Result<(), Dat
          <button type=\"button\" class=\"compare\" hidden>Compare</button></figcaption>\n<div class=\"triple\">\n",
         fixed(view.time.into(), 3)
     );
-    for (kind, picture) in [
-        ("Ground truth", &view.ground_truth),
-        ("Render", &view.render),
-        ("Error", &error),
-    ] {
+    for (kind, picture) in [("Ground truth", &view.ground_truth), ("Render", &view.render), ("Error", &error)] {
         let data = data_uri(picture).map_err(|error| wrong(error.to_string()))?;
         let alt = match kind {
             "Error" => format!("Error of {name}: PSNR {psnr} dB"),
@@ -73,45 +69,23 @@ fn error_map(truth: &RgbImage8, render: &RgbImage8) -> Result<RgbImage8, String>
     let (width, height) = (truth.width, truth.height);
     let bytes = u64::from(width) * u64::from(height) * 3;
     if bytes == 0 || truth.pixels.len() as u64 != bytes {
-        return Err(format!(
-            "{width}x{height} pixels with {} bytes of ground truth",
-            truth.pixels.len()
-        ));
+        return Err(format!("{width}x{height} pixels with {} bytes of ground truth", truth.pixels.len()));
     }
     if (render.width, render.height, render.pixels.len()) != (width, height, truth.pixels.len()) {
-        return Err(format!(
-            "a render of {}x{} pixels for {width}x{height}",
-            render.width, render.height
-        ));
+        return Err(format!("a render of {}x{} pixels for {width}x{height}", render.width, render.height));
     }
-    let pairs = truth
-        .pixels
-        .chunks_exact(3)
-        .zip(render.pixels.chunks_exact(3));
+    let pairs = truth.pixels.chunks_exact(3).zip(render.pixels.chunks_exact(3));
     let pixels = pairs
         .flat_map(|(truth, render)| {
-            let sum: u32 = truth
-                .iter()
-                .zip(render)
-                .map(|(a, b)| u32::from(a.abs_diff(*b)))
-                .sum();
+            let sum: u32 = truth.iter().zip(render).map(|(a, b)| u32::from(a.abs_diff(*b))).sum();
             inferno(sum as f32 / (3.0 * 255.0) / BRIGHTEST_ERROR)
         })
         .collect();
-    Ok(RgbImage8 {
-        width,
-        height,
-        pixels,
-    })
+    Ok(RgbImage8 { width, height, pixels })
 }
 
 fn data_uri(picture: &RgbImage8) -> image::ImageResult<String> {
     let mut png = Vec::new();
-    PngEncoder::new(&mut png).write_image(
-        &picture.pixels,
-        picture.width,
-        picture.height,
-        ExtendedColorType::Rgb8,
-    )?;
+    PngEncoder::new(&mut png).write_image(&picture.pixels, picture.width, picture.height, ExtendedColorType::Rgb8)?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(png)))
 }

@@ -29,26 +29,14 @@ fn summary(html: &mut String, splits: &[SplitQuality]) {
     }
     html.push_str("<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Split</th>");
     for name in ["Views", "PSNR, dB", "SSIM"].iter().chain(&names) {
-        let _ = write!(
-            html,
-            "<th scope=\"col\" class=\"number\">{}</th>",
-            escape(name)
-        );
+        let _ = write!(html, "<th scope=\"col\" class=\"number\">{}</th>", escape(name));
     }
     html.push_str("</tr></thead>\n<tbody>\n");
     for split in splits {
         let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(&split.name));
-        let mut cells = vec![
-            count(split.views.len() as u64),
-            fixed(split.psnr, 2),
-            fixed(split.ssim, 4),
-        ];
+        let mut cells = vec![count(split.views.len() as u64), fixed(split.psnr, 2), fixed(split.ssim, 4)];
         cells.extend(names.iter().map(|name| {
-            let value = split
-                .extra
-                .iter()
-                .find(|(known, _)| known == name)
-                .map_or(f64::NAN, |(_, value)| *value);
+            let value = split.extra.iter().find(|(known, _)| known == name).map_or(f64::NAN, |(_, value)| *value);
             fixed(value, 4)
         }));
         for cell in cells {
@@ -94,11 +82,7 @@ fn over_time(splits: &[SplitQuality]) -> Chart {
             .map(|split| Series {
                 label: split.name.clone(),
                 mark: Mark::Dots,
-                points: split
-                    .views
-                    .iter()
-                    .map(|view| (f64::from(view.time), view.psnr))
-                    .collect(),
+                points: split.views.iter().map(|view| (f64::from(view.time), view.psnr)).collect(),
             })
             .collect(),
         logarithmic: false,

@@ -10,15 +10,9 @@ pub(super) fn section(sections: &[SectionBytes]) -> String {
     if sections.is_empty() {
         return String::new();
     }
-    let total: u64 = sections
-        .iter()
-        .fold(0, |sum, section| sum.saturating_add(section.bytes));
+    let total: u64 = sections.iter().fold(0, |sum, section| sum.saturating_add(section.bytes));
     let share = |bytes: u64| {
-        if total == 0 {
-            0.0
-        } else {
-            bytes as f64 / total as f64 * 100.0
-        }
+        if total == 0 { 0.0 } else { bytes as f64 / total as f64 * 100.0 }
     };
     let mut html = String::from(
         "<div class=\"scroll\"><table class=\"sizes\">\n<thead><tr><th scope=\"col\">Section</th>\

@@ -2,16 +2,9 @@ use super::*;
 use crate::metrics_log::Stage;
 
 fn picture(width: u32, height: u32, shift: u8) -> RgbImage8 {
-    let at =
-        |x: u32, y: u32| [(x * 2) as u8, (y * 2) as u8, 128].map(|v: u8| v.saturating_add(shift));
-    let pixels = (0..height)
-        .flat_map(|y| (0..width).flat_map(move |x| at(x, y)))
-        .collect();
-    RgbImage8 {
-        width,
-        height,
-        pixels,
-    }
+    let at = |x: u32, y: u32| [(x * 2) as u8, (y * 2) as u8, 128].map(|v: u8| v.saturating_add(shift));
+    let pixels = (0..height).flat_map(|y| (0..width).flat_map(move |x| at(x, y))).collect();
+    RgbImage8 { width, height, pixels }
 }
 
 fn sample() -> Report {
@@ -29,30 +22,15 @@ fn sample() -> Report {
         record.iterations_per_second = Some(20.0);
         metrics.push(record);
     }
-    let view = |name: &str| ViewQuality {
-        name: name.into(),
-        time: 0.5,
-        psnr: 31.0,
-        ssim: 0.95,
-    };
+    let view = |name: &str| ViewQuality { name: name.into(), time: 0.5, psnr: 31.0, ssim: 0.95 };
     Report {
         title: "<b>bouncing</b> & \"more\" {{style}}".into(),
         created: "today".into(),
         device: "ndarray".into(),
-        summary: vec![SummaryTile {
-            label: "Test PSNR".into(),
-            value: "31.0 dB".into(),
-            hint: "20 views".into(),
-        }],
+        summary: vec![SummaryTile { label: "Test PSNR".into(), value: "31.0 dB".into(), hint: "20 views".into() }],
         sections: vec![
-            SectionBytes {
-                name: "gaussians".into(),
-                bytes: 123_456,
-            },
-            SectionBytes {
-                name: "planes".into(),
-                bytes: 1_234_567,
-            },
+            SectionBytes { name: "gaussians".into(), bytes: 123_456 },
+            SectionBytes { name: "planes".into(), bytes: 1_234_567 },
         ],
         splits: vec![SplitQuality {
             name: "test".into(),
@@ -75,10 +53,8 @@ fn sample() -> Report {
 
 /// Every tag that is opened is closed, in order.
 fn assert_balanced(html: &str) {
-    const VOID: [&str; 13] = [
-        "meta", "link", "img", "input", "line", "rect", "circle", "polyline", "!doctype", "br",
-        "hr", "path", "col",
-    ];
+    const VOID: [&str; 13] =
+        ["meta", "link", "img", "input", "line", "rect", "circle", "polyline", "!doctype", "br", "hr", "path", "col"];
     let body = html.split("<script>").next().expect("a page");
     let body = match (body.find("<style>"), body.find("</style>")) {
         (Some(from), Some(to)) => format!("{}{}", &body[..from], &body[to + 8..]),
@@ -87,12 +63,7 @@ fn assert_balanced(html: &str) {
     let mut open: Vec<String> = Vec::new();
     for piece in body.split('<').skip(1) {
         let tag = piece.split('>').next().expect("a tag");
-        let name = tag
-            .trim_start_matches('/')
-            .split([' ', '/'])
-            .next()
-            .expect("a name")
-            .to_lowercase();
+        let name = tag.trim_start_matches('/').split([' ', '/']).next().expect("a name").to_lowercase();
         if tag.starts_with('/') {
             assert_eq!(open.pop().as_deref(), Some(name.as_str()), "closing {tag}");
         } else if !tag.ends_with('/') && (name == "circle" || !VOID.contains(&name.as_str())) {
@@ -111,20 +82,13 @@ fn a_report_is_one_well_formed_file() {
     assert_balanced(&html);
     assert_eq!(html.matches("<img src=\"data:image/png;base64,").count(), 3);
     assert_eq!(html.matches("<svg ").count(), 5);
+    assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("//www"), "no request");
     assert!(
-        !html.contains("http:") && !html.contains("https:") && !html.contains("//www"),
-        "no request"
-    );
-    assert!(
-        !html.contains("<b>bouncing")
-            && html.contains("&lt;b&gt;bouncing&lt;/b&gt; &amp; &quot;more&quot; {{style}}")
+        !html.contains("<b>bouncing") && html.contains("&lt;b&gt;bouncing&lt;/b&gt; &amp; &quot;more&quot; {{style}}")
     );
     assert!(html.contains("seed = 0 # &lt;&amp;&gt;"));
     assert!(html.contains("1\u{202f}234\u{202f}567") && html.contains("LPIPS"));
-    assert_eq!(
-        std::fs::read_dir(folder.path()).expect("a folder").count(),
-        1
-    );
+    assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 1);
 }
 
 #[test]
@@ -142,10 +106,7 @@ fn odd_values_do_no_harm() {
     report.metrics[0].psnr = Some(f64::INFINITY);
     report.splits[0].psnr = f64::NAN;
     report.splits[0].views[0].psnr = f64::INFINITY;
-    report
-        .sections
-        .iter_mut()
-        .for_each(|section| section.bytes = 0);
+    report.sections.iter_mut().for_each(|section| section.bytes = 0);
     let html = page(Path::new("report.html"), &report).expect("a page");
     assert_balanced(&html);
     assert!(!html.contains("NaN") && !html.contains("inf\""));
@@ -155,23 +116,13 @@ fn odd_values_do_no_harm() {
 fn sizes_that_differ_are_refused_and_named() {
     let mut report = sample();
     report.pictures[0].render = picture(30, 40, 0);
-    let message = page(Path::new("report.html"), &report)
-        .expect_err("sizes")
-        .to_string();
-    assert!(
-        message.contains("r_000") && message.contains("30x40") && message.contains("40x30"),
-        "{message}"
-    );
+    let message = page(Path::new("report.html"), &report).expect_err("sizes").to_string();
+    assert!(message.contains("r_000") && message.contains("30x40") && message.contains("40x30"), "{message}");
 }
 
 #[test]
 fn the_colour_map_runs_from_dark_to_bright() {
-    let brightness = |value: f32| {
-        color_map::inferno(value)
-            .iter()
-            .map(|c| u32::from(*c))
-            .sum::<u32>()
-    };
+    let brightness = |value: f32| color_map::inferno(value).iter().map(|c| u32::from(*c)).sum::<u32>();
     assert_eq!(color_map::inferno(0.0), [0, 0, 4]);
     assert_eq!(color_map::inferno(7.0), [252, 255, 164]);
     assert_eq!(color_map::inferno(f32::NAN), [0, 0, 4]);

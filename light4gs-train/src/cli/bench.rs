@@ -1,0 +1,62 @@
+//! `bench`: the table of `crate::benchmark`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::print_json;
+use crate::benchmark::{BenchScene, benchmark, table};
+use crate::device::device_by_name;
+use crate::error::TrainError;
+
+#[derive(Debug, Args)]
+pub(super) struct Bench {
+    /// Back ends, separated by commas.
+    #[arg(long, value_delimiter = ',', default_value = "ndarray,flex")]
+    device: Vec<String>,
+    /// A scene file instead of generated ones (layout: docs/benchmarks.md).
+    #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
+    scene: Vec<PathBuf>,
+    /// Gaussians of the generated scenes.
+    #[arg(long, value_delimiter = ',', default_value = "5000,20000,100000")]
+    gaussians: Vec<usize>,
+    /// Widths and heights of the generated scenes' pictures.
+    #[arg(long, value_delimiter = ',', default_value = "400,800")]
+    size: Vec<u32>,
+    /// Timed repetitions of each stage, after two untimed ones.
+    #[arg(long, default_value_t = 11, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    repeats: u32,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Bench {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let mut scenes = Vec::new();
+        for path in &self.scene {
+            scenes.push(BenchScene::open(path)?);
+        }
+        if scenes.is_empty() {
+            if self.size.iter().any(|size| !(1..=16_384).contains(size)) {
+                return Err(TrainError::Input("--size must be between 1 and 16384".into()));
+            }
+            let sizes = self.size.clone();
+            scenes.extend(
+                self.gaussians
+                    .iter()
+                    .flat_map(|count| sizes.iter().map(move |size| BenchScene::generate(*count, *size))),
+            );
+        }
+        let mut results = Vec::new();
+        for name in &self.device {
+            results.push(benchmark(name, &device_by_name(name)?, &scenes, self.repeats as usize)?);
+        }
+        if self.json {
+            print_json(&results);
+        } else {
+            println!("{}", table(&results));
+        }
+        Ok(())
+    }
+}

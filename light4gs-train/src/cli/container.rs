@@ -1,0 +1,165 @@
+//! `encode`, `decode`, `info`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use clap::Args;
+use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically, write_file};
+use light4gs_data::{DataError, Scene};
+use safetensors::Dtype;
+use safetensors::tensor::TensorView;
+use serde_json::json;
+
+use super::train::sections_table;
+use super::{check_output, print_json};
+use crate::checkpoint::Checkpoint;
+use crate::device::device_by_name;
+use crate::error::TrainError;
+use crate::evaluation::section_sizes;
+use crate::run_folder::RunFolder;
+use crate::trainer::{load_options, scene_meta};
+
+#[derive(Debug, Args)]
+pub(super) struct Encode {
+    /// Folder of a run.
+    run: PathBuf,
+    /// A checkpoint of the run; the newest if not given.
+    #[arg(long)]
+    checkpoint: Option<PathBuf>,
+    /// The file to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// Back end: ndarray or flex.
+    #[arg(long)]
+    device: Option<String>,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Encode {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        check_output(&self.out)?;
+        let (folder, record, config) = RunFolder::open(&self.run)?;
+        let Some(path) = self.checkpoint.or_else(|| folder.last_checkpoint()) else {
+            let run = self.run.display();
+            return Err(TrainError::Input(format!(
+                "{run} has no checkpoint yet; train it with `light4gs resume {run}`"
+            )));
+        };
+        let device = device_by_name(self.device.as_deref().unwrap_or(&config.device))?.autodiff();
+        let checkpoint = Checkpoint::load(&path, &config, &device)?;
+        let data = Scene::open(&record.scene, &load_options(&config))?;
+        write_file(&self.out, &checkpoint.scene.to_arrays(scene_meta(&config, &data)))?;
+        print_info(&read_info(&self.out)?, self.json);
+        Ok(())
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Info {
+    /// The file.
+    file: PathBuf,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Info {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        print_info(&read_info(&self.file)?, self.json);
+        Ok(())
+    }
+}
+
+fn print_info(info: &StreamInfo, json: bool) {
+    let SceneMeta { name, frame_count, fps, bounds, background, config_digest, width, height, fov_x, .. } = &info.meta;
+    let digest: String = config_digest.iter().map(|byte| format!("{byte:02x}")).collect();
+    if json {
+        let sections: Vec<_> = info
+            .sections
+            .iter()
+            .map(|s| json!({"name": s.name, "encoding": s.encoding.name(), "offset": s.offset, "bytes": s.bytes}))
+            .collect();
+        return print_json(&json!({
+            "version": info.version, "bytes": info.bytes, "header_bytes": info.header_bytes, "sections": sections,
+            "name": name, "frames": frame_count, "fps": fps, "bounds": bounds, "background": background,
+            "config_digest": digest, "width": width, "height": height, "fov_x": fov_x,
+            "gaussians": info.gaussian_count, "sh_degree": info.sh_degree,
+            "hexplane": {"channels": info.hexplane_channels, "resolution": info.hexplane_resolution,
+                "multipliers": info.hexplane_multipliers},
+            "deformation": {"width": info.network_width, "depth": info.network_depth, "layers": info.layer_count},
+        }));
+    }
+    println!("{name}: version {}, {width}×{height}, {frame_count} times at {fps} frames a second", info.version);
+    println!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree);
+    println!(
+        "hexplanes: {} channels, {:?} cells times {:?}; network: width {}, {} layers",
+        info.hexplane_channels,
+        info.hexplane_resolution,
+        info.hexplane_multipliers,
+        info.network_width,
+        info.layer_count
+    );
+    println!("configuration {digest}\n");
+    let sizes = section_sizes(info);
+    println!("{}", sections_table(sizes.iter().map(|s| (s.name.as_str(), s.bytes)), info.bytes));
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Decode {
+    /// The file.
+    file: PathBuf,
+    /// The safetensors file to write.
+    #[arg(long)]
+    out: PathBuf,
+}
+
+impl Decode {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        check_output(&self.out)?;
+        let data = read_file(&self.file)?;
+        let tensors = plain_tensors(&data);
+        let views = tensors.iter().map(|(name, (shape, bytes))| {
+            (name, TensorView::new(Dtype::F32, shape.clone(), bytes).expect("shapes match their values"))
+        });
+        let bytes = safetensors::serialize(views, None).map_err(|error| TrainError::Input(error.to_string()))?;
+        write_atomically(&self.out, &bytes).map_err(|source| DataError::Io {
+            action: "write",
+            path: self.out.clone(),
+            source,
+        })?;
+        println!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len());
+        Ok(())
+    }
+}
+
+/// Shapes and little-endian float32 bytes by name.
+fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
+    let mut tensors = BTreeMap::new();
+    let mut add = |name: String, shape: Vec<usize>, values: &[f32]| {
+        tensors.insert(name, (shape, values.iter().flat_map(|v| v.to_le_bytes()).collect()));
+    };
+    let gaussians = &data.gaussians;
+    let count = gaussians.len();
+    let rest = if count == 0 { 0 } else { gaussians.sh_rest.len() / (3 * count) };
+    add("gaussians.means".into(), vec![count, 3], gaussians.means.as_flattened());
+    add("gaussians.log_scales".into(), vec![count, 3], gaussians.log_scales.as_flattened());
+    add("gaussians.quats".into(), vec![count, 4], gaussians.quats.as_flattened());
+    add("gaussians.opacity_logits".into(), vec![count, 1], &gaussians.opacity_logits);
+    add("gaussians.sh_dc".into(), vec![count, 1, 3], gaussians.sh_dc.as_flattened());
+    add("gaussians.sh_rest".into(), vec![count, rest, 3], &gaussians.sh_rest);
+    add("frame.mean".into(), vec![3], &data.frame.mean);
+    add("frame.axes".into(), vec![3, 3], data.frame.axes.as_flattened());
+    add("frame.std".into(), vec![3], &data.frame.std);
+    for (i, plane) in data.hexplane.planes.iter().enumerate() {
+        let shape = vec![data.hexplane.channels as usize, plane.height as usize, plane.width as usize];
+        add(format!("hexplane.{}.{}", i / 6, light4gs_model::PLANE_NAMES[i % 6]), shape, &plane.values);
+    }
+    for layer in &data.deformation.layers {
+        let shape = vec![layer.outputs as usize, layer.inputs as usize];
+        add(format!("deformation.{}.weight", layer.name), shape, &layer.weight);
+        add(format!("deformation.{}.bias", layer.name), vec![layer.outputs as usize], &layer.bias);
+    }
+    tensors
+}

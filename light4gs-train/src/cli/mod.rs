@@ -1,0 +1,98 @@
+//! The command line: one file a command.
+
+mod bench;
+mod container;
+mod export;
+mod quickstart;
+mod render;
+mod synth;
+mod train;
+
+use std::path::PathBuf;
+
+use clap::{Parser, Subcommand};
+
+use crate::error::TrainError;
+
+/// Learns dynamic scenes as deformable 3D Gaussians and stores each as one .l4gs file.
+#[derive(Debug, Parser)]
+#[command(name = "light4gs", version, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a small synthetic scene, train on it, write the file and the report.
+    #[command(after_help = "Example:\n  light4gs quickstart --out runs/quickstart")]
+    Quickstart(quickstart::Quickstart),
+    /// Train on a dataset.
+    #[command(
+        after_help = "Example:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-small --out runs/bouncing"
+    )]
+    Train(train::Train),
+    /// Continue a run from its last checkpoint, to the same result as if it had not been interrupted.
+    #[command(after_help = "Example:\n  light4gs resume runs/bouncing")]
+    Resume(train::Resume),
+    /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
+    #[command(after_help = "Example:\n  light4gs eval runs/bouncing --json")]
+    Eval(train::Eval),
+    /// Render a file over time along a camera path, to a GIF or to PNG frames.
+    #[command(after_help = "Example:\n  light4gs render runs/bouncing/scene.l4gs --out bouncing.gif --frames 60")]
+    Render(render::Render),
+    /// Write the newest checkpoint of a run as a .l4gs file.
+    #[command(after_help = "Example:\n  light4gs encode runs/bouncing --out bouncing.l4gs")]
+    Encode(container::Encode),
+    /// Unpack a .l4gs file to plain arrays (safetensors).
+    #[command(after_help = "Example:\n  light4gs decode bouncing.l4gs --out bouncing.safetensors")]
+    Decode(container::Decode),
+    /// Print what a .l4gs file holds, with sizes by section.
+    #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
+    Info(container::Info),
+    /// Write the Gaussians at successive times as PLY files that 3DGS viewers read.
+    #[command(after_help = "Example:\n  light4gs export bouncing.l4gs --out frames --frames 30")]
+    Export(export::Export),
+    /// Write the procedural scene of the quickstart as a D-NeRF dataset.
+    #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
+    Synth(synth::Synth),
+    /// Time every stage of training on one or more devices.
+    #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex --gaussians 20000 --size 400")]
+    Bench(bench::Bench),
+}
+
+impl Cli {
+    /// Runs the command.
+    pub fn run(self) -> Result<(), TrainError> {
+        match self.command {
+            Command::Quickstart(command) => command.run(),
+            Command::Train(command) => command.run(),
+            Command::Resume(command) => command.run(),
+            Command::Eval(command) => command.run(),
+            Command::Render(command) => command.run(),
+            Command::Encode(command) => command.run(),
+            Command::Decode(command) => command.run(),
+            Command::Info(command) => command.run(),
+            Command::Export(command) => command.run(),
+            Command::Synth(command) => command.run(),
+            Command::Bench(command) => command.run(),
+        }
+    }
+}
+
+/// Prints a value as pretty JSON.
+fn print_json(value: &impl serde::Serialize) {
+    println!("{}", serde_json::to_string_pretty(value).expect("plain data has a JSON form"));
+}
+
+/// Refuses an output path whose folder does not exist, before any work is done.
+fn check_output(path: &PathBuf) -> Result<(), TrainError> {
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    match folder {
+        Some(folder) if !folder.is_dir() => {
+            let (path, folder) = (path.display(), folder.display());
+            Err(TrainError::Input(format!("cannot write {path}: the folder {folder} does not exist; make it first")))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,49 @@
+//! `quickstart`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use light4gs_data::{SyntheticOptions, write_synthetic};
+
+use super::train::train;
+use crate::config::Config;
+use crate::error::TrainError;
+
+#[derive(Debug, Args)]
+pub(super) struct Quickstart {
+    /// Folder of the run; the scene is made beside it, in a folder of the same name with `-scene` at its end.
+    #[arg(long, default_value = "runs/quickstart")]
+    out: PathBuf,
+    /// Back end: ndarray or flex.
+    #[arg(long, default_value = "ndarray")]
+    device: String,
+    /// Replace a run that is there already.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print the evaluation as JSON.
+    #[arg(long)]
+    json: bool,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Quickstart {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let config = Config::load("quickstart", &[format!("device={}", self.device)])?;
+        let mut scene = self.out.clone().into_os_string();
+        scene.push("-scene");
+        let scene = PathBuf::from(scene);
+        if !scene.exists() {
+            if let Some(parent) = scene.parent() {
+                std::fs::create_dir_all(parent).map_err(|source| light4gs_data::DataError::Io {
+                    action: "create",
+                    path: parent.into(),
+                    source,
+                })?;
+            }
+            write_synthetic(&scene, &SyntheticOptions::default())?;
+        }
+        train(config, &scene, &self.out, self.overwrite, self.json, self.quiet)
+    }
+}

@@ -1,0 +1,116 @@
+//! `render`.
+
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
+
+use super::check_output;
+use crate::device::device_by_name;
+use crate::error::TrainError;
+use crate::evaluation::DecodedScene;
+use crate::video::{Looping, write_gif, write_png_sequence};
+
+/// Radius in world units and elevation in degrees of the orbit, as the D-NeRF video path has them.
+const ORBIT: (f32, f32) = (4.0, 30.0);
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Path {
+    /// Once around the scene while time runs from 0 to 1.
+    Orbit,
+    /// The orbit's first camera stands still while time runs.
+    Fixed,
+    /// The orbit at one moment (see --time).
+    Frozen,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Render {
+    /// The .l4gs file.
+    file: PathBuf,
+    /// A file that ends in .gif, or a folder for PNG frames.
+    #[arg(long)]
+    out: PathBuf,
+    /// Camera path.
+    #[arg(long, value_enum, default_value = "orbit")]
+    path: Path,
+    /// Render the test views of this dataset instead of a path.
+    #[arg(long, conflicts_with = "path")]
+    scene: Option<PathBuf>,
+    /// Number of frames.
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    frames: u32,
+    /// The moment of a frozen path, in [0, 1].
+    #[arg(long, default_value_t = 0.0)]
+    time: f32,
+    /// Width in pixels; the training pictures' if not given.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    width: Option<u32>,
+    /// Distance of the orbit from the origin, world units.
+    #[arg(long, default_value_t = ORBIT.0)]
+    radius: f32,
+    /// Height of the orbit in degrees.
+    #[arg(long, default_value_t = ORBIT.1)]
+    elevation: f32,
+    /// Frames a second of a GIF.
+    #[arg(long, default_value_t = 20.0)]
+    fps: f32,
+    /// Back end: ndarray or flex.
+    #[arg(long, default_value = "ndarray")]
+    device: String,
+}
+
+impl Render {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        if !(0.0..=1.0).contains(&self.time) {
+            return Err(TrainError::Input(format!("--time must be in [0, 1], not {}", self.time)));
+        }
+        if !(self.radius.is_finite() && self.radius > 0.0 && self.elevation.is_finite()) {
+            return Err(TrainError::Input("--radius must be positive and --elevation finite".into()));
+        }
+        check_output(&self.out)?;
+        let decoded = DecodedScene::open(&self.file, &device_by_name(&self.device)?)?;
+        let frames = self.camera_frames(&decoded)?;
+        let pictures = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
+        if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
+            let count = write_gif(&self.out, pictures, self.fps, Looping::Forever)?;
+            println!("wrote {} ({count} frames)", self.out.display());
+        } else {
+            let files = write_png_sequence(&self.out, pictures)?;
+            println!("wrote {} frames to {}", files.len(), self.out.display());
+        }
+        Ok(())
+    }
+
+    fn camera_frames(&self, decoded: &DecodedScene) -> Result<Vec<Frame>, TrainError> {
+        let meta = &decoded.data.meta;
+        let (width, height) = (meta.width.max(1), meta.height.max(1));
+        let new_width = self.width.unwrap_or(width);
+        let new_height = ((u64::from(height) * u64::from(new_width)).div_ceil(u64::from(width)) as u32).max(1);
+        if let Some(scene) = &self.scene {
+            let resolution = Resolution::Exact { width: new_width, height: new_height };
+            let options = LoadOptions { resolution, background: meta.background, ..LoadOptions::default() };
+            return Ok(Scene::open(scene, &options)?.test);
+        }
+        let intrinsics = Camera::look_at(
+            [0.0, -1.0, 0.0].into(),
+            [0.0; 3].into(),
+            [0.0, 0.0, 1.0].into(),
+            meta.fov_x,
+            width,
+            height,
+        )
+        .resized(new_width, new_height);
+        let path = orbit_path(self.frames as usize, self.radius, self.elevation, &intrinsics);
+        let first = path[0].0;
+        let frame = |(k, (camera, time)): (usize, (Camera, f32))| {
+            let (camera, time) = match self.path {
+                Path::Orbit => (camera, time),
+                Path::Fixed => (first, time),
+                Path::Frozen => (camera, self.time),
+            };
+            Frame::without_picture(format!("{k:04}"), camera, time)
+        };
+        Ok(path.into_iter().enumerate().map(frame).collect())
+    }
+}

@@ -1,0 +1,44 @@
+//! `synth`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use light4gs_data::{SyntheticOptions, write_synthetic};
+
+use crate::error::TrainError;
+
+#[derive(Debug, Args)]
+pub(super) struct Synth {
+    /// Folder to make.
+    out: PathBuf,
+    /// Width and height in pixels.
+    #[arg(long, default_value_t = 200)]
+    resolution: u32,
+    /// Training pictures.
+    #[arg(long, default_value_t = 100)]
+    train_frames: usize,
+    /// Test pictures.
+    #[arg(long, default_value_t = 20)]
+    test_frames: usize,
+    /// Validation pictures.
+    #[arg(long, default_value_t = 10)]
+    val_frames: usize,
+    /// Seed of the cameras.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+}
+
+impl Synth {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let options = SyntheticOptions {
+            resolution: self.resolution,
+            train_frames: self.train_frames,
+            test_frames: self.test_frames,
+            val_frames: self.val_frames,
+            seed: self.seed,
+        };
+        write_synthetic(&self.out, &options)?;
+        println!("wrote {}", self.out.display());
+        Ok(())
+    }
+}

@@ -1,0 +1,189 @@
+//! `train`, `resume`, `eval`.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use light4gs_data::{ImageStore, Scene};
+
+use super::print_json;
+use crate::config::Config;
+use crate::device::device_by_name;
+use crate::error::TrainError;
+use crate::evaluation::{DecodedScene, Evaluation};
+use crate::finish::evaluate_run;
+use crate::run_folder::RunFolder;
+use crate::table::{Align, Table};
+use crate::trainer::{Trainer, load_options};
+
+#[derive(Debug, Args)]
+pub(super) struct Train {
+    /// Folder of the dataset.
+    scene: PathBuf,
+    /// A preset (see docs/configuration.md) or a TOML file.
+    #[arg(long, default_value = "dnerf-small", value_name = "PRESET|FILE")]
+    config: String,
+    /// Folder of the run.
+    #[arg(long)]
+    out: PathBuf,
+    /// Changes one key of the configuration; may be given more than once.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Back end: ndarray or flex.
+    #[arg(long)]
+    device: Option<String>,
+    /// Replace a run that is there already.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print the evaluation as JSON.
+    #[arg(long)]
+    json: bool,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Train {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let mut overrides = self.overrides;
+        overrides.extend(self.device.map(|device| format!("device={device}")));
+        let config = Config::load(&self.config, &overrides)?;
+        train(config, &self.scene, &self.out, self.overwrite, self.json, self.quiet)
+    }
+}
+
+/// A new run from beginning to report.
+pub(super) fn train(
+    config: Config,
+    scene: &Path,
+    out: &Path,
+    overwrite: bool,
+    json: bool,
+    quiet: bool,
+) -> Result<(), TrainError> {
+    device_by_name(&config.device)?;
+    // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
+    Scene::open(scene, &load_options(&config))?;
+    let folder = RunFolder::create(out, scene, &config, overwrite)?;
+    let (folder, record, config) = RunFolder::open(folder.root())?;
+    let trainer = Trainer::start(config.clone(), folder.clone(), &record, quiet)?;
+    finish(trainer, &folder, &config, json)
+}
+
+fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool) -> Result<(), TrainError> {
+    trainer.run()?;
+    let evaluation = evaluate_run(folder, config, trainer.data())?;
+    print_evaluation(&evaluation, json);
+    if !json {
+        println!("\nreport: {}", folder.path("report.html").display());
+    }
+    Ok(())
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Resume {
+    /// Folder of the run.
+    run: PathBuf,
+    /// Print the evaluation as JSON.
+    #[arg(long)]
+    json: bool,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Resume {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let (folder, record, config) = RunFolder::open(&self.run)?;
+        let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.quiet)?;
+        finish(trainer, &folder, &config, self.json)
+    }
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Eval {
+    /// Folder of a run, or a .l4gs file (then --scene is needed).
+    run: PathBuf,
+    /// Folder of the dataset, where it is not the run's own.
+    #[arg(long)]
+    scene: Option<PathBuf>,
+    /// Back end: ndarray or flex.
+    #[arg(long)]
+    device: Option<String>,
+    /// Print as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Eval {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        if self.run.is_file() {
+            return self.eval_file();
+        }
+        let (folder, mut record, mut config) = RunFolder::open(&self.run)?;
+        if !folder.stream().exists() {
+            let run = self.run.display();
+            return Err(TrainError::Input(format!(
+                "{run} has no scene.l4gs yet; finish it with `light4gs resume {run}`"
+            )));
+        }
+        config.device = self.device.unwrap_or(config.device);
+        record.scene = self.scene.unwrap_or(record.scene);
+        let scene = Scene::open(&record.scene, &load_options(&config))?;
+        print_evaluation(&evaluate_run(&folder, &config, &scene)?, self.json);
+        Ok(())
+    }
+
+    fn eval_file(self) -> Result<(), TrainError> {
+        let Some(scene) = self.scene else {
+            return Err(TrainError::Input("a .l4gs file holds no pictures; name the dataset with --scene DIR".into()));
+        };
+        let name = self.device.unwrap_or_else(|| "ndarray".into());
+        let decoded = DecodedScene::open(&self.run, &device_by_name(&name)?)?;
+        let mut config = Config::default();
+        config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
+        config.data.background = decoded.data.meta.background;
+        let options = load_options(&config);
+        let scene = Scene::open(&scene, &options)?;
+        let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
+        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &name)?;
+        print_evaluation(&evaluation, self.json);
+        Ok(())
+    }
+}
+
+fn print_evaluation(evaluation: &Evaluation, json: bool) {
+    if json {
+        return print_json(evaluation);
+    }
+    let mut quality = Table::new([
+        ("split", Align::Left),
+        ("views", Align::Right),
+        ("PSNR dB", Align::Right),
+        ("SSIM", Align::Right),
+    ]);
+    for split in &evaluation.splits {
+        let (psnr, ssim) = (format!("{:.2}", split.psnr), format!("{:.4}", split.ssim));
+        quality.row([split.split.clone(), split.views.len().to_string(), psnr, ssim]);
+    }
+    println!("{quality}");
+    println!("{}", sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes));
+    let [width, height] = evaluation.resolution;
+    println!(
+        "{} Gaussians, {:.1} FPS at {width}×{height} on {}",
+        evaluation.gaussians, evaluation.fps, evaluation.device
+    );
+    if let Some(seconds) = evaluation.training_seconds {
+        println!("trained for {:.1} min", seconds / 60.0);
+    }
+}
+
+/// Bytes and shares of a file's parts.
+pub(super) fn sections_table<'a>(sections: impl Iterator<Item = (&'a str, u64)>, total: u64) -> Table {
+    let mut table = Table::new([("section", Align::Left), ("bytes", Align::Right), ("share", Align::Right)]);
+    let share = |bytes: u64| format!("{:.1} %", 100.0 * bytes as f64 / total as f64);
+    for (name, bytes) in sections {
+        table.row([name.to_owned(), bytes.to_string(), share(bytes)]);
+    }
+    table.rule().row(["file".to_owned(), total.to_string(), share(total)]);
+    table
+}
