@@ -2,7 +2,7 @@
 
 use burn::backend::Dispatch;
 use burn::tensor::activation::sigmoid;
-use burn::tensor::{Bool, Int, Tensor, s};
+use burn::tensor::{Bool, Int, Tensor};
 use light4gs_data::Camera;
 
 use crate::cpu::project::View;
@@ -117,12 +117,14 @@ impl Splatter {
             screen_offsets: screen_offsets.into_dispatch(),
         };
         let outputs = Dispatch::splat(inputs, view);
-        let picture = Tensor::<3>::from_dispatch(outputs.picture);
+        let picture = Tensor::<1>::from_dispatch(outputs.picture);
         let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let pixels = width * height;
         Rendering {
-            image: picture.clone().slice(s![.., .., 0..3]),
-            alpha: picture.clone().slice(s![.., .., 3..4]).squeeze_dim(2),
-            depth: picture.slice(s![.., .., 4..5]).squeeze_dim(2),
+            image: picture.clone().slice([0..3 * pixels]).reshape([height, width, 3]),
+            alpha: picture.clone().slice([3 * pixels..4 * pixels]).reshape([height, width]),
+            depth: picture.slice([4 * pixels..5 * pixels]).reshape([height, width]),
             radii,
         }
     }

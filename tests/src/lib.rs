@@ -4,4 +4,7 @@
 #![allow(deprecated)]
 
 pub mod golden;
+pub mod random;
 pub mod raster;
+pub mod splat_scene;
+pub mod twin;

@@ -2,8 +2,11 @@
 
 use burn::module::Param;
 use burn::nn::Linear;
-use burn::tensor::{Device, Tensor};
-use light4gs_model::{Deformation, DeformationConfig, DeformationHead, HexPlane, Pca, SceneFrame, contract};
+use burn::tensor::{Device, Tensor, s};
+use light4gs_model::{
+    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, Pca, SceneFrame,
+    contract,
+};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 
 #[test]
@@ -202,5 +205,83 @@ fn deformation() {
                 );
             }
         }
+    }
+}
+
+/// The reference's coordinates, which are not ours: a box around the points, the contraction, a quarter of it, and a half
+/// on top. `[N, 4]` in [0, 1] for space and in [-1, 1] for time.
+fn reference_query_points(golden: &Golden, xyz: Tensor<2>, device: &Device) -> Tensor<2> {
+    let count = xyz.dims()[0];
+    let (low, high) = (golden.tensor::<2>("full.aabb_min", device), golden.tensor::<2>("full.aabb_max", device));
+    let boxed = (xyz - low.clone()) / (high - low) * 2.0 - 1.0;
+    let time = golden.tensor::<2>("full.t", device).expand([count, 1]) * 2.0 - 1.0;
+    Tensor::cat(vec![contract(boxed) / 4.0 + 0.5, time], 1)
+}
+
+/// Planes, network and attributes together: `full.*` of c03, whose network is that of depth 1.
+#[test]
+fn deformed_gaussians() {
+    let golden = Golden::open("c03_deform");
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let shs = golden.tensor::<3>("full.in.shs", &device);
+        let [count, coefficients, _] = shs.dims();
+        let gaussians = Gaussians::from_tensors(GaussianTensors {
+            means: golden.tensor("full.in.xyz", &device),
+            log_scales: golden.tensor("full.in.scales", &device),
+            quats: golden.tensor("full.in.rotations", &device),
+            opacity_logits: golden.tensor("full.in.opacity", &device),
+            sh_dc: shs.clone().slice(s![.., 0..1, ..]),
+            sh_rest: shs.slice(s![.., 1..coefficients, ..]),
+        });
+        let identity = Pca { mean: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] };
+        let GoldenNetwork { network, layers } = network_of(&golden, "depth1", &device);
+        let scene = DynamicScene {
+            gaussians,
+            frame: SceneFrame::new(&identity, &device),
+            hexplane: hexplane_of(&golden, "full.", &device),
+            deformation: network,
+            differentiate_points: false,
+        };
+        let rest = scene.gaussians.tensors();
+        let points = reference_query_points(&golden, rest.means.clone().detach(), &device);
+        let moved = scene.deform(rest.clone(), scene.hexplane.query(points));
+
+        let check = |key: &str, found: &[f32]| {
+            let key = format!("full.{key}");
+            assert_close_relative(&format!("{name} {key}"), found, &golden.values(&key), 1e-5);
+        };
+        let moved_shs = Tensor::cat(vec![moved.sh_dc, moved.sh_rest], 1);
+        let outputs = [
+            ("xyz", moved.means),
+            ("scales", moved.log_scales),
+            ("rotations", moved.quats),
+            ("opacity", moved.opacity_logits),
+            ("shs", moved_shs.reshape([count, 3 * coefficients])),
+        ];
+        let mut loss = Tensor::<1>::zeros([1], &device);
+        for (key, output) in outputs {
+            check(&format!("out.{key}"), &values_of(&output));
+            let weights = golden.values(&format!("full.w.{key}"));
+            let weights = Tensor::<1>::from_floats(&weights[..], &device).reshape(output.dims());
+            loss = loss + (output * weights).sum();
+        }
+        // A sum of numbers that cancel.
+        assert_close_relative(&format!("{name} loss"), &values_of(&loss), &golden.values("full.loss"), 1e-4);
+
+        let grads = loss.backward();
+        let gradient = |tensor: &Tensor<2>| values_of(&tensor.grad(&grads).unwrap());
+        check("grad.xyz", &gradient(&rest.means));
+        assert_close(&format!("{name} xyz detached"), &gradient(&rest.means), &golden.values("full.w.xyz"), 0.0);
+        check("grad.scales", &gradient(&rest.log_scales));
+        check("grad.rotations", &gradient(&rest.quats));
+        check("grad.opacity", &gradient(&rest.opacity_logits));
+        let (dc, other) = (rest.sh_dc.grad(&grads).unwrap(), rest.sh_rest.grad(&grads).unwrap());
+        check("grad.shs", &values_of(&Tensor::cat(vec![dc, other], 1)));
+        for (i, plane) in scene.hexplane.planes.iter().enumerate() {
+            let key = format!("grad.scale{}.plane{}", i / 6, i % 6);
+            check(&key, &values_of(&plane.val().grad(&grads).unwrap()));
+        }
+        assert!(layers.iter().all(|(_, layer)| layer.weight.val().grad(&grads).is_some()));
     }
 }

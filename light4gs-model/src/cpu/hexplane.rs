@@ -51,10 +51,12 @@ impl PackedPlanes {
 fn pack(plane: &[f32], channels: usize) -> Vec<Block> {
     let cells = plane.len() / channels;
     let mut packed = vec![[0.0; LANES]; cells * channels.div_ceil(LANES)];
-    for (channel, values) in plane.chunks_exact(cells).enumerate() {
-        let block = &mut packed[channel / LANES * cells..][..cells];
-        for (to, &from) in block.iter_mut().zip(values) {
-            to[channel % LANES] = from;
+    for (block, group) in packed.chunks_exact_mut(cells).zip(plane.chunks(cells * LANES)) {
+        let rows: Vec<&[f32]> = group.chunks_exact(cells).collect();
+        for (cell, to) in block.iter_mut().enumerate() {
+            for (value, row) in to.iter_mut().zip(&rows) {
+                *value = row[cell];
+            }
         }
     }
     packed
@@ -63,12 +65,43 @@ fn pack(plane: &[f32], channels: usize) -> Vec<Block> {
 fn unpack(blocks: &[&[Block]], channels: usize) -> Vec<f32> {
     let cells = blocks[0].len();
     let mut plane = vec![0.0; channels * cells];
-    for (channel, values) in plane.chunks_exact_mut(cells).enumerate() {
-        for (to, from) in values.iter_mut().zip(blocks[channel / LANES]) {
-            *to = from[channel % LANES];
+    for (group, block) in plane.chunks_mut(cells * LANES).zip(blocks) {
+        let mut rows: Vec<&mut [f32]> = group.chunks_exact_mut(cells).collect();
+        for (cell, from) in block.iter().enumerate() {
+            for (row, value) in rows.iter_mut().zip(from) {
+                row[cell] = *value;
+            }
         }
     }
     plane
+}
+
+/// Cells of the coarse grid that points are sorted by, along each spatial axis.
+const SORT_CELLS: usize = 16;
+
+/// Points sorted by a coarse grid, so that neighbours in the order touch the same cells of the planes.
+fn spatial_order(points: &[f32]) -> Vec<u32> {
+    let key = |point: &[f32]| {
+        point[..3].iter().fold(0, |key, &coordinate| {
+            // Saturating: NaN and what lies outside fall to the border.
+            let cell = ((coordinate + 1.0) * 0.5 * SORT_CELLS as f32) as usize;
+            key * SORT_CELLS + cell.min(SORT_CELLS - 1)
+        })
+    };
+    let mut starts = vec![0u32; SORT_CELLS.pow(3) + 1];
+    for point in points.chunks_exact(4) {
+        starts[key(point) + 1] += 1;
+    }
+    for i in 1..starts.len() {
+        starts[i] += starts[i - 1];
+    }
+    let mut order = vec![0; points.len() / 4];
+    for (i, point) in points.chunks_exact(4).enumerate() {
+        let place = &mut starts[key(point)];
+        order[*place as usize] = i as u32;
+        *place += 1;
+    }
+    order
 }
 
 /// Where a coordinate falls on an axis.
@@ -191,6 +224,7 @@ struct Backward<'a> {
     planes: &'a PackedPlanes,
     /// `[N, C]`
     upstream: &'a [f32],
+    order: &'a [u32],
     block: usize,
     with_points: bool,
 }
@@ -208,8 +242,10 @@ impl LaneKernel for Backward<'_> {
         let first = self.block * LANES;
         let own = LANES.min(channels - first);
 
-        for (n, (point, upstream)) in self.points.chunks_exact(4).zip(self.upstream.chunks_exact(channels)).enumerate()
-        {
+        for &n in self.order {
+            let n = n as usize;
+            let point = &self.points[4 * n..4 * n + 4];
+            let upstream = &self.upstream[channels * n..channels * (n + 1)];
             let axes = samples(point, planes.resolution);
             let corners = corners(&axes, planes.resolution);
             let mut padded = [0.0; LANES];
@@ -263,9 +299,10 @@ pub(crate) fn query_backward(
     upstream: &[f32],
     with_points: bool,
 ) -> QueryGradients {
+    let order = spatial_order(points);
     let blocks: Vec<([Vec<Block>; 6], Vec<f32>)> = (0..planes.blocks())
         .into_par_iter()
-        .map(|block| dispatch(Backward { points, planes, upstream, block, with_points }))
+        .map(|block| dispatch(Backward { points, planes, upstream, order: &order, block, with_points }))
         .collect();
     let unpacked: Vec<Vec<f32>> = (0..6)
         .into_par_iter()

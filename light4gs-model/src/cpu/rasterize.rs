@@ -198,36 +198,50 @@ pub(crate) fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
         .collect()
 }
 
-/// Puts tiles together into `[H, W, 5]`: colour over the background, alpha, depth.
+/// Puts tiles together: colour over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+///
+/// One flat array with contiguous parts, since an operation on the tape has one output and contiguous slices are cheap.
 pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
-    let mut image = vec![0.0; width * height * CHANNELS];
-    image.par_chunks_mut((width * CHANNELS).max(1)).enumerate().for_each(|(y, line)| {
-        for (x, pixel) in line.chunks_exact_mut(CHANNELS).enumerate() {
-            let tile = &tiles[y / TILE * view.tiles_across() + x / TILE];
-            let group = y % TILE * GROUPS + x % TILE / LANES;
-            let lane = x % LANES;
-            let t = tile.transmittance[group][lane];
-            for c in 0..3 {
-                pixel[c] = tile.color[c][group][lane] + t * view.background[c];
-            }
-            pixel[3] = 1.0 - t;
-            pixel[4] = tile.depth[group][lane];
-        }
-    });
+    let mut picture = vec![0.0; width * height * CHANNELS];
+    let (image, rest) = picture.split_at_mut(3 * width * height);
+    let (alpha, depth) = rest.split_at_mut(width * height);
     image
+        .par_chunks_mut(3 * width)
+        .zip(alpha.par_chunks_mut(width))
+        .zip(depth.par_chunks_mut(width))
+        .enumerate()
+        .for_each(|(y, ((image, alpha), depth))| {
+            for x in 0..width {
+                let tile = &tiles[y / TILE * view.tiles_across() + x / TILE];
+                let group = y % TILE * GROUPS + x % TILE / LANES;
+                let lane = x % LANES;
+                let t = tile.transmittance[group][lane];
+                for c in 0..3 {
+                    image[3 * x + c] = tile.color[c][group][lane] + t * view.background[c];
+                }
+                alpha[x] = 1.0 - t;
+                depth[x] = tile.depth[group][lane];
+            }
+        });
+    picture
 }
 
-/// Reads a `[H, W, 5]` picture's tile into planes; pixels outside the picture are zero.
-pub(crate) fn tile_of(image: &[f32], view: &View, column: usize, row: usize) -> [TilePlane; CHANNELS] {
+/// Reads a tile of what [`assemble`] lays out into planes; pixels outside the picture are zero.
+pub(crate) fn tile_of(picture: &[f32], view: &View, column: usize, row: usize) -> [TilePlane; CHANNELS] {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
+    let (image, rest) = picture.split_at(3 * width * height);
+    let (alpha, depth) = rest.split_at(width * height);
     let mut planes = [EMPTY; CHANNELS];
     for y in row * TILE..((row + 1) * TILE).min(height) {
         for x in column * TILE..((column + 1) * TILE).min(width) {
-            let pixel = &image[(y * width + x) * CHANNELS..][..CHANNELS];
-            for (plane, value) in planes.iter_mut().zip(pixel) {
-                plane[y % TILE * GROUPS + x % TILE / LANES][x % LANES] = *value;
+            let (group, lane) = (y % TILE * GROUPS + x % TILE / LANES, x % LANES);
+            let pixel = y * width + x;
+            for c in 0..3 {
+                planes[c][group][lane] = image[3 * pixel + c];
             }
+            planes[3][group][lane] = alpha[pixel];
+            planes[4][group][lane] = depth[pixel];
         }
     }
     planes

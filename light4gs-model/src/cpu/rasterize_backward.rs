@@ -26,7 +26,7 @@ struct BackwardTile<'a> {
     view: &'a View,
     tile: usize,
     pixels: &'a TilePixels,
-    /// `[H, W, 5]`
+    /// In the layout of [`assemble`](super::rasterize::assemble).
     upstream: &'a [f32],
     sums: &'a mut [Sums],
 }
@@ -130,7 +130,7 @@ pub(crate) struct GaussianGradients {
     pub(crate) screen_offsets: Vec<f32>,
 }
 
-/// Chain rule from the picture's gradient `[H, W, 5]` to the Gaussians.
+/// Chain rule from the picture's gradient to the Gaussians.
 pub(crate) fn splat_backward(
     gaussians: &GaussianSlices,
     view: &View,

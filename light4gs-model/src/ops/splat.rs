@@ -51,7 +51,7 @@ impl<B: Backend> SplatInputs<B> {
 /// What the operation returns.
 #[derive(ExtensionType)]
 pub struct SplatOutputs<B: Backend> {
-    /// `[H, W, 5]`: red, green, blue over the background, alpha, depth.
+    /// `[5 · H · W]`: colour over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
     pub picture: FloatTensor<B>,
     /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
     pub radii: IntTensor<B>,
@@ -65,7 +65,7 @@ pub trait SplatKernels: Backend {
     /// Draws the picture.
     fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the picture `[H, W, 5]`.
+    /// Gradients of all inputs from that of the picture `[5 · H · W]`.
     fn splat_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self>;
 }
 
@@ -148,7 +148,7 @@ fn forward_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): Splat
     let picture = assemble(&pixels, &view);
     let radii: Vec<i32> = lists.splats.iter().map(|splat| splat.radius).collect();
     let outputs = SplatOutputs {
-        picture: B::from_values(picture, [view.camera.height as usize, view.camera.width as usize, CHANNELS]),
+        picture: B::from_values(picture, [view.camera.height as usize * view.camera.width as usize * CHANNELS]),
         radii: B::int_from_data(TensorData::new(radii, [lists.splats.len()]), &device),
     };
     (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })

@@ -1,0 +1,294 @@
+//! Hand-written derivatives of the custom operations against central finite differences, on every back end.
+//!
+//! Two judges for each operation, since each has what the other lacks:
+//!
+//! - *Differences of the operation itself*, along random directions. They see the very function that is trained, but
+//!   it is float32: a picture's values are rounded at 6e-8, so a loss over some hundred pixels is noisy at 1e-6, and
+//!   a step of 1e-3 makes 1e-3 of that, while the error of the central difference is of the order of the step squared.
+//!   Both are far below the 1e-2 that is asked for. Scenes are such that no threshold (alpha below 1/255, clamp at
+//!   0.99, opaque pixel, edge of the 3-sigma box) lies within a step: there the function jumps, and the derivative by
+//!   definition ignores the jump.
+//! - *Differences of a plain float64 twin*, one coordinate at a time, with a step of 1e-6: that is small enough that
+//!   thresholds are almost never crossed, so the scenes are ordinary ones where everything happens.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_data::Camera;
+use light4gs_model::HexPlane;
+use light4gs_tests::golden::{assert_close_relative, devices, values_of};
+use light4gs_tests::random::Random;
+use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, picture_of, random_camera};
+use light4gs_tests::twin;
+
+const BACKGROUND: [f32; 3] = [0.2, 0.5, 0.9];
+
+fn dot(a: impl IntoIterator<Item = f64>, b: &[f64]) -> f64 {
+    a.into_iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+fn wide(values: &[f32]) -> impl Iterator<Item = f64> {
+    values.iter().map(|v| f64::from(*v))
+}
+
+/// `values + step · direction`, rounded to float32 like everything that the operation sees.
+fn moved(values: &[f64], direction: &[f64], step: f64) -> Vec<f64> {
+    values.iter().zip(direction).map(|(v, d)| f64::from((v + step * d) as f32)).collect()
+}
+
+/// Derivative of `loss` along a direction: central difference with the steps that were really made, since rounding to
+/// float32 changes small ones.
+fn along(values: &[f64], direction: &[f64], step: f64, loss: impl Fn(Vec<f64>) -> f64) -> f64 {
+    (loss(moved(values, direction, step)) - loss(moved(values, direction, -step))) / (2.0 * step)
+}
+
+/// Compares a gradient with differences along three random directions. For normal directions the derivative has the
+/// size of the gradient's norm, so the tolerance is a share of that and not of the derivative, which may cancel.
+fn check_directions(
+    what: &str,
+    values: &[f64],
+    gradient: &[f32],
+    step: f64,
+    random: &mut Random,
+    loss: impl Fn(Vec<f64>) -> f64,
+) {
+    let norm = wide(gradient).map(|g| g * g).sum::<f64>().sqrt();
+    assert!(norm > 1e-2, "{what}: a gradient of {norm} tests nothing");
+    for _ in 0..3 {
+        let direction = random.normals(values.len());
+        let found = dot(wide(gradient), &direction);
+        let expected = along(values, &direction, step, &loss);
+        let error = (found - expected).abs() / norm;
+        assert!(error < 1e-2, "{what}: {found} against {expected}, off by {error:e} of the gradient's norm {norm}");
+    }
+}
+
+/// Large, rather transparent Gaussians, so that no threshold lies in the picture.
+fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
+    let ranges =
+        Ranges { half_size: 0.7, scales: [1.6, 2.6], opacities: [0.2, 0.6], sh: [0.3, 0.1], offset: 0.1 };
+    loop {
+        let mut scene = SplatScene::random(7, &ranges, random);
+        // One far to the side, where the projection's Jacobian is clamped.
+        let axis = camera.rotation.transpose().x_axis * 2.6;
+        scene.row_mut(MEANS, 3).copy_from_slice(&[axis.x, axis.y, axis.z].map(f64::from));
+        // One whose green is clamped at zero.
+        scene.row_mut(SH_DC, 5)[1] = -5.0;
+        let picture = twin::render(&scene, camera, BACKGROUND, 3);
+        let smooth = picture.smallest_alpha > 2.0 / 255.0
+            && picture.largest_alpha < 0.9
+            && picture.smallest_transmittance > 1e-3
+            && picture.radii.iter().all(|radius| *radius > 0);
+        if smooth {
+            return scene;
+        }
+    }
+}
+
+#[test]
+fn splat_along_random_directions() {
+    for (name, device) in devices() {
+        for seed in 0..4 {
+            let mut random = Random::new(seed);
+            let camera = random_camera(20, 18, &mut random);
+            let scene = smooth_scene(&camera, &mut random);
+            let weights = random.normals(20 * 18 * 5);
+            let tape = device.clone().autodiff();
+            let leaves = scene.leaves(&tape);
+            let gradients = leaves.gradients(leaves.render(&camera, BACKGROUND, 3), &weights);
+            for (k, gradient) in gradients.iter().enumerate() {
+                let what = format!("{name} seed {seed} {}", ATTRIBUTES[k]);
+                check_directions(&what, &scene.attributes[k], gradient, 1e-3, &mut random, |values| {
+                    let mut scene = scene.clone();
+                    scene.attributes[k] = values;
+                    let rendering = scene.leaves(&device).render(&camera, BACKGROUND, 3);
+                    dot(wide(&picture_of(&rendering)), &weights)
+                });
+            }
+        }
+    }
+}
+
+/// Ordinary scenes, every coordinate of every input. What differs besides rounding is pixels where float32 decides a
+/// threshold otherwise than float64: one pixel of one Gaussian, of weight 1/255. Hence 2e-3 of the largest entry.
+#[test]
+fn splat_against_the_twin() {
+    const STEP: f64 = 1e-6;
+    for seed in 10..14 {
+        let mut random = Random::new(seed);
+        let (width, height) = [(37, 19), (16, 33), (25, 25), (1, 40)][seed as usize % 4];
+        let degree = seed as usize % 4;
+        let camera = random_camera(width, height, &mut random);
+        let ranges = Ranges { scales: [0.05, 0.5], ..Ranges::default() };
+        let scene = SplatScene::random(14, &ranges, &mut random);
+        let weights = random.normals((width * height * 5) as usize);
+        let loss = |scene: &SplatScene| dot(twin::render(scene, &camera, BACKGROUND, degree).values, &weights);
+
+        let mut expected: [Vec<f32>; 7] = Default::default();
+        for k in 0..ATTRIBUTES.len() {
+            for i in 0..scene.attributes[k].len() {
+                let at = |step: f64| {
+                    let mut scene = scene.clone();
+                    scene.attributes[k][i] += step;
+                    loss(&scene)
+                };
+                expected[k].push(((at(STEP) - at(-STEP)) / (2.0 * STEP)) as f32);
+            }
+        }
+        for (name, device) in devices() {
+            let leaves = scene.leaves(&device.autodiff());
+            let gradients = leaves.gradients(leaves.render(&camera, BACKGROUND, degree), &weights);
+            for (k, gradient) in gradients.iter().enumerate() {
+                let what = format!("{name} seed {seed} {}", ATTRIBUTES[k]);
+                assert_close_relative(&what, gradient, &expected[k], 2e-3);
+            }
+        }
+    }
+}
+
+/// Points and the six planes of one scale.
+#[derive(Clone)]
+struct Query {
+    channels: usize,
+    /// Along x, y, z, t.
+    resolution: [usize; 4],
+    /// `[N, 4]`, then the planes `[C, H, W]`.
+    inputs: [Vec<f64>; 7],
+}
+
+const QUERY_INPUTS: [&str; 7] = ["points", "xy", "xz", "xt", "yz", "yt", "zt"];
+const AXES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+impl Query {
+    /// Points lie inside the cells, not on their borders, where the query has a kink; `outside` of them are moved out
+    /// of [-1, 1] along one axis, where they are clamped and the derivative along that axis is zero.
+    fn random(channels: usize, resolution: [usize; 4], outside: usize, random: &mut Random) -> Self {
+        let count = 40;
+        let mut points: Vec<f64> = (0..4 * count)
+            .map(|i| {
+                let last = resolution[i % 4] - 1;
+                let place = random.below(last) as f64 + random.uniform(0.1, 0.9);
+                f64::from((place / last as f64 * 2.0 - 1.0) as f32)
+            })
+            .collect();
+        for n in 0..outside {
+            points[4 * n + n % 4] = if n % 2 == 0 { 1.25 } else { -1.5 };
+        }
+        let mut inputs: [Vec<f64>; 7] = Default::default();
+        inputs[0] = points;
+        for (plane, [across, down]) in AXES.into_iter().enumerate() {
+            let size = channels * resolution[across] * resolution[down];
+            inputs[plane + 1] = (0..size).map(|_| random.uniform(0.4, 1.4)).collect();
+        }
+        Self { channels, resolution, inputs }
+    }
+
+    /// Features and leaves, with the operation.
+    fn run(&self, device: &Device) -> (Tensor<2>, Tensor<2>, HexPlane) {
+        let data = |k: usize, shape: Vec<usize>| {
+            TensorData::new(self.inputs[k].iter().map(|v| *v as f32).collect::<Vec<_>>(), shape)
+        };
+        let planes = AXES.into_iter().enumerate().map(|(plane, [across, down])| {
+            let shape = vec![self.channels, self.resolution[down], self.resolution[across]];
+            Tensor::<3>::from_data(data(plane + 1, shape), device)
+        });
+        let hexplane = HexPlane::from_planes(planes.collect());
+        let points = Tensor::<2>::from_data(data(0, vec![self.inputs[0].len() / 4, 4]), device).require_grad();
+        (hexplane.query(points.clone()), points, hexplane)
+    }
+
+    /// Gradients of `sum(features · weights)` with the operation.
+    fn gradients(&self, device: &Device, weights: &[f64]) -> [Vec<f32>; 7] {
+        let (features, points, hexplane) = self.run(device);
+        let values: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
+        let weights = Tensor::<2>::from_data(TensorData::new(values, features.dims()), device);
+        let grads = (features * weights).sum().backward();
+        std::array::from_fn(|k| match k {
+            0 => values_of(&points.grad(&grads).unwrap()),
+            plane => values_of(&hexplane.planes[plane - 1].val().grad(&grads).unwrap()),
+        })
+    }
+
+    /// Features in float64, plainly: align-corners, border clamp.
+    fn twin(&self) -> Vec<f64> {
+        let points = self.inputs[0].chunks_exact(4);
+        points.flat_map(|point| (0..self.channels).map(|c| self.twin_feature(point, c)).collect::<Vec<_>>()).collect()
+    }
+
+    fn twin_feature(&self, point: &[f64], channel: usize) -> f64 {
+        let mut product = 1.0;
+        for (plane, [across, down]) in AXES.into_iter().enumerate() {
+            let (width, height) = (self.resolution[across], self.resolution[down]);
+            let place = |axis: usize| {
+                let last = (self.resolution[axis] - 1) as f64;
+                ((point[axis] + 1.0) / 2.0 * last).clamp(0.0, last)
+            };
+            let mut sample = 0.0;
+            for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
+                // Tents: of all cells only the four around the point weigh anything.
+                let tent = |place: f64, cell: usize| (1.0 - (place - cell as f64).abs()).max(0.0);
+                let weight = tent(place(across), column) * tent(place(down), row);
+                sample += weight * self.inputs[plane + 1][(channel * height + row) * width + column];
+            }
+            product *= sample;
+        }
+        product
+    }
+}
+
+/// Channels that do and do not fill the vector lanes, odd resolutions, an axis of two cells.
+fn queries() -> Vec<(String, Query, Random)> {
+    let cases = [(3, [5, 4, 6, 3]), (8, [4, 4, 4, 4]), (9, [7, 3, 5, 2])];
+    let seeded = cases.into_iter().enumerate().map(|(seed, (channels, resolution))| {
+        let mut random = Random::new(100 + seed as u64);
+        let query = Query::random(channels, resolution, 6, &mut random);
+        (format!("{channels} channels {resolution:?}"), query, random)
+    });
+    seeded.collect()
+}
+
+#[test]
+fn hexplane_query_along_random_directions() {
+    for (name, device) in devices() {
+        for (case, query, mut random) in queries() {
+            let weights = random.normals(query.inputs[0].len() / 4 * query.channels);
+            let gradients = query.gradients(&device.clone().autodiff(), &weights);
+            for (k, gradient) in gradients.iter().enumerate() {
+                let what = format!("{name} {case} {}", QUERY_INPUTS[k]);
+                check_directions(&what, &query.inputs[k], gradient, 1e-3, &mut random, |values| {
+                    let mut query = query.clone();
+                    query.inputs[k] = values;
+                    dot(wide(&values_of(&query.run(&device).0)), &weights)
+                });
+            }
+        }
+    }
+}
+
+/// Every coordinate. The features are products of bilinear functions without thresholds, so only rounding is left.
+#[test]
+fn hexplane_query_against_the_twin() {
+    const STEP: f64 = 1e-5;
+    for (case, query, mut random) in queries() {
+        let weights = random.normals(query.inputs[0].len() / 4 * query.channels);
+        let mut expected: [Vec<f32>; 7] = Default::default();
+        for k in 0..QUERY_INPUTS.len() {
+            for i in 0..query.inputs[k].len() {
+                let at = |step: f64| {
+                    let mut query = query.clone();
+                    query.inputs[k][i] += step;
+                    dot(query.twin(), &weights)
+                };
+                expected[k].push(((at(STEP) - at(-STEP)) / (2.0 * STEP)) as f32);
+            }
+        }
+        for (name, device) in devices() {
+            let device = device.autodiff();
+            let features = values_of(&query.run(&device).0);
+            let twin: Vec<f32> = query.twin().into_iter().map(|v| v as f32).collect();
+            assert_close_relative(&format!("{name} {case} features"), &features, &twin, 1e-5);
+            for (k, gradient) in query.gradients(&device, &weights).iter().enumerate() {
+                let what = format!("{name} {case} {}", QUERY_INPUTS[k]);
+                assert_close_relative(&what, gradient, &expected[k], 1e-4);
+            }
+        }
+    }
+}
