@@ -4,6 +4,7 @@
 #![allow(deprecated)]
 
 pub mod golden;
+pub mod program;
 pub mod random;
 pub mod raster;
 pub mod splat_scene;

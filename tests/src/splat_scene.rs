@@ -153,8 +153,7 @@ impl SceneLeaves {
 
 /// `[H, W, 5]`: red, green, blue, alpha, depth of a rendering.
 pub fn picture_of(rendering: &Rendering) -> Vec<f32> {
-    let (image, alpha, depth) =
-        (values_of(&rendering.image), values_of(&rendering.alpha), values_of(&rendering.depth));
+    let (image, alpha, depth) = (values_of(&rendering.image), values_of(&rendering.alpha), values_of(&rendering.depth));
     let pixels = image.chunks_exact(3).zip(alpha).zip(depth);
     pixels.flat_map(|((rgb, alpha), depth)| [rgb[0], rgb[1], rgb[2], alpha, depth]).collect()
 }

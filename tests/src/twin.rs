@@ -28,6 +28,8 @@ pub struct TwinPicture {
     pub largest_alpha: f64,
     /// Smallest transmittance of a pixel at the end.
     pub smallest_transmittance: f64,
+    /// Hash of which Gaussian was blended at which pixel. Where two pictures have the same, no jump lies between them.
+    pub decisions: u64,
 }
 
 struct Splat {
@@ -166,6 +168,7 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
         smallest_alpha: f64::INFINITY,
         largest_alpha: 0.0,
         smallest_transmittance: 1.0,
+        decisions: 0xcbf2_9ce4_8422_2325,
     };
     for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
         let (column, row) = ((x / TILE) as i64, (y / TILE) as i64);
@@ -191,6 +194,10 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
             doubtful |= (after / 1e-4 - 1.0).abs() < 1e-2;
             if after < 1e-4 {
                 break;
+            }
+            // FNV-1a over (pixel, Gaussian).
+            for word in [picture.doubtful.len(), splat.index] {
+                picture.decisions = (picture.decisions ^ word as u64).wrapping_mul(0x0000_0100_0000_01b3);
             }
             let weight = transmittance * alpha;
             for c in 0..3 {

@@ -4,8 +4,8 @@ use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, s};
 use light4gs_model::{
-    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, Pca, SceneFrame,
-    contract,
+    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, Pca,
+    SceneFrame, contract,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 

@@ -42,11 +42,13 @@ fn picture_losses() {
         check("l2", batch_mean(&image, &truth, l2));
         check("ssim", batch_mean(&image, &truth, ssim));
         // The reference adds D-SSIM to the whole of L1.
-        check("l1_plus_02dssim", batch_mean(&image, &truth, |a, b| l1(a.clone(), b.clone()) + (-ssim(a, b) + 1.0) * 0.2));
+        check(
+            "l1_plus_02dssim",
+            batch_mean(&image, &truth, |a, b| l1(a.clone(), b.clone()) + (-ssim(a, b) + 1.0) * 0.2),
+        );
 
-        let similarities: Vec<f32> = (0..image.dims()[0])
-            .flat_map(|i| values_of(&ssim(picture(&image, i), picture(&truth, i))))
-            .collect();
+        let similarities: Vec<f32> =
+            (0..image.dims()[0]).flat_map(|i| values_of(&ssim(picture(&image, i), picture(&truth, i)))).collect();
         assert_close(&format!("{name} ssim.per_image"), &similarities, &golden.values("ssim.per_image"), 1e-5);
     }
 }
@@ -174,7 +176,9 @@ fn stepped(golden: &Golden, name: &str, device: &Device) -> (Adam, Vec<Group>, f
         last_rate = f64::from(golden.scalar(&format!("step{t}.lr_xyz")));
         let rates: Vec<f64> = groups
             .iter()
-            .map(|group| if group.key == "xyz" { last_rate } else { golden.scalar(&format!("lr.{}", group.key)).into() })
+            .map(
+                |group| if group.key == "xyz" { last_rate } else { golden.scalar(&format!("lr.{}", group.key)).into() },
+            )
             .collect();
         step(&mut adam, &mut groups, &gradients, &rates);
         for group in &groups {
@@ -218,7 +222,8 @@ fn adam_after_rows_came_and_went() {
         let steps_before = adam.states[xyz.name].time;
 
         let longer = Tensor::cat(vec![xyz.parameter.val(), rows_of(&golden, "surgery.new_rows", &device)], 0);
-        let kept: Vec<i64> = (0..).zip(golden.integers("surgery.keep_mask")).filter(|(_, k)| *k == 1).map(|(i, _)| i).collect();
+        let kept: Vec<i64> =
+            (0..).zip(golden.integers("surgery.keep_mask")).filter(|(_, k)| *k == 1).map(|(i, _)| i).collect();
         let ints = |values: &[i64], device: &Device| {
             Tensor::<1, Int>::from_data(TensorData::new(values.to_vec(), [values.len()]), device)
         };

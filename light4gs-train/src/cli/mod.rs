@@ -9,6 +9,7 @@ mod synth;
 mod train;
 
 use std::path::PathBuf;
+use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 
@@ -76,6 +77,20 @@ impl Cli {
             Command::Export(command) => command.run(),
             Command::Synth(command) => command.run(),
             Command::Bench(command) => command.run(),
+        }
+    }
+}
+
+/// Parses the arguments of this process, runs the command, and reports an error on stderr. Exit codes: 0 done, 2 wrong
+/// input, 1 our fault.
+pub fn main() -> ExitCode {
+    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
+    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    match Cli::parse().run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(if error.is_internal() { 1 } else { 2 })
         }
     }
 }

@@ -1,0 +1,105 @@
+//! Running the program in tests.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+use tempfile::TempDir;
+
+/// A folder of its own with a tiny synthetic scene in it.
+pub struct Workspace {
+    folder: TempDir,
+    program: PathBuf,
+}
+
+/// What makes a run take seconds.
+const TINY: [&str; 14] = [
+    "train.coarse_iterations=12",
+    "train.fine_iterations=48",
+    "train.checkpoint_interval=9",
+    "train.log_interval=4",
+    "train.sh_degree_interval=5",
+    "train.densify.from=4",
+    "train.densify.until=40",
+    "train.densify.interval=8",
+    "train.densify.prune_from=4",
+    "train.densify.prune_interval=12",
+    "train.densify.opacity_reset_interval=20",
+    "data.initial_points=300",
+    "model.hexplane.resolution=[8, 8, 8, 4]",
+    "eval.interval=20",
+];
+
+impl Workspace {
+    /// Makes the folder and the scene. `program` is `env!("CARGO_BIN_EXE_light4gs-under-test")`.
+    pub fn new(program: &str) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let workspace = Self { folder, program: program.into() };
+        let scene = workspace.path("scene");
+        let frames = ["--train-frames", "8", "--test-frames", "3", "--val-frames", "2"];
+        let output = workspace.command(["synth", scene.to_str().unwrap(), "--resolution", "32"]).args(frames).output();
+        assert_success(&output.expect("the program starts"));
+        workspace
+    }
+
+    /// A path in the folder.
+    pub fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    /// The program with arguments, in the folder.
+    pub fn command<'a>(&self, arguments: impl IntoIterator<Item = &'a str>) -> Command {
+        let mut command = Command::new(&self.program);
+        command.current_dir(self.folder.path()).args(arguments);
+        command
+    }
+
+    /// Runs to the end.
+    pub fn run<'a>(&self, arguments: impl IntoIterator<Item = &'a str>) -> Output {
+        self.command(arguments).output().expect("the program starts")
+    }
+
+    /// `train scene --out RUN` in seconds, with more `--set` on top.
+    pub fn train(&self, run: &str, overrides: &[&str]) -> Command {
+        let mut command = self.command(["train", "scene", "--quiet", "--config", "dnerf-small", "--out", run]);
+        for key_value in TINY.iter().chain(overrides) {
+            command.args(["--set", key_value]);
+        }
+        command
+    }
+
+    /// Names in the folder or one below it, sorted.
+    pub fn names(&self, below: &str) -> Vec<String> {
+        names(&self.path(below))
+    }
+}
+
+/// Names in a folder, sorted; empty if there is none.
+pub fn names(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let mut names: Vec<String> = entries.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+/// Fails with the program's own words.
+#[track_caller]
+pub fn assert_success(output: &Output) {
+    assert!(
+        output.status.success(),
+        "exit {:?}\nstdout: {}\nstderr: {}",
+        output.status,
+        String::from_utf8_lossy(&output.stdout),
+        String::from_utf8_lossy(&output.stderr)
+    );
+}
+
+/// Fails unless the exit code is 2, without a panic, and stderr has all the words.
+#[track_caller]
+pub fn assert_refused(output: &Output, words: &[&str]) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(2), "stderr: {text}");
+    assert!(!text.contains("panicked"), "{text}");
+    for word in words {
+        assert!(text.contains(word), "`{word}` is not in: {text}");
+    }
+}

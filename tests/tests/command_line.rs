@@ -1,0 +1,219 @@
+//! The program on real files: the whole pipeline, and what each kind of wrong input gets.
+
+use std::fs;
+
+use light4gs_tests::program::{Workspace, assert_refused, assert_success};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
+
+#[test]
+fn a_scene_goes_all_the_way() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &[]).output().unwrap());
+    let expected = ["checkpoints", "config.toml", "eval.json", "events", "metrics.jsonl", "renders", "report.html"];
+    for name in expected.iter().chain(&["run.json", "scene.l4gs"]) {
+        assert!(w.names("run").contains(&name.to_string()), "{name} is missing: {:?}", w.names("run"));
+    }
+
+    let eval: serde_json::Value = serde_json::from_slice(&w.run(["eval", "run", "--json"]).stdout).unwrap();
+    let size = fs::metadata(w.path("run/scene.l4gs")).unwrap().len();
+    assert_eq!(eval["bytes"], size, "the reported size is the file's");
+    let sections: u64 = eval["sections"].as_array().unwrap().iter().map(|s| s["bytes"].as_u64().unwrap()).sum();
+    assert_eq!(sections, size, "sections add up to the file");
+    assert_eq!(eval["splits"].as_array().unwrap().len(), 2);
+    assert!(eval["splits"][0]["psnr"].as_f64().unwrap() > 5.0);
+
+    assert_success(&w.run(["encode", "run", "--out", "again.l4gs"]));
+    assert_eq!(fs::read(w.path("again.l4gs")).unwrap(), fs::read(w.path("run/scene.l4gs")).unwrap());
+    let info: serde_json::Value = serde_json::from_slice(&w.run(["info", "again.l4gs", "--json"]).stdout).unwrap();
+    assert_eq!(info["bytes"], size);
+    assert_success(&w.run(["eval", "again.l4gs", "--scene", "scene", "--device", "flex"]));
+    assert_success(&w.run(["decode", "again.l4gs", "--out", "plain.safetensors"]));
+    assert_success(&w.run(["render", "again.l4gs", "--out", "orbit.gif", "--frames", "4"]));
+    assert_success(&w.run([
+        "render",
+        "again.l4gs",
+        "--out",
+        "still",
+        "--path",
+        "frozen",
+        "--time",
+        "0.5",
+        "--frames",
+        "2",
+    ]));
+    assert_eq!(w.names("still"), ["0000.png", "0001.png"]);
+    assert_success(&w.run(["export", "again.l4gs", "--out", "ply", "--frames", "2"]));
+    let ply = light4gs_data::GaussianPly::read(&w.path("ply/0001.ply")).unwrap();
+    assert_eq!(ply.len() as u64, info["gaussians"].as_u64().unwrap());
+}
+
+#[test]
+fn both_devices_train() {
+    let w = Workspace::new(PROGRAM);
+    for device in ["ndarray", "flex"] {
+        assert_success(&w.train(device, &[]).args(["--device", device]).output().unwrap());
+    }
+}
+
+#[test]
+fn a_run_is_never_overwritten_by_accident() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &[]).output().unwrap());
+    let before = fs::read(w.path("run/scene.l4gs")).unwrap();
+    assert_refused(&w.train("run", &[]).output().unwrap(), &["run", "--overwrite"]);
+    assert_eq!(fs::read(w.path("run/scene.l4gs")).unwrap(), before);
+    assert_success(&w.train("run", &["seed=1"]).arg("--overwrite").output().unwrap());
+    assert_ne!(fs::read(w.path("run/scene.l4gs")).unwrap(), before);
+
+    fs::create_dir(w.path("mine")).unwrap();
+    fs::write(w.path("mine/notes.txt"), "keep").unwrap();
+    assert_refused(&w.train("mine", &[]).arg("--overwrite").output().unwrap(), &["mine", "no run"]);
+    assert_eq!(w.names("mine"), ["notes.txt"]);
+}
+
+/// Trains on a damaged scene: refused, the words are named, and no run is left behind.
+#[track_caller]
+fn assert_scene_refused(w: &Workspace, words: &[&str]) {
+    assert_refused(&w.train("run", &[]).output().unwrap(), words);
+    assert!(!w.path("run/scene.l4gs").exists());
+}
+
+fn edit(w: &Workspace, file: &str, change: impl FnOnce(&mut serde_json::Value)) {
+    let path = w.path("scene").join(file);
+    let mut value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    change(&mut value);
+    fs::write(path, serde_json::to_vec(&value).unwrap()).unwrap();
+}
+
+#[test]
+fn a_missing_picture() {
+    let w = Workspace::new(PROGRAM);
+    fs::remove_file(w.path("scene/train/r_003.png")).unwrap();
+    assert_scene_refused(&w, &["r_003"]);
+    assert!(!w.path("run").exists());
+}
+
+#[test]
+fn a_truncated_picture() {
+    let w = Workspace::new(PROGRAM);
+    let path = w.path("scene/train/r_003.png");
+    let bytes = fs::read(&path).unwrap();
+    fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
+    assert_scene_refused(&w, &["r_003.png"]);
+}
+
+#[test]
+fn a_picture_of_another_size() {
+    let w = Workspace::new(PROGRAM);
+    let other = light4gs_data::RgbImage8 { width: 16, height: 8, pixels: vec![0; 16 * 8 * 3] };
+    other.save_png(&w.path("scene/train/r_003.png")).unwrap();
+    assert_scene_refused(&w, &["r_003.png", "16"]);
+}
+
+#[test]
+fn a_frame_without_time() {
+    let w = Workspace::new(PROGRAM);
+    edit(&w, "transforms_train.json", |json| {
+        json["frames"][2].as_object_mut().unwrap().remove("time");
+    });
+    assert_scene_refused(&w, &["transforms_train.json", "frames[2]", "time"]);
+    assert!(!w.path("run").exists());
+}
+
+#[test]
+fn a_pose_that_is_not_a_number() {
+    let w = Workspace::new(PROGRAM);
+    let path = w.path("scene/transforms_train.json");
+    edit(&w, "transforms_train.json", |json| json["frames"][1]["transform_matrix"][0][3] = "NaN".into());
+    // Python writes a bare NaN.
+    let text = fs::read_to_string(&path).unwrap().replace("\"NaN\"", "NaN");
+    fs::write(&path, text).unwrap();
+    assert_scene_refused(&w, &["transforms_train.json", "frames[1]", "transform_matrix"]);
+}
+
+#[test]
+fn an_empty_split() {
+    let w = Workspace::new(PROGRAM);
+    edit(&w, "transforms_train.json", |json| json["frames"] = serde_json::json!([]));
+    assert_scene_refused(&w, &["transforms_train.json", "frames"]);
+}
+
+#[test]
+fn an_unknown_key() {
+    let w = Workspace::new(PROGRAM);
+    fs::write(w.path("mine.toml"), "extends = \"dnerf-small\"\n[train.densify]\nintervall = 3\n").unwrap();
+    let output = w.run(["train", "scene", "--config", "mine.toml", "--out", "run"]);
+    assert_refused(&output, &["mine.toml", "train.densify.intervall", "train.densify.interval"]);
+    assert_refused(&w.train("run", &["train.lamda_dssim=1"]).output().unwrap(), &["lamda_dssim", "lambda_dssim"]);
+    assert_refused(&w.train("run", &["device=cuda"]).output().unwrap(), &["device", "ndarray"]);
+    assert!(!w.path("run").exists());
+}
+
+#[test]
+fn damaged_streams() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &[]).output().unwrap());
+    let bytes = fs::read(w.path("run/scene.l4gs")).unwrap();
+    fs::write(w.path("short.l4gs"), &bytes[..bytes.len() - 7]).unwrap();
+    let mut flipped = bytes.clone();
+    flipped[bytes.len() / 2] ^= 4;
+    fs::write(w.path("flipped.l4gs"), flipped).unwrap();
+    fs::write(w.path("other.l4gs"), b"not a stream").unwrap();
+    for name in ["short.l4gs", "flipped.l4gs", "other.l4gs", "absent.l4gs"] {
+        assert_refused(&w.run(["info", name]), &[name]);
+        assert_refused(&w.run(["decode", name, "--out", "plain.safetensors"]), &[name]);
+        assert_refused(&w.run(["render", name, "--out", "x.gif"]), &[name]);
+        assert_refused(&w.run(["export", name, "--out", "ply"]), &[name]);
+        assert_refused(&w.run(["eval", name, "--scene", "scene"]), &[name]);
+    }
+    for left in ["plain.safetensors", "x.gif", "ply"] {
+        assert!(!w.path(left).exists(), "{left} was left behind");
+    }
+}
+
+/// A file-size limit stands for a full disk: the write fails midway, with EFBIG instead of ENOSPC.
+#[cfg(unix)]
+#[test]
+fn a_full_disk() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &[]).output().unwrap());
+    let before = w.names("");
+    for arguments in ["encode run --out out.l4gs", "decode run/scene.l4gs --out out.safetensors"] {
+        // The signal that would kill the program on reaching the limit is ignored, so that it sees the error.
+        let script = format!("trap '' XFSZ; ulimit -f 16; exec '{PROGRAM}' {arguments}");
+        let output = std::process::Command::new("bash").args(["-c", &script]).current_dir(w.path("")).output().unwrap();
+        assert_refused(&output, &["write", "out."]);
+        assert_eq!(w.names(""), before, "{arguments} left something behind");
+    }
+}
+
+#[test]
+fn wrong_arguments() {
+    let w = Workspace::new(PROGRAM);
+    assert_refused(&w.run(["train", "scene"]), &["--out"]);
+    assert_refused(&w.run(["polish"]), &["polish"]);
+    assert_refused(&w.run(["resume", "scene"]), &["scene", "run.json"]);
+    assert_refused(&w.run(["train", "nowhere", "--out", "run"]), &["nowhere"]);
+    assert_refused(&w.run(["bench", "--device", "abacus"]), &["abacus", "ndarray"]);
+    assert_refused(&w.run(["synth", "scene"]), &["scene"]);
+    for command in
+        ["quickstart", "train", "resume", "eval", "render", "encode", "decode", "info", "export", "synth", "bench"]
+    {
+        let output = w.run([command, "--help"]);
+        assert_success(&output);
+        assert!(String::from_utf8_lossy(&output.stdout).contains("Example:"), "{command} --help has no example");
+    }
+}
+
+#[test]
+fn bench_prints_a_table_and_json() {
+    let w = Workspace::new(PROGRAM);
+    let small = ["bench", "--gaussians", "200", "--size", "40", "--repeats", "1"];
+    let output = w.run(small);
+    assert_success(&output);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("matmul"));
+    let output = w.run(small.into_iter().chain(["--json", "--device", "flex"]));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json[0]["device"], "flex");
+}

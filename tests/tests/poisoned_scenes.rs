@@ -1,0 +1,416 @@
+//! The rasteriser on scenes that nobody would make on purpose, against a plain twin, and its reproducibility.
+
+use burn::tensor::{Device, Tensor};
+use light4gs_data::Camera;
+use light4gs_model::{GaussianTensors, Splatter};
+use light4gs_tests::golden::{devices, values_of};
+use light4gs_tests::random::Random;
+use light4gs_tests::splat_scene::{
+    ATTRIBUTES, MEANS, OPACITIES, QUATS, Ranges, SCALES, SCREEN_OFFSETS, SH_DC, SH_REST, SplatScene, WIDTHS,
+    picture_of, random_camera,
+};
+use light4gs_tests::twin;
+
+const BACKGROUND: [f32; 3] = [0.1, 0.6, 1.0];
+const SIZES: [[u32; 2]; 6] = [[1, 1], [17, 31], [40, 30], [16, 16], [64, 3], [33, 48]];
+
+/// What a rendering and its backward pass give.
+struct Run {
+    /// `[H, W, 5]`
+    picture: Vec<f32>,
+    radii: Vec<i64>,
+    invalid: usize,
+    gradients: [Vec<f32>; 7],
+}
+
+fn run(scene: &SplatScene, camera: &Camera, degree: usize, device: &Device) -> Run {
+    let leaves = scene.leaves(&device.clone().autodiff());
+    let rendering = leaves.render(camera, BACKGROUND, degree);
+    let picture = picture_of(&rendering);
+    let radii = rendering.radii.to_data().iter::<i64>().collect();
+    let invalid = rendering.invalid_count();
+    let weights = Random::new(99).normals(picture.len());
+    Run { picture, radii, invalid, gradients: leaves.gradients(rendering, &weights) }
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+#[track_caller]
+fn assert_finite(what: &str, run: &Run) {
+    let finite = |name: &str, values: &[f32]| {
+        if let Some(i) = values.iter().position(|v| !v.is_finite()) {
+            panic!("{what}: {name}[{i}] is {}", values[i]);
+        }
+    };
+    finite("picture", &run.picture);
+    for (name, gradient) in ATTRIBUTES.iter().zip(&run.gradients) {
+        finite(name, gradient);
+    }
+    let alphas = run.picture.iter().skip(3).step_by(5);
+    assert!(alphas.clone().all(|alpha| (0.0..=1.0).contains(alpha)), "{what}: alpha outside of [0, 1]");
+}
+
+/// Bit by bit equality of pictures, radii and gradients.
+#[track_caller]
+fn assert_same(what: &str, a: &Run, b: &Run) {
+    assert_eq!(bits(&a.picture), bits(&b.picture), "{what}: picture");
+    assert_eq!(a.radii, b.radii, "{what}: radii");
+    for (k, name) in ATTRIBUTES.iter().enumerate() {
+        assert_eq!(bits(&a.gradients[k]), bits(&b.gradients[k]), "{what}: gradient of {name}");
+    }
+}
+
+/// A point `depth` in front of the camera, `x` and `y` in half fields of view off its axis.
+fn point_in_view(camera: &Camera, x: f32, y: f32, depth: f32) -> [f64; 3] {
+    let (tan_x, tan_y) = (camera.width as f32 / (2.0 * camera.fx), camera.height as f32 / (2.0 * camera.fy));
+    let view = glam::Vec3::new(x * tan_x, y * tan_y, 1.0) * depth;
+    (camera.rotation.transpose() * (view - camera.translation)).to_array().map(f64::from)
+}
+
+/// Makes a Gaussian odd, but leaves it valid.
+fn make_odd(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) {
+    let side = random.uniform(-1.0, 1.0) as f32;
+    match random.below(12) {
+        0 => scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(camera, side, -side, -3.0)),
+        1 => scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(camera, 40.0 * side, 9.0, 3.0)),
+        2 => scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(camera, side, side, 0.201)),
+        3 => scene.row_mut(MEANS, i).copy_from_slice(&camera.center().to_array().map(f64::from)),
+        4 => scene.row_mut(SCALES, i).fill(50.0),
+        5 => scene.row_mut(SCALES, i).fill(1e-12),
+        6 => scene.row_mut(SCALES, i).fill(0.0),
+        7 => scene.row_mut(SCALES, i)[1] = 20.0,
+        8 => scene.row_mut(OPACITIES, i)[0] = 0.0,
+        9 => scene.row_mut(OPACITIES, i)[0] = 1.0,
+        10 => scene.row_mut(QUATS, i).iter_mut().for_each(|q| *q = f64::from((*q * 1e-6) as f32)),
+        _ => scene.row_mut(SH_DC, i).fill(-30.0),
+    }
+}
+
+/// Makes a Gaussian one that cannot be drawn; it stands in the picture otherwise. Returns what was done.
+fn poison(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) -> String {
+    let place = point_in_view(camera, random.uniform(-0.8, 0.8) as f32, random.uniform(-0.8, 0.8) as f32, 3.0);
+    scene.row_mut(MEANS, i).copy_from_slice(&place);
+    scene.row_mut(OPACITIES, i)[0] = 0.9;
+    let attribute = random.below(ATTRIBUTES.len() + 1);
+    if attribute == ATTRIBUTES.len() {
+        scene.row_mut(QUATS, i).fill(0.0);
+        return "zero quaternion".to_owned();
+    }
+    let value = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][random.below(3)];
+    let component = random.below(WIDTHS[attribute]);
+    scene.row_mut(attribute, i)[component] = value;
+    format!("{value} in {}[{component}]", ATTRIBUTES[attribute])
+}
+
+/// The number of Gaussians of each of the random scenes, which then differ in everything else too.
+const COUNTS: [usize; 12] = [1, 2, 3, 7, 16, 40, 100, 333, 511, 513, 1200, 2000];
+
+#[test]
+fn poisoned_gaussians_are_counted_and_leave_no_trace() {
+    for (seed, count) in COUNTS.into_iter().cycle().take(36).enumerate() {
+        let mut random = Random::new(1000 + seed as u64);
+        let [width, height] = SIZES[random.below(SIZES.len())];
+        let camera = random_camera(width, height, &mut random);
+        let mut scene = SplatScene::random(count, &Ranges::default(), &mut random);
+        let mut keep = vec![true; count];
+        let mut done = Vec::new();
+        for i in 0..count {
+            match random.below(4) {
+                0 => {
+                    keep[i] = false;
+                    done.push(poison(&mut scene, i, &camera, &mut random));
+                }
+                1 => make_odd(&mut scene, i, &camera, &mut random),
+                _ => {}
+            }
+        }
+        done.truncate(8);
+        let clean = scene.filtered(&keep);
+        for (name, device) in devices() {
+            let what = format!("{name} seed {seed}, {count} Gaussians, {width}x{height}, {done:?}");
+            let found = run(&scene, &camera, 3, &device);
+            assert_finite(&what, &found);
+            assert_eq!(found.invalid, keep.iter().filter(|keep| !**keep).count(), "{what}: invalid");
+            for (i, keep) in keep.iter().enumerate() {
+                assert_eq!(found.radii[i] == -1, !keep, "{what}: radius of {i}");
+            }
+            let expected = run(&clean, &camera, 3, &device);
+            assert_eq!(expected.invalid, 0, "{what}");
+            assert_eq!(bits(&found.picture), bits(&expected.picture), "{what}: picture");
+            // So are the gradients of the others; the poisoned ones' are zero.
+            for (k, width) in WIDTHS.into_iter().enumerate() {
+                let rows = found.gradients[k].chunks_exact(width).zip(&keep);
+                let of_kept: Vec<f32> = rows.clone().filter(|(_, k)| **k).flat_map(|(r, _)| r.to_vec()).collect();
+                assert_eq!(bits(&of_kept), bits(&expected.gradients[k]), "{what}: gradient of {}", ATTRIBUTES[k]);
+                let mut of_poisoned = rows.filter(|(_, keep)| !**keep).flat_map(|(row, _)| row);
+                assert!(of_poisoned.all(|g| *g == 0.0), "{what}: gradient of a poisoned Gaussian's {}", ATTRIBUTES[k]);
+            }
+        }
+    }
+}
+
+/// Each kind of poison alone, so that none hides behind another.
+#[test]
+fn every_attribute_can_be_poisoned() {
+    for (name, device) in devices() {
+        let mut random = Random::new(5);
+        let camera = random_camera(24, 20, &mut random);
+        let clean = SplatScene::random(20, &Ranges::default(), &mut random);
+        let expected = run(&clean, &camera, 3, &device);
+        for (attribute, width) in WIDTHS.into_iter().enumerate() {
+            for component in 0..width {
+                for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+                    let mut scene = clean.clone();
+                    scene.push_random(&Ranges { half_size: 0.3, ..Ranges::default() }, &mut random);
+                    scene.row_mut(attribute, 20)[component] = value;
+                    let what = format!("{name} {value} in {}[{component}]", ATTRIBUTES[attribute]);
+                    let found = run(&scene, &camera, 3, &device);
+                    assert_finite(&what, &found);
+                    assert_eq!(found.invalid, 1, "{what}");
+                    assert_eq!(bits(&found.picture), bits(&expected.picture), "{what}");
+                }
+            }
+        }
+    }
+}
+
+/// Finite numbers of any size in any place. Nothing is known of the picture but that it is one.
+#[test]
+fn extreme_numbers_give_finite_results() {
+    for seed in 0..60 {
+        let mut random = Random::new(3000 + seed);
+        let [width, height] = SIZES[seed as usize % SIZES.len()];
+        let camera = random_camera(width, height, &mut random);
+        let mut scene = SplatScene::random(60, &Ranges::default(), &mut random);
+        let mut done = Vec::new();
+        for i in (0..60).step_by(2) {
+            let attribute = [MEANS, QUATS, SCALES, SH_DC, SH_REST, SCREEN_OFFSETS][random.below(6)];
+            let component = random.below(WIDTHS[attribute]);
+            let magnitude = 10f64.powf(random.uniform(-37.0, 38.0));
+            let sign = if attribute == SCALES || random.below(2) == 0 { 1.0 } else { -1.0 };
+            let value = f64::from((sign * magnitude) as f32);
+            let whole = random.below(2) == 0;
+            if whole {
+                scene.row_mut(attribute, i).fill(value);
+            } else {
+                scene.row_mut(attribute, i)[component] = value;
+            }
+            done.push(format!("{i}: {value:e} in {}[{component}] all {whole}", ATTRIBUTES[attribute]));
+        }
+        for (name, device) in devices() {
+            let found = run(&scene, &camera, 3, &device);
+            let what = format!("{name} seed {seed} {width}x{height}");
+            let finite = found.picture.iter().chain(found.gradients.iter().flatten()).all(|v| v.is_finite());
+            if !finite {
+                println!("{done:#?}");
+            }
+            assert_finite(&what, &found);
+        }
+    }
+}
+
+#[test]
+fn no_gaussians_at_all() {
+    for (name, device) in devices() {
+        for [width, height] in SIZES {
+            let camera = random_camera(width, height, &mut Random::new(1));
+            let found = run(&SplatScene::default(), &camera, 3, &device);
+            let [r, g, b] = BACKGROUND;
+            let expected = [r, g, b, 0.0, 0.0].repeat((width * height) as usize);
+            assert_eq!(found.picture, expected, "{name} {width}x{height}");
+            assert_eq!((found.invalid, found.radii.len()), (0, 0), "{name}");
+            assert!(found.gradients.iter().all(Vec::is_empty), "{name}");
+        }
+    }
+}
+
+#[test]
+fn all_behind_the_camera() {
+    for (name, device) in devices() {
+        let mut random = Random::new(2);
+        let camera = random_camera(40, 30, &mut random);
+        let mut scene = SplatScene::random(300, &Ranges::default(), &mut random);
+        for i in 0..scene.len() {
+            let (x, y) = (random.uniform(-1.0, 1.0) as f32, random.uniform(-1.0, 1.0) as f32);
+            // The nearest of them lie just before the near plane.
+            let depth = if i % 2 == 0 { 0.19 } else { -random.uniform(0.0, 5.0) };
+            scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(&camera, x, y, depth as f32));
+        }
+        let found = run(&scene, &camera, 3, &device);
+        let [r, g, b] = BACKGROUND;
+        assert_eq!(found.picture, [r, g, b, 0.0, 0.0].repeat(40 * 30), "{name}");
+        assert!(found.radii.iter().all(|radius| *radius == 0), "{name}: outside, yet not invalid");
+        assert!(found.gradients.iter().flatten().all(|g| *g == 0.0), "{name}");
+    }
+}
+
+#[test]
+fn twenty_thousand_gaussians_in_one_tile() {
+    let mut random = Random::new(3);
+    let camera = random_camera(16, 16, &mut random);
+    let ranges = Ranges { half_size: 0.4, scales: [0.01, 0.2], opacities: [0.005, 0.05], ..Ranges::default() };
+    let scene = SplatScene::random(20_000, &ranges, &mut random);
+    let (scene, twin) = twin::render_without_doubt(&scene, &camera, BACKGROUND, 3);
+    let count = scene.len();
+    assert!(count > 19_000, "{count} left");
+    let visible = twin.radii.iter().filter(|radius| **radius > 0).count();
+    assert!(visible > 19_000, "{visible} of {count} are in the tile");
+    for (name, device) in devices() {
+        let found = run(&scene, &camera, 3, &device);
+        assert_finite(name, &found);
+        // Thousands of blended splats a pixel: their rounding adds up, so a few times the usual tolerance.
+        assert_twin(name, &found, &twin, 1e-3, 0.2);
+    }
+}
+
+/// Pixels agree, but for those where a threshold is within rounding, which are at most `doubtful` of all.
+#[track_caller]
+fn assert_twin(what: &str, found: &Run, twin: &twin::TwinPicture, tolerance: f64, doubtful: f64) {
+    assert_eq!(found.radii, twin.radii, "{what}: radii");
+    let depth_scale = twin.values.iter().skip(4).step_by(5).fold(1.0f64, |m, v| m.max(*v));
+    let mut left_out = 0;
+    for (pixel, (found, expected)) in found.picture.chunks_exact(5).zip(twin.values.chunks_exact(5)).enumerate() {
+        if twin.doubtful[pixel] {
+            left_out += 1;
+            continue;
+        }
+        for c in 0..5 {
+            let error = (f64::from(found[c]) - expected[c]).abs() / if c == 4 { depth_scale } else { 1.0 };
+            assert!(
+                error <= tolerance,
+                "{what}: pixel {pixel} channel {c} is {} against {}, off by {error:e}",
+                found[c],
+                expected[c]
+            );
+        }
+    }
+    let share = f64::from(left_out) / twin.doubtful.len() as f64;
+    assert!(share <= doubtful, "{what}: {share} of the pixels are within rounding of a threshold");
+}
+
+#[test]
+fn the_plain_twin_agrees() {
+    for (seed, count) in COUNTS.into_iter().cycle().take(48).enumerate() {
+        let mut random = Random::new(5000 + seed as u64);
+        let [width, height] = SIZES[1 + random.below(SIZES.len() - 1)];
+        let degree = random.below(4);
+        let camera = random_camera(width, height, &mut random);
+        let ranges = Ranges { half_size: random.uniform(0.3, 2.5), ..Ranges::default() };
+        let mut scene = SplatScene::random(count, &ranges, &mut random);
+        for i in (0..count).step_by(5) {
+            make_odd(&mut scene, i, &camera, &mut random);
+            // Neither is smooth enough for two precisions to agree on: at 0.201 the projection magnifies rounding by
+            // hundreds of pixels, and a thin splat of hundreds of pixels has an ill-conditioned inverse.
+            let steep = scene.row_mut(SCALES, i).iter().any(|scale| *scale > 1.0);
+            if steep {
+                scene.row_mut(SCALES, i).fill(1.5);
+            }
+            let mean = glam::Vec3::from_slice(&scene.row_mut(MEANS, i).iter().map(|v| *v as f32).collect::<Vec<_>>());
+            let depth = (camera.rotation * mean + camera.translation).z;
+            if (0.0..1.0).contains(&depth) {
+                scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(&camera, 0.3, 0.2, 1.0 + depth));
+            }
+        }
+        let (scene, twin) = twin::render_without_doubt(&scene, &camera, BACKGROUND, degree);
+        for (name, device) in devices() {
+            let what = format!("{name} seed {seed}, {} Gaussians, {width}x{height}, degree {degree}", scene.len());
+            assert_twin(&what, &run(&scene, &camera, degree, &device), &twin, 2e-4, 0.25);
+        }
+    }
+}
+
+/// Scenes for the tests of reproducibility: several tiles, several chunks of Gaussians, odd ones among them.
+fn busy_scene(seed: u64, count: usize) -> (SplatScene, Camera) {
+    let mut random = Random::new(7000 + seed);
+    let camera = random_camera(75, 50, &mut random);
+    let mut scene = SplatScene::random(count, &Ranges::default(), &mut random);
+    for i in (0..count).step_by(9) {
+        make_odd(&mut scene, i, &camera, &mut random);
+    }
+    (scene, camera)
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit() {
+    let pool = |threads: usize| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let pools = [pool(1), pool(2), pool(5)];
+    for (name, device) in devices() {
+        for (seed, count) in [(0, 1), (1, 700), (2, 5000)] {
+            let (scene, camera) = busy_scene(seed, count);
+            let runs = pools.each_ref().map(|pool| pool.install(|| run(&scene, &camera, 3, &device)));
+            for (k, other) in runs.iter().enumerate().skip(1) {
+                assert_same(&format!("{name} {count} Gaussians, pool {k}"), &runs[0], other);
+            }
+        }
+    }
+}
+
+#[test]
+fn back_ends_agree_bit_by_bit() {
+    for (seed, count) in [(10, 1), (11, 60), (12, 700), (13, 5000)] {
+        let (scene, camera) = busy_scene(seed, count);
+        let runs: Vec<_> =
+            devices().into_iter().map(|(name, device)| (name, run(&scene, &camera, 3, &device))).collect();
+        for (name, other) in &runs[1..] {
+            assert_same(&format!("{count} Gaussians: {} and {name}", runs[0].0), &runs[0].1, other);
+        }
+    }
+}
+
+/// Raw attributes go through exp and sigmoid first, whose derivatives meet the poison on the way back.
+#[test]
+fn raw_attributes_that_cannot_be_drawn_have_finite_gradients() {
+    let mut failures = Vec::new();
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let mut random = Random::new(8);
+        let camera = random_camera(20, 20, &mut random);
+        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 100.0, -200.0, 3e38, -3e38] {
+            for attribute in ["means", "quats", "log_scales", "opacity_logits", "sh_dc", "sh_rest"] {
+                let leaf = |key: &str, width: usize, random: &mut Random| {
+                    let mut values: Vec<f32> = (0..2 * width).map(|_| 0.3 * random.normal() as f32).collect();
+                    if key == attribute {
+                        values[0] = value;
+                    }
+                    Tensor::<1>::from_floats(&values[..], &device).reshape([2, width]).require_grad()
+                };
+                let means = leaf("means", 3, &mut random);
+                let quats = leaf("quats", 4, &mut random);
+                let log_scales = leaf("log_scales", 3, &mut random);
+                let opacity_logits = leaf("opacity_logits", 1, &mut random);
+                let (sh_dc, sh_rest) = (leaf("sh_dc", 3, &mut random), leaf("sh_rest", 45, &mut random));
+                let gaussians = GaussianTensors {
+                    means: means.clone(),
+                    quats: quats.clone(),
+                    log_scales: log_scales.clone(),
+                    opacity_logits: opacity_logits.clone(),
+                    sh_dc: sh_dc.clone().reshape([2, 1, 3]),
+                    sh_rest: sh_rest.clone().reshape([2, 15, 3]),
+                };
+                let rendering = Splatter::new(BACKGROUND, 3).render(gaussians, &camera, None);
+                if !picture_of(&rendering).iter().all(|v| v.is_finite()) {
+                    failures.push(format!("{name} {value} in {attribute}: picture"));
+                }
+                let grads = (rendering.image.sum() + rendering.depth.sum()).backward();
+                let leaves = [
+                    ("means", means),
+                    ("quats", quats),
+                    ("log_scales", log_scales),
+                    ("opacity_logits", opacity_logits),
+                    ("sh_dc", sh_dc),
+                    ("sh_rest", sh_rest),
+                ];
+                for (key, leaf) in leaves {
+                    let gradient = values_of(&leaf.grad(&grads).unwrap());
+                    if let Some(i) = gradient.iter().position(|g| !g.is_finite()) {
+                        failures
+                            .push(format!("{name} {value} in {attribute}: {key} gradient [{i}] is {}", gradient[i]));
+                    }
+                }
+            }
+        }
+    }
+    assert!(failures.is_empty(), "{failures:#?}");
+}

@@ -1,0 +1,51 @@
+//! A run that is killed and resumed ends where an uninterrupted one ends, bit for bit.
+
+use std::fs;
+use std::time::Duration;
+
+use light4gs_tests::program::{Workspace, assert_success};
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
+
+#[test]
+fn killed_and_resumed_runs_are_bit_identical() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("whole", &[]).output().unwrap());
+    let expected = fs::read(w.path("whole/scene.l4gs")).unwrap();
+
+    // SIGKILL after a growing delay: in the first iterations, between checkpoints, in the fine stage.
+    let mut child = w.train("killed", &[]).spawn().unwrap();
+    let mut kills = 0;
+    for attempt in 1..60 {
+        let delay = Duration::from_millis(40 * attempt);
+        std::thread::sleep(delay);
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success());
+            break;
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        kills += 1;
+        if w.path("killed/run.json").exists() {
+            child = w.command(["resume", "killed", "--quiet"]).spawn().unwrap();
+        } else {
+            // Killed before there was a run: what a user does then is to start again.
+            let _ = fs::remove_dir_all(w.path("killed"));
+            child = w.train("killed", &[]).spawn().unwrap();
+        }
+    }
+    assert!(child.wait().unwrap().success());
+    assert!(kills > 0, "the run was never interrupted");
+    assert_eq!(fs::read(w.path("killed/scene.l4gs")).unwrap(), expected, "after {kills} kills");
+}
+
+#[test]
+fn a_seed_repeats_and_threads_do_not_matter() {
+    let w = Workspace::new(PROGRAM);
+    let mut files = Vec::new();
+    for (run, threads) in [("one", "1"), ("two", "2"), ("three", "3")] {
+        assert_success(&w.train(run, &[]).env("RAYON_NUM_THREADS", threads).output().unwrap());
+        files.push(fs::read(w.path(run).join("scene.l4gs")).unwrap());
+    }
+    assert!(files.iter().all(|file| *file == files[0]));
+}
