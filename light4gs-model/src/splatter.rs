@@ -9,6 +9,9 @@ use crate::cpu::project::View;
 use crate::gaussians::GaussianTensors;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
 
+/// Logarithms of scales are cut here before the exponential.
+const MAX_LOG_SCALE: f32 = 40.0;
+
 /// A picture and what the optimiser wants to know of it.
 #[derive(Clone, Debug)]
 pub struct Rendering {
@@ -70,7 +73,8 @@ impl Splatter {
         self.render_activated(
             gaussians.means,
             gaussians.quats,
-            gaussians.log_scales.exp(),
+            // Far beyond any scene, and exp stays finite, so that the way back has no 0 · infinity.
+            gaussians.log_scales.clamp_max(MAX_LOG_SCALE).exp(),
             sigmoid(gaussians.opacity_logits),
             gaussians.sh_dc,
             gaussians.sh_rest,

@@ -3,13 +3,13 @@
 //! Two judges for each operation, since each has what the other lacks:
 //!
 //! - *Differences of the operation itself*, along random directions. They see the very function that is trained, but
-//!   it is float32: a picture's values are rounded at 6e-8, so a loss over some hundred pixels is noisy at 1e-6, and
-//!   a step of 1e-3 makes 1e-3 of that, while the error of the central difference is of the order of the step squared.
-//!   Both are far below the 1e-2 that is asked for. Scenes are such that no threshold (alpha below 1/255, clamp at
-//!   0.99, opaque pixel, edge of the 3-sigma box) lies within a step: there the function jumps, and the derivative by
-//!   definition ignores the jump.
-//! - *Differences of a plain float64 twin*, one coordinate at a time, with a step of 1e-6 or less: thresholds are almost
-//!   never crossed, and the twin tells when one is, so the scenes are ordinary ones where everything happens.
+//!   it is float32, whose rounding a step h magnifies by 1/h, while the central difference is off by the order of h².
+//!   Steps between 2.5e-4 and 1.6e-2 were tried: at 1e-3 neither matters, and the worst error is 1e-3 of the
+//!   gradient's norm, in the quaternions. 3e-3 is allowed. The weights of the loss are smooth: white noise has smaller gradients
+//!   with the same rounding (7e-3). Scenes are such that no jump (alpha below 1/255, opaque pixel, edge of the 3-sigma
+//!   box, two Gaussians changing their order) lies within a step, since the derivative by definition ignores jumps.
+//! - *Differences of a plain float64 twin*, one coordinate at a time, with a step of 1e-6 or less: thresholds are
+//!   almost never crossed, and the twin tells when one is, so the scenes are ordinary ones where everything happens.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::Camera;
@@ -57,11 +57,27 @@ fn check_directions(
         let found = dot(wide(gradient), &direction);
         let expected = along(values, &direction, step, &loss);
         let error = (found - expected).abs() / norm;
-        assert!(error < 1e-2, "{what}: {found} against {expected}, off by {error:e} of the gradient's norm {norm}");
+        assert!(error < 3e-3, "{what}: {found} against {expected}, off by {error:e} of the gradient's norm {norm}");
     }
 }
 
-/// Large, rather transparent Gaussians, so that no threshold lies in the picture.
+/// Weights `[H, W, 5]` that vary slowly over the picture, so that what the pixels say adds up, and their rounding less.
+fn smooth_weights(camera: &Camera, random: &mut Random) -> Vec<f64> {
+    let (width, height) = (f64::from(camera.width), f64::from(camera.height));
+    let waves: [[f64; 3]; 5] = std::array::from_fn(|_| [0; 3].map(|_| random.uniform(-3.0, 3.0)));
+    let pixels = (0..camera.height).flat_map(|y| (0..camera.width).map(move |x| (f64::from(x), f64::from(y))));
+    pixels
+        .flat_map(|(x, y)| waves.map(|[a, b, c]| f64::from((a * x / width + b * y / height + c).cos() as f32)))
+        .collect()
+}
+
+fn depth_of(scene: &mut SplatScene, i: usize, camera: &Camera) -> f64 {
+    let mean = glam::DVec3::from_slice(scene.row_mut(MEANS, i));
+    (camera.rotation.as_dmat3() * mean + camera.translation.as_dvec3()).z
+}
+
+/// Large, rather transparent Gaussians, so that no threshold lies in the picture, and none that a step could move
+/// before another.
 fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
     let ranges = Ranges { half_size: 0.7, scales: [1.6, 2.6], opacities: [0.2, 0.6], sh: [0.3, 0.1], offset: 0.1 };
     loop {
@@ -72,7 +88,10 @@ fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
         // One whose green is clamped at zero.
         scene.row_mut(SH_DC, 5)[1] = -5.0;
         let picture = twin::render(&scene, camera, BACKGROUND, 3);
-        let smooth = picture.smallest_alpha > 2.0 / 255.0
+        let mut depths: Vec<f64> = (0..scene.len()).map(|i| depth_of(&mut scene, i, camera)).collect();
+        depths.sort_by(f64::total_cmp);
+        let smooth = depths.windows(2).all(|pair| pair[1] - pair[0] > 0.02)
+            && picture.smallest_alpha > 2.0 / 255.0
             && picture.largest_alpha < 0.9
             && picture.smallest_transmittance > 1e-3
             && picture.radii.iter().all(|radius| *radius > 0);
@@ -89,7 +108,7 @@ fn splat_along_random_directions() {
             let mut random = Random::new(seed);
             let camera = random_camera(20, 18, &mut random);
             let scene = smooth_scene(&camera, &mut random);
-            let weights = random.normals(20 * 18 * 5);
+            let weights = smooth_weights(&camera, &mut random);
             let tape = device.clone().autodiff();
             let leaves = scene.leaves(&tape);
             let gradients = leaves.gradients(leaves.render(&camera, BACKGROUND, 3), &weights);

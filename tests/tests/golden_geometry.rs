@@ -208,8 +208,8 @@ fn deformation() {
     }
 }
 
-/// The reference's coordinates, which are not ours: a box around the points, the contraction, a quarter of it, and a half
-/// on top. `[N, 4]` in [0, 1] for space and in [-1, 1] for time.
+/// The reference's coordinates, which are not ours: a box around the points, the contraction, a quarter of it, and a
+/// half on top. `[N, 4]` in [0, 1] for space and in [-1, 1] for time.
 fn reference_query_points(golden: &Golden, xyz: Tensor<2>, device: &Device) -> Tensor<2> {
     let count = xyz.dims()[0];
     let (low, high) = (golden.tensor::<2>("full.aabb_min", device), golden.tensor::<2>("full.aabb_max", device));

@@ -176,39 +176,52 @@ fn every_attribute_can_be_poisoned() {
     }
 }
 
-/// Finite numbers of any size in any place. Nothing is known of the picture but that it is one.
-#[test]
-fn extreme_numbers_give_finite_results() {
+/// Scenes half of whose Gaussians have a finite number of any size, 1e-37 to 10^`largest`, in some of the attributes.
+/// Nothing is known of their pictures but that they are finite; says which are not.
+fn failures_at_extremes(attributes: &[usize], largest: f64) -> Vec<String> {
+    let mut failures = Vec::new();
     for seed in 0..60 {
         let mut random = Random::new(3000 + seed);
         let [width, height] = SIZES[seed as usize % SIZES.len()];
         let camera = random_camera(width, height, &mut random);
         let mut scene = SplatScene::random(60, &Ranges::default(), &mut random);
-        let mut done = Vec::new();
         for i in (0..60).step_by(2) {
-            let attribute = [MEANS, QUATS, SCALES, SH_DC, SH_REST, SCREEN_OFFSETS][random.below(6)];
-            let component = random.below(WIDTHS[attribute]);
-            let magnitude = 10f64.powf(random.uniform(-37.0, 38.0));
+            let attribute = attributes[random.below(attributes.len())];
+            let magnitude = 10f64.powf(random.uniform(-37.0, largest));
             let sign = if attribute == SCALES || random.below(2) == 0 { 1.0 } else { -1.0 };
             let value = f64::from((sign * magnitude) as f32);
-            let whole = random.below(2) == 0;
-            if whole {
-                scene.row_mut(attribute, i).fill(value);
-            } else {
-                scene.row_mut(attribute, i)[component] = value;
+            let row = scene.row_mut(attribute, i);
+            match random.below(2) {
+                0 => row.fill(value),
+                _ => row[random.below(WIDTHS[attribute])] = value,
             }
-            done.push(format!("{i}: {value:e} in {}[{component}] all {whole}", ATTRIBUTES[attribute]));
         }
         for (name, device) in devices() {
             let found = run(&scene, &camera, 3, &device);
-            let what = format!("{name} seed {seed} {width}x{height}");
-            let finite = found.picture.iter().chain(found.gradients.iter().flatten()).all(|v| v.is_finite());
-            if !finite {
-                println!("{done:#?}");
+            let parts =
+                std::iter::once(("picture", &found.picture)).chain(ATTRIBUTES.into_iter().zip(&found.gradients));
+            for (part, values) in parts {
+                let bad = values.iter().filter(|v| !v.is_finite()).count();
+                if bad > 0 {
+                    failures.push(format!("{name} seed {seed} {width}x{height}: {bad} values of {part}"));
+                }
             }
-            assert_finite(&what, &found);
         }
     }
+    failures
+}
+
+#[test]
+fn extreme_geometry_gives_finite_results() {
+    let failures = failures_at_extremes(&[MEANS, QUATS, SCALES, SCREEN_OFFSETS], 38.0);
+    assert!(failures.is_empty(), "{failures:#?}");
+}
+
+/// Colours beyond 1e30 are not asked for: products of several of them leave float32 in the backward pass.
+#[test]
+fn extreme_colors_give_finite_results() {
+    let failures = failures_at_extremes(&[SH_DC, SH_REST], 30.0);
+    assert!(failures.is_empty(), "{failures:#?}");
 }
 
 #[test]
@@ -251,17 +264,20 @@ fn twenty_thousand_gaussians_in_one_tile() {
     let mut random = Random::new(3);
     let camera = random_camera(16, 16, &mut random);
     let ranges = Ranges { half_size: 0.4, scales: [0.01, 0.2], opacities: [0.005, 0.05], ..Ranges::default() };
-    let scene = SplatScene::random(20_000, &ranges, &mut random);
-    let (scene, twin) = twin::render_without_doubt(&scene, &camera, BACKGROUND, 3);
-    let count = scene.len();
-    assert!(count > 19_000, "{count} left");
-    let visible = twin.radii.iter().filter(|radius| **radius > 0).count();
-    assert!(visible > 19_000, "{visible} of {count} are in the tile");
+    // More than needed, since those at almost equal depths are left out.
+    let scene = SplatScene::random(30_000, &ranges, &mut random);
+    let (scene, _) = twin::render_without_doubt(&scene, &camera, BACKGROUND, 3);
+    let visible: Vec<bool> = twin::render(&scene, &camera, BACKGROUND, 3).radii.iter().map(|r| *r > 0).collect();
+    let mut scene = scene.filtered(&visible);
+    assert!(scene.len() >= 20_000, "{} left", scene.len());
+    let first: Vec<bool> = (0..scene.len()).map(|i| i < 20_000).collect();
+    scene = scene.filtered(&first);
+    let twin = twin::render(&scene, &camera, BACKGROUND, 3);
     for (name, device) in devices() {
         let found = run(&scene, &camera, 3, &device);
         assert_finite(name, &found);
         // Thousands of blended splats a pixel: their rounding adds up, so a few times the usual tolerance.
-        assert_twin(name, &found, &twin, 1e-3, 0.2);
+        assert_twin(name, &found, &twin, 1e-3, 0.15);
     }
 }
 
@@ -314,9 +330,11 @@ fn the_plain_twin_agrees() {
             }
         }
         let (scene, twin) = twin::render_without_doubt(&scene, &camera, BACKGROUND, degree);
+        // Else the two might agree on next to nothing.
+        assert!(scene.len() + 2 + count / 5 >= count, "seed {seed}: {} of {count} Gaussians left", scene.len());
         for (name, device) in devices() {
             let what = format!("{name} seed {seed}, {} Gaussians, {width}x{height}, degree {degree}", scene.len());
-            assert_twin(&what, &run(&scene, &camera, degree, &device), &twin, 2e-4, 0.25);
+            assert_twin(&what, &run(&scene, &camera, degree, &device), &twin, 2e-4, 0.15);
         }
     }
 }
@@ -359,58 +377,75 @@ fn back_ends_agree_bit_by_bit() {
     }
 }
 
-/// Raw attributes go through exp and sigmoid first, whose derivatives meet the poison on the way back.
-#[test]
-fn raw_attributes_that_cannot_be_drawn_have_finite_gradients() {
-    let mut failures = Vec::new();
+/// What is not finite after a bad raw value in one of two Gaussians.
+#[derive(Default)]
+struct RawFailures {
+    picture: Vec<String>,
+    /// In gradients of the Gaussian that has the value.
+    own: Vec<String>,
+    /// In gradients of the other one.
+    other: Vec<String>,
+}
+
+const RAW_ATTRIBUTES: [(&str, usize); 6] =
+    [("means", 3), ("quats", 4), ("log_scales", 3), ("opacity_logits", 1), ("sh_dc", 3), ("sh_rest", 45)];
+
+fn raw_failures() -> RawFailures {
+    let mut failures = RawFailures::default();
+    let camera = random_camera(20, 20, &mut Random::new(8));
     for (name, device) in devices() {
         let device = device.autodiff();
-        let mut random = Random::new(8);
-        let camera = random_camera(20, 20, &mut random);
-        for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 100.0, -200.0, 3e38, -3e38] {
-            for attribute in ["means", "quats", "log_scales", "opacity_logits", "sh_dc", "sh_rest"] {
-                let leaf = |key: &str, width: usize, random: &mut Random| {
+        for (attribute, _) in RAW_ATTRIBUTES {
+            for value in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 100.0, -200.0] {
+                let mut random = Random::new(9);
+                let leaves = RAW_ATTRIBUTES.map(|(key, width)| {
                     let mut values: Vec<f32> = (0..2 * width).map(|_| 0.3 * random.normal() as f32).collect();
                     if key == attribute {
                         values[0] = value;
                     }
                     Tensor::<1>::from_floats(&values[..], &device).reshape([2, width]).require_grad()
-                };
-                let means = leaf("means", 3, &mut random);
-                let quats = leaf("quats", 4, &mut random);
-                let log_scales = leaf("log_scales", 3, &mut random);
-                let opacity_logits = leaf("opacity_logits", 1, &mut random);
-                let (sh_dc, sh_rest) = (leaf("sh_dc", 3, &mut random), leaf("sh_rest", 45, &mut random));
+                });
+                let [means, quats, log_scales, opacity_logits, sh_dc, sh_rest] = leaves.clone();
                 let gaussians = GaussianTensors {
-                    means: means.clone(),
-                    quats: quats.clone(),
-                    log_scales: log_scales.clone(),
-                    opacity_logits: opacity_logits.clone(),
-                    sh_dc: sh_dc.clone().reshape([2, 1, 3]),
-                    sh_rest: sh_rest.clone().reshape([2, 15, 3]),
+                    means,
+                    quats,
+                    log_scales,
+                    opacity_logits,
+                    sh_dc: sh_dc.reshape([2, 1, 3]),
+                    sh_rest: sh_rest.reshape([2, 15, 3]),
                 };
                 let rendering = Splatter::new(BACKGROUND, 3).render(gaussians, &camera, None);
+                let what = format!("{name}: {value} in {attribute}");
                 if !picture_of(&rendering).iter().all(|v| v.is_finite()) {
-                    failures.push(format!("{name} {value} in {attribute}: picture"));
+                    failures.picture.push(what.clone());
                 }
                 let grads = (rendering.image.sum() + rendering.depth.sum()).backward();
-                let leaves = [
-                    ("means", means),
-                    ("quats", quats),
-                    ("log_scales", log_scales),
-                    ("opacity_logits", opacity_logits),
-                    ("sh_dc", sh_dc),
-                    ("sh_rest", sh_rest),
-                ];
-                for (key, leaf) in leaves {
+                for ((key, width), leaf) in RAW_ATTRIBUTES.iter().zip(&leaves) {
                     let gradient = values_of(&leaf.grad(&grads).unwrap());
-                    if let Some(i) = gradient.iter().position(|g| !g.is_finite()) {
-                        failures
-                            .push(format!("{name} {value} in {attribute}: {key} gradient [{i}] is {}", gradient[i]));
+                    let (own, other) = gradient.split_at(*width);
+                    // What is not finite itself may have such a derivative: it is lost already.
+                    if value.is_finite() && !own.iter().all(|g| g.is_finite()) {
+                        failures.own.push(format!("{what}: gradient of {key}"));
+                    }
+                    if !other.iter().all(|g| g.is_finite()) {
+                        failures.other.push(format!("{what}: gradient of {key}"));
                     }
                 }
             }
         }
     }
-    assert!(failures.is_empty(), "{failures:#?}");
+    failures
+}
+
+/// Raw attributes go through exp and sigmoid first. Whatever is in one Gaussian, the picture and the others are well.
+#[test]
+fn bad_raw_attributes_do_not_reach_other_gaussians() {
+    let RawFailures { picture, other, .. } = raw_failures();
+    assert!(picture.is_empty() && other.is_empty(), "{picture:#?} {other:#?}");
+}
+
+#[test]
+fn finite_raw_attributes_have_finite_gradients() {
+    let RawFailures { own, .. } = raw_failures();
+    assert!(own.is_empty(), "{own:#?}");
 }

@@ -15,11 +15,11 @@ pub(crate) fn adam_step(
     step: AdamStep,
 ) {
     let AdamStep { learning_rate, beta_1, beta_2, epsilon, time } = step;
-    // Bias corrections in f64: 1 - 0.999^t loses digits in f32.
-    let correction_1 = 1.0 - f64::from(beta_1).powi(time as i32);
-    let correction_2 = 1.0 - f64::from(beta_2).powi(time as i32);
-    let step_size = (f64::from(learning_rate) / correction_1) as f32;
-    let root_correction = correction_2.sqrt() as f32;
+    // In f64: 1 - 0.999 and 1 - 0.999^t lose digits in f32.
+    let (rest_1, rest_2) = ((1.0 - beta_1) as f32, (1.0 - beta_2) as f32);
+    let step_size = (f64::from(learning_rate) / (1.0 - beta_1.powi(time as i32))) as f32;
+    let root_correction = (1.0 - beta_2.powi(time as i32)).sqrt() as f32;
+    let (beta_1, beta_2) = (beta_1 as f32, beta_2 as f32);
     parameter
         .par_chunks_mut(CHUNK)
         .zip(gradient.par_chunks(CHUNK))
@@ -28,8 +28,8 @@ pub(crate) fn adam_step(
         .for_each(|(((parameter, gradient), first), second)| {
             for i in 0..parameter.len() {
                 let g = gradient[i];
-                first[i] = beta_1 * first[i] + (1.0 - beta_1) * g;
-                second[i] = beta_2 * second[i] + (1.0 - beta_2) * g * g;
+                first[i] = beta_1 * first[i] + rest_1 * g;
+                second[i] = beta_2 * second[i] + rest_2 * g * g;
                 parameter[i] -= step_size * first[i] / (second[i].sqrt() / root_correction + epsilon);
             }
         });

@@ -155,6 +155,7 @@ pub(crate) fn project(gaussians: &GaussianSlices, i: usize, view: &View) -> Spla
     let opacity = gaussians.opacities[i];
     let attributes_finite = mean.is_finite()
         && opacity.is_finite()
+        && gaussians.screen_offsets[2 * i..2 * i + 2].iter().all(|offset| offset.is_finite())
         && gaussians.scales[3 * i..3 * i + 3].iter().all(|s| s.is_finite())
         && gaussians.quats[4 * i..4 * i + 4].iter().all(|q| q.is_finite());
     if !attributes_finite {

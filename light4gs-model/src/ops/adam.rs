@@ -13,9 +13,9 @@ pub struct AdamStep {
     /// Learning rate of this step.
     pub learning_rate: f32,
     /// Decay of the first moment.
-    pub beta_1: f32,
+    pub beta_1: f64,
     /// Decay of the second moment.
-    pub beta_2: f32,
+    pub beta_2: f64,
     /// Added to the root of the second moment after bias correction.
     pub epsilon: f32,
     /// Steps that this parameter has taken, this one included (so at least 1).

@@ -167,7 +167,7 @@ impl Default for DensifyConfig {
             opacity_threshold_fine_final: 0.005,
             prune_from: 500,
             prune_interval: 100,
-            prune_above: 0,
+            prune_above: 200_000,
             opacity_reset_interval: 3000,
         }
     }
