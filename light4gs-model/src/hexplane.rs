@@ -85,7 +85,11 @@ impl HexPlane {
     /// # Panics
     /// If there are no planes, or their number is no multiple of six.
     pub fn from_planes(planes: Vec<Tensor<3>>) -> Self {
-        assert!(!planes.is_empty() && planes.len() % 6 == 0, "a hexplane has six planes a scale, not {}", planes.len());
+        assert!(
+            !planes.is_empty() && planes.len().is_multiple_of(6),
+            "a hexplane has six planes a scale, not {}",
+            planes.len()
+        );
         let channels = planes[0].dims()[0];
         Self { planes: planes.into_iter().map(Param::from_tensor).collect(), channels }
     }

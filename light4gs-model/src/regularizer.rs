@@ -39,11 +39,15 @@ pub fn time_l1(hexplane: &HexPlane) -> Tensor<1> {
 
 /// The three terms with their weights, `[1]`; terms of weight 0 are not computed.
 pub fn weighted_sum(hexplane: &HexPlane, plane: f32, time: f32, l1: f32) -> Tensor<1> {
-    let terms: [(f32, fn(&HexPlane) -> Tensor<1>); 3] =
-        [(plane, plane_smoothness), (time, time_smoothness), (l1, time_l1)];
-    let zero = Tensor::zeros([1], &hexplane.planes[0].device());
-    terms
-        .into_iter()
-        .filter(|(weight, _)| *weight != 0.0)
-        .fold(zero, |sum, (weight, term)| sum + term(hexplane) * weight)
+    let mut sum = Tensor::zeros([1], &hexplane.planes[0].device());
+    if plane != 0.0 {
+        sum = sum + plane_smoothness(hexplane) * plane;
+    }
+    if time != 0.0 {
+        sum = sum + time_smoothness(hexplane) * time;
+    }
+    if l1 != 0.0 {
+        sum = sum + time_l1(hexplane) * l1;
+    }
+    sum
 }

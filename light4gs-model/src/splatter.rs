@@ -2,7 +2,7 @@
 
 use burn::backend::Dispatch;
 use burn::tensor::activation::sigmoid;
-use burn::tensor::{Bool, Int, Tensor};
+use burn::tensor::{Bool, Int, Tensor, s};
 use light4gs_data::Camera;
 
 use crate::cpu::project::View;
@@ -126,9 +126,9 @@ impl Splatter {
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels = width * height;
         Rendering {
-            image: picture.clone().slice([0..3 * pixels]).reshape([height, width, 3]),
-            alpha: picture.clone().slice([3 * pixels..4 * pixels]).reshape([height, width]),
-            depth: picture.slice([4 * pixels..5 * pixels]).reshape([height, width]),
+            image: picture.clone().slice(s![0..3 * pixels]).reshape([height, width, 3]),
+            alpha: picture.clone().slice(s![3 * pixels..4 * pixels]).reshape([height, width]),
+            depth: picture.slice(s![4 * pixels..5 * pixels]).reshape([height, width]),
             radii,
         }
     }

@@ -3,7 +3,7 @@
 
 use burn::module::Param;
 use burn::tensor::activation::sigmoid;
-use burn::tensor::{Device, Int, Tensor, TensorData};
+use burn::tensor::{Device, Int, Tensor, TensorData, s};
 use light4gs_model::{GaussianTensors, Gaussians};
 
 use crate::optimizer::Adam;
@@ -116,9 +116,9 @@ pub fn densify(gaussians: &mut Gaussians, adam: &mut Adam, masks: &DensifyMasks,
     let halves = 2 * splits.len();
     let before = rows.len() - halves;
     let tensors = inner_tensors(gaussians);
-    let scales = tensors.log_scales.clone().slice([before..rows.len()]).exp();
+    let scales = tensors.log_scales.clone().slice(s![before..rows.len()]).exp();
     let normals = Tensor::<2>::from_data(TensorData::new(normals.to_vec(), [halves, 3]), &device);
-    let offsets = rotate(tensors.quats.slice([before..rows.len()]), normals * scales);
+    let offsets = rotate(tensors.quats.slice(s![before..rows.len()]), normals * scales);
     let pad = |change: Tensor<2>| Tensor::cat(vec![Tensor::zeros([before, 3], &change.device()), change], 0);
     let shrink = Tensor::full([halves, 3], -SPLIT_SHRINK.ln(), &device);
     replace(&mut gaussians.means, tensors.means + pad(offsets));

@@ -157,7 +157,7 @@ impl Trainer {
             self.state.seconds += begin.elapsed().as_secs_f64();
             bar.inc(1);
 
-            if iteration % self.config.train.log_interval == 0 || iteration == iterations {
+            if iteration.is_multiple_of(self.config.train.log_interval) || iteration == iterations {
                 let rate = (iteration - lap.1) as f64 / lap.0.elapsed().as_secs_f64();
                 lap = (Instant::now(), iteration);
                 let psnr = psnr(picture.image, picture.truth);
@@ -171,7 +171,7 @@ impl Trainer {
                 self.log(&record)?;
             }
             let interval = self.config.train.checkpoint_interval;
-            if (interval > 0 && iteration % interval == 0) || iteration == iterations {
+            if (interval > 0 && iteration.is_multiple_of(interval)) || iteration == iterations {
                 self.save_checkpoint()?;
                 lap = (Instant::now(), iteration);
             }
@@ -295,7 +295,7 @@ impl Trainer {
                 between(config.opacity_threshold_fine_init, config.opacity_threshold_fine_final),
             ),
         };
-        let due = |from: usize, interval: usize| interval > 0 && iteration > from && iteration % interval == 0;
+        let due = |from: usize, interval: usize| interval > 0 && iteration > from && iteration.is_multiple_of(interval);
         let extent = self.data.extent;
 
         let count = self.state.scene.gaussians.len();
@@ -332,7 +332,7 @@ impl Trainer {
     fn test_psnr(&self, stage: Stage, iteration: usize, last: usize) -> Result<Option<f64>, TrainError> {
         let eval = &self.config.eval;
         let frames = self.data.frames(Split::Test);
-        let due = eval.interval > 0 && (iteration % eval.interval == 0 || iteration == last);
+        let due = eval.interval > 0 && (iteration.is_multiple_of(eval.interval) || iteration == last);
         if !due || eval.views == 0 || frames.is_empty() {
             return Ok(None);
         }

@@ -8,7 +8,7 @@ mod render;
 mod synth;
 mod train;
 
-use std::path::PathBuf;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -101,7 +101,7 @@ fn print_json(value: &impl serde::Serialize) {
 }
 
 /// Refuses an output path whose folder does not exist, before any work is done.
-fn check_output(path: &PathBuf) -> Result<(), TrainError> {
+fn check_output(path: &Path) -> Result<(), TrainError> {
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
     match folder {
         Some(folder) if !folder.is_dir() => {
