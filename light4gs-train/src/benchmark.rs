@@ -132,7 +132,13 @@ impl BenchScene {
         self.opacity_logits.len()
     }
 
-    fn gaussians(&self, device: &Device) -> Gaussians {
+    /// Where it is seen from.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The Gaussians on a device.
+    pub fn gaussians(&self, device: &Device) -> Gaussians {
         let count = self.count();
         let matrix = |values: &[f32], columns: usize| {
             Tensor::<2>::from_data(TensorData::new(values.to_vec(), [count, columns]), device)
