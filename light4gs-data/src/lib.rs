@@ -5,7 +5,7 @@
 //! [`write_synthetic`] makes a small moving scene to try things on.
 //! Nothing here depends on Burn, and no user input makes this crate panic.
 //!
-//! Conventions (`docs` and `shared/DESIGN.md` section 3): cameras are OpenCV pinholes
+//! Conventions: cameras are OpenCV pinholes
 //! (+x right, +y down, +z forward), time is in `[0, 1]`, pictures are `[H, W, 3]`, row-major,
 //! already composited on the background, in the byte values of the file (no gamma handling).
 

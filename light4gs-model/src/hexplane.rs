@@ -24,7 +24,7 @@ pub struct HexPlaneConfig {
     #[config(default = 32)]
     pub channels: usize,
     /// Cells along x, y, z and t at the lowest scale.
-    #[config(default = "[64, 64, 64, 28]")]
+    #[config(default = "[64, 64, 64, 24]")]
     pub resolution: [usize; 4],
     /// One scale each: spatial resolutions are multiplied, time keeps its own.
     #[config(default = "vec![1, 2]")]

@@ -176,17 +176,12 @@ impl Load<'_> {
             Some(values) if expected.is_none_or(|expected| expected == values.len()) => values,
             found => {
                 let found = found.map_or("nothing".to_owned(), |values| format!("{} values", values.len()));
-                let expected = expected.map_or("float32 values".to_owned(), |n| format!("{n} float32 values"));
-                self.problem.get_or_insert(format!("tensor `{name}`: expected {expected}, found {found}"));
-                vec![0.0; expected_len(&expected)]
+                let wanted = expected.map_or("float32 values".to_owned(), |n| format!("{n} float32 values"));
+                self.problem.get_or_insert(format!("tensor `{name}`: expected {wanted}, found {found}"));
+                vec![0.0; expected.unwrap_or(0)]
             }
         }
     }
-}
-
-/// Length to stand in for a tensor that is already known to be wrong.
-fn expected_len(expected: &str) -> usize {
-    expected.split(' ').next().and_then(|n| n.parse().ok()).unwrap_or(0)
 }
 
 impl ParameterVisitor for Load<'_> {

@@ -19,12 +19,12 @@ use crate::densification::{
 };
 use crate::device::device_by_name;
 use crate::error::TrainError;
+use crate::learning_rates::GroupRates;
 use crate::loss::{photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
 use crate::run_folder::{RunFolder, RunRecord};
-use crate::schedule::ExponentialDecay;
 use crate::tensorboard::TensorBoard;
 
 /// Gaussians larger than this on the screen, in pixels, are dropped once opacities have been reset.
@@ -388,55 +388,6 @@ pub(crate) fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
 fn regularization(scene: &DynamicScene, config: &TrainConfig) -> Tensor<1> {
     let weights = &config.regularizer;
     regularizer::weighted_sum(&scene.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1)
-}
-
-/// Learning rates of one iteration.
-struct GroupRates {
-    means: f64,
-    grid: f64,
-    deformation: f64,
-    sh_dc: f64,
-    sh_rest: f64,
-    opacity: f64,
-    scale: f64,
-    rotation: f64,
-}
-
-impl GroupRates {
-    fn new(config: &TrainConfig, stage: Stage, iteration: usize, extent: f32) -> Self {
-        let rates = &config.learning_rate;
-        let length = match stage {
-            Stage::Coarse => config.coarse_iterations,
-            Stage::Fine => config.fine_iterations,
-        };
-        let steps = rates.schedule_steps.unwrap_or(length);
-        let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
-        let decay =
-            |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
-        Self {
-            means: decay(rates.means_init, rates.means_final),
-            grid: decay(rates.grid_init, rates.grid_final),
-            deformation: decay(rates.deformation_init, rates.deformation_final),
-            sh_dc: rates.sh_dc,
-            sh_rest: rates.sh_dc / rates.sh_rest_divisor,
-            opacity: rates.opacity,
-            scale: rates.scale,
-            rotation: rates.rotation,
-        }
-    }
-
-    fn of(&self, group: ParameterGroup) -> f64 {
-        match group {
-            ParameterGroup::Means => self.means,
-            ParameterGroup::LogScales => self.scale,
-            ParameterGroup::Quats => self.rotation,
-            ParameterGroup::Opacity => self.opacity,
-            ParameterGroup::ShDc => self.sh_dc,
-            ParameterGroup::ShRest => self.sh_rest,
-            ParameterGroup::Grid => self.grid,
-            ParameterGroup::Deformation => self.deformation,
-        }
-    }
 }
 
 struct AdamVisitor<'a> {

@@ -149,19 +149,7 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>, wi
     }
 }
 
-impl HexPlaneKernels for NdArray {
-    type Saved = CpuSaved;
-
-    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, CpuSaved) {
-        forward_on_cpu(inputs)
-    }
-
-    fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self> {
-        backward_on_cpu(saved, gradient, with_points)
-    }
-}
-
-impl HexPlaneKernels for Flex {
+impl<B: HostBackend> HexPlaneKernels for B {
     type Saved = CpuSaved;
 
     fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, CpuSaved) {

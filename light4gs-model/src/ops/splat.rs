@@ -164,19 +164,7 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) ->
     )
 }
 
-impl SplatKernels for NdArray {
-    type Saved = CpuSaved;
-
-    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
-        forward_on_cpu(inputs, view)
-    }
-
-    fn splat_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
-        backward_on_cpu(saved, gradient)
-    }
-}
-
-impl SplatKernels for Flex {
+impl<B: HostBackend> SplatKernels for B {
     type Saved = CpuSaved;
 
     fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
