@@ -97,7 +97,7 @@ pub struct DensifyConfig {
     pub prune_interval: usize,
     /// Pruning only happens above this many Gaussians; 0 means always.
     pub prune_above: usize,
-    /// Opacities are reset every so many iterations.
+    /// Opacities are reset every so many iterations; 0 = never.
     pub opacity_reset_interval: usize,
 }
 

@@ -132,14 +132,11 @@ fn densify(check: &mut Check, densify: &DensifyConfig) {
         ("until", densify.until),
         ("prune_from", densify.prune_from),
         ("prune_above", densify.prune_above),
+        ("opacity_reset_interval", densify.opacity_reset_interval),
     ] {
         check.toml_integer(&key(name), value);
     }
-    for (name, value) in [
-        ("interval", densify.interval),
-        ("prune_interval", densify.prune_interval),
-        ("opacity_reset_interval", densify.opacity_reset_interval),
-    ] {
+    for (name, value) in [("interval", densify.interval), ("prune_interval", densify.prune_interval)] {
         check.range(&key(name), value, 1, 100_000_000);
     }
     for (name, value) in [
