@@ -116,6 +116,7 @@ struct AxisSample {
 
 impl AxisSample {
     /// Align-corners: -1 is the first cell's centre, 1 the last one's; border clamp.
+    #[inline(always)]
     fn new(coordinate: f32, cells: usize) -> Self {
         let last = (cells - 1) as f32;
         let position = (coordinate + 1.0) * 0.5 * last;
@@ -163,6 +164,7 @@ impl Corners {
     }
 }
 
+#[inline(always)]
 fn samples(point: &[f32], resolution: [usize; 4]) -> [AxisSample; 4] {
     std::array::from_fn(|axis| AxisSample::new(point[axis], resolution[axis]))
 }
@@ -251,7 +253,11 @@ impl LaneKernel for Backward<'_> {
             let mut padded = [0.0; LANES];
             padded[..own].copy_from_slice(&upstream[first..first + own]);
             let upstream = L::load(&padded);
-            let values: [L; 6] = std::array::from_fn(|plane| corners[plane].sample::<L>(cells[plane]));
+            // Loops, not `array::from_fn`: a call that is not inlined leaves the vector registers.
+            let mut values = [L::splat(0.0); 6];
+            for plane in 0..6 {
+                values[plane] = corners[plane].sample::<L>(cells[plane]);
+            }
 
             // Product of the others without dividing: upstream · prefix · suffix.
             let mut prefix = [upstream; 6];
@@ -270,7 +276,10 @@ impl LaneKernel for Backward<'_> {
                 }
                 if self.with_points {
                     let [across, down] = PLANE_AXES[plane];
-                    let corner = index.map(|i| L::load(&cells[plane][i]));
+                    let mut corner = [L::splat(0.0); 4];
+                    for k in 0..4 {
+                        corner[k] = L::load(&cells[plane][index[k]]);
+                    }
                     let (x, y) = (L::splat(axes[across].fraction), L::splat(axes[down].fraction));
                     let lower = corner[1].sub(corner[0]);
                     let upper = corner[3].sub(corner[2]);

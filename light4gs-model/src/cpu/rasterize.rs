@@ -73,7 +73,8 @@ impl<L: Lanes> WideSplat<L> {
             b: L::splat(-splat.conic[1]),
             half_c: L::splat(-0.5 * splat.conic[2]),
             opacity: L::splat(splat.opacity),
-            color: splat.color.map(L::splat),
+            // Written out: a call that is not inlined leaves the vector registers.
+            color: [L::splat(splat.color[0]), L::splat(splat.color[1]), L::splat(splat.color[2])],
             depth: L::splat(splat.depth),
         }
     }
@@ -124,7 +125,12 @@ pub(crate) fn groups(splat: &Splat, origin_x: f32, dy: f32) -> RangeInclusive<us
 /// Pixel columns of a group as lanes, from the tile's left edge.
 #[inline(always)]
 pub(crate) fn pixel_columns<L: Lanes>(origin_x: f32) -> [L; GROUPS] {
-    std::array::from_fn(|group| L::load(&std::array::from_fn(|lane| origin_x + (group * LANES + lane) as f32)))
+    let mut columns = [L::splat(0.0); GROUPS];
+    for (group, column) in columns.iter_mut().enumerate() {
+        let x: [f32; LANES] = std::array::from_fn(|lane| origin_x + (group * LANES + lane) as f32);
+        *column = L::load(&x);
+    }
+    columns
 }
 
 /// Lanes of a tile that lie outside the picture count as opaque from the start.

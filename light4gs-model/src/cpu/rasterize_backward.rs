@@ -66,7 +66,7 @@ impl LaneKernel for BackwardTile<'_> {
                     footprint.hit.select(taken.and(after), t).store(&mut open[at]);
 
                     let weight = taken.and(t.mul(footprint.alpha));
-                    let up: [L; 5] = std::array::from_fn(|c| L::load(&upstream[c][at]));
+                    let up = load_all::<L>(&upstream, at);
                     for c in 0..3 {
                         linear[c] = weight.mul_add(up[c], linear[c]);
                     }
@@ -94,11 +94,24 @@ impl LaneKernel for BackwardTile<'_> {
                 moments[4] = row_px.mul_add(dy, moments[4]);
                 moments[5] = row_py.mul_add(dy, moments[5]);
             }
-            for (sum, lanes) in sums.iter_mut().zip(linear.into_iter().chain(moments)) {
-                *sum = lanes.sum();
+            for k in 0..4 {
+                sums[k] = linear[k].sum();
+            }
+            for k in 0..6 {
+                sums[4 + k] = moments[k].sum();
             }
         }
     }
+}
+
+/// A loop, not `array::from_fn`: a call that is not inlined leaves the vector registers.
+#[inline(always)]
+fn load_all<L: Lanes>(planes: &[TilePlane; 5], at: usize) -> [L; 5] {
+    let mut values = [L::splat(0.0); 5];
+    for (value, plane) in values.iter_mut().zip(planes) {
+        *value = L::load(&plane[at]);
+    }
+    values
 }
 
 /// `S` of every pixel: the finished sums weighed by the upstream gradient.
@@ -106,7 +119,7 @@ impl LaneKernel for BackwardTile<'_> {
 fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; 5], background: [f32; 3]) -> TilePlane {
     let mut total = [[0.0; LANES]; TILE * TILE_GROUPS];
     for at in 0..total.len() {
-        let up: [L; 5] = std::array::from_fn(|c| L::load(&upstream[c][at]));
+        let up = load_all::<L>(upstream, at);
         // The background's value; alpha is 1 - T, hence the minus.
         let mut behind = L::splat(0.0).sub(up[3]);
         let mut value = up[4].mul(L::load(&pixels.depth[at]));
