@@ -71,6 +71,10 @@ impl DynamicScene {
     /// Raw attributes at a time in [0, 1].
     pub fn at(&self, time: f32) -> GaussianTensors {
         let rest = self.gaussians.tensors();
+        if self.gaussians.is_empty() {
+            // Dense layers of some back ends refuse a batch of none.
+            return rest;
+        }
         let points = self.query_points(rest.means.clone(), time);
         self.deform(rest, self.hexplane.query(points))
     }

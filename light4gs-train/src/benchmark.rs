@@ -100,6 +100,9 @@ impl BenchScene {
         };
         let opacity_logits = values("raw_opacities", None)?;
         let count = opacity_logits.len();
+        if count == 0 {
+            return Err(field("raw_opacities", "no Gaussians, expected at least one".into()).into());
+        }
         let size = values("image_wh", Some(2))?;
         if !size.iter().all(|side| (1.0..=16_384.0).contains(side)) {
             return Err(field("image_wh", format!("{size:?}, expected sides between 1 and 16384")).into());

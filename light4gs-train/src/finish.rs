@@ -60,22 +60,7 @@ fn save_renders(folder: &RunFolder, views: &[RenderedView]) -> Result<(), TrainE
 }
 
 fn created() -> String {
-    let seconds = std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs());
-    format!("{} UTC", civil_date(seconds))
-}
-
-/// `YYYY-MM-DD hh:mm` of Unix seconds (Hinnant, *chrono-Compatible Low-Level Date Algorithms*).
-fn civil_date(seconds: u64) -> String {
-    let days = (seconds / 86_400) as i64 + 719_468;
-    let era = days.div_euclid(146_097);
-    let day_of_era = days.rem_euclid(146_097);
-    let year_of_era = (day_of_era - day_of_era / 1460 + day_of_era / 36_524 - day_of_era / 146_096) / 365;
-    let day_of_year = day_of_era - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
-    let shifted_month = (5 * day_of_year + 2) / 153;
-    let day = day_of_year - (153 * shifted_month + 2) / 5 + 1;
-    let month = if shifted_month < 10 { shifted_month + 3 } else { shifted_month - 9 };
-    let year = year_of_era + era * 400 + i64::from(month <= 2);
-    format!("{year:04}-{month:02}-{day:02} {:02}:{:02}", seconds % 86_400 / 3600, seconds % 3600 / 60)
+    jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {
@@ -95,16 +80,4 @@ fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {
         tiles.push(tile("Training", format!("{:.1} min", seconds / 60.0), "on this device"));
     }
     tiles
-}
-
-#[cfg(test)]
-mod tests {
-    use super::civil_date;
-
-    #[test]
-    fn dates() {
-        assert_eq!(civil_date(0), "1970-01-01 00:00");
-        assert_eq!(civil_date(951_868_740), "2000-02-29 23:59");
-        assert_eq!(civil_date(1_795_219_200), "2026-11-21 00:00");
-    }
 }

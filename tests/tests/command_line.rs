@@ -196,6 +196,7 @@ fn wrong_arguments() {
     assert_refused(&w.run(["resume", "scene"]), &["scene", "run.json"]);
     assert_refused(&w.run(["train", "nowhere", "--out", "run"]), &["nowhere"]);
     assert_refused(&w.run(["bench", "--device", "abacus"]), &["abacus", "ndarray"]);
+    assert_refused(&w.run(["bench", "--gaussians", "0"]), &["--gaussians", "between 1"]);
     assert_refused(&w.run(["synth", "scene"]), &["scene"]);
     for command in
         ["quickstart", "train", "resume", "eval", "render", "encode", "decode", "info", "export", "synth", "bench"]

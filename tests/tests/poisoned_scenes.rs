@@ -1,8 +1,10 @@
 //! The rasteriser on scenes that nobody would make on purpose, against a plain twin, and its reproducibility.
 
 use burn::tensor::{Device, Tensor};
-use light4gs_data::Camera;
-use light4gs_model::{GaussianTensors, Splatter};
+use light4gs_data::{Camera, PointCloud};
+use light4gs_model::{
+    DeformationConfig, DynamicSceneConfig, GaussianTensors, GaussiansConfig, HexPlaneConfig, Splatter,
+};
 use light4gs_tests::golden::{devices, values_of};
 use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{
@@ -448,4 +450,21 @@ fn bad_raw_attributes_do_not_reach_other_gaussians() {
 fn finite_raw_attributes_have_finite_gradients() {
     let RawFailures { own, .. } = raw_failures();
     assert!(own.is_empty(), "{own:#?}");
+}
+
+/// A file may legally hold no Gaussians: it renders as background at every time.
+#[test]
+fn a_scene_without_gaussians_renders_the_background() {
+    let config = DynamicSceneConfig::new(
+        GaussiansConfig::new(),
+        HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]),
+        DeformationConfig::new(0).with_width(8),
+    );
+    for (name, device) in devices() {
+        let scene = config.init(&PointCloud::default(), &device);
+        let camera = random_camera(20, 12, &mut Random::new(8));
+        let image = Splatter::new(BACKGROUND, 3).render(scene.at(0.5), &camera, None).image;
+        let values = values_of(&image);
+        assert!(values.chunks_exact(3).all(|pixel| pixel == BACKGROUND), "{name}");
+    }
 }

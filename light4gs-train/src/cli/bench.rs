@@ -38,6 +38,9 @@ impl Bench {
             scenes.push(BenchScene::open(path)?);
         }
         if scenes.is_empty() {
+            if self.gaussians.iter().any(|count| !(1..=10_000_000).contains(count)) {
+                return Err(TrainError::Input("--gaussians must be between 1 and 10000000".into()));
+            }
             if self.size.iter().any(|size| !(1..=16_384).contains(size)) {
                 return Err(TrainError::Input("--size must be between 1 and 16384".into()));
             }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use light4gs_data::{SyntheticOptions, write_synthetic};
 
-use super::train::train;
+use super::train::{RunOutput, train};
 use crate::config::Config;
 use crate::error::TrainError;
 
@@ -20,12 +20,8 @@ pub(super) struct Quickstart {
     /// Replace a run that is there already.
     #[arg(long)]
     overwrite: bool,
-    /// Print the evaluation as JSON.
-    #[arg(long)]
-    json: bool,
-    /// No progress bars.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    output: RunOutput,
 }
 
 impl Quickstart {
@@ -44,6 +40,6 @@ impl Quickstart {
             }
             write_synthetic(&scene, &SyntheticOptions::default())?;
         }
-        train(config, &scene, &self.out, self.overwrite, self.json, self.quiet)
+        train(config, &scene, &self.out, self.overwrite, &self.output)
     }
 }

@@ -15,6 +15,17 @@ use crate::run_folder::RunFolder;
 use crate::table::{Align, Table};
 use crate::trainer::{Trainer, load_options};
 
+/// What a run prints.
+#[derive(Debug, Args)]
+pub(super) struct RunOutput {
+    /// Print the evaluation as JSON.
+    #[arg(long)]
+    json: bool,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
 #[derive(Debug, Args)]
 pub(super) struct Train {
     /// Folder of the dataset.
@@ -34,12 +45,8 @@ pub(super) struct Train {
     /// Replace a run that is there already.
     #[arg(long)]
     overwrite: bool,
-    /// Print the evaluation as JSON.
-    #[arg(long)]
-    json: bool,
-    /// No progress bars.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    output: RunOutput,
 }
 
 impl Train {
@@ -47,7 +54,7 @@ impl Train {
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
         let config = Config::load(&self.config, &overrides)?;
-        train(config, &self.scene, &self.out, self.overwrite, self.json, self.quiet)
+        train(config, &self.scene, &self.out, self.overwrite, &self.output)
     }
 }
 
@@ -57,16 +64,15 @@ pub(super) fn train(
     scene: &Path,
     out: &Path,
     overwrite: bool,
-    json: bool,
-    quiet: bool,
+    output: &RunOutput,
 ) -> Result<(), TrainError> {
     device_by_name(&config.device)?;
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
     Scene::open(scene, &load_options(&config))?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (folder, record, config) = RunFolder::open(folder.root())?;
-    let trainer = Trainer::start(config.clone(), folder.clone(), &record, quiet)?;
-    finish(trainer, &folder, &config, json)
+    let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
+    finish(trainer, &folder, &config, output.json)
 }
 
 fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool) -> Result<(), TrainError> {
@@ -83,19 +89,15 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool)
 pub(super) struct Resume {
     /// Folder of the run.
     run: PathBuf,
-    /// Print the evaluation as JSON.
-    #[arg(long)]
-    json: bool,
-    /// No progress bars.
-    #[arg(long)]
-    quiet: bool,
+    #[command(flatten)]
+    output: RunOutput,
 }
 
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let (folder, record, config) = RunFolder::open(&self.run)?;
-        let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.quiet)?;
-        finish(trainer, &folder, &config, self.json)
+        let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
+        finish(trainer, &folder, &config, self.output.json)
     }
 }
 

@@ -11,8 +11,7 @@ const TOLERANCE: f32 = 1e-5;
 
 /// The folder or file of the golden set whose name begins with `prefix`, whatever its letter.
 fn golden(prefix: &str) -> PathBuf {
-    let default = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden");
-    let folder = std::env::var_os("LIGHT4GS_GOLDEN").map_or_else(|| default.into(), PathBuf::from);
+    let folder = light4gs_tests::golden::directory();
     let mut found: Vec<PathBuf> = std::fs::read_dir(&folder)
         .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
         .map(|entry| entry.unwrap().path())
