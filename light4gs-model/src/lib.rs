@@ -7,6 +7,7 @@
 //! | [`HexPlane`] | six feature planes over the pairs of x, y, z, t, at several scales | III-A |
 //! | [`Deformation`] | from a feature to changes of position, scale, rotation | III-A |
 //! | [`Splatter`] | differentiable rendering | 3DGS |
+//! | [`Significance`] | what each Gaussian contributes over views and times | III-B |
 //! | [`DynamicScene`] | all of it together: Gaussians at a time, and the plain arrays of a `.l4gs` file | III |
 //!
 //! Every part is a Burn module of its own (`Config` and `init`) and works alone. Custom operations with hand-written
@@ -22,6 +23,7 @@ pub mod ops;
 mod plain_arrays;
 pub mod regularizer;
 mod scene_frame;
+mod significance;
 pub mod spherical_harmonics;
 mod splatter;
 
@@ -32,4 +34,5 @@ pub use gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
 pub use hexplane::{HexPlane, HexPlaneConfig, PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 pub use plain_arrays::ModelError;
 pub use scene_frame::{Pca, SceneFrame};
+pub use significance::{Significance, SignificanceScore, VolumeWeight, least_significant};
 pub use splatter::{Rendering, Splatter};

@@ -1,5 +1,6 @@
 //! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use burn::module::Param;
@@ -7,7 +8,7 @@ use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
 use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
-use light4gs_model::{DynamicScene, Splatter, regularizer};
+use light4gs_model::{DynamicScene, Significance, Splatter, least_significant, regularizer};
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -153,6 +154,9 @@ impl Trainer {
             let begin = Instant::now();
             let picture = self.step(stage, iteration)?;
             self.control_density(stage, iteration);
+            if stage == Stage::Fine && self.config.train.prune.is_due(iteration) {
+                self.prune_insignificant(iteration);
+            }
             self.state.iteration = iteration;
             self.state.seconds += begin.elapsed().as_secs_f64();
             bar.inc(1);
@@ -281,6 +285,42 @@ impl Trainer {
         generator
     }
 
+    /// Drops the Gaussians that contribute least to the training views at their times (STP, paper III-B).
+    fn prune_insignificant(&mut self, iteration: usize) {
+        let config = &self.config.train.prune;
+        let scene = &self.state.scene;
+        let splatter = self.splatter(Stage::Fine, iteration);
+        let mut significance = Significance::new(scene.gaussians.len());
+        for frame in self.pruning_views(iteration) {
+            significance.add(&splatter, scene.at(frame.time), &frame.camera);
+        }
+        let volumes: Vec<f64> =
+            scene.gaussians.log_scales.val().inner().sum_dim(1).exp().into_data().iter::<f64>().collect();
+        let mut scores = significance.scores(config.score());
+        for (score, factor) in scores.iter_mut().zip(config.volume_weight().of(&volumes)) {
+            *score *= factor;
+        }
+        let keep: Vec<bool> = least_significant(&scores, config.fraction).iter().map(|drop| !drop).collect();
+        // Never everything: an empty scene has no gradient to come back from.
+        if keep.contains(&true) && keep.contains(&false) {
+            prune(&mut self.state.scene.gaussians, &mut self.state.adam, &keep);
+            self.state.statistics.keep(&keep);
+        }
+    }
+
+    /// Every training view, or one random view a time.
+    fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
+        if !self.config.train.prune.one_camera_per_time {
+            return self.data.train.iter().collect();
+        }
+        let mut by_time: BTreeMap<u32, Vec<&Frame>> = BTreeMap::new();
+        for frame in &self.data.train {
+            by_time.entry(frame.time.to_bits()).or_default().push(frame);
+        }
+        let mut generator = self.generator(Purpose::PruningViews, Stage::Fine, iteration);
+        by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()
+    }
+
     fn control_density(&mut self, stage: Stage, iteration: usize) {
         let config = self.config.train.densify.clone();
         if iteration > config.until {
@@ -356,6 +396,7 @@ impl Trainer {
 enum Purpose {
     FrameOrder,
     Split,
+    PruningViews,
 }
 
 /// Box-Muller, one of the pair.

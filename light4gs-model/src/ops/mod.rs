@@ -9,4 +9,5 @@
 pub mod adam;
 pub mod hexplane_query;
 mod host;
+pub mod significance;
 pub mod splat;

@@ -20,6 +20,7 @@ mod model;
 mod optional;
 mod overrides;
 mod presets;
+mod prune;
 mod schema;
 mod train;
 mod validate;
@@ -37,6 +38,7 @@ pub use error::{ConfigError, Origin, Problem};
 pub use eval::EvalConfig;
 pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use presets::preset_names;
+pub use prune::PruneConfig;
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 
 /// The devices that `device` may name.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::optional;
+use super::{PruneConfig, optional};
 
 /// Stages, loss and bookkeeping of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,6 +28,8 @@ pub struct TrainConfig {
     pub learning_rate: LearningRates,
     /// Cloning, splitting, pruning and opacity reset.
     pub densify: DensifyConfig,
+    /// Dropping the least significant Gaussians.
+    pub prune: PruneConfig,
     /// Weights of the space-time regularisers, used in the fine stage.
     pub regularizer: RegularizerConfig,
 }
@@ -126,6 +128,7 @@ impl Default for TrainConfig {
             keep_checkpoints: 2,
             learning_rate: LearningRates::default(),
             densify: DensifyConfig::default(),
+            prune: PruneConfig::default(),
             regularizer: RegularizerConfig::default(),
         }
     }

@@ -1,8 +1,9 @@
 //! Ranges: what the types alone let through.
 
+use super::prune::{SCORES, VOLUMES};
 use super::{
     Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates, ModelConfig,
-    Problem, RegularizerConfig, TrainConfig,
+    Problem, PruneConfig, RegularizerConfig, TrainConfig,
 };
 
 /// Planes are halved twice by the context model and predicted scale by scale.
@@ -100,6 +101,7 @@ fn train(check: &mut Check, train: &TrainConfig) {
     check.range("train.keep_checkpoints", train.keep_checkpoints, 1, MOST);
     learning_rates(check, &train.learning_rate);
     densify(check, &train.densify);
+    prune(check, &train.prune, train);
     regularizer(check, &train.regularizer);
 }
 
@@ -155,6 +157,25 @@ fn densify(check: &mut Check, densify: &DensifyConfig) {
     ] {
         check.share(&key(name), value);
     }
+}
+
+fn prune(check: &mut Check, prune: &PruneConfig, train: &TrainConfig) {
+    check.that("train.prune.fraction", (0.0..1.0).contains(&prune.fraction), || {
+        format!("is {}; it must be at least 0 and below 1", prune.fraction)
+    });
+    if prune.fraction > 0.0 {
+        for &iteration in &prune.iterations {
+            check.that("train.prune.iterations", (1..=train.fine_iterations).contains(&iteration), || {
+                format!("has {iteration}, but the fine stage has iterations 1 to {}", train.fine_iterations)
+            });
+            check.that("train.prune.iterations", iteration > train.densify.until, || {
+                format!("has {iteration}; pruning follows densification, which ends at {}", train.densify.until)
+            });
+        }
+    }
+    check.one_of("train.prune.score", &prune.score, SCORES);
+    check.one_of("train.prune.volume", &prune.volume, VOLUMES);
+    check.positive("train.prune.volume_exponent", prune.volume_exponent);
 }
 
 fn regularizer(check: &mut Check, weights: &RegularizerConfig) {
