@@ -160,7 +160,7 @@ fn significance_of_each_picture() {
     for case in ["c08_raster", "c08_raster_edge"] {
         let (golden, cameras) = significance_scene(case);
         for (name, device) in devices() {
-            let gaussians = raw_gaussians(&golden, &device);
+            let gaussians = raw_gaussians(&golden, &device.autodiff());
             for (k, camera) in cameras.iter().enumerate() {
                 let mut significance = Significance::new(gaussians.means.dims()[0]);
                 significance.add(&Splatter::new([0.0; 3], 3), gaussians.clone(), camera);
