@@ -14,6 +14,7 @@ pub mod loss;
 pub mod metrics_log;
 pub mod optimizer;
 pub mod parameters;
+mod randomness;
 pub mod report;
 pub mod run_folder;
 pub mod schedule;

@@ -9,9 +9,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
 use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
 use light4gs_model::{DynamicScene, Significance, Splatter, least_significant, regularizer};
-use rand::seq::SliceRandom;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use rand::Rng;
 
 use crate::checkpoint::{self, Checkpoint};
 use crate::config::{Config, TrainConfig};
@@ -25,6 +23,7 @@ use crate::loss::{photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::randomness::{FrameOrder, Purpose, generator, standard_normal};
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
 
@@ -55,6 +54,7 @@ pub struct Trainer {
     state: Checkpoint,
     metrics: MetricsLog,
     events: TensorBoard,
+    order: FrameOrder,
     quiet: bool,
 }
 
@@ -105,7 +105,8 @@ impl Trainer {
         let metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
         let step = global_step(&config.train, state.stage, state.iteration) as u64;
         let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
-        Ok(Self { config, device, data, images, folder, state, metrics, events, quiet })
+        let order = FrameOrder::default();
+        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet })
     }
 
     /// The dataset.
@@ -212,16 +213,19 @@ impl Trainer {
 
     /// Forward, backward, and one optimiser step.
     fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
+        let batch = self.config.train.batch_size.max(1);
+        let views = self.data.train.len();
+        let frames: Vec<usize> =
+            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, views)).collect();
         let config = &self.config.train;
         let splatter = self.splatter(stage, iteration);
         let scene = &self.state.scene;
         let count = scene.gaussians.len();
-        let batch = config.batch_size.max(1);
         let mut loss: Option<Tensor<1>> = None;
         let mut picture = None;
         let mut views = Vec::with_capacity(batch);
-        for k in 0..batch {
-            let frame = self.frame(stage, (iteration - 1) * batch + k);
+        for frame in frames {
+            let frame = &self.data.train[frame];
             let gaussians = match stage {
                 Stage::Coarse => scene.gaussians.tensors(),
                 Stage::Fine => scene.at(frame.time),
@@ -270,21 +274,6 @@ impl Trainer {
         Splatter::new(self.config.data.background, degree)
     }
 
-    /// Frames in an order that is shuffled anew each time all have been seen; depends on seed and position alone.
-    fn frame(&self, stage: Stage, position: usize) -> &Frame {
-        let count = self.data.train.len();
-        let mut order: Vec<usize> = (0..count).collect();
-        order.shuffle(&mut self.generator(Purpose::FrameOrder, stage, position / count));
-        &self.data.train[order[position % count]]
-    }
-
-    fn generator(&self, purpose: Purpose, stage: Stage, position: usize) -> ChaCha8Rng {
-        let mut generator = ChaCha8Rng::seed_from_u64(self.config.seed);
-        let stage = if stage == Stage::Coarse { 0 } else { 1 };
-        generator.set_stream((purpose as u64) << 62 | stage << 61 | position as u64);
-        generator
-    }
-
     /// Drops the Gaussians that contribute least to the training views at their times (STP, paper III-B).
     fn prune_insignificant(&mut self, iteration: usize) {
         let config = &self.config.train.prune;
@@ -317,7 +306,7 @@ impl Trainer {
         for frame in &self.data.train {
             by_time.entry(frame.time.to_bits()).or_default().push(frame);
         }
-        let mut generator = self.generator(Purpose::PruningViews, Stage::Fine, iteration);
+        let mut generator = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
         by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()
     }
 
@@ -358,7 +347,7 @@ impl Trainer {
                 threshold,
                 config.percent_dense * extent,
             );
-            let mut generator = self.generator(Purpose::Split, stage, iteration);
+            let mut generator = generator(self.config.seed, Purpose::Split, stage, iteration);
             let normals: Vec<f32> = (0..masks.normals_needed()).map(|_| standard_normal(&mut generator)).collect();
             densify(&mut self.state.scene.gaussians, &mut self.state.adam, &masks, &normals);
             self.reset_statistics();
@@ -389,20 +378,6 @@ impl Trainer {
         }
         Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
     }
-}
-
-/// What a random number is drawn for.
-#[derive(Clone, Copy)]
-enum Purpose {
-    FrameOrder,
-    Split,
-    PruningViews,
-}
-
-/// Box-Muller, one of the pair.
-fn standard_normal(generator: &mut ChaCha8Rng) -> f32 {
-    let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
-    ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
 }
 
 /// Iterations done over both stages.

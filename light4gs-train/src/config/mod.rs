@@ -12,6 +12,7 @@
 //! fine_iterations = 2000
 //! ```
 
+mod compression;
 mod data;
 mod error;
 mod eval;
@@ -33,6 +34,9 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+pub use compression::{
+    AttributesConfig, CompressionConfig, ContextConfig, RateConfig, ShConfig, StepsConfig, WeightsConfig,
+};
 pub use data::DataConfig;
 pub use error::{ConfigError, Origin, Problem};
 pub use eval::EvalConfig;
@@ -58,6 +62,8 @@ pub struct Config {
     pub model: ModelConfig,
     /// How it is trained.
     pub train: TrainConfig,
+    /// How small it becomes.
+    pub compression: CompressionConfig,
     /// How it is measured.
     pub eval: EvalConfig,
 }
@@ -70,6 +76,7 @@ impl Default for Config {
             data: DataConfig::default(),
             model: ModelConfig::default(),
             train: TrainConfig::default(),
+            compression: CompressionConfig::default(),
             eval: EvalConfig::default(),
         }
     }

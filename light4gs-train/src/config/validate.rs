@@ -1,9 +1,10 @@
 //! Ranges: what the types alone let through.
 
+use super::compression::{ARCHITECTURES, PROFILES, SH_MODELS, WEIGHTINGS};
 use super::prune::{SCORES, VOLUMES};
 use super::{
-    Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates, ModelConfig,
-    Problem, PruneConfig, RegularizerConfig, TrainConfig,
+    CompressionConfig, Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig,
+    LearningRates, ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
 };
 
 /// Planes are halved twice by the context model and predicted scale by scale.
@@ -24,6 +25,7 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     data(&mut check, &config.data);
     model(&mut check, &config.model);
     train(&mut check, &config.train);
+    compression(&mut check, &config.compression);
     eval(&mut check, &config.eval);
     if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
 }
@@ -186,6 +188,47 @@ fn regularizer(check: &mut Check, weights: &RegularizerConfig) {
             format!("is {weight}; it must be finite and at least 0")
         });
     }
+}
+
+fn compression(check: &mut Check, compression: &CompressionConfig) {
+    let CompressionConfig { profile, rate, context, steps, sh, attributes, weights } = compression;
+    check.one_of("compression.profile", profile, PROFILES);
+    check.that("compression.rate.lambda", rate.lambda.is_finite() && rate.lambda >= 0.0, || {
+        format!("is {}; it must be finite and at least 0", rate.lambda)
+    });
+    check.one_of("compression.rate.weighting", &rate.weighting, WEIGHTINGS);
+    check.range("compression.rate.interval", rate.interval, 1, 1000);
+    check.that("compression.rate.fraction", rate.fraction > 0.0 && rate.fraction <= 1.0, || {
+        format!("is {}; it must be above 0 and at most 1", rate.fraction)
+    });
+    check.toml_integer("compression.rate.from", rate.from);
+    check.one_of("compression.context.architecture", &context.architecture, ARCHITECTURES);
+    check.range("compression.context.fit_iterations", context.fit_iterations, 1, 1_000_000);
+    check.toml_integer("compression.steps.adaptive_from", steps.adaptive_from);
+    check.one_of("compression.sh.model", &sh.model, SH_MODELS);
+    for (name, value) in [
+        ("context.learning_rate_init", context.learning_rate_init),
+        ("context.learning_rate_final", context.learning_rate_final),
+        ("steps.space_only", steps.space_only),
+        ("steps.space_time", steps.space_time),
+        ("steps.learning_rate", steps.learning_rate),
+        ("sh.step", sh.step),
+        ("sh.learning_rate_init", sh.learning_rate_init),
+        ("sh.learning_rate_final", sh.learning_rate_final),
+        ("attributes.log_scale", attributes.log_scale.into()),
+        ("attributes.quaternion", attributes.quaternion.into()),
+        ("attributes.opacity_logit", attributes.opacity_logit.into()),
+        ("attributes.sh_dc", attributes.sh_dc.into()),
+    ] {
+        check.positive(&format!("compression.{name}"), value);
+    }
+    check.range("compression.attributes.position_bits", attributes.position_bits as usize, 4, 20);
+    let tolerance = attributes.search_tolerance;
+    check.that("compression.attributes.search_tolerance", tolerance.is_finite() && tolerance >= 0.0, || {
+        format!("is {tolerance}; it must be finite and at least 0 dB")
+    });
+    check.range("compression.weights.deformation_bits", weights.deformation_bits as usize, 4, 16);
+    check.range("compression.weights.context_bits", weights.context_bits as usize, 4, 16);
 }
 
 fn eval(check: &mut Check, eval: &EvalConfig) {
