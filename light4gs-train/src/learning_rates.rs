@@ -30,15 +30,18 @@ impl GroupRates {
         let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
+        let attribute = |rate: f64| {
+            ExponentialDecay::new(rate, rate * rates.attributes_final_share, steps).at(iteration as f64)
+        };
         Self {
             means: decay(rates.means_init, rates.means_final),
             grid: decay(rates.grid_init, rates.grid_final),
             deformation: decay(rates.deformation_init, rates.deformation_final),
-            sh_dc: rates.sh_dc,
-            sh_rest: rates.sh_dc / rates.sh_rest_divisor,
-            opacity: rates.opacity,
-            scale: rates.scale,
-            rotation: rates.rotation,
+            sh_dc: attribute(rates.sh_dc),
+            sh_rest: attribute(rates.sh_dc / rates.sh_rest_divisor),
+            opacity: attribute(rates.opacity),
+            scale: attribute(rates.scale),
+            rotation: attribute(rates.rotation),
         }
     }
 

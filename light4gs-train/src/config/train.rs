@@ -60,6 +60,9 @@ pub struct LearningRates {
     pub scale: f64,
     /// Quaternions.
     pub rotation: f64,
+    /// What the rates of colours, opacities, scales and rotations have decayed to at the end of the schedule, as a
+    /// share of those above; 1 keeps them constant.
+    pub attributes_final_share: f64,
     /// Length of the decay in iterations; `None` (0 in TOML) takes the stage's length.
     #[serde(with = "optional")]
     pub schedule_steps: Option<usize>,
@@ -148,6 +151,7 @@ impl Default for LearningRates {
             opacity: 0.05,
             scale: 0.005,
             rotation: 0.001,
+            attributes_final_share: 1.0,
             schedule_steps: None,
             scale_by_extent: true,
         }

@@ -120,6 +120,7 @@ fn learning_rates(check: &mut Check, rates: &LearningRates) {
         ("opacity", rates.opacity),
         ("scale", rates.scale),
         ("rotation", rates.rotation),
+        ("attributes_final_share", rates.attributes_final_share),
     ] {
         check.positive(&format!("train.learning_rate.{name}"), rate);
     }
