@@ -30,9 +30,8 @@ impl GroupRates {
         let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
-        let attribute = |rate: f64| {
-            ExponentialDecay::new(rate, rate * rates.attributes_final_share, steps).at(iteration as f64)
-        };
+        let attribute =
+            |rate: f64| ExponentialDecay::new(rate, rate * rates.attributes_final_share, steps).at(iteration as f64);
         Self {
             means: decay(rates.means_init, rates.means_final),
             grid: decay(rates.grid_init, rates.grid_final),

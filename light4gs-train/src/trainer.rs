@@ -19,7 +19,7 @@ use crate::densification::{
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::learning_rates::GroupRates;
-use crate::loss::{photometric, psnr};
+use crate::loss::{l2, photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
@@ -233,7 +233,13 @@ impl Trainer {
             let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
             let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
             let truth = image_tensor(&*self.images.get(frame)?, &self.device);
-            let term = photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim) / batch as f32;
+            let squared = config.l2_until > 0 && (stage == Stage::Coarse || iteration <= config.l2_until);
+            let term = if squared {
+                l2(rendering.image.clone(), truth.clone())
+            } else {
+                photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim)
+            };
+            let term = term / batch as f32;
             loss = Some(match loss {
                 Some(sum) => sum + term,
                 None => term,

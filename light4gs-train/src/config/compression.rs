@@ -114,8 +114,8 @@ pub(super) const SH_MODELS: &[&str] =
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct AttributesConfig {
-    /// Bits of a coordinate along the longest side of the Gaussians' box.
-    pub position_bits: u32,
+    /// Step of the positions, as a share of the size of the typical Gaussian.
+    pub position: f32,
     /// Step of the logarithms of scales.
     pub log_scale: f32,
     /// Step of the quaternions' components.
@@ -196,11 +196,11 @@ impl Default for ShConfig {
 impl Default for AttributesConfig {
     fn default() -> Self {
         Self {
-            position_bits: 13,
+            position: 0.125,
             log_scale: 0.1,
             quaternion: 0.03,
-            opacity_logit: 0.15,
-            sh_dc: 0.04,
+            opacity_logit: 0.25,
+            sh_dc: 0.03,
             search_tolerance: 0.05,
         }
     }

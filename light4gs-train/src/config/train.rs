@@ -16,6 +16,9 @@ pub struct TrainConfig {
     pub batch_size: usize,
     /// Weight of D-SSIM in the loss; L1 has the rest.
     pub lambda_dssim: f32,
+    /// The loss is the squared difference until this iteration of the fine stage, and in the coarse stage if it is not 0.
+    /// L1 is content with the median, which for an object that passes quickly is the background behind it.
+    pub l2_until: usize,
     /// The active degree of the spherical harmonics grows by one every so many iterations.
     pub sh_degree_interval: usize,
     /// A checkpoint is written every so many iterations.
@@ -125,6 +128,7 @@ impl Default for TrainConfig {
             fine_iterations: 30_000,
             batch_size: 1,
             lambda_dssim: 0.0,
+            l2_until: 0,
             sh_degree_interval: 1000,
             checkpoint_interval: 1000,
             log_interval: 10,

@@ -97,6 +97,7 @@ fn train(check: &mut Check, train: &TrainConfig) {
     });
     check.range("train.batch_size", train.batch_size, 1, 1024);
     check.share("train.lambda_dssim", train.lambda_dssim);
+    check.toml_integer("train.l2_until", train.l2_until);
     check.range("train.sh_degree_interval", train.sh_degree_interval, 1, MOST);
     check.range("train.checkpoint_interval", train.checkpoint_interval, 1, MOST);
     check.range("train.log_interval", train.log_interval, 1, MOST);
@@ -216,6 +217,7 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
         ("sh.step", sh.step),
         ("sh.learning_rate_init", sh.learning_rate_init),
         ("sh.learning_rate_final", sh.learning_rate_final),
+        ("attributes.position", attributes.position.into()),
         ("attributes.log_scale", attributes.log_scale.into()),
         ("attributes.quaternion", attributes.quaternion.into()),
         ("attributes.opacity_logit", attributes.opacity_logit.into()),
@@ -223,7 +225,6 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     ] {
         check.positive(&format!("compression.{name}"), value);
     }
-    check.range("compression.attributes.position_bits", attributes.position_bits as usize, 4, 20);
     let tolerance = attributes.search_tolerance;
     check.that("compression.attributes.search_tolerance", tolerance.is_finite() && tolerance >= 0.0, || {
         format!("is {tolerance}; it must be finite and at least 0 dB")
