@@ -43,6 +43,7 @@
 #![forbid(unsafe_code)]
 
 mod adaptive;
+pub mod attributes;
 mod compression;
 mod compressor;
 mod container;
@@ -57,6 +58,7 @@ mod harmonics;
 mod info;
 mod limits;
 mod motion;
+pub mod network_weights;
 mod open_stream;
 mod parallel;
 mod planes;

@@ -4,7 +4,7 @@ use super::{
     neighbors::NEIGHBORS,
     prediction::{Channel, LinearPrediction},
 };
-use crate::adaptive::{AdaptiveInteger, BitCoder, BitEncoder, BitDecoder, Damaged, magnitude_level};
+use crate::adaptive::{AdaptiveInteger, BitCoder, BitDecoder, BitEncoder, Damaged, magnitude_level};
 
 /// The last level of an expected residual: 64 steps.
 const LAST_LEVEL: usize = 13;

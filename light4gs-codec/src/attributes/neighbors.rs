@@ -35,10 +35,7 @@ mod tests {
     #[test]
     fn neighbours_come_before() {
         let cells = [[0, 0, 0], [9, 0, 0], [1, 0, 0], [1, 0, 0], [8, 0, 0], [0, 0, 1]];
-        assert_eq!(
-            nearest_before(&cells),
-            [[0; 4], [0; 4], [0, 1, 0, 0], [2, 0, 1, 2], [1, 3, 2, 0], [0, 3, 2, 4]]
-        );
+        assert_eq!(nearest_before(&cells), [[0; 4], [0; 4], [0, 1, 0, 0], [2, 0, 1, 2], [1, 3, 2, 0], [0, 3, 2, 4]]);
         assert_eq!(nearest_before(&[]), [[0; 4]; 0]);
     }
 }

@@ -165,9 +165,13 @@ mod tests {
                 let means = [[-extent, 0.0, 0.0], [extent, 0.0, 0.0]];
                 let grid = PositionGrid::new(&means, step).unwrap();
                 assert!(grid.bits <= MOST_BITS, "{extent} {step}: {grid:?}");
-                assert!(means.map(|mean| grid.mean(grid.cell(mean))).as_flattened().iter().all(|value| value.is_finite()));
+                assert!(
+                    means.map(|mean| grid.mean(grid.cell(mean))).as_flattened().iter().all(|value| value.is_finite())
+                );
             }
         }
-        assert!(PositionGrid::new(&[[0.0, 2e30, 0.0]], 1.0).unwrap_err().to_string().contains("means is 2e30 in value 1"));
+        assert!(
+            PositionGrid::new(&[[0.0, 2e30, 0.0]], 1.0).unwrap_err().to_string().contains("means is 2e30 in value 1")
+        );
     }
 }

@@ -130,7 +130,11 @@ mod tests {
     #[test]
     fn uniform_points_cost_their_information() {
         let (count, bits) = (10_000_u32, 36);
-        let mut codes: Vec<u64> = (0..u64::from(count)).map(|i| i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31).wrapping_mul(0xd6e8_feb8_6659_fd93) >> (64 - bits)).collect();
+        let mut codes: Vec<u64> = (0..u64::from(count))
+            .map(|i| {
+                i.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(31).wrapping_mul(0xd6e8_feb8_6659_fd93) >> (64 - bits)
+            })
+            .collect();
         codes.sort_unstable();
         let bound = f64::from(count * bits) - (1..=count).map(|n| f64::from(n).log2()).sum::<f64>();
         let spent = 8.0 * round_trip(&codes, bits) as f64;

@@ -108,13 +108,7 @@ impl LinearPrediction {
 
     /// The expected value of a channel at a Gaussian.
     #[inline]
-    pub(super) fn predict(
-        &self,
-        own: &Channel,
-        before: &[Channel],
-        neighbors: &[u32; NEIGHBORS],
-        index: usize,
-    ) -> i32 {
+    pub(super) fn predict(&self, own: &Channel, before: &[Channel], neighbors: &[u32; NEIGHBORS], index: usize) -> i32 {
         let inputs = inputs(own, before, neighbors, index);
         let sum: i64 = self.weights.iter().zip(inputs).map(|(&weight, input)| i64::from(weight) * input).sum();
         let rounded = (sum + (1 << (FRACTION - 1))) >> FRACTION;
@@ -167,7 +161,8 @@ mod tests {
         let (whole, half) = (channel(2), channel(1));
         let before = [whole];
         let prediction = LinearPrediction::fit(&half, &before, &neighbors);
-        let exact = (0..1000).filter(|&i| prediction.predict(&half, &before, &neighbors[i], i) == half.values[i]).count();
+        let exact =
+            (0..1000).filter(|&i| prediction.predict(&half, &before, &neighbors[i], i) == half.values[i]).count();
         assert!(exact > 990, "{exact} of 1000");
     }
 }
