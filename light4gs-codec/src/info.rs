@@ -70,7 +70,9 @@ pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
     let container = Container::read(bytes, &limits)?;
     meta::check(&container.meta, &limits)?;
     for kind in SectionKind::ALL {
-        container.section(kind)?;
+        if container.has(kind) {
+            container.section(kind)?;
+        }
     }
     let reader = |kind: SectionKind| container.section(kind).map(|(_, payload)| Reader::new(kind.name(), payload));
     let gaussians = gaussians::Head::read(&mut reader(SectionKind::Gaussians)?, &limits)?;

@@ -42,27 +42,50 @@
 
 #![forbid(unsafe_code)]
 
+mod adaptive;
+pub mod attributes;
+mod compression;
+mod compressor;
 mod container;
+mod context_model;
+mod entropy;
 mod error;
+mod executor;
 mod fields;
 #[cfg(not(target_arch = "wasm32"))]
 mod file;
+mod harmonics;
 mod info;
 mod limits;
+mod motion;
+pub mod network_weights;
+mod open_stream;
+mod parallel;
+mod planes;
+mod query;
 mod reader;
 mod scene;
 mod sections;
 mod stream;
 mod writer;
 
+pub use compression::{CompressionInput, PlaneCoding, Profile};
+pub use compressor::{CompressionReport, Encoded, encode_compressed};
 pub use container::{Encoding, MAGIC, VERSION};
+pub use context_model::{
+    ContextModelArrays, ContextModelShape, ContextParts, ConvolutionLayer, ConvolutionShape, PerGroup, SpatialKernel,
+};
+pub use entropy::FrequencyTable;
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
 pub use file::{read_file, read_info, write_atomically, write_file};
+pub use harmonics::{ShCoding, ShCondition};
 pub use info::{SectionInfo, StreamInfo, info};
 pub use limits::Limits;
+pub use open_stream::OpenStream;
 pub use scene::{
     GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
     SceneMeta, sh_rest_coefficients,
 };
+pub use sections::{coded_hexplanes::PlaneBytes, coded_sh::ShBytes};
 pub use stream::{decode, decode_with_limits, encode};
