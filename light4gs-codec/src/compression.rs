@@ -1,6 +1,9 @@
 //! How a scene is to be compressed.
 
-use crate::{ContextModelArrays, PerGroup, ShCoding};
+use crate::{
+    ContextModelArrays, ContextModelShape, PerGroup, ShCoding, attributes::AttributeSteps,
+    network_weights::WeightPrecision, planes::plan,
+};
 
 /// What a compressed stream keeps in full precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,6 +35,28 @@ pub struct CompressionInput {
     pub planes: Option<PlaneCoding>,
     /// The coding of the spherical harmonics beyond degree 0.
     pub sh: ShCoding,
+    /// How finely the other attributes of the Gaussians are quantised, in the compact profile.
+    pub attributes: AttributeSteps,
+    /// How finely weights are quantised, in the compact profile.
+    pub weights: WeightPrecisions,
+}
+
+/// How finely the weights of each kind of network are quantised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WeightPrecisions {
+    /// Of the deformation network, whose errors show in the picture.
+    pub deformation: WeightPrecision,
+    /// Of the context model, whose errors only cost bits.
+    pub context_model: WeightPrecision,
+    /// Of the networks of the spherical harmonics, likewise.
+    pub sh: WeightPrecision,
+}
+
+impl Default for WeightPrecisions {
+    fn default() -> Self {
+        let [deformation, context_model, sh] = [12, 8, 8].map(WeightPrecision::Bits);
+        Self { deformation, context_model, sh }
+    }
 }
 
 /// How the hexplane is coded.
@@ -51,8 +76,8 @@ impl PlaneCoding {
     /// for planes that have none.
     ///
     /// This says where [`PlaneCoding::hyper_symbols`] must not be empty.
-    pub fn hyper_shapes(model: &crate::ContextModelShape, sizes: &[[u32; 2]]) -> Vec<Option<[u32; 3]>> {
-        let plans = crate::planes::plan(model, sizes.len() / 6);
+    pub fn hyper_shapes(model: &ContextModelShape, sizes: &[[u32; 2]]) -> Vec<Option<[u32; 3]>> {
+        let plans = plan(model, sizes.len() / 6);
         let shape = |&[height, width]: &[u32; 2]| [model.hyper_channels, height / 4, width / 4];
         plans.iter().zip(sizes).map(|(plan, size)| plan.has_hyperprior().then(|| shape(size))).collect()
     }

@@ -1,14 +1,14 @@
 //! A scene into a compressed stream.
 
 use crate::{
-    CodecError, CompressionInput, Encoding, GaussianArrays, HexPlaneArrays, Limits, NetworkArrays, PlaneBytes, Profile, SceneData,
-    ShBytes,
+    CodecError, CompressionInput, Encoding, GaussianArrays, HexPlaneArrays, Limits, NetworkArrays, PlaneBytes,
+    PlaneCoding, Profile, SceneData, ShBytes,
+    attributes::{self, EncodedAttributes},
     container::{Builder, VERSION},
     fields,
     harmonics::Conditions,
-    sections::{
-        SectionKind, coded_hexplanes, coded_sh, context_model, deformation, gaussians, hexplanes, scene_frame, weights,
-    },
+    network_weights::WeightPrecision,
+    sections::{SectionKind, coded_hexplanes, coded_sh, context_model, deformation, gaussians, hexplanes, scene_frame},
     stream::{check, decode},
     writer::Writer,
 };
@@ -48,21 +48,27 @@ pub struct CompressionReport {
 pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<Encoded, CodecError> {
     let limits = Limits::default();
     check(scene, &limits)?;
-    let precision = precision_of(input);
+    let compact = |precision| (input.profile == Profile::Compact).then_some(precision);
 
     let mut sections = Vec::new();
-    let (attributes, order) = write_gaussians(scene, input, &mut sections)?;
-    let network = write_network(&scene.deformation, precision, &limits, &mut sections)?;
+    let (attributes, order) = write_gaussians(&scene.gaussians, input, &mut sections)?;
+    let network = write_network(&scene.deformation, input, &mut sections)?;
     let mut frame = Writer::default();
     scene_frame::write(&scene.frame, &mut frame);
     sections.push((SectionKind::SceneFrame, Encoding::Float32, frame.bytes));
-    let (hexplane, planes) = write_planes(scene, input, precision, &limits, &mut sections)?;
+    let (hexplane, planes) = write_planes(
+        &scene.hexplane,
+        input.planes.as_ref(),
+        compact(input.weights.context_model),
+        &limits,
+        &mut sections,
+    )?;
 
     let conditions = Conditions { gaussians: &attributes, frame: &scene.frame, hexplane: &hexplane };
     let rest = reordered(&scene.gaussians, &order);
     let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
     let mut writer = Writer::default();
-    let (sh_rest, sh) = coded_sh::write(&with_rest, &input.sh, precision, conditions, &mut writer)?;
+    let (sh_rest, sh) = coded_sh::write(&with_rest, &input.sh, compact(input.weights.sh), conditions, &mut writer)?;
     sections.push((SectionKind::Sh, input.sh.encoding(), writer.bytes));
 
     let expected = SceneData {
@@ -81,71 +87,75 @@ pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<
 
     let decoded = decode(&bytes)?;
     fields::check_same_bits(&expected, &decoded)?;
-    let sections: Vec<_> = sections
-        .into_iter()
-        .map(|(kind, encoding, payload)| (kind.name(), encoding, payload.len() as u64))
-        .collect();
+    let sections: Vec<_> =
+        sections.into_iter().map(|(kind, encoding, payload)| (kind.name(), encoding, payload.len() as u64)).collect();
     let header_bytes = bytes.len() as u64 - sections.iter().map(|section| section.2).sum::<u64>();
     Ok(Encoded { bytes, decoded, report: CompressionReport { header_bytes, sections, planes, sh } })
 }
 
 type Sections = Vec<(SectionKind, Encoding, Vec<u8>)>;
 
-fn precision_of(input: &CompressionInput) -> Option<weights::Precision> {
-    (input.profile == Profile::Compact).then_some(12)
-}
-
 /// The attributes but for `sh_rest`, as decoded, and which of the given Gaussians each of them was.
 fn write_gaussians(
-    scene: &SceneData,
-    _input: &CompressionInput,
+    gaussians: &GaussianArrays,
+    input: &CompressionInput,
     sections: &mut Sections,
 ) -> Result<(GaussianArrays, Vec<u32>), CodecError> {
-    let given = GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..scene.gaussians.clone() };
+    if input.profile == Profile::Compact {
+        let EncodedAttributes { bytes, order, .. } = attributes::encode(gaussians, &input.attributes)?;
+        sections.push((SectionKind::Gaussians, Encoding::Quantised, bytes));
+        return Ok((attributes::quantised(gaussians, &input.attributes)?, order));
+    }
     let mut writer = Writer::default();
-    gaussians::write(&given, &mut writer);
+    gaussians::write(gaussians, &mut writer);
     sections.push((SectionKind::Gaussians, Encoding::Float32, writer.bytes));
-    let order = (0..given.len() as u32).collect();
-    Ok((given, order))
+    let order = (0..gaussians.len() as u32).collect();
+    Ok((GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.clone() }, order))
 }
 
 /// The deformation network as decoded.
 fn write_network(
     network: &NetworkArrays,
-    _precision: Option<weights::Precision>,
-    _limits: &Limits,
+    input: &CompressionInput,
     sections: &mut Sections,
 ) -> Result<NetworkArrays, CodecError> {
     let mut writer = Writer::default();
-    deformation::write(network, &mut writer);
-    sections.push((SectionKind::Deformation, Encoding::Float32, writer.bytes));
-    Ok(network.clone())
+    let (encoding, decoded) = match input.profile {
+        Profile::Compact => {
+            let decoded = deformation::write_coded(network, input.weights.deformation, &mut writer)?;
+            (Encoding::Quantised, decoded)
+        }
+        Profile::Paper => {
+            deformation::write(network, &mut writer);
+            (Encoding::Float32, network.clone())
+        }
+    };
+    sections.push((SectionKind::Deformation, encoding, writer.bytes));
+    Ok(decoded)
 }
 
 /// The planes as decoded, and what each of them takes.
 fn write_planes(
-    scene: &SceneData,
-    input: &CompressionInput,
-    precision: Option<weights::Precision>,
+    hexplane: &HexPlaneArrays,
+    coding: Option<&PlaneCoding>,
+    precision: Option<WeightPrecision>,
     limits: &Limits,
     sections: &mut Sections,
 ) -> Result<(HexPlaneArrays, Vec<PlaneBytes>), CodecError> {
     let mut writer = Writer::default();
-    let Some(coding) = &input.planes else {
-        hexplanes::write(&scene.hexplane, &mut writer);
+    let Some(PlaneCoding { model, steps, hyper_symbols }) = coding else {
+        hexplanes::write(hexplane, &mut writer);
         sections.push((SectionKind::HexPlanes, Encoding::Float32, writer.bytes));
-        return Ok((scene.hexplane.clone(), Vec::new()));
+        return Ok((hexplane.clone(), Vec::new()));
     };
-    coding.model.check(limits)?;
-    coded_hexplanes::check(&scene.hexplane, &coding.model.shape, &coding.steps, &coding.hyper_symbols)?;
-    context_model::write(&coding.model, precision, &mut writer)?;
-    let model = context_model::read(&writer.bytes, precision.is_some(), limits)?;
+    model.check(limits)?;
+    coded_hexplanes::check(hexplane, &model.shape, steps, hyper_symbols)?;
+    let model = context_model::write(model, precision, &mut writer)?;
     let encoding = if precision.is_some() { Encoding::Quantised } else { Encoding::Float32 };
     sections.push((SectionKind::ContextModel, encoding, writer.bytes));
 
     let mut writer = Writer::default();
-    let decoded =
-        coded_hexplanes::write(&scene.hexplane, &model, &coding.steps, &coding.hyper_symbols, &mut writer)?;
+    let decoded = coded_hexplanes::write(hexplane, &model, steps, hyper_symbols, &mut writer)?;
     let (_, planes) = coded_hexplanes::plane_bytes(&writer.bytes, &model.shape, limits)?;
     sections.push((SectionKind::HexPlanes, Encoding::ContextCoded, writer.bytes));
     Ok((decoded, planes))

@@ -223,8 +223,8 @@ fn read_table(table: &[u8], version: u16, start: u64, end: u64) -> Result<Vec<En
             .ok_or(CodecError::UnknownSection { index: index as u32, id })?;
         let section = kind.name();
         let number = reader.u16("encoding")?;
-        let encoding =
-            Encoding::from_number(number, kind, version).ok_or(CodecError::UnknownEncoding { section, encoding: number })?;
+        let encoding = Encoding::from_number(number, kind, version)
+            .ok_or(CodecError::UnknownEncoding { section, encoding: number })?;
         let crc = reader.u32("checksum")?;
         let offset = reader.u64("offset")?;
         let bytes = reader.u64("length")?;

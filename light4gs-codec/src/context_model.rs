@@ -230,7 +230,10 @@ impl ContextModelShape {
 impl ContextModelArrays {
     /// A layer that the shape has.
     pub(crate) fn layer(&self, name: &str) -> &ConvolutionLayer {
-        self.layers.iter().find(|layer| layer.shape.name == name).expect("`check` has compared the layers with the shape")
+        self.layers
+            .iter()
+            .find(|layer| layer.shape.name == name)
+            .expect("`check` has compared the layers with the shape")
     }
 
     /// Refuses arrays that contradict the shape.
@@ -242,8 +245,7 @@ impl ContextModelArrays {
             return invalid("layers", &format!("{found:?}"), &format!("{expected:?}"));
         }
         for ConvolutionLayer { shape, weight, bias } in &self.layers {
-            for (what, values, count) in
-                [("weight", weight, shape.weights()), ("bias", bias, u64::from(shape.outputs))]
+            for (what, values, count) in [("weight", weight, shape.weights()), ("bias", bias, u64::from(shape.outputs))]
             {
                 if values.len() as u64 != count {
                     let field = format!("length of {}.{what}", shape.name);
@@ -258,7 +260,11 @@ impl ContextModelArrays {
         let channels = if self.shape.parts.hyperprior { self.shape.hyper_channels as usize } else { 0 };
         for (what, count) in [("hyper_tables", self.hyper_tables.len()), ("hyper_medians", self.hyper_medians.len())] {
             if count != channels {
-                return invalid(&format!("length of {what}"), &count.to_string(), &format!("{channels}, the hyper channels"));
+                return invalid(
+                    &format!("length of {what}"),
+                    &count.to_string(),
+                    &format!("{channels}, the hyper channels"),
+                );
             }
         }
         if let Some(index) = self.hyper_medians.iter().position(|median| !median.is_finite()) {

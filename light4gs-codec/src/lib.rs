@@ -69,7 +69,7 @@ mod sections;
 mod stream;
 mod writer;
 
-pub use compression::{CompressionInput, PlaneCoding, Profile};
+pub use compression::{CompressionInput, PlaneCoding, Profile, WeightPrecisions};
 pub use compressor::{CompressionReport, Encoded, encode_compressed};
 pub use container::{Encoding, MAGIC, VERSION};
 pub use context_model::{

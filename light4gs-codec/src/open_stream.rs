@@ -1,11 +1,14 @@
 //! A stream whose sections are decoded one at a time.
 
 use crate::{
-    CodecError, Encoding, GaussianArrays, HexPlaneArrays, Limits, NetworkArrays, SceneData, SceneFrameArrays, SceneMeta,
+    CodecError, Encoding, GaussianArrays, HexPlaneArrays, Limits, NetworkArrays, SceneData, SceneFrameArrays,
+    SceneMeta, attributes,
     container::Container,
     harmonics::Conditions,
     parallel,
-    sections::{SectionKind, coded_hexplanes, coded_sh, context_model, deformation, gaussians, hexplanes, scene_frame, sh},
+    sections::{
+        SectionKind, coded_hexplanes, coded_sh, context_model, deformation, gaussians, hexplanes, scene_frame, sh,
+    },
     stream::check,
 };
 
@@ -53,8 +56,10 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn gaussians(&self) -> Result<GaussianArrays, CodecError> {
-        let (_, payload) = self.container.section(SectionKind::Gaussians)?;
-        gaussians::read(payload, &self.limits)
+        match self.container.section(SectionKind::Gaussians)? {
+            (Encoding::Quantised, payload) => attributes::decode(payload, &self.limits),
+            (_, payload) => gaussians::read(payload, &self.limits),
+        }
     }
 
     /// The frame.
@@ -70,8 +75,10 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn deformation(&self) -> Result<NetworkArrays, CodecError> {
-        let (_, payload) = self.container.section(SectionKind::Deformation)?;
-        deformation::read(payload, &self.limits)
+        match self.container.section(SectionKind::Deformation)? {
+            (Encoding::Quantised, payload) => deformation::read_coded(payload, &self.limits),
+            (_, payload) => deformation::read(payload, &self.limits),
+        }
     }
 
     /// The planes.

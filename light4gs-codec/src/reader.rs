@@ -105,7 +105,11 @@ impl<'a> Reader<'a> {
     /// A finite number.
     pub(crate) fn finite(&mut self, field: &str) -> Result<f32, CodecError> {
         let value = self.f32(field)?;
-        if value.is_finite() { Ok(value) } else { Err(CodecError::invalid(self.section, field, value, "a finite number")) }
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(CodecError::invalid(self.section, field, value, "a finite number"))
+        }
     }
 
     /// One group of `K` numbers.

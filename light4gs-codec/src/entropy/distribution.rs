@@ -95,7 +95,8 @@ mod tests {
     fn every_quantile_finds_its_slot() {
         let starts = vec![0, 1, 2, 70_000, 70_001, 9_000_000, TOTAL - 1];
         let distribution = Distribution::new(-2, starts.clone());
-        let around = starts.iter().flat_map(|&start| [start.saturating_sub(1), start, start + 1]).chain([65_535, 65_536]);
+        let around =
+            starts.iter().flat_map(|&start| [start.saturating_sub(1), start, start + 1]).chain([65_535, 65_536]);
         for quantile in around.filter(|&quantile| quantile < TOTAL) {
             let expected = starts.partition_point(|&start| start <= quantile) - 1;
             assert_eq!((&distribution).quantile_function(quantile).0, expected, "{quantile}");

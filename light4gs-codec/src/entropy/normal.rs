@@ -4,7 +4,7 @@
 const FAR: f64 = 8.0;
 const INVERSE_SQRT_TAU: f64 = 0.398_942_280_401_432_68;
 
-/// The probability that a standard normal variable is below `x`, within 1e-14.
+/// The probability that a standard normal variable is below `x`, within 1e-13.
 ///
 /// Marsaglia's series: 1/2 plus the density times `x + x^3/3 + x^5/(3·5) + ...`, whose terms are all of one sign. Only
 /// additions, multiplications and divisions, so every machine gets the same bits.
@@ -25,15 +25,15 @@ pub(super) fn normal_distribution(x: f64) -> f64 {
     0.5 + INVERSE_SQRT_TAU * exponential_decay(0.5 * square) * sum
 }
 
-/// `exp(-x)` for `x` in 0..=32: the Taylor polynomial at `x / 1024`, squared ten times. Relative error below 1e-12.
+/// `exp(-x)` for `x` in 0..=32: the Taylor polynomial at `x / 64`, squared six times. Relative error below 1e-13.
 fn exponential_decay(x: f64) -> f64 {
-    let small = x / 1024.0;
+    let small = x / 64.0;
     let (mut term, mut sum) = (1.0, 1.0);
-    for n in 1..=9 {
+    for n in 1..=18 {
         term *= -small / f64::from(n);
         sum += term;
     }
-    for _ in 0..10 {
+    for _ in 0..6 {
         sum *= sum;
     }
     sum
@@ -55,7 +55,7 @@ mod tests {
             (-5.5, 1.898_956_246_588_771_9e-8),
             (9.0, 1.0),
         ] {
-            assert!((normal_distribution(x) - expected).abs() < 1e-14, "{x}: {}", normal_distribution(x));
+            assert!((normal_distribution(x) - expected).abs() < 1e-13, "{x}: {}", normal_distribution(x));
         }
     }
 
@@ -63,13 +63,14 @@ mod tests {
     fn decay_is_accurate() {
         for i in 0..=320 {
             let x = f64::from(i) / 10.0;
-            assert!((exponential_decay(x) / (-x).exp() - 1.0).abs() < 1e-12, "{x}");
+            assert!((exponential_decay(x) / (-x).exp() - 1.0).abs() < 1e-13, "{x}");
         }
     }
 
+    /// At the distance of neighbouring edges of the widest row of the table, and as far as it reaches.
     #[test]
-    fn it_never_falls() {
-        let values: Vec<_> = (-9000..9000).map(|i| normal_distribution(f64::from(i) / 1000.0)).collect();
-        assert!(values.is_sorted());
+    fn it_rises() {
+        let values: Vec<_> = (-1550..=1550).map(|i| normal_distribution(f64::from(i) / 256.0)).collect();
+        assert!(values.is_sorted_by(|a, b| a < b));
     }
 }

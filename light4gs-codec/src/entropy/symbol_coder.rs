@@ -21,7 +21,12 @@ const MOST_ZEROS: u32 = 23;
 pub(crate) trait SymbolCoder {
     /// Codes one symbol under `distributions[table]`: encoding, the one that `wanted` returns is remembered and
     /// returned; decoding, `wanted` is not called and the one that was written is returned.
-    fn code(&mut self, distributions: &[Distribution], table: u16, wanted: impl FnOnce() -> i32) -> Result<i32, Damaged>;
+    fn code(
+        &mut self,
+        distributions: &[Distribution],
+        table: u16,
+        wanted: impl FnOnce() -> i32,
+    ) -> Result<i32, Damaged>;
 }
 
 /// Remembers symbols, and codes them when all are known: the coder is a stack, so the last comes first.
@@ -211,7 +216,14 @@ mod tests {
         let symbols: Vec<_> = (0..20_000)
             .map(|_| {
                 state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-                (0, match state >> 16 { 0..13_107 => -1, 13_107..45_875 => 0, _ => 1 })
+                (
+                    0,
+                    match state >> 16 {
+                        0..13_107 => -1,
+                        13_107..45_875 => 0,
+                        _ => 1,
+                    },
+                )
             })
             .collect();
         let ideal: f64 = symbols.iter().map(|&(_, symbol)| tables[0].bits(symbol)).sum();

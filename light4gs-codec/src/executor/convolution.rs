@@ -1,9 +1,6 @@
 //! Convolutions of stride 1 that keep the size, with groups as in PyTorch.
 
-use super::{
-    Columns, Lanes, PaddedMap,
-    lanes::Matrix,
-};
+use super::{Columns, Lanes, PaddedMap, lanes::Matrix};
 use crate::ConvolutionLayer;
 
 /// A convolution with an odd kernel and zeros beyond the border, which take part in the sums.
@@ -30,10 +27,6 @@ impl Convolution {
     /// Zeros that the input needs around it.
     pub(crate) fn border(&self) -> usize {
         self.kernel / 2
-    }
-
-    pub(crate) fn outputs(&self) -> usize {
-        self.groups.iter().map(Matrix::outputs).sum()
     }
 
     /// The outputs at `columns` of row `y`. `window` is memory to work in.

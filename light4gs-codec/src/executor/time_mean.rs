@@ -17,7 +17,12 @@ pub(crate) fn time_means(values: &[f32], [rows, size]: [usize; 2], centre: f32) 
 }
 
 /// Means along the first axis (columns) and along the second (rows), spread over the plane: `[2 channels, height, width]`.
-pub(crate) fn spread_time_means(first: &[f32], second: &[f32], [height, width]: [usize; 2], border: usize) -> PaddedMap {
+pub(crate) fn spread_time_means(
+    first: &[f32],
+    second: &[f32],
+    [height, width]: [usize; 2],
+    border: usize,
+) -> PaddedMap {
     let channels = first.len() / width;
     let mut map = PaddedMap::zeros(2 * channels, height, width, border);
     for channel in 0..channels {

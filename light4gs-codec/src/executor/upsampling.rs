@@ -15,13 +15,7 @@ fn positions(from: usize, to: usize) -> impl Iterator<Item = (usize, usize, f32)
 /// A plane `[channels, from]`, each value less `centre`, at the size `to`.
 ///
 /// `a (1 - x) + b x` along each of the two rows, then likewise between the rows.
-pub(crate) fn upsample(
-    values: &[f32],
-    from: [usize; 2],
-    to: [usize; 2],
-    centre: f32,
-    border: usize,
-) -> PaddedMap {
+pub(crate) fn upsample(values: &[f32], from: [usize; 2], to: [usize; 2], centre: f32, border: usize) -> PaddedMap {
     let lower = PaddedMap::centred(values, from, centre, 0);
     let mut map = PaddedMap::zeros(lower.channels, to[0], to[1], border);
     let columns: Vec<_> = positions(from[1], to[1]).collect();

@@ -2,11 +2,12 @@
 
 use super::{Conditional, ShCoding, group};
 use crate::{
-    GaussianArrays, HexPlaneArrays, SceneFrameArrays, sh_rest_coefficients,
+    GaussianArrays, HexPlaneArrays, SceneFrameArrays,
     adaptive::Damaged,
     entropy::{Distribution, SymbolCoder, gaussian_table},
     executor::LANES,
     planes::bounded_mean,
+    sh_rest_coefficients,
 };
 
 /// What conditional distributions may depend on: decoded Gaussians without `sh_rest`, the frame, decoded planes.

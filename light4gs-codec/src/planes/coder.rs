@@ -48,11 +48,15 @@ pub(crate) fn encode(
 ) -> Result<CodedPlanes, CodecError> {
     let coder = PlaneCoder::new(model, hexplane.multipliers.len(), steps);
     let mut sub_streams = Vec::new();
-    let decoded = coder.run(hexplane.clone(), |plane_coder, index, planes| {
-        let mut values = planes.planes[index].values.clone();
-        let streams = plane_coder.encode_plane(index, planes, &mut values, hyper_symbols)?;
-        Ok((values, streams))
-    }, |streams| sub_streams.extend(streams))?;
+    let decoded = coder.run(
+        hexplane.clone(),
+        |plane_coder, index, planes| {
+            let mut values = planes.planes[index].values.clone();
+            let streams = plane_coder.encode_plane(index, planes, &mut values, hyper_symbols)?;
+            Ok((values, streams))
+        },
+        |streams| sub_streams.extend(streams),
+    )?;
     Ok(CodedPlanes { sub_streams, decoded })
 }
 
@@ -65,14 +69,18 @@ pub(crate) fn decode(
 ) -> Result<HexPlaneArrays, CodecError> {
     let coder = PlaneCoder::new(model, hexplane.multipliers.len(), steps);
     let order = stream_order(&coder.plans);
-    coder.run(hexplane, |plane_coder, index, planes| {
-        let first = order.iter().find(|(plane, _)| *plane == index).expect("the order has every plane").1;
-        let streams = &sub_streams[first..first + plane_coder.plans[index].sub_streams()];
-        let values = plane_coder.decode_plane(index, planes, streams).map_err(|Damaged| {
-            CodecError::invalid(SECTION, format!("symbols of planes[{index}]"), "damaged", "what an encoder writes")
-        })?;
-        Ok((values, ()))
-    }, |()| ())
+    coder.run(
+        hexplane,
+        |plane_coder, index, planes| {
+            let first = order.iter().find(|(plane, _)| *plane == index).expect("the order has every plane").1;
+            let streams = &sub_streams[first..first + plane_coder.plans[index].sub_streams()];
+            let values = plane_coder.decode_plane(index, planes, streams).map_err(|Damaged| {
+                CodecError::invalid(SECTION, format!("symbols of planes[{index}]"), "damaged", "what an encoder writes")
+            })?;
+            Ok((values, ()))
+        },
+        |()| (),
+    )
 }
 
 struct PlaneCoder<'a> {
@@ -144,7 +152,8 @@ impl<'a> PlaneCoder<'a> {
     fn decode_plane(&self, index: usize, planes: &HexPlaneArrays, streams: &[&[u8]]) -> Result<Vec<f32>, Damaged> {
         let plan = &self.plans[index];
         let size = size_of(&planes.planes[index]);
-        let mut readers = streams.iter().map(|bytes| SymbolReader::new(bytes)).collect::<Result<Vec<_>, _>>()?.into_iter();
+        let mut readers =
+            streams.iter().map(|bytes| SymbolReader::new(bytes)).collect::<Result<Vec<_>, _>>()?.into_iter();
         let mut next = || readers.next().expect("one reader a sub-stream");
         let hyperprior = match plan.has_hyperprior() {
             true => {

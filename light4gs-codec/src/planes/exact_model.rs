@@ -31,9 +31,7 @@ impl ExactModel {
                 .then(|| HyperSynthesis::new(["h_s.0", "h_s.2", "h_s.4"].map(|name| model.layer(name)))),
             hyper_distributions: model.hyper_tables.iter().map(|table| table.distribution()).collect(),
             hyper_medians: model.hyper_medians.clone(),
-            context_prediction: parts
-                .checkerboard
-                .then(|| MaskedConvolution::new(model.layer(CONTEXT_PREDICTION))),
+            context_prediction: parts.checkerboard.then(|| MaskedConvolution::new(model.layer(CONTEXT_PREDICTION))),
             inter_plane: parts.inter_plane.then(|| Convolution::new(model.layer("inter_plane"))),
             inter_scale: parts.inter_scale.then(|| Convolution::new(model.layer("inter_scale"))),
             entropy_parameters: EntropyParameters::new(head.map(|name| model.layer(name))),

@@ -138,7 +138,12 @@ impl Head {
         let has_meaning = |scale: usize| multipliers[scale] != 1 && resolution[TIME] != 0;
         if bits >> scales != 0 || (0..scales as usize).any(|scale| bits >> scale & 1 == 1 && !has_meaning(scale)) {
             let field = "scales with multiplied time";
-            return Err(CodecError::invalid(SECTION, field, format!("{bits:#b}"), "bits of scales whose multiplier is not 1"));
+            return Err(CodecError::invalid(
+                SECTION,
+                field,
+                format!("{bits:#b}"),
+                "bits of scales whose multiplier is not 1",
+            ));
         }
         let planes = hexplanes::Head { channels, resolution, multipliers, sizes };
         planes.check(limits)?;

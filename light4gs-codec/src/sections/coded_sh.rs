@@ -7,6 +7,7 @@ use crate::{
     entropy::{SymbolReader, SymbolWriter, read_tables, write_tables},
     harmonics::{Conditions, HarmonicsModel, layer_shapes, walk},
     limits::at_most,
+    network_weights::{TensorLength, WeightPrecision},
     reader::Reader,
     sh_rest_coefficients,
     writer::Writer,
@@ -55,7 +56,13 @@ impl ShCoding {
                 }
                 for LinearLayer { name, inputs, outputs, weight, bias } in layers {
                     let weights = u64::from(*inputs) * u64::from(*outputs);
-                    super::check_length(SECTION, format!("{name}.weight"), weight.len(), weights, "inputs times outputs")?;
+                    super::check_length(
+                        SECTION,
+                        format!("{name}.weight"),
+                        weight.len(),
+                        weights,
+                        "inputs times outputs",
+                    )?;
                     super::check_length(SECTION, format!("{name}.bias"), bias.len(), (*outputs).into(), "outputs")?;
                     if *inputs == 0 || *outputs == 0 {
                         return Err(CodecError::invalid(SECTION, format!("sizes of {name}"), 0, "1 or more"));
@@ -73,7 +80,7 @@ impl ShCoding {
     }
 
     /// Writes tables or networks, and returns them as a decoder gets them.
-    fn write(&self, precision: Option<weights::Precision>, writer: &mut Writer) -> Result<Self, CodecError> {
+    fn write(&self, precision: Option<WeightPrecision>, writer: &mut Writer) -> Result<Self, CodecError> {
         match self {
             Self::Tables { tables, .. } => {
                 writer.block(&write_tables(tables));
@@ -81,22 +88,20 @@ impl ShCoding {
             }
             Self::Conditional { step, kind, layers } => {
                 layers.iter().step_by(2).for_each(|layer| writer.varint(layer.outputs.into()));
-                let tensors: Vec<_> =
-                    layers.iter().flat_map(|layer| [layer.weight.clone(), layer.bias.clone()]).collect();
-                let block = weights::encode(&tensors, precision)?;
-                writer.u8(precision.is_some().into());
-                writer.block(&block);
-                let lengths: Vec<u64> = tensors.iter().map(|tensor| tensor.len() as u64).collect();
-                let decoded = weights::decode(SECTION, &block, precision.is_some(), &lengths, &Limits::default())?;
-                let layers = layers
+                let tensors: Vec<weights::Tensor<'_>> = layers
                     .iter()
-                    .zip(decoded.as_chunks::<2>().0)
-                    .map(|(layer, [weight, bias])| LinearLayer {
-                        weight: weight.clone(),
-                        bias: bias.clone(),
-                        ..layer.clone()
-                    })
+                    .flat_map(|layer| [&layer.weight, &layer.bias].map(|values| (&layer.name[..], &values[..])))
                     .collect();
+                let encoded = weights::encode(SECTION, &tensors, precision)?;
+                writer.u8(precision.is_some().into());
+                writer.block(&encoded.bytes);
+                let pairs = encoded.tensors.as_chunks::<2>().0;
+                let decoded = |(layer, [weight, bias]): (&LinearLayer, &[Vec<f32>; 2])| LinearLayer {
+                    weight: weight.clone(),
+                    bias: bias.clone(),
+                    ..layer.clone()
+                };
+                let layers = layers.iter().zip(pairs).map(decoded).collect();
                 Ok(Self::Conditional { step: *step, kind: *kind, layers })
             }
         }
@@ -125,9 +130,12 @@ impl ShCoding {
             .map(|_| reader.varint_at_most("hidden width", limits.layer_width))
             .collect::<Result<Vec<_>, _>>()?;
         let shapes = layer_shapes(kind, degree, features, &hidden);
-        let lengths: Vec<u64> =
-            shapes.iter().flat_map(|&(inputs, outputs)| [inputs.saturating_mul(outputs), outputs]).collect();
-        let total = lengths.iter().fold(0u64, |sum, &length| sum.saturating_add(length));
+        let lengths: Vec<_> = shapes
+            .iter()
+            .flat_map(|&(inputs, outputs)| [inputs.saturating_mul(outputs), outputs])
+            .map(|length| TensorLength { name: "weights", length })
+            .collect();
+        let total = lengths.iter().fold(0u64, |sum, tensor| sum.saturating_add(tensor.length));
         at_most(SECTION, "number of weights", total, limits.layer_weights)?;
         let quantised = match reader.u8("precision of the weights")? {
             0 => false,
@@ -167,7 +175,7 @@ fn features(conditions: Conditions<'_>) -> u64 {
 pub(crate) fn write(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
-    precision: Option<weights::Precision>,
+    precision: Option<WeightPrecision>,
     conditions: Conditions<'_>,
     writer: &mut Writer,
 ) -> Result<(Vec<f32>, ShBytes), CodecError> {
@@ -222,8 +230,7 @@ pub(crate) fn read(
         at_most(SECTION, "number of multiplications", work, limits.multiplications)?;
     }
 
-    let lengths =
-        (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
+    let lengths = (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
     let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "what an encoder writes");
     let mut readers = Vec::new();
     for length in lengths {

@@ -7,26 +7,36 @@ use crate::{
     context_model::{CONTEXT_PREDICTION, masked_taps},
     entropy::{read_tables, write_tables},
     limits::at_most,
+    network_weights::{TensorLength, WeightPrecision},
     reader::Reader,
     writer::Writer,
 };
 
 const SECTION: &str = SectionKind::ContextModel.name();
 
-/// Writes a model whose arrays are sound; `precision` is for the weights, float32 where there is none.
+/// Writes a model whose arrays are sound, with float32 weights where there is no precision; returns it as a decoder gets
+/// it.
 pub(crate) fn write(
     model: &ContextModelArrays,
-    precision: Option<weights::Precision>,
+    precision: Option<WeightPrecision>,
     writer: &mut Writer,
-) -> Result<(), CodecError> {
+) -> Result<ContextModelArrays, CodecError> {
     write_shape(&model.shape, writer);
     if model.shape.parts.hyperprior {
         writer.block(&write_tables(&model.hyper_tables));
         writer.f32s(&model.hyper_medians);
     }
-    let tensors: Vec<_> = model.layers.iter().flat_map(|layer| [stored_weight(layer), layer.bias.clone()]).collect();
-    writer.bytes.extend(weights::encode(&tensors, precision)?);
-    Ok(())
+    let stored: Vec<_> = model.layers.iter().map(stored_weight).collect();
+    let tensors: Vec<weights::Tensor<'_>> = model
+        .layers
+        .iter()
+        .zip(&stored)
+        .flat_map(|(layer, weight)| [(layer.shape.name, &weight[..]), (layer.shape.name, &layer.bias[..])])
+        .collect();
+    let encoded = weights::encode(SECTION, &tensors, precision)?;
+    writer.bytes.extend(encoded.bytes);
+    let layers = layers(model.shape.layers(), encoded.tensors);
+    Ok(ContextModelArrays { layers, ..model.clone() })
 }
 
 /// Reads the shape alone.
@@ -95,18 +105,23 @@ pub(crate) fn read(bytes: &[u8], quantised: bool, limits: &Limits) -> Result<Con
         hyper_medians = reader.f32s("medians of the hyperprior", shape.hyper_channels.into())?;
     }
     let shapes = shape.layers();
-    let lengths: Vec<u64> =
-        shapes.iter().flat_map(|shape| [stored_weights(shape), u64::from(shape.outputs)]).collect();
-    let rest = reader.rest();
-    let mut tensors = weights::decode(SECTION, rest, quantised, &lengths, limits)?.into_iter();
-    let mut next = || tensors.next().expect("a tensor for each length");
-    let layers = shapes
-        .into_iter()
-        .map(|shape| ConvolutionLayer { shape, weight: unmasked(&shape, next()), bias: next() })
+    let lengths: Vec<_> = shapes
+        .iter()
+        .flat_map(|shape| [stored_weights(shape), u64::from(shape.outputs)].map(|length| (shape.name, length)))
+        .map(|(name, length)| TensorLength { name, length })
         .collect();
-    let model = ContextModelArrays { shape, layers, hyper_tables, hyper_medians };
+    let tensors = weights::decode(SECTION, reader.rest(), quantised, &lengths, limits)?;
+    let model = ContextModelArrays { shape, layers: layers(shapes, tensors), hyper_tables, hyper_medians };
     model.check(limits)?;
     Ok(model)
+}
+
+/// Layers from a weight and a bias each, as they are stored.
+fn layers(shapes: Vec<ConvolutionShape>, tensors: Vec<Vec<f32>>) -> Vec<ConvolutionLayer> {
+    let mut tensors = tensors.into_iter();
+    let mut next = || tensors.next().expect("two tensors a layer");
+    let layer = |shape| ConvolutionLayer { shape, weight: unmasked(&shape, next()), bias: next() };
+    shapes.into_iter().map(layer).collect()
 }
 
 /// Numbers of a weight that the stream holds.

@@ -26,16 +26,11 @@ pub(crate) enum SectionKind {
 
 impl SectionKind {
     /// The sections that every stream has, in the order in which version 1 writes them.
-    pub(crate) const CORE: [Self; 5] = [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Deformation, Self::HexPlanes];
+    pub(crate) const CORE: [Self; 5] =
+        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Deformation, Self::HexPlanes];
     /// Every section, in the order of their numbers.
-    pub(crate) const ALL: [Self; 6] = [
-        Self::Gaussians,
-        Self::Sh,
-        Self::SceneFrame,
-        Self::Deformation,
-        Self::HexPlanes,
-        Self::ContextModel,
-    ];
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Deformation, Self::HexPlanes, Self::ContextModel];
 
     /// The number that stands in the table.
     pub(crate) const fn id(self) -> u16 {
