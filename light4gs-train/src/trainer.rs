@@ -12,6 +12,7 @@ use light4gs_model::{DynamicScene, Significance, Splatter, least_significant, re
 use rand::Rng;
 
 use crate::checkpoint::{self, Checkpoint};
+use crate::compression::{Compression, NoisyScene, TrainedScene, write_scene};
 use crate::config::{Config, TrainConfig};
 use crate::densification::{
     DensifyMasks, DensityStatistics, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
@@ -22,8 +23,8 @@ use crate::learning_rates::GroupRates;
 use crate::loss::{l2, photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
-use crate::randomness::{FrameOrder, Purpose, generator, standard_normal};
+use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::randomness::{FrameOrder, Purpose, generator, seed_device, standard_normal};
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
 
@@ -67,6 +68,7 @@ impl Trainer {
         let scene = config.model.build().init(&data.points, &device);
         let state = Checkpoint {
             statistics: DensityStatistics::new(scene.gaussians.len(), &device.clone().inner()),
+            compression: Compression::of_run(&config, &device),
             scene,
             adam: Adam::default(),
             stage: Stage::Coarse,
@@ -126,8 +128,22 @@ impl Trainer {
             self.begin_fine_stage();
         }
         self.run_stage(Stage::Fine, self.config.train.fine_iterations)?;
-        let meta = scene_meta(&self.config, &self.data);
-        Ok(light4gs_codec::write_file(&self.folder.stream(), &self.state.scene.to_arrays(meta))?)
+        let trained = TrainedScene {
+            scene: &self.state.scene,
+            compression: self.state.compression.as_ref(),
+            config: &self.config,
+            data: &self.data,
+            images: &self.images,
+            device: &self.device,
+        };
+        let (encoded, record) = write_scene(&trained, &self.folder.stream(), self.quiet)?;
+        if let Some(record) = record {
+            self.folder.write_json("coding.json", &record)?;
+        }
+        if let Some(coded) = &encoded.coded {
+            self.folder.write_json("bit_maps.json", &coded.bit_maps)?;
+        }
+        Ok(encoded.bytes.len() as u64)
     }
 
     /// The fine stage starts with a new optimiser and new statistics.
@@ -217,6 +233,7 @@ impl Trainer {
         let views = self.data.train.len();
         let frames: Vec<usize> =
             (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, views)).collect();
+        let noisy = self.quantization_noise(stage, iteration);
         let config = &self.config.train;
         let splatter = self.splatter(stage, iteration);
         let scene = &self.state.scene;
@@ -226,9 +243,10 @@ impl Trainer {
         let mut views = Vec::with_capacity(batch);
         for frame in frames {
             let frame = &self.data.train[frame];
-            let gaussians = match stage {
-                Stage::Coarse => scene.gaussians.tensors(),
-                Stage::Fine => scene.at(frame.time),
+            let gaussians = match (stage, &noisy) {
+                (Stage::Coarse, _) => scene.gaussians.tensors(),
+                (Stage::Fine, None) => scene.at(frame.time),
+                (Stage::Fine, Some(noisy)) => scene.at_with(frame.time, noisy.planes.clone(), noisy.sh_rest.clone()),
             };
             let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
             let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
@@ -251,6 +269,11 @@ impl Trainer {
         if stage == Stage::Fine {
             loss = loss + regularization(scene, config);
         }
+        if let Some(noisy) = &noisy
+            && let Some(rate) = self.rate_term(noisy, iteration)
+        {
+            loss = loss + rate;
+        }
         let value: f32 = loss.clone().into_scalar();
         if !value.is_finite() {
             let checkpoint = self.folder.last_checkpoint().map_or("none".into(), |path| path.display().to_string());
@@ -267,11 +290,51 @@ impl Trainer {
                 }
             }
         }
-        let rates = GroupRates::new(&self.config.train, stage, iteration, self.data.extent);
+        let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
         let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
         visit_parameters(&mut self.state.scene, &mut step);
+        if let Some(compression) = &mut self.state.compression {
+            visit_compression(compression, &mut step);
+        }
         let (image, truth) = picture.expect("a batch has at least one picture");
         Ok(StepPicture { loss: value, image, truth })
+    }
+
+    /// The scene as it will roughly be decoded, once the rate has entered the training.
+    fn quantization_noise(&mut self, stage: Stage, iteration: usize) -> Option<NoisyScene> {
+        let Config { seed, compression: config, .. } = &self.config;
+        let from = config.rate.from.max(1);
+        if stage == Stage::Coarse || iteration < from {
+            return None;
+        }
+        let with_sh = self.sh_counts(iteration);
+        let compression = self.state.compression.as_mut()?;
+        let scene = &self.state.scene;
+        if iteration == from {
+            compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
+        }
+        seed_device(&self.device, *seed, stage, iteration);
+        let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
+        Some(compression.noisy(scene, learn_steps, with_sh))
+    }
+
+    /// Whether spherical harmonics have a part in the rate: once Gaussians neither come nor split any more.
+    fn sh_counts(&self, iteration: usize) -> bool {
+        iteration > self.config.train.densify.until
+    }
+
+    /// The weighted rate, in the iterations in which it is due.
+    fn rate_term(&self, noisy: &NoisyScene, iteration: usize) -> Option<Tensor<1>> {
+        let config = &self.config.compression.rate;
+        let compression = self.state.compression.as_ref().filter(|_| iteration.is_multiple_of(config.interval))?;
+        let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
+        let with_sh = self.sh_counts(iteration);
+        let rate = compression.rate(noisy, &self.state.scene, config.fraction, with_sh, &mut generator);
+        Some(match config.weighting.as_str() {
+            "per_symbol" => rate.bits_per_symbol() * config.lambda,
+            // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
+            _ => rate.megabytes() * (config.lambda * config.interval as f64),
+        })
     }
 
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {

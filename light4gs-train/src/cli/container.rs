@@ -4,20 +4,21 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically, write_file};
-use light4gs_data::{DataError, Scene};
+use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically};
+use light4gs_data::{DataError, ImageStore, Scene};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
-use super::train::sections_table;
+use super::train::{coding_table, sections_table};
 use super::{check_output, print_json};
 use crate::checkpoint::Checkpoint;
+use crate::compression::{TrainedScene, write_scene};
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
 use crate::run_folder::RunFolder;
-use crate::trainer::{load_options, scene_meta};
+use crate::trainer::load_options;
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {
@@ -50,8 +51,23 @@ impl Encode {
         let device = device_by_name(self.device.as_deref().unwrap_or(&config.device))?.autodiff();
         let checkpoint = Checkpoint::load(&path, &config, &device)?;
         let data = Scene::open(&record.scene, &load_options(&config))?;
-        write_file(&self.out, &checkpoint.scene.to_arrays(scene_meta(&config, &data)))?;
+        let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
+        let trained = TrainedScene {
+            scene: &checkpoint.scene,
+            compression: checkpoint.compression.as_ref(),
+            config: &config,
+            data: &data,
+            images: &images,
+            device: &device,
+        };
+        let (_, record) = write_scene(&trained, &self.out, self.json)?;
         print_info(&read_info(&self.out)?, self.json);
+        if let Some(record) = record.filter(|_| !self.json) {
+            if let Some(seconds) = record.fit_seconds {
+                println!("the entropy models were fitted to the finished scene in {seconds:.1} s");
+            }
+            println!("{}", coding_table(&record));
+        }
         Ok(())
     }
 }

@@ -133,9 +133,9 @@ pub struct AttributesConfig {
 #[serde(default)]
 pub struct WeightsConfig {
     /// Bits a weight of the deformation network.
-    pub deformation_bits: u32,
+    pub deformation_bits: u8,
     /// Bits a weight of the context model and of spherical-harmonics networks.
-    pub context_bits: u32,
+    pub context_bits: u8,
 }
 
 impl Default for CompressionConfig {
@@ -196,11 +196,11 @@ impl Default for ShConfig {
 impl Default for AttributesConfig {
     fn default() -> Self {
         Self {
-            position: 0.125,
+            position: 0.05,
             log_scale: 0.1,
-            quaternion: 0.03,
-            opacity_logit: 0.25,
-            sh_dc: 0.03,
+            quaternion: 0.02,
+            opacity_logit: 0.4,
+            sh_dc: 0.04,
             search_tolerance: 0.05,
         }
     }

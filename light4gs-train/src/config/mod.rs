@@ -85,20 +85,23 @@ impl Default for Config {
 impl Config {
     /// Reads a TOML file, with everything that it extends, and validates the result.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self, ConfigError> {
-        layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[])
+        layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[], &[])
     }
 
     /// The built-in preset called `name` (see [`preset_names`]), validated.
     pub fn from_preset(name: &str) -> Result<Self, ConfigError> {
-        layers::resolve(&Origin::Preset(name.to_owned()), &[])
+        layers::resolve(&Origin::Preset(name.to_owned()), &[], &[])
     }
 
     /// What a command line gives: a preset's name or a file's path, and overrides such as
     /// `train.fine_iterations=200`, each one a line of TOML (a bare word is taken as a string).
     ///
-    /// A name without a folder and without `.toml` is a preset, unless only a file has that name.
+    /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
+    /// may follow, each after a `+`, as in `dnerf-lego-small+medium`: they are laid on top in that order.
     pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
-        layers::resolve(&layers::named(name_or_path, None), overrides)
+        let mut names = name_or_path.split('+').map(|name| layers::named(name, None));
+        let first = names.next().expect("splitting gives at least one part");
+        layers::resolve(&first, &names.collect::<Vec<_>>(), overrides)
     }
 
     /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.

@@ -205,6 +205,11 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     });
     check.toml_integer("compression.rate.from", rate.from);
     check.one_of("compression.context.architecture", &context.architecture, ARCHITECTURES);
+    check.that(
+        "compression.context.high_scale_hyperprior",
+        !context.high_scale_hyperprior || (context.hyperprior && context.inter_scale),
+        || "needs `compression.context.hyperprior` and `compression.context.inter_scale`".to_owned(),
+    );
     check.range("compression.context.fit_iterations", context.fit_iterations, 1, 1_000_000);
     check.toml_integer("compression.steps.adaptive_from", steps.adaptive_from);
     check.one_of("compression.sh.model", &sh.model, SH_MODELS);
