@@ -1,6 +1,6 @@
 //! Compact coding of the Gaussians' attributes, but for the higher spherical harmonics (DESIGN.md, section 7).
 //!
-//! Positions go onto a grid and into Morton order, in which they are coded as a set, see [`mod@positions`]. The other
+//! Positions go onto a grid and into Morton order, in which they are coded as a set (`positions.rs`). The other
 //! attributes follow in that order, uniformly quantised. Each channel is predicted linearly from the nearest Gaussians
 //! before and from the channels before, and what the prediction misses by is coded adaptively.
 //!
