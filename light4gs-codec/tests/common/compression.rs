@@ -198,3 +198,20 @@ pub fn input(scene: &SceneData, profile: Profile, shape: ContextModelShape) -> C
         weights: Default::default(),
     }
 }
+
+/// Two small scenes and how to code them, with something of everything between them.
+pub fn tiny(profile: Profile) -> (SceneData, CompressionInput) {
+    let scene = scene(6, 2, 4, [8, 4, 4, 4], &[1, 2]);
+    let (shape, kind) = match profile {
+        Profile::Compact => (compact_shape(4, ALL_PARTS), Some(ShCondition::Autoregressive)),
+        Profile::Paper => {
+            let parts = ContextParts { high_scale_hyperprior: true, ..ALL_PARTS };
+            (ContextModelShape { inter_scale: SpatialKernel { kernel: 3, groups: 4 }, ..reference_shape(4, parts) }, None)
+        }
+    };
+    let mut input = input(&scene, profile, shape);
+    if let Some(kind) = kind {
+        input.sh = sh_networks(kind, 2, 8);
+    }
+    (scene, input)
+}
