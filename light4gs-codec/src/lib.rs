@@ -61,6 +61,7 @@ mod motion;
 pub mod network_weights;
 mod open_stream;
 mod parallel;
+mod parts;
 mod planes;
 mod query;
 mod reader;
@@ -83,6 +84,7 @@ pub use harmonics::{ShCoding, ShCondition};
 pub use info::{SectionInfo, StreamInfo, info};
 pub use limits::Limits;
 pub use open_stream::OpenStream;
+pub use parts::{PlaneDistributions, encode_planes, encode_sh, plane_distributions};
 pub use scene::{
     GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
     SceneMeta, sh_rest_coefficients,

@@ -17,6 +17,6 @@ mod plan;
 mod plane_parameters;
 mod walk;
 
-pub(crate) use coder::{CodedPlanes, decode, encode, stream_order};
+pub(crate) use coder::{CodedPlanes, decode, encode, parameters, stream_order};
 pub(crate) use plan::{PlanePlan, plan};
 pub(crate) use plane_parameters::bounded_mean;
