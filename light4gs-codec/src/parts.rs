@@ -21,8 +21,8 @@ pub fn encode_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<
     Ok(writer.bytes)
 }
 
-/// The bytes of coded spherical harmonics, with float32 weights. `frame` and `hexplane`, decoded, matter to the hexplane-coupled
-/// ones alone.
+/// The bytes of coded spherical harmonics, with float32 weights. `frame` and `hexplane`, decoded, matter to the
+/// hexplane-coupled ones alone.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`].
@@ -50,8 +50,8 @@ pub struct PlaneDistributions {
     pub means: Vec<f32>,
 }
 
-/// What the exact executor gives for one plane of a decoded hexplane: the distributions that a stream's intervals come from. The step is
-/// not asked for, since all networks see planes in their own units.
+/// What the exact executor gives for one plane of a decoded hexplane: the distributions that a stream's intervals come
+/// from. The step is not asked for, since all networks see planes in their own units.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`]; a plane that is not there.

@@ -39,8 +39,8 @@ pub(crate) fn stream_order(plans: &[PlanePlan]) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Codes planes whose arrays agree with the model and the head. `steps` has one entry, or one a scale; `hyper_symbols` has
-/// those of each plane with a hyperprior, `[N, H/4, W/4]`.
+/// Codes planes whose arrays agree with the model and the head. `steps` has one entry, or one a scale; `hyper_symbols`
+/// has those of each plane with a hyperprior, `[N, H/4, W/4]`.
 pub(crate) fn encode(
     hexplane: &HexPlaneArrays,
     model: &ContextModelArrays,
@@ -140,7 +140,7 @@ impl<'a> PlaneCoder<'a> {
         })?;
         let parameters = PlaneParameters::new(&self.model, plan, size, planes, hyperprior);
         let grid = self.grid(plan);
-        let mut coders = coders(plan, || SymbolWriter::default());
+        let mut coders = coders(plan, SymbolWriter::default);
         walk(&parameters, grid, size, values, &mut coders).map_err(|Damaged| {
             let found = format!("more than 4194304 steps of {} from its centre", grid.step);
             CodecError::invalid(SECTION, format!("a value of planes[{index}]"), found, "fewer; make the step larger")
@@ -190,8 +190,8 @@ impl<'a> PlaneCoder<'a> {
     }
 }
 
-/// Scales and means of every value of a plane, given that and the planes that it is coded from, all decoded; and the symbols of its
-/// hyperprior, where it has one. Values are `[M, height, width]`.
+/// Scales and means of every value of a plane, given that and the planes that it is coded from, all decoded; and the
+/// symbols of its hyperprior, where it has one. Values are `[M, height, width]`.
 pub(crate) fn parameters(
     hexplane: &HexPlaneArrays,
     model: &ContextModelArrays,

@@ -30,7 +30,8 @@ impl Grid {
     }
 }
 
-/// Codes the values `[M, height, width]` of a plane, with one coder a part. An encoder's values become the decoded ones.
+/// Codes the values `[M, height, width]` of a plane, with one coder a part. An encoder's values become the decoded
+/// ones.
 ///
 /// Order within a part: row, channel, column.
 pub(super) fn walk<C: SymbolCoder>(
