@@ -11,8 +11,8 @@ pub enum Profile {
     /// Everything is quantised and entropy coded. Gaussians come back in another order.
     #[default]
     Compact,
-    /// As in the paper: planes and spherical harmonics are entropy coded; the other attributes of the Gaussians and all network
-    /// weights stay float32.
+    /// As in the paper: planes and spherical harmonics are entropy coded; the other attributes of the Gaussians and all
+    /// network weights stay float32.
     Paper,
 }
 
@@ -62,18 +62,19 @@ impl Default for WeightPrecisions {
 /// How the hexplane is coded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlaneCoding {
-    /// The networks that give distributions. They are used as the stream holds them, that is, quantised in the compact profile.
+    /// The networks that give distributions. They are used as the stream holds them, that is, quantised in the compact
+    /// profile.
     pub model: ContextModelArrays,
     /// Quantisation steps, for all scales or one entry a scale.
     pub steps: Vec<PerGroup>,
-    /// For each plane that has a hyperprior its symbols `[N, H/4, W/4]` row-major, an empty list for the others. Any integers within ±2^22
-    /// are legal; good ones are `round(h_a(P / step) - median)`.
+    /// For each plane that has a hyperprior its symbols `[N, H/4, W/4]` row-major, an empty list for the others. Any
+    /// integers within ±2^22 are legal; good ones are `round(h_a(P / step) - median)`.
     pub hyper_symbols: Vec<Vec<i32>>,
 }
 
 impl PlaneCoding {
-    /// Channels, height and width of the hyperprior of each plane of a hexplane with these plane sizes `[height, width]`; nothing
-    /// for planes that have none.
+    /// Channels, height and width of the hyperprior of each plane of a hexplane with these plane sizes `[height,
+    /// width]`; nothing for planes that have none.
     ///
     /// This says where [`PlaneCoding::hyper_symbols`] must not be empty.
     pub fn hyper_shapes(model: &ContextModelShape, sizes: &[[u32; 2]]) -> Vec<Option<[u32; 3]>> {

@@ -39,12 +39,12 @@ pub struct CompressionReport {
 
 /// Compresses a scene.
 ///
-/// What is quantised is quantised here, and every network is used as the stream holds it. The stream is decoded again and
-/// compared, bit by bit, with what the encoder expects before it is returned.
+/// What is quantised is quantised here, and every network is used as the stream holds it. The stream is decoded again
+/// and compared, bit by bit, with what the encoder expects before it is returned.
 ///
 /// # Errors
-/// What [`crate::encode`] refuses; a model, tables or layers that contradict themselves or the scene; values beyond ±2^22 steps. The
-/// message names the section and the field.
+/// What [`crate::encode`] refuses; a model, tables or layers that contradict themselves or the scene; values beyond
+/// ±2^22 steps. The message names the section and the field.
 pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<Encoded, CodecError> {
     let limits = Limits::default();
     check(scene, &limits)?;

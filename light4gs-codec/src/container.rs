@@ -14,8 +14,8 @@ use crate::{
 /// The first bytes of every stream. The first is not ASCII and two line ends follow, so that a transfer as text shows.
 pub const MAGIC: [u8; 8] = *b"\x89L4GS\r\n\x1a";
 
-/// The newest version, which [`crate::encode_compressed`] writes. [`crate::encode`] writes version 1, which needs no more;
-/// [`crate::decode`] reads both.
+/// The newest version, which [`crate::encode_compressed`] writes. [`crate::encode`] writes version 1, which needs no
+/// more; [`crate::decode`] reads both.
 pub const VERSION: u16 = 2;
 /// The version of streams without compression.
 pub(crate) const PLAIN_VERSION: u16 = 1;

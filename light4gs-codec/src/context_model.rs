@@ -19,8 +19,8 @@ impl PerGroup {
     }
 }
 
-/// Everything that is needed to read planes: the networks that give each value's distribution, but for `h_a`, which only the
-/// encoder needs.
+/// Everything that is needed to read planes: the networks that give each value's distribution, but for `h_a`, which
+/// only the encoder needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContextModelArrays {
     /// Sizes and parts.
@@ -108,7 +108,8 @@ pub struct ConvolutionShape {
     pub kernel: u32,
     /// Groups, as in PyTorch.
     pub groups: u32,
-    /// Whether it is a transposed convolution of stride 2 (padding 2, output padding 1); others have stride 1 and keep the size.
+    /// Whether it is a transposed convolution of stride 2 (padding 2, output padding 1); others have stride 1 and keep
+    /// the size.
     pub transposed: bool,
 }
 

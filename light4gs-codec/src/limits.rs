@@ -42,8 +42,8 @@ pub struct Limits {
     /// Weights of the context model, and of the networks of the spherical harmonics.
     pub layer_weights: u64,
     /// Values of all entropy-coded planes, or of the entropy-coded spherical harmonics. Coded values can take next to
-    /// no bytes, so this bounds the memory that a small stream can ask for. A stream of `b` bytes may hold `64 b` of them
-    /// whatever this says.
+    /// no bytes, so this bounds the memory that a small stream can ask for. A stream of `b` bytes may hold `64 b` of
+    /// them whatever this says.
     pub coded_values: u64,
     /// Multiplications that the networks of a stream may ask for: positions times weights.
     pub multiplications: u64,

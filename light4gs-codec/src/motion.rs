@@ -11,8 +11,8 @@ const SECTION: &str = SectionKind::Deformation.name();
 impl SceneData {
     /// The centres of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves.
     ///
-    /// For tools that want to look into a file without a back end. It follows the model's conventions (DESIGN section 3) to float
-    /// tolerance, takes some microseconds a Gaussian, and uses one thread.
+    /// For tools that want to look into a file without a back end. It follows the model's conventions (DESIGN section
+    /// 3) to float tolerance, takes some microseconds a Gaussian, and uses one thread.
     ///
     /// # Errors
     /// A deformation network without the layers that its heads ask for, or with other sizes.

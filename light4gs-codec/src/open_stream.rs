@@ -14,7 +14,8 @@ use crate::{
 
 /// A stream whose header is sound and whose sections are decoded when they are asked for.
 ///
-/// For programs that need a part of a scene, or want to know how long each part takes; [`crate::decode`] decodes all of it.
+/// For programs that need a part of a scene, or want to know how long each part takes; [`crate::decode`] decodes all of
+/// it.
 ///
 /// ```
 /// use light4gs_codec::{OpenStream, SceneData, encode};

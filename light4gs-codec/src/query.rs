@@ -1,11 +1,12 @@
 //! Points, their coordinates in the hexplane, and samples of a plane there.
 //!
-//! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the hexplane-coupled
-//! harmonics are coded by these numbers.
+//! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
+//! hexplane-coupled harmonics are coded by these numbers.
 
 use crate::{Plane, SceneFrameArrays};
 
-/// Coordinates in [-1, 1]: standardised along the principal axes, contracted into the ball of radius 2, halved (paper III-A).
+/// Coordinates in [-1, 1]: standardised along the principal axes, contracted into the ball of radius 2, halved (paper
+/// III-A).
 pub(crate) fn normalised(frame: &SceneFrameArrays, point: [f32; 3]) -> [f32; 3] {
     let offset: [f32; 3] = std::array::from_fn(|i| point[i] - frame.mean[i]);
     let [x, y, z] = std::array::from_fn(|j| {
@@ -27,7 +28,8 @@ struct Between {
 }
 
 impl Between {
-    /// Where a coordinate in [-1, 1] falls among `samples`, the first at -1 and the last at 1; outside counts as the border.
+    /// Where a coordinate in [-1, 1] falls among `samples`, the first at -1 and the last at 1; outside counts as the
+    /// border.
     fn of(coordinate: f32, samples: u32) -> Self {
         let last = samples as usize - 1;
         let position = (coordinate + 1.0) * 0.5 * last as f32;

@@ -37,8 +37,8 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
 /// Turns a `.l4gs` stream into the scene that it holds.
 ///
 /// # Errors
-/// Whatever is wrong with the bytes; the message names the section. No input makes it panic, and none makes it take more
-/// memory than a small multiple of the input's length or of [`Limits::coded_values`], whichever is more.
+/// Whatever is wrong with the bytes; the message names the section. No input makes it panic, and none makes it take
+/// more memory than a small multiple of the input's length or of [`Limits::coded_values`], whichever is more.
 pub fn decode(bytes: &[u8]) -> Result<SceneData, CodecError> {
     decode_with_limits(bytes, &Limits::default())
 }

@@ -6,8 +6,8 @@ use common::compression::{
     ALL_PARTS, compact_shape, input, model, plane_coding, reference_shape, scene, sh_networks, sh_tables, step,
 };
 use light4gs_codec::{
-    CodecError, CompressionInput, ContextParts, Encoded, Encoding, OpenStream, PerGroup, Profile, SceneData, ShCoding,
-    ShCondition, decode, encode_compressed, info,
+    CodecError, CompressionInput, ContextParts, Encoded, Encoding, OpenStream, PerGroup, PlaneDistributions, Profile,
+    SceneData, ShCoding, ShCondition, decode, encode_compressed, encode_planes, info, plane_distributions,
 };
 use proptest::prelude::*;
 
@@ -170,6 +170,40 @@ fn harmonics_need_no_planes_unless_coupled() {
         let gaussians = stream.sh(gaussians, &stream.frame().unwrap(), &Default::default()).unwrap();
         assert_eq!(gaussians, encoded.decoded.gaussians);
     }
+}
+
+/// The distributions of the decoded planes are those that the planes were coded under: the coded bits say so.
+#[test]
+fn the_coded_bits_are_those_of_the_distributions() {
+    let scene = scene(0, 0, 16, [32, 32, 32, 16], &[1, 2]);
+    let input = input(&scene, Profile::Paper, compact_shape(16, ALL_PARTS));
+    let encoded = round_trip(&scene, &input);
+    let planes = input.planes.as_ref().unwrap();
+    let bytes = encode_planes(&scene.hexplane, planes).unwrap();
+    assert_eq!(bytes.len() as u64, encoded.report.sections[4].2);
+    for (index, plane) in encoded.decoded.hexplane.planes.iter().enumerate() {
+        let PlaneDistributions { scales, means } =
+            plane_distributions(&encoded.decoded.hexplane, planes, index).unwrap();
+        let centre = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
+        let mut ideal = 0.0;
+        for ((&value, &scale), &mean) in plane.values.iter().zip(&scales).zip(&means) {
+            let distance = (f64::from((value - centre) / 0.1) - f64::from(mean)).round().abs();
+            let scale = f64::from(scale.max(0.11));
+            ideal -= (upper_tail((distance - 0.5) / scale) - upper_tail((distance + 0.5) / scale)).max(2e-9).log2();
+        }
+        let sizes = encoded.report.planes[index];
+        let coded = 8.0 * (sizes.anchors + sizes.others) as f64;
+        assert!((coded / ideal - 1.0).abs() < 0.01, "plane {index}: {coded} bits, ideal {ideal}");
+    }
+}
+
+/// The probability that a standard normal variable is above `x`: Simpson's rule on the density.
+fn upper_tail(x: f64) -> f64 {
+    let (steps, end) = (400, x + 9.0);
+    let width = (end - x) / f64::from(steps);
+    let density = |i: i32| (-0.5 * (x + f64::from(i) * width).powi(2)).exp() / std::f64::consts::TAU.sqrt();
+    let inner: f64 = (1..steps).map(|i| density(i) * if i % 2 == 1 { 4.0 } else { 2.0 }).sum();
+    (density(0) + inner + density(steps)) * width / 3.0
 }
 
 #[test]

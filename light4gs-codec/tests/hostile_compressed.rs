@@ -118,7 +118,8 @@ fn the_largest_planes_of_a_small_stream() {
     scene.hexplane.planes.iter_mut().for_each(|plane| plane.values.fill(0.0));
     let planes = input.planes.unwrap();
     let planes = common::compression::plane_coding(&scene.hexplane, planes.model, planes.steps);
-    let bytes = encode_compressed(&scene, &CompressionInput { planes: Some(planes), ..tiny(Profile::Paper).1 }).unwrap();
+    let bytes =
+        encode_compressed(&scene, &CompressionInput { planes: Some(planes), ..tiny(Profile::Paper).1 }).unwrap();
     drop(scene);
     let bytes = bytes.bytes;
     survive(&bytes, &Limits::default());

@@ -70,8 +70,8 @@ impl FrequencyTable {
         self.distribution().bits(symbol)
     }
 
-    /// Slot `i` begins at `i + floor(W · (2^24 - slots) / S)`, where `W` is the sum of the weights before it and `S` that
-    /// of all.
+    /// Slot `i` begins at `i + floor(W · (2^24 - slots) / S)`, where `W` is the sum of the weights before it and `S`
+    /// that of all.
     pub(crate) fn distribution(&self) -> Distribution {
         let slots = self.codes.len() as u64;
         let total: u64 = self.codes.iter().map(|&code| weight_of(code)).sum();

@@ -70,7 +70,8 @@ impl SymbolWriter {
     }
 }
 
-/// Pushes what follows an escape, backwards: the side, then the distance from the table as an Exp-Golomb code of order 0.
+/// Pushes what follows an escape, backwards: the side, then the distance from the table as an Exp-Golomb code of order
+/// 0.
 fn push_escaped(coder: &mut DefaultAnsCoder, distribution: &Distribution, symbol: i32) {
     let (above, distance) = match symbol.checked_sub(distribution.first) {
         Some(offset) if offset >= 0 => (true, offset as u32 - distribution.escape() as u32),

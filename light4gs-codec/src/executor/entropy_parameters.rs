@@ -18,7 +18,8 @@ impl EntropyParameters {
         Self { layers: layers.map(|layer| Matrix::from_rows(&layer.weight, &layer.bias)) }
     }
 
-    /// Scales and means `[2M]` in `outputs`, from parameters `[2M]` and context `[2M]`; a context of zeros may be left out.
+    /// Scales and means `[2M]` in `outputs`, from parameters `[2M]` and context `[2M]`; a context of zeros may be left
+    /// out.
     pub(crate) fn apply(&self, inputs: &[Lanes], hidden: &mut Hidden, outputs: &mut [Lanes]) {
         let Hidden { first, second } = hidden;
         first.resize(self.layers[0].outputs(), [0.0; LANES]);

@@ -16,7 +16,8 @@ pub(crate) fn time_means(values: &[f32], [rows, size]: [usize; 2], centre: f32) 
     means
 }
 
-/// Means along the first axis (columns) and along the second (rows), spread over the plane: `[2 channels, height, width]`.
+/// Means along the first axis (columns) and along the second (rows), spread over the plane: `[2 channels, height,
+/// width]`.
 pub(crate) fn spread_time_means(
     first: &[f32],
     second: &[f32],

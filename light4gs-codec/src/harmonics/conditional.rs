@@ -54,8 +54,8 @@ impl<'a> Conditional<'a> {
         Self { condition, networks, gaussians, frame, hexplane, inputs: Vec::new(), outputs: Vec::new() }
     }
 
-    /// Scales and means of the channels of one degree, for the Gaussians from `first` on. Degrees rise; `values` are those of all
-    /// channels, `[Gaussians, channels]`, of which the lower degrees are decoded.
+    /// Scales and means of the channels of one degree, for the Gaussians from `first` on. Degrees rise; `values` are
+    /// those of all channels, `[Gaussians, channels]`, of which the lower degrees are decoded.
     pub(super) fn parameters(
         &mut self,
         degree: usize,

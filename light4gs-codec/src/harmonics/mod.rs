@@ -1,7 +1,7 @@
 //! Entropy coding of the spherical harmonics beyond degree 0 (paper III-D, DESIGN section 6).
 //!
-//! Channels are `coefficient · 3 + colour`. They fall into groups by degree, 9, 15 and 21 channels, and each group has a sub-stream
-//! of its own. Within a group symbols run Gaussian by Gaussian, channel by channel.
+//! Channels are `coefficient · 3 + colour`. They fall into groups by degree, 9, 15 and 21 channels, and each group has
+//! a sub-stream of its own. Within a group symbols run Gaussian by Gaussian, channel by channel.
 
 mod conditional;
 mod model;
@@ -27,7 +27,8 @@ pub enum ShCoding {
         step: f32,
         /// What the networks see.
         kind: ShCondition,
-        /// Two linear layers a network, with LeakyReLU (0.01) between. Outputs are scales, then means, in units of the step.
+        /// Two linear layers a network, with LeakyReLU (0.01) between. Outputs are scales, then means, in units of the
+        /// step.
         layers: Vec<LinearLayer>,
     },
 }
@@ -38,8 +39,8 @@ pub enum ShCondition {
     /// The coefficients of lower degrees, degree 0 included: one network a degree, `sh_ar.{g}.0` and `sh_ar.{g}.2` for
     /// `g` = 0 (degree 1), 1, 2. Inputs: `sh_dc`, then the decoded values of lower groups.
     Autoregressive,
-    /// The hexplane: one network, `sh_hex.0` and `sh_hex.2`. Inputs: the product of the three space-only planes at the decoded
-    /// position, scale by scale.
+    /// The hexplane: one network, `sh_hex.0` and `sh_hex.2`. Inputs: the product of the three space-only planes at the
+    /// decoded position, scale by scale.
     HexplaneCoupled,
 }
 

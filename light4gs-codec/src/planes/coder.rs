@@ -9,7 +9,8 @@ use super::{
 use crate::{
     CodecError, ContextModelArrays, HexPlaneArrays, PerGroup, Plane,
     adaptive::Damaged,
-    entropy::{SymbolCoder, SymbolReader, SymbolWriter},
+    entropy::{SymbolCoder, SymbolReader, SymbolWriter, gaussian_table},
+    executor::{AnchorMap, PaddedMap},
     parallel,
     sections::SectionKind,
 };
@@ -38,8 +39,8 @@ pub(crate) fn stream_order(plans: &[PlanePlan]) -> Vec<(usize, usize)> {
         .collect()
 }
 
-/// Codes planes whose arrays agree with the model and the head. `steps` has one entry, or one a scale; `hyper_symbols` has
-/// those of each plane with a hyperprior, `[N, H/4, W/4]`.
+/// Codes planes whose arrays agree with the model and the head. `steps` has one entry, or one a scale; `hyper_symbols`
+/// has those of each plane with a hyperprior, `[N, H/4, W/4]`.
 pub(crate) fn encode(
     hexplane: &HexPlaneArrays,
     model: &ContextModelArrays,
@@ -139,12 +140,12 @@ impl<'a> PlaneCoder<'a> {
         })?;
         let parameters = PlaneParameters::new(&self.model, plan, size, planes, hyperprior);
         let grid = self.grid(plan);
-        let mut coders = coders(plan, || SymbolWriter::default());
+        let mut coders = coders(plan, SymbolWriter::default);
         walk(&parameters, grid, size, values, &mut coders).map_err(|Damaged| {
             let found = format!("more than 4194304 steps of {} from its centre", grid.step);
             CodecError::invalid(SECTION, format!("a value of planes[{index}]"), found, "fewer; make the step larger")
         })?;
-        let levels = &crate::entropy::gaussian_table().levels;
+        let levels = &gaussian_table().levels;
         streams.extend(coders.iter().map(|(_, writer)| writer.finish(levels)));
         Ok(streams)
     }
@@ -178,7 +179,7 @@ impl<'a> PlaneCoder<'a> {
         [height, width]: [usize; 2],
         coder: &mut impl SymbolCoder,
         symbols: &[i32],
-    ) -> Result<crate::executor::PaddedMap, Damaged> {
+    ) -> Result<PaddedMap, Damaged> {
         let size = [height / 4, width / 4];
         let distributions = &self.model.hyper_distributions;
         let area = size[0] * size[1];
@@ -187,6 +188,37 @@ impl<'a> PlaneCoder<'a> {
             .collect::<Result<Vec<_>, _>>()?;
         Ok(self.model.hyperprior(&coded, size))
     }
+}
+
+/// Scales and means of every value of a plane, given that and the planes that it is coded from, all decoded; and the
+/// symbols of its hyperprior, where it has one. Values are `[M, height, width]`.
+pub(crate) fn parameters(
+    hexplane: &HexPlaneArrays,
+    model: &ContextModelArrays,
+    hyper_symbols: &[i32],
+    index: usize,
+) -> (Vec<f32>, Vec<f32>) {
+    let model = ExactModel::new(model);
+    let plan = plan(&model.shape, hexplane.multipliers.len())[index];
+    let plane = &hexplane.planes[index];
+    let size = size_of(plane);
+    let hyperprior = plan.has_hyperprior().then(|| model.hyperprior(hyper_symbols, [size[0] / 4, size[1] / 4]));
+    let parameters = PlaneParameters::new(&model, &plan, size, hexplane, hyperprior);
+    let anchors = AnchorMap::new(&plane.values, size, model.shape.centres.of(plan.space_time));
+    let (mut scales, mut means) = (vec![0.0; plane.values.len()], vec![0.0; plane.values.len()]);
+    for (part, ()) in coders(&plan, || ()) {
+        for y in 0..size[0] {
+            let row = parameters.row(y, part, (part == Part::Others).then_some(&anchors));
+            let columns = part.columns(y);
+            for (all, row) in [(&mut scales, &row.scales), (&mut means, &row.means)] {
+                for (channel, values) in row.chunks_exact(part.count(size[1])).enumerate() {
+                    let start = (channel * size[0] + y) * size[1] + columns.first;
+                    all[start..].iter_mut().step_by(columns.step).zip(values).for_each(|(to, &value)| *to = value);
+                }
+            }
+        }
+    }
+    (scales, means)
 }
 
 fn size_of(plane: &Plane) -> [usize; 2] {

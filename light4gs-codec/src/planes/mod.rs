@@ -1,7 +1,7 @@
 //! Entropy coding of the hexplanes under a context model (paper III-C, DESIGN sections 6 and 7).
 //!
-//! Encoder and decoder run the same walk over the planes and ask the same networks for every value's distribution; they differ
-//! only in the [`SymbolCoder`](crate::entropy::SymbolCoder) that they hand to it.
+//! Encoder and decoder run the same walk over the planes and ask the same networks for every value's distribution; they
+//! differ only in the [`SymbolCoder`](crate::entropy::SymbolCoder) that they hand to it.
 //!
 //! | file | what |
 //! |---|---|
@@ -17,6 +17,6 @@ mod plan;
 mod plane_parameters;
 mod walk;
 
-pub(crate) use coder::{CodedPlanes, decode, encode, stream_order};
+pub(crate) use coder::{CodedPlanes, decode, encode, parameters, stream_order};
 pub(crate) use plan::{PlanePlan, plan};
 pub(crate) use plane_parameters::bounded_mean;

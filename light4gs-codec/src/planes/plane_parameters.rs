@@ -6,7 +6,6 @@ use super::{
 };
 use crate::{
     HexPlaneArrays,
-    entropy::gaussian_table,
     executor::{
         AnchorMap, Columns, Convolution, LANES, Lanes, PaddedMap, first_anchor, spread_time_means, time_means, upsample,
     },
@@ -61,10 +60,10 @@ impl<'a> Conditions<'a> {
     }
 }
 
-/// Levels of the Gaussian table and means of one row, `[M, positions]` each.
+/// Scales as the network gives them, and usable means, of one row, `[M, positions]` each.
 #[derive(Debug)]
 pub(super) struct RowParameters {
-    pub(super) levels: Vec<u16>,
+    pub(super) scales: Vec<f32>,
     pub(super) means: Vec<f32>,
 }
 
@@ -121,8 +120,7 @@ impl<'a> PlaneParameters<'a> {
     pub(super) fn row(&self, y: usize, part: Part, anchors: Option<&AnchorMap>) -> RowParameters {
         let channels = self.model.shape.channels as usize;
         let count = part.count(self.width);
-        let table = gaussian_table();
-        let mut row = RowParameters { levels: vec![0; channels * count], means: vec![0.0; channels * count] };
+        let mut row = RowParameters { scales: vec![0.0; channels * count], means: vec![0.0; channels * count] };
         let (mut window, mut hidden) = (Vec::new(), Default::default());
         let mut inputs = vec![[0.0; LANES]; 4 * channels];
         let mut outputs = vec![[0.0; LANES]; 2 * channels];
@@ -149,10 +147,9 @@ impl<'a> PlaneParameters<'a> {
             let lanes = LANES.min(count - first);
             for channel in 0..channels {
                 let at = channel * count + first;
-                for lane in 0..lanes {
-                    row.levels[at + lane] = table.level(scales[channel][lane]);
-                    row.means[at + lane] = bounded_mean(means[channel][lane]);
-                }
+                row.scales[at..at + lanes].copy_from_slice(&scales[channel][..lanes]);
+                let bounded = means[channel].map(bounded_mean);
+                row.means[at..at + lanes].copy_from_slice(&bounded[..lanes]);
             }
         }
         row

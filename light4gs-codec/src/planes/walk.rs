@@ -30,7 +30,8 @@ impl Grid {
     }
 }
 
-/// Codes the values `[M, height, width]` of a plane, with one coder a part. An encoder's values become the decoded ones.
+/// Codes the values `[M, height, width]` of a plane, with one coder a part. An encoder's values become the decoded
+/// ones.
 ///
 /// Order within a part: row, channel, column.
 pub(super) fn walk<C: SymbolCoder>(
@@ -47,34 +48,52 @@ pub(super) fn walk<C: SymbolCoder>(
         }
         for first in (0..size[0]).step_by(BATCH) {
             let rows = BATCH.min(size[0] - first);
-            let batch = parallel::map(rows, |row| parameters.row(first + row, *part, anchors.as_ref()));
-            for (y, row) in (first..).zip(batch) {
-                walk_row(&row, grid, part.columns(y), y, size, values, coder)?;
+            let batch = parallel::map(rows, |row| Row::of(parameters, first + row, *part, anchors.as_ref()));
+            for row in batch {
+                row.walk(grid, size, values, coder)?;
             }
         }
     }
     Ok(())
 }
 
-fn walk_row<C: SymbolCoder>(
-    row: &RowParameters,
-    grid: Grid,
-    columns: Columns,
+/// The positions of one row and their distributions.
+struct Row {
     y: usize,
-    [height, width]: [usize; 2],
-    values: &mut [f32],
-    coder: &mut C,
-) -> Result<(), Damaged> {
-    let levels: &[Distribution] = &gaussian_table().levels;
-    let count = (width - columns.first).div_ceil(columns.step);
-    let parameters = row.levels.chunks_exact(count).zip(row.means.chunks_exact(count));
-    for (channel, (row_levels, row_means)) in parameters.enumerate() {
-        let start = (channel * height + y) * width;
-        let targets = values[start + columns.first..start + width].iter_mut().step_by(columns.step);
-        for ((value, &level), &mean) in targets.zip(row_levels).zip(row_means) {
-            let symbol = coder.code(levels, level, || grid.symbol(*value, mean))?;
-            *value = grid.value(symbol, mean);
-        }
+    columns: Columns,
+    /// Levels of the Gaussian table, `[M, positions]`.
+    levels: Vec<u16>,
+    /// `[M, positions]`.
+    means: Vec<f32>,
+}
+
+impl Row {
+    fn of(parameters: &PlaneParameters<'_>, y: usize, part: Part, anchors: Option<&AnchorMap>) -> Self {
+        let RowParameters { scales, means } = parameters.row(y, part, anchors);
+        let table = gaussian_table();
+        let levels = scales.into_iter().map(|scale| table.level(scale)).collect();
+        Self { y, columns: part.columns(y), levels, means }
     }
-    Ok(())
+
+    fn walk<C: SymbolCoder>(
+        &self,
+        grid: Grid,
+        [height, width]: [usize; 2],
+        values: &mut [f32],
+        coder: &mut C,
+    ) -> Result<(), Damaged> {
+        let levels: &[Distribution] = &gaussian_table().levels;
+        let Columns { first, step } = self.columns;
+        let count = (width - first).div_ceil(step);
+        let channels = self.levels.chunks_exact(count).zip(self.means.chunks_exact(count));
+        for (channel, (row_levels, row_means)) in channels.enumerate() {
+            let start = (channel * height + self.y) * width;
+            let targets = values[start + first..start + width].iter_mut().step_by(step);
+            for ((value, &level), &mean) in targets.zip(row_levels).zip(row_means) {
+                let symbol = coder.code(levels, level, || grid.symbol(*value, mean))?;
+                *value = grid.value(symbol, mean);
+            }
+        }
+        Ok(())
+    }
 }

@@ -192,25 +192,30 @@ pub(crate) fn write(
     Ok(decoded)
 }
 
-/// The head, the plans of the planes, and their sub-streams.
-fn read_sub_streams<'a>(
-    bytes: &'a [u8],
-    model: &ContextModelShape,
-    limits: &Limits,
-) -> Result<(Head, Vec<PlanePlan>, Vec<&'a [u8]>), CodecError> {
-    let mut reader = Reader::new(SECTION, bytes);
-    let head = Head::read(&mut reader, limits)?;
-    check_model(&head.planes, model)?;
-    let plans = planes::plan(model, head.planes.multipliers.len());
-    let count: usize = plans.iter().map(PlanePlan::sub_streams).sum();
-    let lengths = (0..count).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
-    let streams = lengths.into_iter().map(|length| reader.take("sub-stream", length)).collect::<Result<_, _>>()?;
-    reader.finish()?;
-    Ok((head, plans, streams))
+/// A section taken apart.
+struct Parts<'a> {
+    head: Head,
+    plans: Vec<PlanePlan>,
+    sub_streams: Vec<&'a [u8]>,
+}
+
+impl<'a> Parts<'a> {
+    fn read(bytes: &'a [u8], model: &ContextModelShape, limits: &Limits) -> Result<Self, CodecError> {
+        let mut reader = Reader::new(SECTION, bytes);
+        let head = Head::read(&mut reader, limits)?;
+        check_model(&head.planes, model)?;
+        let plans = planes::plan(model, head.planes.multipliers.len());
+        let count: usize = plans.iter().map(PlanePlan::sub_streams).sum();
+        let lengths = (0..count).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
+        let take = |length| reader.take("sub-stream", length);
+        let sub_streams = lengths.into_iter().map(take).collect::<Result<_, _>>()?;
+        reader.finish()?;
+        Ok(Self { head, plans, sub_streams })
+    }
 }
 
 pub(crate) fn read(bytes: &[u8], model: &ContextModelArrays, limits: &Limits) -> Result<HexPlaneArrays, CodecError> {
-    let (Head { planes: head, steps }, _, streams) = read_sub_streams(bytes, &model.shape, limits)?;
+    let Parts { head: Head { planes: head, steps }, sub_streams, .. } = Parts::read(bytes, &model.shape, limits)?;
     let values = head.sizes.iter().fold(0u64, |sum, &size| sum.saturating_add(head.values(size)));
     at_most(SECTION, "number of values", values, limits.coded_values)?;
     let positions = values / u64::from(head.channels.max(1));
@@ -224,7 +229,7 @@ pub(crate) fn read(bytes: &[u8], model: &ContextModelArrays, limits: &Limits) ->
 
     let hexplanes::Head { channels, resolution, multipliers, sizes } = head;
     let planes = sizes.iter().map(|&[height, width]| Plane { height, width, values: Vec::new() }).collect();
-    planes::decode(HexPlaneArrays { channels, resolution, multipliers, planes }, model, &steps, &streams)
+    planes::decode(HexPlaneArrays { channels, resolution, multipliers, planes }, model, &steps, &sub_streams)
 }
 
 /// Bytes of every plane, without decoding.
@@ -233,12 +238,12 @@ pub(crate) fn plane_bytes(
     model: &ContextModelShape,
     limits: &Limits,
 ) -> Result<(Head, Vec<PlaneBytes>), CodecError> {
-    let (head, plans, streams) = read_sub_streams(bytes, model, limits)?;
+    let Parts { head, plans, sub_streams } = Parts::read(bytes, model, limits)?;
     let mut planes: Vec<_> = planes::stream_order(&plans)
         .into_iter()
         .map(|(plane, first)| {
             let plan = &plans[plane];
-            let mut lengths = streams[first..].iter().map(|stream| stream.len() as u64);
+            let mut lengths = sub_streams[first..].iter().map(|stream| stream.len() as u64);
             let mut part = |present: bool| if present { lengths.next().unwrap_or(0) } else { 0 };
             let (hyperprior, anchors) = (part(plan.has_hyperprior()), part(plan.checkerboard));
             PlaneBytes { plane, hyperprior, anchors, others: part(true) }

@@ -14,8 +14,8 @@ use crate::{
 
 const SECTION: &str = SectionKind::ContextModel.name();
 
-/// Writes a model whose arrays are sound, with float32 weights where there is no precision; returns it as a decoder gets
-/// it.
+/// Writes a model whose arrays are sound, with float32 weights where there is no precision; returns it as a decoder
+/// gets it.
 pub(crate) fn write(
     model: &ContextModelArrays,
     precision: Option<WeightPrecision>,

@@ -206,7 +206,10 @@ pub fn tiny(profile: Profile) -> (SceneData, CompressionInput) {
         Profile::Compact => (compact_shape(4, ALL_PARTS), Some(ShCondition::Autoregressive)),
         Profile::Paper => {
             let parts = ContextParts { high_scale_hyperprior: true, ..ALL_PARTS };
-            (ContextModelShape { inter_scale: SpatialKernel { kernel: 3, groups: 4 }, ..reference_shape(4, parts) }, None)
+            (
+                ContextModelShape { inter_scale: SpatialKernel { kernel: 3, groups: 4 }, ..reference_shape(4, parts) },
+                None,
+            )
         }
     };
     let mut input = input(&scene, profile, shape);
