@@ -335,7 +335,16 @@ impl ContextModel {
     /// Quantises all planes in coding order, each with the parameters that the decoder will have: what the codec does,
     /// with a back end's floats in place of its exact executor. Without gradients.
     pub fn quantize(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<QuantizedPlane> {
-        let parts = self.parts();
+        self.quantize_with(&self.parts(), planes, steps)
+    }
+
+    /// [`Self::quantize`] with other parts than the model's own.
+    pub fn quantize_with(
+        &self,
+        parts: &[Box<dyn PriorPart + '_>],
+        planes: &[Tensor<3>],
+        steps: &PlaneSteps,
+    ) -> Vec<QuantizedPlane> {
         let mut known = self.centered(planes, steps);
         for plane in &mut known.planes {
             *plane = plane.clone().detach();
@@ -343,7 +352,7 @@ impl ContextModel {
         let mut quantized: Vec<Option<QuantizedPlane>> = vec![None; planes.len()];
         for plane in coding_order(planes.len()) {
             let step = steps.broadcast(plane).detach();
-            let prior = prior_of(&parts, &known, plane, Latent::Rounded);
+            let prior = prior_of(parts, &known, plane, Latent::Rounded);
             let hyper_bits = prior.hyper_bits.clone();
             let values = known.in_steps(plane);
             let round = |means: Tensor<3>| ((values.clone() - means.clone()).round() + means) * step.clone();

@@ -126,7 +126,8 @@ fn masked_convolution() {
         expect("grad_bias", values_of(&bias), golden.values("maskconv.grad_bias"));
         // PyTorch also has gradients for the taps that the mask then sets to zero. We do not.
         let mask = golden.values("mask5x5");
-        let masked = golden.values("maskconv.grad_weight").into_iter().enumerate().map(|(i, g)| g * mask[i % mask.len()]);
+        let masked =
+            golden.values("maskconv.grad_weight").into_iter().enumerate().map(|(i, g)| g * mask[i % mask.len()]);
         let weight = conv.weight.val().grad(&gradients).unwrap();
         expect("grad_weight", values_of(&weight), masked.collect());
     }

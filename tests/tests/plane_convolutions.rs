@@ -9,7 +9,12 @@ use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 
 type Output = (Tensor<3>, [Vec<f32>; 3]);
 
-fn gradients_of(plane: &Tensor<3>, weight: &Param<Tensor<4>>, bias: &Param<Tensor<1>>, grads: &Gradients) -> [Vec<f32>; 3] {
+fn gradients_of(
+    plane: &Tensor<3>,
+    weight: &Param<Tensor<4>>,
+    bias: &Param<Tensor<1>>,
+    grads: &Gradients,
+) -> [Vec<f32>; 3] {
     [
         values_of(&plane.grad(grads).unwrap()),
         values_of(&weight.val().grad(grads).unwrap()),
@@ -18,7 +23,14 @@ fn gradients_of(plane: &Tensor<3>, weight: &Param<Tensor<4>>, bias: &Param<Tenso
 }
 
 /// Both outputs and their gradients of one random loss.
-fn compare(what: &str, plane: &Tensor<3>, weight: &Param<Tensor<4>>, bias: &Param<Tensor<1>>, ours: Tensor<3>, burns: Tensor<3>) {
+fn compare(
+    what: &str,
+    plane: &Tensor<3>,
+    weight: &Param<Tensor<4>>,
+    bias: &Param<Tensor<1>>,
+    ours: Tensor<3>,
+    burns: Tensor<3>,
+) {
     assert_eq!(ours.dims(), burns.dims(), "{what}");
     let loss_weights = Tensor::random(ours.dims(), Distribution::Normal(0.0, 1.0), &plane.device());
     let run = |output: Tensor<3>| -> Output {
@@ -27,7 +39,9 @@ fn compare(what: &str, plane: &Tensor<3>, weight: &Param<Tensor<4>>, bias: &Para
     };
     let ((ours, our_gradients), (burns, their_gradients)) = (run(ours), run(burns));
     assert_close_relative(&format!("{what} output"), &values_of(&ours), &values_of(&burns), 1e-5);
-    for (name, (found, expected)) in ["plane", "weight", "bias"].into_iter().zip(our_gradients.iter().zip(&their_gradients)) {
+    for (name, (found, expected)) in
+        ["plane", "weight", "bias"].into_iter().zip(our_gradients.iter().zip(&their_gradients))
+    {
         assert_close_relative(&format!("{what} gradient of {name}"), found, expected, 1e-5);
     }
 }
