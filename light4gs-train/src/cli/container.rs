@@ -13,7 +13,8 @@ use serde_json::json;
 use super::train::{coding_table, sections_table};
 use super::{check_output, print_json};
 use crate::checkpoint::Checkpoint;
-use crate::compression::{TrainedScene, write_scene};
+use crate::compression::{TrainedScene, plane_name, write_scene};
+use crate::config::Config;
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
@@ -30,6 +31,10 @@ pub(super) struct Encode {
     /// The file to write.
     #[arg(long)]
     out: PathBuf,
+    /// Changes one key below `compression` for this file; may be given more than once. What concerns the entropy models
+    /// (`context`, `steps`, `sh`) has them fitted anew to the scene as it is.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
     /// Back end: ndarray or flex.
     #[arg(long)]
     device: Option<String>,
@@ -51,11 +56,17 @@ impl Encode {
         let device = device_by_name(self.device.as_deref().unwrap_or(&config.device))?.autodiff();
         let checkpoint = Checkpoint::load(&path, &config, &device)?;
         let data = Scene::open(&record.scene, &load_options(&config))?;
+        let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
+        if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
+            return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
+        }
+        let (old, new) = (&config.compression, &changed.compression);
+        let same_models = old.context == new.context && old.steps == new.steps && old.sh == new.sh;
         let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
         let trained = TrainedScene {
             scene: &checkpoint.scene,
-            compression: checkpoint.compression.as_ref(),
-            config: &config,
+            compression: checkpoint.compression.as_ref().filter(|_| same_models),
+            config: &changed,
             data: &data,
             images: &images,
             device: &device,
@@ -105,6 +116,10 @@ fn print_info(info: &StreamInfo, json: bool) {
             "hexplane": {"channels": info.hexplane_channels, "resolution": info.hexplane_resolution,
                 "multipliers": info.hexplane_multipliers},
             "deformation": {"width": info.network_width, "depth": info.network_depth, "layers": info.layer_count},
+            "profile": info.profile.map(|profile| profile.name()),
+            "plane_steps": info.plane_steps.iter().map(|s| [s.space_only, s.space_time]).collect::<Vec<_>>(),
+            "plane_bytes": info.plane_bytes.iter().map(|p| json!({"plane": plane_name(p.plane),
+                "hyperprior": p.hyperprior, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
         }));
     }
     println!("{name}: version {}, {width}×{height}, {frame_count} times at {fps} frames a second", info.version);
@@ -117,6 +132,14 @@ fn print_info(info: &StreamInfo, json: bool) {
         info.network_width,
         info.layer_count
     );
+    if let Some(profile) = info.profile {
+        let steps: Vec<String> = info
+            .plane_steps
+            .iter()
+            .map(|s| format!("{:.4} (space), {:.4} (time)", s.space_only, s.space_time))
+            .collect();
+        println!("profile {}; steps of the planes: {}", profile.name(), steps.join("; "));
+    }
     println!("configuration {digest}\n");
     let sizes = section_sizes(info);
     println!("{}", sections_table(sizes.iter().map(|s| (s.name.as_str(), s.bytes)), info.bytes));

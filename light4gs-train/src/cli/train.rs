@@ -233,10 +233,13 @@ pub(super) fn coding_table(record: &CodingRecord) -> Table {
 
 /// Bytes and shares of a file's parts.
 pub(super) fn sections_table<'a>(sections: impl Iterator<Item = (&'a str, u64)>, total: u64) -> Table {
-    let mut table = Table::new([("section", Align::Left), ("bytes", Align::Right), ("share", Align::Right)]);
+    const BAR: f64 = 40.0;
+    let columns = [("section", Align::Left), ("bytes", Align::Right), ("share", Align::Right), ("", Align::Left)];
+    let mut table = Table::new(columns);
     let share = |bytes: u64| format!("{:.1} %", 100.0 * bytes as f64 / total as f64);
     for (name, bytes) in sections {
-        table.row([name.to_owned(), bytes.to_string(), share(bytes)]);
+        let bar = "█".repeat((BAR * bytes as f64 / total as f64).round() as usize);
+        table.row([name.to_owned(), bytes.to_string(), share(bytes), bar]);
     }
     table.rule().row(["file".to_owned(), total.to_string(), share(total)]);
     table

@@ -51,7 +51,7 @@ pub struct BitMap {
 }
 
 /// How a plane is called in records: its scale and its axes.
-pub(super) fn plane_name(plane: usize) -> String {
+pub fn plane_name(plane: usize) -> String {
     format!("{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
 }
 

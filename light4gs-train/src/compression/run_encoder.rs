@@ -11,8 +11,7 @@ use light4gs_data::{DataError, Frame, ImageStore, Scene};
 use light4gs_model::{DynamicScene, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::encoder::plane_name;
-use super::{BitEstimate, CodedSizes, Compression, EncodedScene, Pictures, encode, fit};
+use super::{BitEstimate, CodedSizes, Compression, EncodedScene, Pictures, encode, fit, plane_name};
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::trainer::{image_tensor, scene_meta};

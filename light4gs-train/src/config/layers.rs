@@ -30,7 +30,7 @@ pub(super) fn resolve(top: &Origin, above: &[Origin], override_texts: &[String])
 }
 
 /// The same for text, whose `extends` may name a preset or a path relative to the working folder.
-pub(super) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigError> {
+pub(super) fn resolve_text(text: &str, origin: &str, override_texts: &[String]) -> Result<Config, ConfigError> {
     let origin = Origin::Text(origin.to_owned());
     let (layer, extends) = parse(text, &origin)?;
     let mut layers = vec![(origin.clone(), layer)];
@@ -38,6 +38,9 @@ pub(super) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigErr
         collect(&named(&below, None), Some(&origin), &mut Vec::new(), &mut layers)?;
     }
     layers.reverse();
+    for text in override_texts {
+        layers.push(overrides::parse(text)?);
+    }
     build(layers)
 }
 

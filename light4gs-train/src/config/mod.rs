@@ -106,7 +106,12 @@ impl Config {
 
     /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        layers::resolve_text(text, origin)
+        layers::resolve_text(text, origin, &[])
+    }
+
+    /// Reads a configuration from text and lays overrides on top, as [`Config::load`] does. `origin` names the text.
+    pub fn load_text_with(text: &str, origin: &str, overrides: &[String]) -> Result<Self, ConfigError> {
+        layers::resolve_text(text, origin, overrides)
     }
 
     /// The whole configuration, every key written out. Reading it back gives an equal configuration.
