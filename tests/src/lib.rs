@@ -4,6 +4,7 @@
 #![allow(deprecated)]
 
 pub mod golden;
+pub mod named;
 pub mod program;
 pub mod random;
 pub mod raster;

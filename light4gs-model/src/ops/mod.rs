@@ -9,4 +9,6 @@
 pub mod adam;
 pub mod hexplane_query;
 mod host;
+pub mod lower_bound;
+pub mod normal_cdf;
 pub mod splat;
