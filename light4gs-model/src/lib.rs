@@ -8,6 +8,9 @@
 //! | [`Deformation`] | from a feature to changes of position, scale, rotation | III-A |
 //! | [`Splatter`] | differentiable rendering | 3DGS |
 //! | [`Significance`] | what each Gaussian contributes over views and times | III-B |
+//! | [`ContextModel`] | what every value of the hexplane costs in the file: the multiscale hexplane context model | III-C |
+//! | [`AdaptiveQuantization`] | learned quantisation steps | III-D |
+//! | [`ShEntropyModel`] | what every spherical harmonic costs in the file: four models | III-D |
 //! | [`DynamicScene`] | all of it together: Gaussians at a time, and the plain arrays of a `.l4gs` file | III |
 //!
 //! Every part is a Burn module of its own (`Config` and `init`) and works alone. Custom operations with hand-written
@@ -74,5 +77,6 @@ pub use sh_bottleneck::{ShBottleneck, ShBottleneckConfig};
 pub use sh_entropy::{SH_CHANNELS, ShEntropy, ShEntropyConfig, ShEntropyModel, ShKnown, ShTables};
 pub use sh_hexplane_coupled::{ShHexPlaneCoupled, ShHexPlaneCoupledConfig, space_feature};
 pub use sh_mixture::{ShMixture, ShMixtureConfig};
+pub use sh_network::ShNetwork;
 pub use significance::{Significance, SignificanceScore, VolumeWeight, least_significant};
 pub use splatter::{Rendering, Splatter};

@@ -95,7 +95,7 @@ impl ShEntropy for ShAutoregressive {
 impl NamedParameters for ShAutoregressive {
     fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
         for (network, names) in self.degrees.iter_mut().zip(NAMES) {
-            network.visit(names, visitor);
+            network.visit_layers(names, visitor);
         }
     }
 }

@@ -87,6 +87,6 @@ impl ShEntropy for ShHexPlaneCoupled {
 
 impl NamedParameters for ShHexPlaneCoupled {
     fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        ShNetwork::visit(&mut self.network, NAMES, visitor);
+        self.network.visit_layers(NAMES, visitor);
     }
 }

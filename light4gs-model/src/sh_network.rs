@@ -38,7 +38,7 @@ impl ShNetwork {
         names.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
     }
 
-    pub(crate) fn visit(&mut self, names: Names, visitor: &mut impl NamedParameterVisitor) {
+    pub(crate) fn visit_layers(&mut self, names: Names, visitor: &mut impl NamedParameterVisitor) {
         for (name, layer) in names.into_iter().zip(&mut self.layers) {
             visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
         }
