@@ -111,7 +111,7 @@ impl EntropyParameters {
     pub fn start_from(&mut self, means: &[f32], scales: &[f32]) {
         let [.., last] = &mut self.layers;
         let device = last.bias.val().device();
-        last.weight = Param::from_tensor(last.weight.val().detach() * 0.1);
+        last.weight = Param::from_tensor((last.weight.val() * 0.1).detach());
         last.bias = Param::from_tensor(Tensor::from_floats([scales, means].concat().as_slice(), &device));
     }
 }

@@ -52,7 +52,7 @@ impl PlaneConvConfig {
         let weight = pytorch_uniform([outputs, inputs / groups, kernel, kernel], fan_in, device);
         let weight = if checkerboard {
             let mask = checkerboard_kernel(kernel, device);
-            Param::from_tensor(weight.val().detach() * mask.unsqueeze::<4>())
+            Param::from_tensor((weight.val() * mask.unsqueeze::<4>()).detach())
         } else {
             weight
         };

@@ -24,7 +24,7 @@ impl ShNetwork {
         let [first, mut last] = [(inputs, hidden), (hidden, 2 * channels)]
             .map(|(inputs, outputs)| PlaneConvConfig::new(inputs, outputs, 1).init(device));
         let bias = [vec![scale; channels], vec![0.0; channels]].concat();
-        last.weight = Param::from_tensor(last.weight.val().detach() * 0.1);
+        last.weight = Param::from_tensor((last.weight.val() * 0.1).detach());
         last.bias = Param::from_tensor(Tensor::from_floats(bias.as_slice(), device));
         Self { layers: [first, last] }
     }
