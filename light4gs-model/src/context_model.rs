@@ -281,10 +281,21 @@ impl ContextModel {
         plane: usize,
         latent: Latent,
     ) -> PlaneRate {
+        let (gaussians, hyper_bits) = self.parameters_with(parts, planes, plane, latent);
+        PlaneRate { plane, values_bits: value_bits(planes.in_steps(plane), gaussians).sum(), hyper_bits }
+    }
+
+    /// [`Self::plane_parameters`] of one plane with other parts than the model's own, and its hyperprior's bits.
+    pub fn parameters_with(
+        &self,
+        parts: &[Box<dyn PriorPart + '_>],
+        planes: &CenteredPlanes,
+        plane: usize,
+        latent: Latent,
+    ) -> (PlaneGaussians, Option<Tensor<1>>) {
         let prior = prior_of(parts, planes, plane, latent);
         let hyper_bits = prior.hyper_bits.clone();
-        let gaussians = self.gaussians(prior, &planes.planes[plane]);
-        PlaneRate { plane, values_bits: value_bits(planes.in_steps(plane), gaussians).sum(), hyper_bits }
+        (self.gaussians(prior, &planes.planes[plane]), hyper_bits)
     }
 
     /// `[H, W]` for each selected plane: the bits of its values, summed over channels.
@@ -313,11 +324,7 @@ impl ContextModel {
         latent: Latent,
     ) -> Vec<PlaneGaussians> {
         let (planes, parts) = (self.centered(planes, steps), self.parts());
-        let gaussians = selection.iter().map(|plane| {
-            let prior = prior_of(&parts, &planes, *plane, latent);
-            self.gaussians(prior, &planes.planes[*plane])
-        });
-        gaussians.collect()
+        selection.iter().map(|plane| self.parameters_with(&parts, &planes, *plane, latent).0).collect()
     }
 
     /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one. Call

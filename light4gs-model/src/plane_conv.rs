@@ -120,47 +120,82 @@ impl PlaneConv {
 
     /// `[O, H / stride, W / stride]` from `[I, H, W]`, borders padded with zeros.
     pub fn forward(&self, plane: Tensor<3>) -> Tensor<3> {
-        let [channels, height, width] = plane.dims();
         let [outputs, inputs, kernel, _] = self.weight.dims();
         let groups = self.groups;
+        let channels = plane.dims()[0];
         assert_eq!(channels, inputs * groups, "the layer takes {} channels, not {channels}", inputs * groups);
-        let [rows, columns] = [height, width].map(|length| length.div_ceil(self.stride));
         let taps = self.taps(kernel);
-        let shifted = shifted_copies(plane, kernel, self.stride, &taps);
+        let shifted = ShiftedCopies::of(plane, kernel, self.stride, &taps);
+        let places = shifted.places();
+        let weight = self.weight_matrix(&taps);
         let product = if groups == 1 {
-            let weight = self.weight_matrix(&taps).squeeze_dim::<2>(0);
-            weight.matmul(shifted.reshape([inputs * taps.len(), rows * columns]))
+            weight.squeeze_dim::<2>(0).matmul(shifted.copies.clone().reshape([inputs * taps.len(), places]))
         } else {
-            let product =
-                self.weight_matrix(&taps).matmul(shifted.reshape([groups, inputs * taps.len(), rows * columns]));
-            product.reshape([outputs, rows * columns])
+            let copies = shifted.copies.clone().reshape([groups, inputs * taps.len(), places]);
+            weight.matmul(copies).reshape([outputs, places])
         };
-        (product + self.bias.val().unsqueeze_dim::<2>(1)).reshape([outputs, rows, columns])
+        shifted.crop(product + self.bias.val().unsqueeze_dim::<2>(1))
     }
 }
 
-/// `[C, taps, H / stride, W / stride]`: for each tap the plane moved by it, zero beyond the borders.
-fn shifted_copies(plane: Tensor<3>, kernel: usize, stride: usize, taps: &[[usize; 2]]) -> Tensor<4> {
-    let [channels, height, width] = plane.dims();
-    if kernel == 1 && stride == 1 {
-        return plane.unsqueeze_dim(1);
+/// For each tap of a kernel the plane moved by it, zero beyond the borders.
+///
+/// Rows keep their padding, so that a tap is one contiguous run of a channel instead of a piece of each row; what was
+/// computed in the padding is cropped at the end.
+struct ShiftedCopies {
+    /// `[C, taps, rows · padded columns]`.
+    copies: Tensor<3>,
+    rows: usize,
+    columns: usize,
+    padded_columns: usize,
+}
+
+impl ShiftedCopies {
+    fn of(plane: Tensor<3>, kernel: usize, stride: usize, taps: &[[usize; 2]]) -> Self {
+        let [channels, height, width] = plane.dims();
+        let [rows, columns] = [height, width].map(|length| length.div_ceil(stride));
+        if kernel == 1 && stride == 1 {
+            return Self {
+                copies: plane.reshape([channels, 1, height * width]),
+                rows,
+                columns,
+                padded_columns: columns,
+            };
+        }
+        let before = kernel / 2;
+        // How far the last tap reaches, in strides. One more row, into which the last run reaches with its padding.
+        let reach = kernel.div_ceil(stride) - 1;
+        let [padded_rows, padded_columns] = [rows + reach + 1, columns + reach];
+        let after = |length: usize, padded: usize| (padded * stride).saturating_sub(length + before);
+        let padding = [(before, after(height, padded_rows)), (before, after(width, padded_columns))];
+        let padded = plane.pad(padding, PadMode::Constant(0.0));
+        // A picture for each phase of the stride, within which a tap is a plain shift.
+        let phases = if stride == 1 {
+            padded
+        } else {
+            let split: Tensor<5> = padded.reshape([channels, padded_rows, stride, padded_columns, stride]);
+            split.permute([0, 2, 4, 1, 3]).reshape([channels, stride * stride, padded_rows * padded_columns])
+        };
+        let phases: Tensor<3> = phases.reshape([channels, stride * stride, padded_rows * padded_columns]);
+        let copies = taps.iter().map(|[row, column]| {
+            let phase = row % stride * stride + column % stride;
+            let start = row / stride * padded_columns + column / stride;
+            phases.clone().slice(s![.., phase..phase + 1, start..start + rows * padded_columns])
+        });
+        Self { copies: Tensor::cat(copies.collect(), 1), rows, columns, padded_columns }
     }
-    let [rows, columns] = [height, width].map(|length| length.div_ceil(stride));
-    let padding = kernel / 2;
-    // Long enough for whole strides, so that a stride becomes an axis and a tap a plain slice.
-    let phases = kernel.div_ceil(stride) - 1;
-    let [padded_rows, padded_columns] = [rows, columns].map(|length| length + phases);
-    let after = |length: usize, padded: usize| (padded * stride).saturating_sub(length + padding);
-    let padded = plane
-        .pad([(padding, after(height, padded_rows)), (padding, after(width, padded_columns))], PadMode::Constant(0.0));
-    let split: Tensor<5> = padded.reshape([channels, padded_rows, stride, padded_columns, stride]);
-    let copies = taps.iter().map(|[row, column]| {
-        let ([down, row], [across, column]) = ([row / stride, row % stride], [column / stride, column % stride]);
-        let slice =
-            split.clone().slice(s![.., down..down + rows, row..row + 1, across..across + columns, column..column + 1]);
-        slice.reshape([channels, 1, rows, columns])
-    });
-    Tensor::cat(copies.collect(), 1)
+
+    /// Rows times padded columns.
+    fn places(&self) -> usize {
+        self.rows * self.padded_columns
+    }
+
+    /// `[O, rows, columns]` from `[O, places]`.
+    fn crop(&self, product: Tensor<2>) -> Tensor<3> {
+        let outputs = product.dims()[0];
+        let padded: Tensor<3> = product.reshape([outputs, self.rows, self.padded_columns]);
+        if self.padded_columns == self.columns { padded } else { padded.slice(s![.., .., 0..self.columns]) }
+    }
 }
 
 /// Configuration of a [`PlaneDeconv`].
@@ -205,12 +240,13 @@ impl PlaneDeconv {
         let outputs = self.bias.dims()[0];
         // In the order of m, that is from below to above.
         let neighbors: Vec<[usize; 2]> = (0..9).map(|i| [2 - i / 3, 2 - i % 3]).collect();
-        let shifted = shifted_copies(plane, 3, 1, &neighbors).reshape([inputs * 9, height * width]);
+        let shifted = ShiftedCopies::of(plane, 3, 1, &neighbors);
+        let copies = shifted.copies.clone().reshape([inputs * 9, shifted.places()]);
         // The kernel's sixth row and column do not exist; the axes of [I, O, 3, 2, 3, 2] are then (I, O, m, a, m, a).
         let weight = self.weight.val().pad([(0, 1), (0, 1)], PadMode::Constant(0.0));
         let weight: Tensor<6> = weight.reshape([inputs, outputs, 3, 2, 3, 2]);
         let weight = weight.permute([1, 3, 5, 0, 2, 4]).reshape([outputs * 4, inputs * 9]);
-        let phases: Tensor<5> = weight.matmul(shifted).reshape([outputs, 2, 2, height, width]);
+        let phases: Tensor<5> = shifted.crop(weight.matmul(copies)).reshape([outputs, 2, 2, height, width]);
         let plane = phases.permute([0, 3, 1, 4, 2]).reshape([outputs, 2 * height, 2 * width]);
         plane + self.bias.val().reshape([outputs, 1, 1])
     }

@@ -5,11 +5,12 @@
 //! as one more [`PriorPart`], and the rest is the model itself in its reference configuration.
 
 use burn::tensor::{Device, Tensor};
+use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
     CenteredPlanes, ContextModel, ContextModelConfig, InterPlane, InterScale, KernelShape, Latent, Passes, PlaneSteps,
     Prior, PriorPart, anchor_mask, checkerboard_kernel, coding_order, demultiplex, multiplex, upsample,
 };
-use light4gs_tests::golden::{Golden, assert_close_relative, devices, values_of};
+use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::named::{compare_gradients, load};
 
 /// The golden file's name of one of our parameters.
@@ -238,52 +239,49 @@ fn identity() {
     }
 }
 
-/// Rate of the planes rounded around their means, in coding order.
+/// Rate of values rounded around their means, with contexts that are not rounded.
 #[test]
 fn eval() {
     let golden = Golden::open("c06_context");
     let (bits_y, bits_z) = (golden.values("eval.bits_y"), golden.values("eval.bits_z"));
     for (name, device) in devices() {
         let model = model_of(&golden, &device);
-        let steps = steps_of(&golden, &device);
-        let planes = planes_of(&golden, &device);
-        let quantized = model.quantize_with(&parts(&model), &planes, &steps);
-        {
-            use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
-            let centered = model.centered(&planes, &steps);
-            let parts = parts(&model);
-            for plane in 0..12 {
-                let prior = parts.iter().find_map(|p| p.prior(&centered, plane, Latent::Rounded)).unwrap();
-                let y = centered.in_steps(plane);
-                let [_, h, w] = y.dims();
-                let mask = anchor_mask([h, w], &device);
-                let mut out = String::new();
-                for variant in 0..2 {
-                    let g = if prior.passes == Passes::One {
-                        model.entropy_parameters.forward(prior.parameters.clone(), prior.context.clone(), [h, w])
-                    } else {
-                        let a = model.entropy_parameters.forward(prior.parameters.clone(), None, [h, w]);
-                        let hat = ((y.clone() - a.means.clone()).round() + a.means) * golden.scalar("Q");
-                        let src = if variant == 0 { hat } else { centered.planes[plane].clone() };
-                        let ctx = model.checkerboard.as_ref().unwrap().context(src * mask.clone());
-                        model.entropy_parameters.forward(prior.parameters.clone(), Some(ctx), [h, w])
-                    };
-                    let v = (y.clone() - g.means.clone()).round() + g.means.clone();
-                    let b = values_of(&bits(gaussian_likelihood(v, g.means, g.scales)).sum())[0];
-                    out += &format!(" {b}");
-                }
-                println!("{name} raw contexts {plane}: {out} against {}", bits_y[plane]);
-            }
-        }
+        let planes = model.centered(&planes_of(&golden, &device), &steps_of(&golden, &device));
+        let parts = parts(&model);
         let mut total = 0.0;
-        for plane in coding_order(planes.len()) {
-            let rate = &quantized[plane].rate;
+        for plane in 0..planes.planes.len() {
+            let (gaussians, hyper) = model.parameters_with(&parts, &planes, plane, Latent::Rounded);
+            let rounded = (planes.in_steps(plane) - gaussians.means.clone()).round() + gaussians.means.clone();
+            let likelihood = gaussian_likelihood(rounded, gaussians.means, gaussians.scales);
             let what = format!("{name} eval {}", file_key(plane));
-            let values = values_of(&rate.values_bits);
-            let hyper = rate.hyper_bits.as_ref().map_or(0.0, |bits| values_of(bits)[0]);
-            println!("{what}: {} against {}, {hyper} against {}", values[0], bits_y[plane], bits_z[plane]);
-            total += values[0] + hyper;
+            let key = format!("eval.likelihood_y.{}", file_key(plane));
+            assert_close_relative(&format!("{name} {key}"), &values_of(&likelihood), &golden.values(&key), 1e-4);
+            let found = values_of(&bits(likelihood).sum());
+            assert_close_relative(&format!("{what} y"), &found, &bits_y[plane..=plane], 1e-4);
+            let hyper = hyper.map_or(0.0, |bits| values_of(&bits)[0]);
+            assert_close_relative(&format!("{what} z"), &[hyper], &bits_z[plane..=plane], 1e-4);
+            total += found[0] + hyper;
         }
-        println!("{total} against {}", golden.scalar("eval.total_bits"));
+        assert_close_relative(&format!("{name} total"), &[total], &golden.values("eval.total_bits"), 1e-4);
+    }
+}
+
+/// Our quantiser against the planes that CompressAI's decoder gave back, and what they cost.
+#[test]
+fn stream() {
+    let golden = Golden::open("c06_context");
+    for (name, device) in devices() {
+        let model = model_of(&golden, &device);
+        let planes = planes_of(&golden, &device);
+        let quantized = model.quantize_with(&parts(&model), &planes, &steps_of(&golden, &device));
+        for plane in coding_order(planes.len()) {
+            let decoded = values_of(&quantized[plane].decoded);
+            let key = format!("stream.decoded.{}", file_key(plane));
+            assert_close(&format!("{name} {key}"), &decoded, &golden.values(&key), 1e-4);
+            // A stream ends in whole words.
+            let found = values_of(&quantized[plane].rate.values_bits)[0];
+            let stream = golden.values("stream.bits_y")[plane];
+            assert!((found - stream).abs() < 0.01 * stream + 128.0, "{name} {key}: {found} bits against {stream}");
+        }
     }
 }
