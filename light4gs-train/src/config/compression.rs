@@ -154,7 +154,7 @@ impl Default for CompressionConfig {
 
 impl Default for RateConfig {
     fn default() -> Self {
-        Self { lambda: 0.0, weighting: "megabytes".to_owned(), interval: 3, fraction: 0.25, from: 1000 }
+        Self { lambda: 0.0, weighting: "megabytes".to_owned(), interval: 3, fraction: 0.125, from: 1000 }
     }
 }
 
