@@ -107,11 +107,14 @@ impl EntropyParameters {
     }
 
     /// Makes the network say about this mean and scale (in steps) for each channel, whatever it sees: the last layer's biases
-    /// become these, its weights a tenth of themselves.
+    /// become these, its weights a tenth of themselves times the channel's scale. To be called once. So a weight moves an output by
+    /// about as many standard deviations in a channel that spans hundreds of symbols as in one that spans two.
     pub fn start_from(&mut self, means: &[f32], scales: &[f32]) {
         let [.., last] = &mut self.layers;
         let device = last.bias.val().device();
-        last.weight = Param::from_tensor((last.weight.val() * 0.1).detach());
+        let gains = Tensor::<1>::from_floats([scales, scales].concat().as_slice(), &device) * 0.1;
+        let outputs = gains.dims()[0];
+        last.weight = Param::from_tensor((last.weight.val() * gains.reshape([outputs, 1, 1, 1])).detach());
         last.bias = Param::from_tensor(Tensor::from_floats([scales, means].concat().as_slice(), &device));
     }
 }
