@@ -107,7 +107,8 @@ impl EntropyParameters {
     }
 
     /// Makes the network say about this mean and scale (in steps) for each channel, whatever it sees: the last layer's biases
-    /// become these, its weights a tenth of themselves.
+    /// become these, its weights a tenth of themselves times the channel's scale. To be called once. So a weight moves an output by
+    /// about as many standard deviations in a channel that spans hundreds of symbols as in one that spans two.
     pub fn start_from(&mut self, means: &[f32], scales: &[f32]) {
         let [.., last] = &mut self.layers;
         let device = last.bias.val().device();

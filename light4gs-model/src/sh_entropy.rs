@@ -114,6 +114,8 @@ impl ShEntropyConfig {
 /// let noisy = model.add_noise(Tensor::zeros([7, 15, 3], &device));
 /// assert_eq!(model.bits(noisy, &known).dims(), [7, 15, 3]);
 /// ```
+// There is one of it in a scene, so its size does not matter.
+#[allow(clippy::large_enum_variant)]
 #[derive(Module, Debug)]
 pub enum ShEntropyModel {
     /// The paper's choice.
