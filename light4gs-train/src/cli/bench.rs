@@ -6,13 +6,13 @@ use clap::Args;
 
 use super::print_json;
 use crate::benchmark::{BenchScene, benchmark, table};
-use crate::device::device_by_name;
+use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Bench {
     /// Back ends, separated by commas.
-    #[arg(long, value_delimiter = ',', default_value = "ndarray,flex")]
+    #[arg(long, value_delimiter = ',', default_value = "ndarray,flex,wgpu")]
     device: Vec<String>,
     /// A scene file instead of generated ones (layout: docs/benchmarks.md).
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
@@ -53,7 +53,8 @@ impl Bench {
         }
         let mut results = Vec::new();
         for name in &self.device {
-            results.push(benchmark(name, &device_by_name(name)?, &scenes, self.repeats as usize)?);
+            let device = device_by_name(name)?;
+            results.push(benchmark(&describe(name, &device), &device, &scenes, self.repeats as usize)?);
         }
         if self.json {
             print_json(&results);

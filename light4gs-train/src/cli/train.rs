@@ -7,7 +7,7 @@ use light4gs_data::{ImageStore, Scene};
 
 use super::print_json;
 use crate::config::Config;
-use crate::device::device_by_name;
+use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::finish::evaluate_run;
@@ -140,14 +140,15 @@ impl Eval {
             return Err(TrainError::Input("a .l4gs file holds no pictures; name the dataset with --scene DIR".into()));
         };
         let name = self.device.unwrap_or_else(|| "ndarray".into());
-        let decoded = DecodedScene::open(&self.run, &device_by_name(&name)?)?;
+        let device = device_by_name(&name)?;
+        let decoded = DecodedScene::open(&self.run, &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
         let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
-        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &name)?;
+        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(&name, &device))?;
         print_evaluation(&evaluation, self.json);
         Ok(())
     }
