@@ -105,6 +105,11 @@ pub fn devices() -> Vec<(&'static str, Device)> {
     DEVICES.iter().map(|name| (*name, device_by_name(name).unwrap_or_else(|error| panic!("{error}")))).collect()
 }
 
+/// The back ends among [`devices`] that compute on the processor.
+pub fn cpu_devices() -> Vec<(&'static str, Device)> {
+    devices().into_iter().filter(|(name, _)| *name != "wgpu").collect()
+}
+
 /// Row-major values of a tensor.
 pub fn values_of<const D: usize>(tensor: &Tensor<D>) -> Vec<f32> {
     tensor.to_data().iter::<f32>().collect()

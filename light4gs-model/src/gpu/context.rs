@@ -51,8 +51,7 @@ impl Gpu {
 
     /// Reads one word and waits for all that was launched before.
     pub(super) fn read_word(&self, operation: &'static str, buffer: &Handle) -> Result<u32, GpuError> {
-        let words = buffer.clone().offset_end(buffer.size_in_used() - 4);
-        let bytes = self.client.read_one(words).map_err(|error| failed(operation, &error))?;
+        let bytes = self.client.read_one(first_words(buffer, 1)).map_err(|error| failed(operation, &error))?;
         Ok(u32::from_le_bytes(bytes[..4].try_into().expect("a word has four bytes")))
     }
 
@@ -73,6 +72,12 @@ pub(super) fn buffer_of(tensor: CubeTensor) -> Handle {
         return tensor.client.empty(4 * PART_ALIGNMENT);
     }
     into_contiguous(tensor).handle
+}
+
+/// The first `count` words of a buffer, which may be larger.
+pub(super) fn first_words(buffer: &Handle, count: usize) -> Handle {
+    let unused = buffer.size_in_used() - 4 * count as u64;
+    buffer.clone().offset_end(unused)
 }
 
 /// Several arrays in one buffer, each beginning where it may be bound.
@@ -100,22 +105,22 @@ impl Parts {
     pub(super) fn of(&self, buffer: &Handle, k: usize) -> Handle {
         let start = 4 * self.starts[k] as u64;
         let end = start + 4 * self.lengths[k].max(1) as u64;
-        buffer.clone().offset_start(start).offset_end(buffer.size() - end)
+        buffer.clone().offset_start(start).offset_end(buffer.size_in_used() - end)
     }
 }
 
 #[cfg(test)]
 pub(super) mod tests {
     use cubecl::client::Client;
-    use cubecl::prelude::Runtime;
-    use cubecl::wgpu::{WgpuDevice, WgpuRuntime};
+
+    use cubecl::wgpu::WgpuDevice;
 
     use super::*;
 
     /// The default adapter, without Burn.
     pub(in crate::gpu) fn gpu() -> Gpu {
         let device = WgpuDevice::default();
-        let client: Client = <WgpuRuntime as Runtime>::client(&device);
+        let client: Client = CubeDevice::Wgpu(device.clone()).client();
         Gpu { client, device: CubeDevice::Wgpu(device) }
     }
 }

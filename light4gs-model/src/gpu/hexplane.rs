@@ -6,7 +6,7 @@ use burn_cubecl::CubeBackend;
 use burn_cubecl::tensor::CubeTensor;
 use cubecl::server::Handle;
 
-use super::context::{Gpu, Parts, buffer_of};
+use super::context::{Gpu, Parts, buffer_of, first_words};
 use super::error::GpuError;
 use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
@@ -82,8 +82,8 @@ fn forward(inputs: QueryInputs<CubeBackend>) -> Result<(CubeTensor, GpuQuerySave
         .writes(&features)
         .uniform(&layout.uniform())
         .invocations(layout.points * layout.quads())?;
-    let unused = features.size() - 4 * (layout.points * layout.channels) as u64;
-    let output = gpu.tensor(features.offset_end(unused), Shape::from([layout.points, layout.channels]));
+    let values = first_words(&features, layout.points * layout.channels);
+    let output = gpu.tensor(values, Shape::from([layout.points, layout.channels]));
     Ok((output, GpuQuerySaved { layout, points, packed }))
 }
 

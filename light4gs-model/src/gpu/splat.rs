@@ -7,7 +7,7 @@ use burn_cubecl::tensor::CubeTensor;
 use cubecl::features::Plane;
 use cubecl::server::Handle;
 
-use super::context::{Gpu, Parts, buffer_of};
+use super::context::{Gpu, Parts, buffer_of, first_words};
 use super::error::GpuError;
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
@@ -264,16 +264,10 @@ fn forward_with(
     gpu.check("the picture", &[&picture])?;
     let values = CHANNELS * frame.pixels();
     let outputs = SplatOutputs {
-        picture: gpu.tensor(sized(&picture, values), Shape::from([values])),
-        radii: gpu.int_tensor(sized(&radii, frame.gaussians), Shape::from([frame.gaussians])),
+        picture: gpu.tensor(first_words(&picture, values), Shape::from([values])),
+        radii: gpu.int_tensor(first_words(&radii, frame.gaussians), Shape::from([frame.gaussians])),
     };
     Ok((outputs, GpuSplatSaved { frame, shapes, inputs, intersections, picture }))
-}
-
-/// The first `count` words of a buffer, which may be larger.
-fn sized(buffer: &Handle, count: usize) -> Handle {
-    let unused = buffer.size() - 4 * count as u64;
-    if unused == 0 { buffer.clone() } else { buffer.clone().offset_end(unused) }
 }
 
 fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<CubeBackend>, GpuError> {
