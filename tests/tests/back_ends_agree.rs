@@ -9,7 +9,7 @@ use light4gs_data::Camera;
 use light4gs_tests::golden::{assert_close_relative, devices};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run_weighed};
 use light4gs_tests::random::Random;
-use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SplatScene, random_camera};
+use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SCALES, SplatScene, random_camera};
 use light4gs_tests::twin;
 
 const PICTURE: f32 = 2e-4;
@@ -69,7 +69,12 @@ fn odd_scene(count: usize, size: [u32; 2], ranges: &Ranges, random: &mut Random)
     let mut scene = SplatScene::random(count, ranges, random);
     for i in 0..count {
         if random.below(6) == 0 {
+            let ordinary = scene.row_mut(SCALES, i).to_vec();
             make_odd(&mut scene, i, &camera, random);
+            // Far larger than the scene: in float32 its covariance keeps three digits or fewer, whoever computes it.
+            if scene.row_mut(SCALES, i).iter().any(|scale| *scale > 1.0) {
+                scene.row_mut(SCALES, i).copy_from_slice(&ordinary);
+            }
         }
     }
     let (mut scene, _) = twin::render_without_doubt(&scene, &camera, BACKGROUND, 3);
@@ -119,8 +124,14 @@ fn large_scenes() {
 fn seventy_thousand_gaussians_in_one_tile() {
     let mut random = Random::new(6);
     let camera = random_camera(9, 7, &mut random);
-    let ranges = Ranges { half_size: 0.3, scales: [0.05, 0.3], opacities: [0.004, 0.005], ..Ranges::default() };
-    let scene = SplatScene::random(75_000, &ranges, &mut random);
+    let ranges = Ranges { scales: [0.05, 0.3], opacities: [0.004, 0.006], ..Ranges::default() };
+    let mut scene = SplatScene::random(75_000, &ranges, &mut random);
+    for i in 0..scene.len() {
+        let (x, y) = (random.uniform(-0.5, 0.5) as f32, random.uniform(-0.5, 0.5) as f32);
+        // Depths so far apart that no rounding changes their order.
+        let depth = 3.0 * (3e-6 * i as f64).exp();
+        scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(&camera, x, y, depth as f32));
+    }
     let (scene, _) = twin::render_without_doubt(&scene, &camera, BACKGROUND, 0);
     assert!(scene.len() > 66_000, "{} left", scene.len());
     let keep = vec![true; scene.len()];
