@@ -26,7 +26,7 @@ type Constants = Vec<(&'static str, u32)>;
 #[derive(Clone, Debug)]
 struct Kernel {
     stage: Stage,
-    team: Option<&'static str>,
+    team: &'static [&'static str],
     workgroup: u32,
     constants: Constants,
 }
@@ -35,7 +35,7 @@ impl KernelSource for Kernel {
     fn source(&self) -> SourceTemplate {
         let constants: String =
             self.constants.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
-        let includes = self.stage.includes.iter().copied().chain(self.team);
+        let includes = self.stage.includes.iter().chain(self.team).copied();
         SourceTemplate::new(constants + &includes.collect::<String>() + self.stage.source)
     }
 
@@ -64,7 +64,7 @@ static LAUNCHED: Mutex<Option<HashSet<(DeviceId, &'static str, Constants)>>> = M
 
 impl<'a> Launch<'a> {
     pub(super) fn new(client: &'a Client, stage: Stage) -> Self {
-        let kernel = Kernel { stage, team: None, workgroup: WORKGROUP, constants: vec![("WORKGROUP", WORKGROUP)] };
+        let kernel = Kernel { stage, team: &[], workgroup: WORKGROUP, constants: vec![("WORKGROUP", WORKGROUP)] };
         Self { client, kernel, arguments: KernelArguments::new(), written: Vec::new() }
     }
 
@@ -75,9 +75,9 @@ impl<'a> Launch<'a> {
         self
     }
 
-    /// Makes the workgroup a team of that size, which meets as the included text says.
-    pub(super) fn team(mut self, team: u32, include: &'static str) -> Self {
-        self.kernel.team = Some(include);
+    /// Makes the workgroup a team of that size, which meets as the included texts say.
+    pub(super) fn team(mut self, team: u32, includes: &'static [&'static str]) -> Self {
+        self.kernel.team = includes;
         self.workgroup(team).constant("TEAM", team)
     }
 

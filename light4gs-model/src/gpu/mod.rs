@@ -8,6 +8,7 @@ mod kernel;
 mod sort;
 mod splat;
 mod stages;
+mod team;
 
 pub(crate) use adam::adam_on_gpu;
 pub use error::GpuError;

@@ -4,17 +4,14 @@ use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
 use burn_cubecl::CubeBackend;
 use burn_cubecl::tensor::CubeTensor;
-use cubecl::features::Plane;
 use cubecl::server::Handle;
 
 use super::context::{Gpu, Parts, buffer_of, first_words};
 use super::error::GpuError;
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
-use super::stages::{
-    CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, TEAM_SUBGROUP,
-    TEAM_WORKGROUP,
-};
+use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
+use super::team::Team;
 use crate::cpu::project::{FRUSTUM_MARGIN, TILE, View};
 use crate::cpu::rasterize::CHANNELS;
 use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
@@ -23,43 +20,6 @@ use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 const PART: usize = 32768;
 /// Values of an intersection's sums.
 const SUMS: usize = 10;
-/// Cells that a Gaussian may touch on Mesa's software driver, which leaves any loop after 65535 rounds.
-const MAX_CELLS_IN_SOFTWARE: u32 = 60_000;
-
-/// Who blends a cell: a team of invocations, and how its members meet.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Team {
-    pub(super) members: u32,
-    pub(super) subgroup: bool,
-    /// Side of the cell in pixels.
-    pub(super) cell: u32,
-}
-
-impl Team {
-    /// A team is a subgroup where their size is known: eight lanes blend 8×8 pixels, 32 lanes 16×16, so that each has
-    /// eight pixels, which a fetched splat then serves.
-    fn choose(gpu: &Gpu, width: u32, height: u32) -> Result<Self, GpuError> {
-        let properties = gpu.client.properties();
-        let (smallest, largest) = (properties.hardware.plane_size_min, properties.hardware.plane_size_max);
-        let known = properties.features.plane.contains(Plane::Ops) && smallest == largest;
-        let cells = |side: u32| width.div_ceil(side) * height.div_ceil(side);
-        let team = match smallest {
-            8 | 16 if known && cells(8) <= MAX_CELLS_IN_SOFTWARE => Self { members: smallest, subgroup: true, cell: 8 },
-            16 | 32 | 64 if known => Self { members: smallest, subgroup: true, cell: 16 },
-            _ => Self { members: 32, subgroup: false, cell: 16 },
-        };
-        if smallest == 8 && cells(team.cell) > MAX_CELLS_IN_SOFTWARE {
-            return Err(GpuError::Picture { width, height, limit: MAX_CELLS_IN_SOFTWARE });
-        }
-        Ok(team)
-    }
-
-    fn launch<'a>(&self, gpu: &'a Gpu, stage: super::stages::Stage) -> Launch<'a> {
-        Launch::new(&gpu.client, stage)
-            .team(self.members, if self.subgroup { TEAM_SUBGROUP } else { TEAM_WORKGROUP })
-            .constant("CELL", self.cell)
-    }
-}
 
 /// What the stages of one picture have in common.
 #[derive(Clone, Copy, Debug)]
@@ -325,5 +285,81 @@ impl SplatKernels for CubeBackend {
 
     fn splat_backward(saved: GpuSplatSaved, gradient: CubeTensor) -> SplatInputs<Self> {
         backward(saved, gradient).unwrap_or_else(|error| error.raise())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use light4gs_data::Camera;
+
+    use super::super::context::tests::gpu;
+    use super::super::stages::{TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+    use super::*;
+
+    const COUNT: usize = 300;
+    const SIZE: [u32; 2] = [50, 37];
+
+    /// Picture and gradients of one scene, blended by a team.
+    fn run(gpu: &Gpu, team: Team) -> Vec<Vec<f32>> {
+        // Any numbers will do that look random.
+        let mut state = 1u32;
+        let mut uniform = move |low: f32, high: f32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            low + (high - low) * (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let widths = [3, 4, 3, 1, 3, 45, 2];
+        let ranges = [(-1.0, 1.0), (-1.0, 1.0), (0.03, 0.3), (0.05, 1.0), (-0.5, 1.5), (-0.2, 0.2), (-0.01, 0.01)];
+        let mut upload = |count: usize, (low, high): (f32, f32)| {
+            let bytes: Vec<u8> = (0..count).flat_map(|_| uniform(low, high).to_le_bytes()).collect();
+            gpu.client.create_from_slice(&bytes)
+        };
+        let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] =
+            std::array::from_fn(|k| upload(widths[k] * COUNT, ranges[k]));
+        let upstream = upload(CHANNELS * (SIZE[0] * SIZE[1]) as usize, (-1.0, 1.0));
+        let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
+        let camera = Camera::look_at(Vec3::new(0.0, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIZE[0], SIZE[1]);
+        let view = View { camera, background: [0.1, 0.5, 0.9], sh_degree: 3 };
+        let shapes = widths.map(|width| Shape::from([COUNT, width]));
+        let frame = Frame { view, team, gaussians: COUNT, rest: 15 };
+        let (outputs, saved) = forward_with(gpu, frame, inputs, shapes).unwrap();
+        let values = outputs.picture.shape().num_elements();
+        let gradients = backward(saved, gpu.tensor(upstream, Shape::from([values]))).unwrap().into_array();
+        std::iter::once(outputs.picture)
+            .chain(gradients)
+            .map(|tensor| {
+                let bytes = gpu.client.read_one(tensor.handle).unwrap();
+                bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_team_draws_the_same() {
+        let gpu = gpu();
+        let chosen = Team::choose(&gpu, SIZE[0], SIZE[1]).unwrap();
+        let expected = run(&gpu, chosen);
+        assert!(expected[0].iter().any(|value| *value > 1.0), "the scene is empty");
+        let mut teams =
+            vec![(32, TEAM_WITHOUT_SUBGROUPS, 16), (32, TEAM_WITHOUT_SUBGROUPS, 8), (8, TEAM_WITHOUT_SUBGROUPS, 8)];
+        if chosen.includes != TEAM_WITHOUT_SUBGROUPS {
+            let cells: &[u32] = if chosen.members <= 16 { &[8, 16] } else { &[16] };
+            for cell in cells {
+                teams.extend([(chosen.members, TEAM_OF_FEW, *cell), (chosen.members, TEAM_OF_MANY, *cell)]);
+            }
+        }
+        for (members, includes, cell) in teams {
+            // An invocation owns its pixels in fours.
+            if cell * cell / members < 4 || members < cell {
+                continue;
+            }
+            let team = Team { members, includes, cell };
+            for (k, (found, expected)) in run(&gpu, team).iter().zip(&expected).enumerate() {
+                let largest = expected.iter().fold(0.0f32, |m, v| m.max(v.abs()));
+                let pairs = found.iter().zip(expected);
+                let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest;
+                assert!(error < 1e-5, "{members} members, cell {cell}: output {k} is off by {error}");
+            }
+        }
     }
 }

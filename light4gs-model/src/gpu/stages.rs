@@ -17,10 +17,12 @@ const PIXELS: &str = wgsl!("include/pixels");
 const FOOTPRINT: &str = wgsl!("include/footprint");
 const PLANES: &str = wgsl!("include/hexplane");
 
-/// Members of a team meet through subgroup operations.
-pub(super) const TEAM_SUBGROUP: &str = wgsl!("include/team_subgroup");
+/// Members of a team meet through subgroup operations; they are few.
+pub(super) const TEAM_OF_FEW: &[&str] = &[wgsl!("include/team_subgroup"), wgsl!("include/team_sum_of_few")];
+/// Members of a team meet through subgroup operations; they are many.
+pub(super) const TEAM_OF_MANY: &[&str] = &[wgsl!("include/team_subgroup"), wgsl!("include/team_sum_of_many")];
 /// Members of a team meet in workgroup memory.
-pub(super) const TEAM_WORKGROUP: &str = wgsl!("include/team_workgroup");
+pub(super) const TEAM_WITHOUT_SUBGROUPS: &[&str] = &[wgsl!("include/team_workgroup")];
 
 /// One kernel: a file of `shaders/` with what it includes.
 #[derive(Clone, Copy, Debug)]
@@ -55,4 +57,5 @@ stages! {
     HEXPLANE_QUERY_BACKWARD = "hexplane_query_backward" [PLANES];
     HEXPLANE_GATHER = "hexplane_gather" [PLANES];
     ADAM = "adam" [];
+    SUBGROUPS = "subgroups" [];
 }
