@@ -14,8 +14,11 @@ use crate::{
 /// The first bytes of every stream. The first is not ASCII and two line ends follow, so that a transfer as text shows.
 pub const MAGIC: [u8; 8] = *b"\x89L4GS\r\n\x1a";
 
-/// The version that [`crate::encode`] writes, and the newest that [`crate::decode`] reads.
-pub const VERSION: u16 = 1;
+/// The newest version, which [`crate::encode_compressed`] writes. [`crate::encode`] writes version 1, which needs no
+/// more; [`crate::decode`] reads both.
+pub const VERSION: u16 = 2;
+/// The version of streams without compression.
+pub(crate) const PLAIN_VERSION: u16 = 1;
 
 /// Bytes before the meta.
 pub(crate) const PRELUDE: usize = 32;
@@ -30,28 +33,64 @@ const ENTRY: usize = 24;
 pub enum Encoding {
     /// Plain little-endian float32.
     Float32,
+    /// Quantised, then adaptively entropy coded.
+    Quantised,
+    /// Spherical harmonics under one frequency table a channel.
+    FrequencyTables,
+    /// Spherical harmonics, each degree from those below.
+    Autoregressive,
+    /// Spherical harmonics from the hexplane.
+    HexplaneCoupled,
+    /// Hexplanes under a context model.
+    ContextCoded,
 }
 
 impl Encoding {
+    const ALL: [Self; 6] = [
+        Self::Float32,
+        Self::Quantised,
+        Self::FrequencyTables,
+        Self::Autoregressive,
+        Self::HexplaneCoupled,
+        Self::ContextCoded,
+    ];
+
     /// The number that stands in the table.
     pub const fn number(self) -> u16 {
         match self {
             Self::Float32 => 0,
+            Self::Quantised => 1,
+            Self::FrequencyTables => 2,
+            Self::Autoregressive => 3,
+            Self::HexplaneCoupled => 4,
+            Self::ContextCoded => 5,
         }
     }
 
-    /// The encoding with a number of the table.
-    pub(crate) const fn from_number(number: u16) -> Option<Self> {
-        match number {
-            0 => Some(Self::Float32),
-            _ => None,
-        }
+    /// The encoding with a number of the table, where a section of a stream of that version may have it.
+    pub(crate) fn from_number(number: u16, kind: SectionKind, version: u16) -> Option<Self> {
+        let encoding = Self::ALL.into_iter().find(|encoding| encoding.number() == number)?;
+        let legal = match kind {
+            _ if version == PLAIN_VERSION => matches!(encoding, Self::Float32),
+            SectionKind::Gaussians | SectionKind::Deformation | SectionKind::ContextModel => {
+                matches!(encoding, Self::Float32 | Self::Quantised)
+            }
+            SectionKind::Sh => !matches!(encoding, Self::Quantised | Self::ContextCoded),
+            SectionKind::SceneFrame => matches!(encoding, Self::Float32),
+            SectionKind::HexPlanes => matches!(encoding, Self::Float32 | Self::ContextCoded),
+        };
+        legal.then_some(encoding)
     }
 
     /// A name for people.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Float32 => "float32",
+            Self::Quantised => "quantised",
+            Self::FrequencyTables => "frequency tables",
+            Self::Autoregressive => "autoregressive",
+            Self::HexplaneCoupled => "hexplane-coupled",
+            Self::ContextCoded => "context model",
         }
     }
 }
@@ -145,12 +184,16 @@ impl<'a> Container<'a> {
         }
         if prelude.flags != 0 {
             let found = format!("{:#06x}", prelude.flags);
-            return Err(CodecError::invalid("header", "flags", found, "0, version 1 has none; use a newer program"));
+            return Err(CodecError::invalid("header", "flags", found, "0, there are none yet; use a newer program"));
         }
 
-        let entries = read_table(table, header_bytes as u64, stated)?;
+        let entries = read_table(table, prelude.version, header_bytes as u64, stated)?;
         let meta = meta::read(meta_bytes, limits)?;
         Ok(Self { bytes, prelude, meta, entries })
+    }
+
+    pub(crate) fn has(&self, kind: SectionKind) -> bool {
+        self.entries.iter().any(|entry| entry.kind == kind)
     }
 
     /// The bytes of one section, checked against their checksum, and how they are coded.
@@ -169,17 +212,19 @@ impl<'a> Container<'a> {
 }
 
 /// Reads the table and checks that the sections fill the stream from `start` to `end`, each of them once.
-fn read_table(table: &[u8], start: u64, end: u64) -> Result<Vec<Entry>, CodecError> {
+fn read_table(table: &[u8], version: u16, start: u64, end: u64) -> Result<Vec<Entry>, CodecError> {
     let mut entries: Vec<Entry> = Vec::new();
     let mut expected = start;
     for (index, row) in table.chunks_exact(ENTRY).enumerate() {
         let mut reader = Reader::new("table", row);
         let id = reader.u16("section id")?;
-        let kind = SectionKind::from_id(id).ok_or(CodecError::UnknownSection { index: index as u32, id })?;
+        let kind = SectionKind::from_id(id)
+            .filter(|kind| version > PLAIN_VERSION || SectionKind::CORE.contains(kind))
+            .ok_or(CodecError::UnknownSection { index: index as u32, id })?;
         let section = kind.name();
         let number = reader.u16("encoding")?;
-        let encoding =
-            Encoding::from_number(number).ok_or(CodecError::UnknownEncoding { section, encoding: number })?;
+        let encoding = Encoding::from_number(number, kind, version)
+            .ok_or(CodecError::UnknownEncoding { section, encoding: number })?;
         let crc = reader.u32("checksum")?;
         let offset = reader.u64("offset")?;
         let bytes = reader.u64("length")?;
@@ -203,7 +248,7 @@ fn read_table(table: &[u8], start: u64, end: u64) -> Result<Vec<Entry>, CodecErr
         expected = section_end;
         entries.push(Entry { kind, encoding, crc, offset, bytes });
     }
-    for kind in SectionKind::ALL {
+    for kind in SectionKind::CORE {
         if !entries.iter().any(|entry| entry.kind == kind) {
             return Err(CodecError::MissingSection { section: kind.name() });
         }
@@ -221,21 +266,23 @@ fn header_checksum(header: &[u8]) -> u32 {
 
 /// Puts a stream together, one section after the other.
 pub(crate) struct Builder {
+    version: u16,
+    sections: usize,
     writer: Writer,
     table_at: usize,
     entries: Vec<Entry>,
 }
 
 impl Builder {
-    /// A stream that holds `meta` and no section yet.
-    pub(crate) fn new(meta: &SceneMeta, limits: &Limits) -> Result<Self, CodecError> {
+    /// A stream that holds `meta` and will hold some number of sections.
+    pub(crate) fn new(version: u16, sections: usize, meta: &SceneMeta, limits: &Limits) -> Result<Self, CodecError> {
         let mut writer = Writer::default();
         writer.bytes.resize(PRELUDE, 0);
         meta::write(meta, &mut writer);
         let table_at = writer.bytes.len();
         at_most("meta", "length", (table_at - PRELUDE) as u64, limits.meta_bytes)?;
-        writer.bytes.resize(table_at + ENTRY * SectionKind::ALL.len(), 0);
-        Ok(Self { writer, table_at, entries: Vec::new() })
+        writer.bytes.resize(table_at + ENTRY * sections, 0);
+        Ok(Self { version, sections, writer, table_at, entries: Vec::new() })
     }
 
     /// Appends a section that `write` writes.
@@ -254,7 +301,8 @@ impl Builder {
 
     /// Fills in the prelude and the table.
     pub(crate) fn finish(self) -> Vec<u8> {
-        let Self { writer: Writer { mut bytes }, table_at, entries } = self;
+        let Self { version, sections, writer: Writer { mut bytes }, table_at, entries } = self;
+        debug_assert_eq!(entries.len(), sections);
 
         let mut table = Writer::default();
         for entry in &entries {
@@ -269,7 +317,7 @@ impl Builder {
 
         let mut prelude = Writer::default();
         prelude.bytes.extend_from_slice(&MAGIC);
-        prelude.u16(VERSION);
+        prelude.u16(version);
         prelude.u16(0); // flags
         prelude.u32(entries.len() as u32);
         prelude.u32((table_at - PRELUDE) as u32);

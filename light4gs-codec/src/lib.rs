@@ -34,35 +34,82 @@
 //! # Ok::<(), light4gs_codec::CodecError>(())
 //! ```
 //!
+//! Where are the Gaussians of a file half-way through?
+//!
+//! ```no_run
+//! let scene = light4gs_codec::read_file("scene.l4gs".as_ref())?;
+//! for [x, y, z] in scene.positions_at(0.5)? {
+//!     println!("{x} {y} {z}");
+//! }
+//! # Ok::<(), light4gs_codec::CodecError>(())
+//! ```
+//!
+//! # Compression
+//!
+//! [`encode_compressed`] quantises a scene and spends bits by learned distributions: planes under a [context
+//! model](ContextModelArrays), spherical harmonics under [tables or small networks](ShCoding), other [`attributes`] and
+//! [network weights](network_weights) adaptively. Networks that choose a coding interval are evaluated by an executor
+//! of this crate in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
+//! The encoder decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`]
+//! section by section, and [`info`] tells what is inside.
+//!
+//! # Hostile bytes, other platforms
+//!
 //! A reader trusts nothing: every length and every count is checked against the bytes that are there and against
 //! [`Limits`] before memory is taken, so hostile input gets a [`CodecError`], never a panic.
 //!
-//! [`encode`], [`decode`] and [`info`] use neither files nor threads and compile for `wasm32-unknown-unknown`, where the
-//! file functions (`read_file`, `write_file`, ...) are absent.
+//! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`,
+//! where the file functions (`read_file`, `write_file`, ...) are absent and work is done by one thread. Elsewhere
+//! planes are coded by the threads of rayon's current pool; the bytes do not depend on how many there are.
 
 #![forbid(unsafe_code)]
 
+mod adaptive;
+pub mod attributes;
+mod compression;
+mod compressor;
 mod container;
+mod context_model;
+mod entropy;
 mod error;
+mod executor;
 mod fields;
 #[cfg(not(target_arch = "wasm32"))]
 mod file;
+mod harmonics;
 mod info;
 mod limits;
+mod motion;
+pub mod network_weights;
+mod open_stream;
+mod parallel;
+mod parts;
+mod planes;
+mod query;
 mod reader;
 mod scene;
 mod sections;
 mod stream;
 mod writer;
 
+pub use compression::{CompressionInput, PlaneCoding, Profile, WeightPrecisions};
+pub use compressor::{CompressionReport, Encoded, encode_compressed};
 pub use container::{Encoding, MAGIC, VERSION};
+pub use context_model::{
+    ContextModelArrays, ContextModelShape, ContextParts, ConvolutionLayer, ConvolutionShape, PerGroup, SpatialKernel,
+};
+pub use entropy::FrequencyTable;
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
 pub use file::{read_file, read_info, write_atomically, write_file};
+pub use harmonics::{ShCoding, ShCondition};
 pub use info::{SectionInfo, StreamInfo, info};
 pub use limits::Limits;
+pub use open_stream::OpenStream;
+pub use parts::{PlaneDistributions, encode_planes, encode_sh, plane_distributions};
 pub use scene::{
     GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
     SceneMeta, sh_rest_coefficients,
 };
+pub use sections::{coded_hexplanes::PlaneBytes, coded_sh::ShBytes};
 pub use stream::{decode, decode_with_limits, encode};

@@ -39,6 +39,14 @@ pub struct Limits {
     pub layers: u32,
     /// Inputs or outputs of one layer.
     pub layer_width: u32,
+    /// Weights of the context model, and of the networks of the spherical harmonics.
+    pub layer_weights: u64,
+    /// Values of all entropy-coded planes, or of the entropy-coded spherical harmonics. Coded values can take next to
+    /// no bytes, so this bounds the memory that a small stream can ask for. A stream of `b` bytes may hold `64 b` of
+    /// them whatever this says.
+    pub coded_values: u64,
+    /// Multiplications that the networks of a stream may ask for: positions times weights.
+    pub multiplications: u64,
 }
 
 impl Default for Limits {
@@ -55,7 +63,17 @@ impl Default for Limits {
             scales: 16,
             layers: 1 << 10,
             layer_width: 1 << 16,
+            layer_weights: 1 << 22,
+            coded_values: 1 << 23,
+            multiplications: 1 << 38,
         }
+    }
+}
+
+impl Limits {
+    /// These limits for a stream of some length, which raises what it may hold.
+    pub(crate) fn for_stream(&self, bytes: usize) -> Self {
+        Self { coded_values: self.coded_values.max(64 * bytes as u64), ..*self }
     }
 }
 

@@ -56,6 +56,42 @@ impl<'a> Reader<'a> {
         self.array(field).map(u64::from_le_bytes)
     }
 
+    /// An unsigned integer in groups of seven bits, lowest first, the upper bit set in all but the last. One spelling
+    /// only: the last group is not 0 unless it is the first.
+    pub(crate) fn varint(&mut self, field: &str) -> Result<u64, CodecError> {
+        let mut value = 0u64;
+        for shift in (0..64).step_by(7) {
+            let byte = self.u8(field)?;
+            let group = u64::from(byte & 0x7f);
+            if group << shift >> shift != group || byte == 0 && shift > 0 {
+                break;
+            }
+            value |= group << shift;
+            if byte < 0x80 {
+                return Ok(value);
+            }
+        }
+        Err(CodecError::invalid(self.section, field, "spelled wrongly", "an integer below 2^64 without leading zeros"))
+    }
+
+    /// As [`Reader::varint`], at most `limit`.
+    pub(crate) fn varint_at_most(&mut self, field: &str, limit: u32) -> Result<u32, CodecError> {
+        let value = self.varint(field)?;
+        at_most(self.section, field, value, limit)?;
+        Ok(value as u32)
+    }
+
+    /// A run of bytes behind its length.
+    pub(crate) fn block(&mut self, field: &str) -> Result<&'a [u8], CodecError> {
+        let length = self.varint(field)?;
+        self.take(field, length)
+    }
+
+    /// Everything that is left.
+    pub(crate) fn rest(self) -> &'a [u8] {
+        self.rest
+    }
+
     pub(crate) fn f32(&mut self, field: &str) -> Result<f32, CodecError> {
         self.array(field).map(f32::from_le_bytes)
     }
@@ -64,6 +100,16 @@ impl<'a> Reader<'a> {
     pub(crate) fn f32s(&mut self, field: &str, count: u64) -> Result<Vec<f32>, CodecError> {
         let taken = self.take(field, count.saturating_mul(4))?;
         Ok(taken.as_chunks::<4>().0.iter().map(|&bytes| f32::from_le_bytes(bytes)).collect())
+    }
+
+    /// A finite number.
+    pub(crate) fn finite(&mut self, field: &str) -> Result<f32, CodecError> {
+        let value = self.f32(field)?;
+        if value.is_finite() {
+            Ok(value)
+        } else {
+            Err(CodecError::invalid(self.section, field, value, "a finite number"))
+        }
     }
 
     /// One group of `K` numbers.

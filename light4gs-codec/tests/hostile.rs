@@ -81,9 +81,9 @@ fn forging_alone_changes_nothing() {
 
 #[test]
 fn versions_and_flags() {
-    let error = forged_prelude(8, &2u16.to_le_bytes());
-    assert!(matches!(error, CodecError::NewerVersion { found: 2 }));
-    assert!(error.to_string().contains("version 2"));
+    let error = forged_prelude(8, &3u16.to_le_bytes());
+    assert!(matches!(error, CodecError::NewerVersion { found: 3 }));
+    assert!(error.to_string().contains("version 3"));
     assert!(matches!(forged_prelude(8, &0u16.to_le_bytes()), CodecError::Invalid { .. }));
     assert!(forged_prelude(10, &[1, 0]).to_string().contains("flags"));
 }

@@ -58,6 +58,23 @@ pub struct GaussianTensors {
     pub sh_rest: Tensor<3>,
 }
 
+impl GaussianTensors {
+    /// The same values off the tape; tensors that were never on one stay as they are.
+    pub fn inner(self) -> Self {
+        fn inner<const D: usize>(tensor: Tensor<D>) -> Tensor<D> {
+            if tensor.device().is_autodiff() { tensor.inner() } else { tensor }
+        }
+        Self {
+            means: inner(self.means),
+            log_scales: inner(self.log_scales),
+            quats: inner(self.quats),
+            opacity_logits: inner(self.opacity_logits),
+            sh_dc: inner(self.sh_dc),
+            sh_rest: inner(self.sh_rest),
+        }
+    }
+}
+
 /// Trained attributes of N Gaussians.
 ///
 /// ```

@@ -104,10 +104,14 @@ impl HexPlane {
         self.channels * self.scales()
     }
 
+    /// The planes `[C, res b, res a]`, scale-major.
+    pub fn tensors(&self) -> Vec<Tensor<3>> {
+        self.planes.iter().map(Param::val).collect()
+    }
+
     /// Features `[N, C · scales]` at points `[N, 4]`: x, y, z, t in [-1, 1] (clamped to the border outside).
     pub fn query(&self, points: Tensor<2>) -> Tensor<2> {
-        let planes = self.planes.iter().map(Param::val).collect();
-        query_planes(points, planes)
+        query_planes(points, self.tensors())
     }
 }
 

@@ -70,17 +70,16 @@ impl Splatter {
     /// `screen_offsets [N, 2]`, normally zeros, are added to the projected positions in units of half the picture;
     /// their gradient is the screen-space gradient that drives densification.
     pub fn render(&self, gaussians: GaussianTensors, camera: &Camera, screen_offsets: Option<Tensor<2>>) -> Rendering {
-        self.render_activated(
-            gaussians.means,
-            gaussians.quats,
-            // Far beyond any scene, and exp stays finite, so that the way back has no 0 · infinity.
-            gaussians.log_scales.clamp_max(MAX_LOG_SCALE).exp(),
-            sigmoid(gaussians.opacity_logits),
-            gaussians.sh_dc,
-            gaussians.sh_rest,
-            camera,
-            screen_offsets,
-        )
+        let (scales, opacities) = activate(gaussians.log_scales, gaussians.opacity_logits);
+        let GaussianTensors { means, quats, sh_dc, sh_rest, .. } = gaussians;
+        self.render_activated(means, quats, scales, opacities, sh_dc, sh_rest, camera, screen_offsets)
+    }
+
+    /// What the operations on one picture take, from raw attributes.
+    pub(crate) fn inputs(&self, gaussians: GaussianTensors, camera: &Camera) -> (SplatInputs<Dispatch>, SplatView) {
+        let (scales, opacities) = activate(gaussians.log_scales, gaussians.opacity_logits);
+        let GaussianTensors { means, quats, sh_dc, sh_rest, .. } = gaussians;
+        self.activated_inputs(means, quats, scales, opacities, sh_dc, sh_rest, camera, None)
     }
 
     /// Renders activated attributes: standard deviations `scales [N, 3]` and `opacities [N, 1]` in [0, 1].
@@ -98,6 +97,32 @@ impl Splatter {
         camera: &Camera,
         screen_offsets: Option<Tensor<2>>,
     ) -> Rendering {
+        let (inputs, view) =
+            self.activated_inputs(means, quats, scales, opacities, sh_dc, sh_rest, camera, screen_offsets);
+        let outputs = Dispatch::splat(inputs, view);
+        let picture = Tensor::<1>::from_dispatch(outputs.picture);
+        let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
+        let (width, height) = (camera.width as usize, camera.height as usize);
+        let pixels = width * height;
+        Rendering {
+            image: picture.clone().slice(s![0..3 * pixels]).reshape([height, width, 3]),
+            alpha: picture.clone().slice(s![3 * pixels..4 * pixels]).reshape([height, width]),
+            depth: picture.slice(s![4 * pixels..5 * pixels]).reshape([height, width]),
+            radii,
+        }
+    }
+
+    fn activated_inputs(
+        &self,
+        means: Tensor<2>,
+        quats: Tensor<2>,
+        scales: Tensor<2>,
+        opacities: Tensor<2>,
+        sh_dc: Tensor<3>,
+        sh_rest: Tensor<3>,
+        camera: &Camera,
+        screen_offsets: Option<Tensor<2>>,
+    ) -> (SplatInputs<Dispatch>, SplatView) {
         let count = means.dims()[0];
         let rest = sh_rest.dims()[1];
         assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
@@ -120,16 +145,12 @@ impl Splatter {
             sh_rest: sh_rest.into_dispatch(),
             screen_offsets: screen_offsets.into_dispatch(),
         };
-        let outputs = Dispatch::splat(inputs, view);
-        let picture = Tensor::<1>::from_dispatch(outputs.picture);
-        let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
-        let (width, height) = (camera.width as usize, camera.height as usize);
-        let pixels = width * height;
-        Rendering {
-            image: picture.clone().slice(s![0..3 * pixels]).reshape([height, width, 3]),
-            alpha: picture.clone().slice(s![3 * pixels..4 * pixels]).reshape([height, width]),
-            depth: picture.slice(s![4 * pixels..5 * pixels]).reshape([height, width]),
-            radii,
-        }
+        (inputs, view)
     }
+}
+
+/// Standard deviations and opacities from what is trained.
+fn activate(log_scales: Tensor<2>, opacity_logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
+    // Far beyond any scene, and exp stays finite, so that the way back has no 0 · infinity.
+    (log_scales.clamp_max(MAX_LOG_SCALE).exp(), sigmoid(opacity_logits))
 }

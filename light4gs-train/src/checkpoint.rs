@@ -13,18 +13,21 @@ use light4gs_data::{DataError, PointCloud};
 use light4gs_model::{DynamicScene, Pca, SceneFrame};
 use safetensors::{Dtype, SafeTensors};
 
+use crate::compression::Compression;
 use crate::config::Config;
 use crate::densification::DensityStatistics;
 use crate::error::TrainError;
 use crate::metrics_log::Stage;
 use crate::optimizer::{Adam, AdamState};
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
 
 /// A run's state after an iteration.
 #[derive(Debug)]
 pub struct Checkpoint {
     /// The model, on the run's device.
     pub scene: DynamicScene,
+    /// Entropy models and quantisation steps, where the run trains them.
+    pub compression: Option<Compression>,
     /// Optimiser state.
     pub adam: Adam,
     /// Since the last densification.
@@ -63,6 +66,9 @@ impl Checkpoint {
     pub fn save(&mut self, path: &Path) -> Result<(), TrainError> {
         let mut collect = Collect(BTreeMap::new());
         visit_parameters(&mut self.scene, &mut collect);
+        if let Some(compression) = &mut self.compression {
+            visit_compression(compression, &mut collect);
+        }
         let mut entries = collect.0;
         let Pca { mean, axes, std } = self.scene.frame.pca();
         let frame: Vec<u8> =
@@ -122,6 +128,10 @@ impl Checkpoint {
         let mut scene = config.model.build().init(&cloud, device);
         let mut load = Load { file: &file, device, problem: None };
         visit_parameters(&mut scene, &mut load);
+        let mut compression = Compression::of_run(config, device);
+        if let Some(compression) = &mut compression {
+            visit_compression(compression, &mut load);
+        }
         let inner = device.clone().inner();
         let frame = load.values("frame", Some(15));
         let mut adam = Adam::default();
@@ -151,6 +161,7 @@ impl Checkpoint {
         scene.frame = SceneFrame::new(&pca, device);
         Ok(Self {
             scene,
+            compression,
             adam,
             statistics,
             stage,
@@ -188,7 +199,7 @@ impl ParameterVisitor for Load<'_> {
     fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
         let key = format!("parameter.{name}");
         let mut shape = parameter.dims();
-        if !matches!(group, ParameterGroup::Grid | ParameterGroup::Deformation)
+        if group.is_per_gaussian()
             && let Ok(view) = self.file.tensor(&key)
         {
             shape[0] = view.shape().first().copied().unwrap_or(0);

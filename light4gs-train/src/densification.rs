@@ -4,7 +4,7 @@
 use burn::module::Param;
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
-use light4gs_model::{GaussianTensors, Gaussians};
+use light4gs_model::Gaussians;
 
 use crate::optimizer::Adam;
 use crate::parameters::GAUSSIAN_PARAMETERS;
@@ -115,7 +115,7 @@ pub fn densify(gaussians: &mut Gaussians, adam: &mut Adam, masks: &DensifyMasks,
     // The halves are the last rows; their offsets and shrunken scales are added to what was copied.
     let halves = 2 * splits.len();
     let before = rows.len() - halves;
-    let tensors = inner_tensors(gaussians);
+    let tensors = gaussians.tensors().inner();
     let scales = tensors.log_scales.clone().slice(s![before..rows.len()]).exp();
     let normals = Tensor::<2>::from_data(TensorData::new(normals.to_vec(), [halves, 3]), &device);
     let offsets = rotate(tensors.quats.slice(s![before..rows.len()]), normals * scales);
@@ -188,18 +188,6 @@ pub fn reset_opacity(gaussians: &mut Gaussians, adam: &mut Adam) {
     adam.reset_moments("gaussians.opacity_logits");
 }
 
-fn inner_tensors(gaussians: &Gaussians) -> GaussianTensors {
-    let GaussianTensors { means, log_scales, quats, opacity_logits, sh_dc, sh_rest } = gaussians.tensors();
-    GaussianTensors {
-        means: means.inner(),
-        log_scales: log_scales.inner(),
-        quats: quats.inner(),
-        opacity_logits: opacity_logits.inner(),
-        sh_dc: sh_dc.inner(),
-        sh_rest: sh_rest.inner(),
-    }
-}
-
 fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
     *parameter = Param::initialized(parameter.id, Tensor::from_inner(value).require_grad());
 }
@@ -214,7 +202,7 @@ fn select_rows(gaussians: &mut Gaussians, adam: &mut Adam, rows: &[usize], first
     for name in GAUSSIAN_PARAMETERS {
         adam.select_rows(name, &rows, &fresh, count);
     }
-    let tensors = inner_tensors(gaussians);
+    let tensors = gaussians.tensors().inner();
     replace(&mut gaussians.means, tensors.means.select(0, rows.clone()));
     replace(&mut gaussians.log_scales, tensors.log_scales.select(0, rows.clone()));
     replace(&mut gaussians.quats, tensors.quats.select(0, rows.clone()));

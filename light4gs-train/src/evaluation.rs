@@ -9,6 +9,7 @@ use light4gs_data::{Frame, ImageStore, RgbImage8, RgbImage32, Scene, Split};
 use light4gs_model::{DynamicScene, Splatter};
 use serde::Serialize;
 
+use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
 use crate::error::TrainError;
 use crate::loss::{psnr, ssim};
@@ -71,6 +72,9 @@ pub struct Evaluation {
     pub training_seconds: Option<f64>,
     /// One entry a measured split.
     pub splits: Vec<SplitScore>,
+    /// Expected and coded bits, where the run has a record of its coding.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coding: Option<CodingRecord>,
 }
 
 /// A render next to its ground truth.
@@ -190,6 +194,7 @@ impl DecodedScene {
             decode_seconds: self.decode_seconds,
             training_seconds: None,
             splits,
+            coding: None,
         };
         Ok((evaluation, rendered))
     }

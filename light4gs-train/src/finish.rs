@@ -9,7 +9,7 @@ use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
 use crate::metrics_log::read_metrics;
-use crate::report::{Report, SectionBytes, SummaryTile, write_report};
+use crate::report::{CodingReport, Report, SectionBytes, SummaryTile, write_report};
 use crate::run_folder::RunFolder;
 use crate::trainer::load_options;
 
@@ -24,6 +24,7 @@ pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Resul
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(&config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
     evaluation.training_seconds = metrics.last().map(|record| record.seconds);
+    evaluation.coding = folder.read_json("coding.json")?;
     folder.write_json("eval.json", &evaluation)?;
     if config.eval.save_renders {
         save_renders(folder, &views)?;
@@ -38,6 +39,13 @@ pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Resul
             .iter()
             .map(|section| SectionBytes { name: section.name.clone(), bytes: section.bytes })
             .collect(),
+        coding: match &evaluation.coding {
+            Some(record) => {
+                let bit_maps = folder.read_json("bit_maps.json")?.unwrap_or_default();
+                Some(CodingReport { record: record.clone(), bit_maps })
+            }
+            None => None,
+        },
         splits: evaluation.report_splits(),
         pictures: {
             let stride = views.len().div_ceil(REPORT_VIEWS).max(1);

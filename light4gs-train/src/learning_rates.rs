@@ -1,6 +1,6 @@
 //! The learning rate of every parameter group at an iteration.
 
-use crate::config::TrainConfig;
+use crate::config::Config;
 use crate::metrics_log::Stage;
 use crate::parameters::ParameterGroup;
 use crate::schedule::ExponentialDecay;
@@ -16,29 +16,40 @@ pub struct GroupRates {
     opacity: f64,
     scale: f64,
     rotation: f64,
+    context: f64,
+    sh_model: f64,
+    steps: f64,
 }
 
 impl GroupRates {
     /// `iteration` counts from 1 in its stage; `extent` is the scene's, world units.
-    pub fn new(config: &TrainConfig, stage: Stage, iteration: usize, extent: f32) -> Self {
-        let rates = &config.learning_rate;
+    pub fn new(config: &Config, stage: Stage, iteration: usize, extent: f32) -> Self {
+        let Config { train, compression, .. } = config;
+        let rates = &train.learning_rate;
         let length = match stage {
-            Stage::Coarse => config.coarse_iterations,
-            Stage::Fine => config.fine_iterations,
+            Stage::Coarse => train.coarse_iterations,
+            Stage::Fine => train.fine_iterations,
         };
         let steps = rates.schedule_steps.unwrap_or(length);
         let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
+        let attribute =
+            |rate: f64| ExponentialDecay::new(rate, rate * rates.attributes_final_share, steps).at(iteration as f64);
+        let model =
+            |first: f64, last: f64| ExponentialDecay::new(first, last, train.fine_iterations).at(iteration as f64);
         Self {
             means: decay(rates.means_init, rates.means_final),
             grid: decay(rates.grid_init, rates.grid_final),
             deformation: decay(rates.deformation_init, rates.deformation_final),
-            sh_dc: rates.sh_dc,
-            sh_rest: rates.sh_dc / rates.sh_rest_divisor,
-            opacity: rates.opacity,
-            scale: rates.scale,
-            rotation: rates.rotation,
+            sh_dc: attribute(rates.sh_dc),
+            sh_rest: attribute(rates.sh_dc / rates.sh_rest_divisor),
+            opacity: attribute(rates.opacity),
+            scale: attribute(rates.scale),
+            rotation: attribute(rates.rotation),
+            context: model(compression.context.learning_rate_init, compression.context.learning_rate_final),
+            sh_model: model(compression.sh.learning_rate_init, compression.sh.learning_rate_final),
+            steps: compression.steps.learning_rate,
         }
     }
 
@@ -53,6 +64,9 @@ impl GroupRates {
             ParameterGroup::ShRest => self.sh_rest,
             ParameterGroup::Grid => self.grid,
             ParameterGroup::Deformation => self.deformation,
+            ParameterGroup::Context => self.context,
+            ParameterGroup::ShModel => self.sh_model,
+            ParameterGroup::Steps => self.steps,
         }
     }
 }

@@ -1,8 +1,10 @@
 //! Training, evaluation and the command line of Light4GS.
 
+pub mod ablation;
 pub mod benchmark;
 pub mod checkpoint;
 pub mod cli;
+pub mod compression;
 pub mod config;
 pub mod densification;
 pub mod device;
@@ -14,6 +16,7 @@ pub mod loss;
 pub mod metrics_log;
 pub mod optimizer;
 pub mod parameters;
+mod randomness;
 pub mod report;
 pub mod run_folder;
 pub mod schedule;

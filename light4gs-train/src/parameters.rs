@@ -1,9 +1,11 @@
-//! Every trained tensor of a scene with its name and its learning-rate group.
+//! Every trained tensor of a run with its name and its learning-rate group.
 
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::Tensor;
-use light4gs_model::{DeformationHead, DynamicScene, PLANE_NAMES};
+use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters, PLANE_NAMES};
+
+use crate::compression::Compression;
 
 /// Parameters that share a learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +26,20 @@ pub enum ParameterGroup {
     Grid,
     /// The deformation network.
     Deformation,
+    /// The entropy model of the hexplanes.
+    Context,
+    /// The entropy model of the spherical harmonics.
+    ShModel,
+    /// Logarithms of the hexplanes' quantisation steps.
+    Steps,
+}
+
+impl ParameterGroup {
+    /// Whether parameters of this group have a row for each Gaussian.
+    pub fn is_per_gaussian(self) -> bool {
+        use ParameterGroup::*;
+        matches!(self, Means | LogScales | Quats | Opacity | ShDc | ShRest)
+    }
 }
 
 /// Names of the parameters that have a row for each Gaussian.
@@ -71,6 +87,30 @@ pub fn visit_parameters(scene: &mut DynamicScene, visitor: &mut impl ParameterVi
             visit_linear(visitor, &format!("deformation.{name}.hidden"), &mut head.hidden);
             visit_linear(visitor, &format!("deformation.{name}.output"), &mut head.output);
         }
+    }
+}
+
+/// Visits every trained parameter of the entropy models and the quantisation steps.
+pub fn visit_compression(compression: &mut Compression, visitor: &mut impl ParameterVisitor) {
+    use ParameterGroup::*;
+    let Compression { context, quantization, sh } = compression;
+    context.visit_parameters(&mut InGroup { group: Context, prefix: "context", visitor });
+    quantization.visit_parameters(&mut InGroup { group: Steps, prefix: "quantization", visitor });
+    if let Some(sh) = sh {
+        sh.visit_parameters(&mut InGroup { group: ShModel, prefix: "sh_model", visitor });
+    }
+}
+
+/// Shows a module's parameters as members of a group.
+struct InGroup<'a, V> {
+    group: ParameterGroup,
+    prefix: &'static str,
+    visitor: &'a mut V,
+}
+
+impl<V: ParameterVisitor> NamedParameterVisitor for InGroup<'_, V> {
+    fn visit<const D: usize>(&mut self, name: &str, parameter: &mut Param<Tensor<D>>) {
+        self.visitor.visit(self.group, &format!("{}.{name}", self.prefix), parameter);
     }
 }
 

@@ -4,6 +4,7 @@
 //! without its script, in light and dark, on paper and aloud.
 
 mod chart;
+mod coding;
 mod color_map;
 mod curves;
 mod format;
@@ -19,6 +20,7 @@ use std::path::Path;
 use light4gs_data::atomic::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
 
+use crate::compression::{BitMap, CodingRecord};
 use crate::metrics_log::MetricsRecord;
 use html::{escape, fill};
 
@@ -39,6 +41,8 @@ pub struct Report {
     pub summary: Vec<SummaryTile>,
     /// Bytes of the file by section, in the order of the file.
     pub sections: Vec<SectionBytes>,
+    /// How the file was coded.
+    pub coding: Option<CodingReport>,
     /// Quality by split.
     pub splits: Vec<SplitQuality>,
     /// Views to show beside their ground truth.
@@ -58,6 +62,15 @@ pub struct SummaryTile {
     pub value: String,
     /// A word on it: `20 views, decoded file`; may be empty.
     pub hint: String,
+}
+
+/// How a file was coded.
+#[derive(Debug, Clone)]
+pub struct CodingReport {
+    /// Expected and real bits.
+    pub record: CodingRecord,
+    /// Where the planes' bits are; may be empty.
+    pub bit_maps: Vec<BitMap>,
 }
 
 /// Size of one section of the file.
@@ -126,6 +139,7 @@ fn page(path: &Path, report: &Report) -> Result<String, DataError> {
         section("views", "Ground truth, render, error", picture::section(path, &report.pictures)?),
         section("quality", "Quality", quality::section(&report.splits)),
         section("size", "Bytes of the file", sizes::section(&report.sections)),
+        section("coding", "Entropy coding", coding::section(path, report.coding.as_ref())?),
         section("curves", "Training", curves::section(&report.metrics)),
         section("configuration", "Configuration", configuration(&report.config_toml)),
     ];

@@ -12,6 +12,18 @@ use crate::checkpoint;
 use crate::config::Config;
 use crate::error::TrainError;
 
+/// Files of a run; `--overwrite` removes them.
+const FILES: [&str; 8] = [
+    "run.json",
+    "config.toml",
+    "metrics.jsonl",
+    "scene.l4gs",
+    "coding.json",
+    "bit_maps.json",
+    "eval.json",
+    "report.html",
+];
+
 /// Where a run's scene is; kept beside the configuration so that `resume` and `eval` need no arguments.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -50,7 +62,7 @@ impl RunFolder {
                     "{root} holds files but no run; --overwrite replaces runs only"
                 )));
             }
-            for name in ["run.json", "config.toml", "metrics.jsonl", "scene.l4gs", "eval.json", "report.html"] {
+            for name in FILES {
                 remove(&folder.path(name), |path| fs::remove_file(path))?;
             }
             for name in ["events", "checkpoints", "renders"] {
@@ -114,6 +126,17 @@ impl RunFolder {
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
         let path = self.path(name);
         write_atomically(&path, bytes).map_err(io("write", &path)).map_err(Into::into)
+    }
+
+    /// Reads a JSON file of the run; nothing if it is not there.
+    pub fn read_json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<Option<T>, TrainError> {
+        let path = self.path(name);
+        let text = match fs::read_to_string(&path) {
+            Ok(text) => text,
+            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            Err(error) => return Err(io("read", &path)(error).into()),
+        };
+        Ok(Some(serde_json::from_str(&text).map_err(|source| DataError::Json { path, source })?))
     }
 
     /// Writes pretty JSON.

@@ -1,5 +1,6 @@
 //! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use burn::module::Param;
@@ -7,12 +8,11 @@ use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
 use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
-use light4gs_model::{DynamicScene, Splatter, regularizer};
-use rand::seq::SliceRandom;
-use rand::{Rng, SeedableRng};
-use rand_chacha::ChaCha8Rng;
+use light4gs_model::{DynamicScene, Significance, Splatter, least_significant, regularizer};
+use rand::Rng;
 
 use crate::checkpoint::{self, Checkpoint};
+use crate::compression::{Compression, NoisyScene, TrainedScene, write_scene};
 use crate::config::{Config, TrainConfig};
 use crate::densification::{
     DensifyMasks, DensityStatistics, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
@@ -20,10 +20,11 @@ use crate::densification::{
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::learning_rates::GroupRates;
-use crate::loss::{photometric, psnr};
+use crate::loss::{l2, photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::randomness::{FrameOrder, Purpose, generator, seed_device, standard_normal};
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
 
@@ -54,6 +55,7 @@ pub struct Trainer {
     state: Checkpoint,
     metrics: MetricsLog,
     events: TensorBoard,
+    order: FrameOrder,
     quiet: bool,
 }
 
@@ -66,6 +68,7 @@ impl Trainer {
         let scene = config.model.build().init(&data.points, &device);
         let state = Checkpoint {
             statistics: DensityStatistics::new(scene.gaussians.len(), &device.clone().inner()),
+            compression: Compression::of_run(&config, &device),
             scene,
             adam: Adam::default(),
             stage: Stage::Coarse,
@@ -104,7 +107,8 @@ impl Trainer {
         let metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
         let step = global_step(&config.train, state.stage, state.iteration) as u64;
         let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
-        Ok(Self { config, device, data, images, folder, state, metrics, events, quiet })
+        let order = FrameOrder::default();
+        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet })
     }
 
     /// The dataset.
@@ -124,8 +128,22 @@ impl Trainer {
             self.begin_fine_stage();
         }
         self.run_stage(Stage::Fine, self.config.train.fine_iterations)?;
-        let meta = scene_meta(&self.config, &self.data);
-        Ok(light4gs_codec::write_file(&self.folder.stream(), &self.state.scene.to_arrays(meta))?)
+        let trained = TrainedScene {
+            scene: &self.state.scene,
+            compression: self.state.compression.as_ref(),
+            config: &self.config,
+            data: &self.data,
+            images: &self.images,
+            device: &self.device,
+        };
+        let (encoded, record) = write_scene(&trained, &self.folder.stream(), self.quiet)?;
+        if let Some(record) = record {
+            self.folder.write_json("coding.json", &record)?;
+        }
+        if let Some(coded) = &encoded.coded {
+            self.folder.write_json("bit_maps.json", &coded.bit_maps)?;
+        }
+        Ok(encoded.bytes.len() as u64)
     }
 
     /// The fine stage starts with a new optimiser and new statistics.
@@ -153,6 +171,9 @@ impl Trainer {
             let begin = Instant::now();
             let picture = self.step(stage, iteration)?;
             self.control_density(stage, iteration);
+            if stage == Stage::Fine && self.config.train.prune.is_due(iteration) {
+                self.prune_insignificant(iteration);
+            }
             self.state.iteration = iteration;
             self.state.seconds += begin.elapsed().as_secs_f64();
             bar.inc(1);
@@ -208,24 +229,35 @@ impl Trainer {
 
     /// Forward, backward, and one optimiser step.
     fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
+        let batch = self.config.train.batch_size.max(1);
+        let views = self.data.train.len();
+        let frames: Vec<usize> =
+            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, views)).collect();
+        let noisy = self.quantization_noise(stage, iteration);
         let config = &self.config.train;
         let splatter = self.splatter(stage, iteration);
         let scene = &self.state.scene;
         let count = scene.gaussians.len();
-        let batch = config.batch_size.max(1);
         let mut loss: Option<Tensor<1>> = None;
         let mut picture = None;
         let mut views = Vec::with_capacity(batch);
-        for k in 0..batch {
-            let frame = self.frame(stage, (iteration - 1) * batch + k);
-            let gaussians = match stage {
-                Stage::Coarse => scene.gaussians.tensors(),
-                Stage::Fine => scene.at(frame.time),
+        for frame in frames {
+            let frame = &self.data.train[frame];
+            let gaussians = match (stage, &noisy) {
+                (Stage::Coarse, _) => scene.gaussians.tensors(),
+                (Stage::Fine, None) => scene.at(frame.time),
+                (Stage::Fine, Some(noisy)) => scene.at_with(frame.time, noisy.planes.clone(), noisy.sh_rest.clone()),
             };
             let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
             let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
             let truth = image_tensor(&*self.images.get(frame)?, &self.device);
-            let term = photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim) / batch as f32;
+            let squared = config.l2_until > 0 && (stage == Stage::Coarse || iteration <= config.l2_until);
+            let term = if squared {
+                l2(rendering.image.clone(), truth.clone())
+            } else {
+                photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim)
+            };
+            let term = term / batch as f32;
             loss = Some(match loss {
                 Some(sum) => sum + term,
                 None => term,
@@ -236,6 +268,11 @@ impl Trainer {
         let mut loss = loss.expect("a batch has at least one picture");
         if stage == Stage::Fine {
             loss = loss + regularization(scene, config);
+        }
+        if let Some(noisy) = &noisy
+            && let Some(rate) = self.rate_term(noisy, iteration)
+        {
+            loss = loss + rate;
         }
         let value: f32 = loss.clone().into_scalar();
         if !value.is_finite() {
@@ -253,11 +290,51 @@ impl Trainer {
                 }
             }
         }
-        let rates = GroupRates::new(&self.config.train, stage, iteration, self.data.extent);
+        let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
         let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
         visit_parameters(&mut self.state.scene, &mut step);
+        if let Some(compression) = &mut self.state.compression {
+            visit_compression(compression, &mut step);
+        }
         let (image, truth) = picture.expect("a batch has at least one picture");
         Ok(StepPicture { loss: value, image, truth })
+    }
+
+    /// The scene as it will roughly be decoded, once the rate has entered the training.
+    fn quantization_noise(&mut self, stage: Stage, iteration: usize) -> Option<NoisyScene> {
+        let Config { seed, compression: config, .. } = &self.config;
+        let from = config.rate.from.max(1);
+        if stage == Stage::Coarse || iteration < from {
+            return None;
+        }
+        let with_sh = self.sh_counts(iteration);
+        let compression = self.state.compression.as_mut()?;
+        let scene = &self.state.scene;
+        if iteration == from {
+            compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
+        }
+        seed_device(&self.device, *seed, stage, iteration);
+        let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
+        Some(compression.noisy(scene, learn_steps, with_sh))
+    }
+
+    /// Whether spherical harmonics have a part in the rate: once Gaussians neither come nor split any more.
+    fn sh_counts(&self, iteration: usize) -> bool {
+        iteration > self.config.train.densify.until
+    }
+
+    /// The weighted rate, in the iterations in which it is due.
+    fn rate_term(&self, noisy: &NoisyScene, iteration: usize) -> Option<Tensor<1>> {
+        let config = &self.config.compression.rate;
+        let compression = self.state.compression.as_ref().filter(|_| iteration.is_multiple_of(config.interval))?;
+        let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
+        let with_sh = self.sh_counts(iteration);
+        let rate = compression.rate(noisy, &self.state.scene, config.fraction, with_sh, &mut generator);
+        Some(match config.weighting.as_str() {
+            "per_symbol" => rate.bits_per_symbol() * config.lambda,
+            // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
+            _ => rate.megabytes() * (config.lambda * config.interval as f64),
+        })
     }
 
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
@@ -266,19 +343,40 @@ impl Trainer {
         Splatter::new(self.config.data.background, degree)
     }
 
-    /// Frames in an order that is shuffled anew each time all have been seen; depends on seed and position alone.
-    fn frame(&self, stage: Stage, position: usize) -> &Frame {
-        let count = self.data.train.len();
-        let mut order: Vec<usize> = (0..count).collect();
-        order.shuffle(&mut self.generator(Purpose::FrameOrder, stage, position / count));
-        &self.data.train[order[position % count]]
+    /// Drops the Gaussians that contribute least to the training views at their times (STP, paper III-B).
+    fn prune_insignificant(&mut self, iteration: usize) {
+        let config = &self.config.train.prune;
+        let scene = &self.state.scene;
+        let splatter = self.splatter(Stage::Fine, iteration);
+        let mut significance = Significance::new(scene.gaussians.len());
+        for frame in self.pruning_views(iteration) {
+            significance.add(&splatter, scene.at(frame.time), &frame.camera);
+        }
+        let volumes: Vec<f64> =
+            scene.gaussians.log_scales.val().inner().sum_dim(1).exp().into_data().iter::<f64>().collect();
+        let mut scores = significance.scores(config.score());
+        for (score, factor) in scores.iter_mut().zip(config.volume_weight().of(&volumes)) {
+            *score *= factor;
+        }
+        let keep: Vec<bool> = least_significant(&scores, config.fraction).iter().map(|drop| !drop).collect();
+        // Never everything: an empty scene has no gradient to come back from.
+        if keep.contains(&true) && keep.contains(&false) {
+            prune(&mut self.state.scene.gaussians, &mut self.state.adam, &keep);
+            self.state.statistics.keep(&keep);
+        }
     }
 
-    fn generator(&self, purpose: Purpose, stage: Stage, position: usize) -> ChaCha8Rng {
-        let mut generator = ChaCha8Rng::seed_from_u64(self.config.seed);
-        let stage = if stage == Stage::Coarse { 0 } else { 1 };
-        generator.set_stream((purpose as u64) << 62 | stage << 61 | position as u64);
-        generator
+    /// Every training view, or one random view a time.
+    fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
+        if !self.config.train.prune.one_camera_per_time {
+            return self.data.train.iter().collect();
+        }
+        let mut by_time: BTreeMap<u32, Vec<&Frame>> = BTreeMap::new();
+        for frame in &self.data.train {
+            by_time.entry(frame.time.to_bits()).or_default().push(frame);
+        }
+        let mut generator = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
+        by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()
     }
 
     fn control_density(&mut self, stage: Stage, iteration: usize) {
@@ -318,7 +416,7 @@ impl Trainer {
                 threshold,
                 config.percent_dense * extent,
             );
-            let mut generator = self.generator(Purpose::Split, stage, iteration);
+            let mut generator = generator(self.config.seed, Purpose::Split, stage, iteration);
             let normals: Vec<f32> = (0..masks.normals_needed()).map(|_| standard_normal(&mut generator)).collect();
             densify(&mut self.state.scene.gaussians, &mut self.state.adam, &masks, &normals);
             self.reset_statistics();
@@ -349,19 +447,6 @@ impl Trainer {
         }
         Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
     }
-}
-
-/// What a random number is drawn for.
-#[derive(Clone, Copy)]
-enum Purpose {
-    FrameOrder,
-    Split,
-}
-
-/// Box-Muller, one of the pair.
-fn standard_normal(generator: &mut ChaCha8Rng) -> f32 {
-    let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
-    ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
 }
 
 /// Iterations done over both stages.

@@ -12,7 +12,7 @@ pub struct Workspace {
 }
 
 /// What makes a run take seconds.
-const TINY: [&str; 14] = [
+const TINY: [&str; 15] = [
     "train.coarse_iterations=12",
     "train.fine_iterations=48",
     "train.checkpoint_interval=9",
@@ -27,6 +27,16 @@ const TINY: [&str; 14] = [
     "data.initial_points=300",
     "model.hexplane.resolution=[8, 8, 8, 4]",
     "eval.interval=20",
+    "compression.context.fit_iterations=4",
+];
+
+/// Overrides that put everything that compresses into a tiny run.
+pub const TINY_COMPRESSION: [&str; 5] = [
+    "compression.rate.lambda=0.05",
+    "compression.rate.from=12",
+    "compression.steps.adaptive_from=20",
+    "train.prune.fraction=0.2",
+    "train.prune.iterations=[42, 45]",
 ];
 
 impl Workspace {

@@ -14,6 +14,8 @@
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::Camera;
 use light4gs_model::HexPlane;
+use light4gs_model::ops::lower_bound::lower_bound;
+use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, picture_of, random_camera};
@@ -312,6 +314,79 @@ fn hexplane_query_against_the_twin() {
                 let what = format!("{name} {case} {}", QUERY_INPUTS[k]);
                 assert_close_relative(&what, gradient, &expected[k], 1e-4);
             }
+        }
+    }
+}
+
+/// Elementwise operations: values that are neither all in the tails nor on a threshold.
+fn check_elementwise(
+    what: &str,
+    values: &[f64],
+    operation: impl Fn(Tensor<1>) -> Tensor<1>,
+    device: &Device,
+    random: &mut Random,
+) {
+    let tensor = |values: &[f64]| {
+        let values: Vec<f32> = values.iter().map(|v| *v as f32).collect();
+        Tensor::<1>::from_floats(values.as_slice(), device)
+    };
+    let weights = random.normals(values.len());
+    let leaf = tensor(values).require_grad();
+    let grads = (operation(leaf.clone()) * tensor(&weights)).sum().backward();
+    let gradient = values_of(&leaf.grad(&grads).unwrap());
+    check_directions(what, values, &gradient, 1e-3, random, |values| {
+        dot(wide(&values_of(&operation(tensor(&values)))), &weights)
+    });
+}
+
+/// Above the bound; what happens below it is no derivative, and golden cases c04 and c05 pin it.
+#[test]
+fn lower_bound_above_the_bound() {
+    for (name, device) in devices() {
+        let mut random = Random::new(200);
+        let values: Vec<f64> = (0..50).map(|_| random.uniform(0.15, 2.0)).collect();
+        let what = format!("{name} lower bound");
+        check_elementwise(&what, &values, |x| lower_bound(x, 0.11), &device.autodiff(), &mut random);
+    }
+}
+
+#[test]
+fn normal_cdf_along_random_directions() {
+    for (name, device) in devices() {
+        let mut random = Random::new(201);
+        let values: Vec<f64> = (0..50).map(|_| random.uniform(-3.0, 3.0)).collect();
+        check_elementwise(&format!("{name} normal cdf"), &values, normal_cdf, &device.autodiff(), &mut random);
+    }
+}
+
+/// The standard normal distribution function: its density integrated by Simpson's rule from far below.
+fn normal_cdf_twin(x: f64) -> f64 {
+    const CELLS: usize = 20_000;
+    let low = x.min(0.0) - 12.0;
+    let step = (x - low) / CELLS as f64;
+    let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+    let inner = (1..CELLS).map(|i| density(low + i as f64 * step) * if i % 2 == 1 { 4.0 } else { 2.0 });
+    (density(low) + inner.sum::<f64>() + density(x)) * step / 3.0
+}
+
+/// Relative errors, down to where nothing is coded any more: the bits of a symbol are a logarithm.
+#[test]
+fn normal_cdf_against_the_twin() {
+    const STEP: f64 = 1e-4;
+    let places: Vec<f64> = (-90..=60).map(|i| f64::from((f64::from(i) * 0.1) as f32)).collect();
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let values: Vec<f32> = places.iter().map(|v| *v as f32).collect();
+        let leaf = Tensor::<1>::from_floats(values.as_slice(), &device).require_grad();
+        let found = normal_cdf(leaf.clone());
+        let gradient = values_of(&leaf.grad(&found.clone().sum().backward()).unwrap());
+        for ((x, found), gradient) in places.iter().zip(values_of(&found)).zip(gradient) {
+            let expected = normal_cdf_twin(*x);
+            let error = (f64::from(found) / expected - 1.0).abs();
+            assert!(error < 5e-6, "{name} at {x}: {found} against {expected}, off by {error:e} of it");
+            let slope = (normal_cdf_twin(x + STEP) - normal_cdf_twin(x - STEP)) / (2.0 * STEP);
+            let error = (f64::from(gradient) / slope - 1.0).abs();
+            assert!(error < 5e-6, "{name} slope at {x}: {gradient} against {slope}, off by {error:e} of it");
         }
     }
 }

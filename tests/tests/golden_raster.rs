@@ -1,7 +1,9 @@
 //! Golden cases c07 (spherical harmonics) and c08 (rasteriser, and its corner cases) on every back end.
 
-use burn::tensor::Tensor;
+use burn::tensor::{Device, Tensor, s};
+use light4gs_data::Camera;
 use light4gs_model::spherical_harmonics::{basis, basis_gradient, coefficient_count};
+use light4gs_model::{GaussianTensors, Significance, SignificanceScore, Splatter, VolumeWeight, least_significant};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::raster::{Leaves, camera_of};
 
@@ -116,4 +118,112 @@ fn rasterizer() {
 fn rasterizer_corner_cases() {
     let golden = Golden::open("c08_raster_edge");
     check_camera(&golden, "cam0", "grad_autograd", false);
+}
+
+const SCORES: [(&str, SignificanceScore); 4] = [
+    ("count", SignificanceScore::PixelCount),
+    ("sum_T_alpha", SignificanceScore::BlendingWeight),
+    ("sum_T_opacity", SignificanceScore::TransmittanceOpacity),
+    ("sum_opacity", SignificanceScore::Opacity),
+];
+
+/// Checks the scores under `prefix` and returns them in the order of [`SCORES`].
+fn check_scores(golden: &Golden, what: &str, prefix: &str, significance: &Significance) -> Vec<Vec<f64>> {
+    let check = |(name, score): (&str, SignificanceScore)| {
+        let key = format!("{prefix}.{name}");
+        let found = significance.scores(score);
+        let as_f32: Vec<f32> = found.iter().map(|v| *v as f32).collect();
+        match score {
+            SignificanceScore::PixelCount => assert_eq!(as_f32, golden.values(&key), "{what} {key}"),
+            _ => assert_close_relative(&format!("{what} {key}"), &as_f32, &golden.values(&key), 2e-5),
+        }
+        found
+    };
+    SCORES.map(check).into()
+}
+
+fn significance_scene(case: &str) -> (Golden, Vec<Camera>) {
+    let golden = Golden::open(case);
+    let cameras = (0..)
+        .map(|k| format!("cam{k}"))
+        .take_while(|camera| golden.has(&format!("{camera}.sig.count")))
+        .map(|camera| {
+            let size = golden.integers(&format!("{camera}.width_height"));
+            camera_of(&golden, &format!("{camera}."), size[0] as u32, size[1] as u32)
+        })
+        .collect();
+    (golden, cameras)
+}
+
+#[test]
+fn significance_of_each_picture() {
+    for case in ["c08_raster", "c08_raster_edge"] {
+        let (golden, cameras) = significance_scene(case);
+        for (name, device) in devices() {
+            let gaussians = raw_gaussians(&golden, &device.autodiff());
+            for (k, camera) in cameras.iter().enumerate() {
+                let mut significance = Significance::new(gaussians.means.dims()[0]);
+                significance.add(&Splatter::new([0.0; 3], 3), gaussians.clone(), camera);
+                check_scores(&golden, &format!("{name} {case}"), &format!("cam{k}.sig"), &significance);
+            }
+        }
+    }
+}
+
+#[test]
+fn significance_over_views_with_volumes_and_masks() {
+    let (golden, cameras) = significance_scene("c08_raster");
+    let volumes: Vec<f64> =
+        golden.values("scales").as_chunks::<3>().0.iter().map(|s| s.iter().map(|v| f64::from(*v)).product()).collect();
+    for (name, device) in devices() {
+        // Leaves on the tape: the scores are taken off it.
+        let gaussians = raw_gaussians(&golden, &device.autodiff());
+        let mut significance = Significance::new(gaussians.means.dims()[0]);
+        for camera in &cameras {
+            significance.add(&Splatter::new([0.0; 3], 3), gaussians.clone(), camera);
+        }
+        let totals = check_scores(&golden, name, "sig_total", &significance);
+        for ((score, _), total) in SCORES.into_iter().zip(&totals).skip(1) {
+            for (kind, weight) in [
+                ("clipped", VolumeWeight::Clamped { exponent: 0.1 }),
+                ("code", VolumeWeight::Unclamped { exponent: 0.1 }),
+            ] {
+                let key = format!("sig_volume.{kind}_{score}");
+                let found: Vec<f32> =
+                    weight.of(&volumes).iter().zip(total).map(|(factor, score)| (factor * score) as f32).collect();
+                assert_close_relative(&format!("{name} {key}"), &found, &golden.values(&key), 2e-5);
+            }
+        }
+        for percent in [19, 40] {
+            let key = format!("sig_prune.mask_{percent}");
+            let expected: Vec<bool> = golden.values(&key).iter().map(|v| *v != 0.0).collect();
+            assert_eq!(least_significant(&totals[2], f64::from(percent) / 100.0), expected, "{name} {key}");
+        }
+    }
+}
+
+#[test]
+fn least_significant_rows_with_ties() {
+    let golden = Golden::open("c11_densify");
+    let scores: Vec<f64> = golden.values("sigprune.score").iter().map(|v| f64::from(*v)).collect();
+    for percent in ["05", "40", "60"] {
+        let key = format!("sigprune.mask_{percent}");
+        let expected: Vec<bool> = golden.values(&key).iter().map(|v| *v != 0.0).collect();
+        let share = percent.parse::<f64>().unwrap() / 100.0;
+        assert_eq!(least_significant(&scores, share), expected, "{key}");
+    }
+}
+
+/// The scene's activated attributes, taken back to raw ones.
+fn raw_gaussians(golden: &Golden, device: &Device) -> GaussianTensors {
+    let Leaves { means, quats, scales, opacities, sh, .. } = Leaves::read(golden, device);
+    let [_, coefficients, _] = sh.dims();
+    GaussianTensors {
+        means,
+        quats,
+        log_scales: scales.log(),
+        opacity_logits: (opacities.clone() / (opacities.neg() + 1.0)).log(),
+        sh_dc: sh.clone().slice(s![.., 0..1, ..]),
+        sh_rest: sh.slice(s![.., 1..coefficients, ..]),
+    }
 }

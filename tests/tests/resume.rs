@@ -3,18 +3,18 @@
 use std::fs;
 use std::time::Duration;
 
-use light4gs_tests::program::{Workspace, assert_success};
+use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_success};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
 #[test]
 fn killed_and_resumed_runs_are_bit_identical() {
     let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("whole", &[]).output().unwrap());
+    assert_success(&w.train("whole", &TINY_COMPRESSION).output().unwrap());
     let expected = fs::read(w.path("whole/scene.l4gs")).unwrap();
 
     // SIGKILL after a growing delay: in the first iterations, between checkpoints, in the fine stage.
-    let mut child = w.train("killed", &[]).spawn().unwrap();
+    let mut child = w.train("killed", &TINY_COMPRESSION).spawn().unwrap();
     let mut kills = 0;
     for attempt in 1..60 {
         let delay = Duration::from_millis(40 * attempt);
@@ -31,7 +31,7 @@ fn killed_and_resumed_runs_are_bit_identical() {
         } else {
             // Killed before there was a run: what a user does then is to start again.
             let _ = fs::remove_dir_all(w.path("killed"));
-            child = w.train("killed", &[]).spawn().unwrap();
+            child = w.train("killed", &TINY_COMPRESSION).spawn().unwrap();
         }
     }
     assert!(child.wait().unwrap().success());
@@ -44,7 +44,7 @@ fn a_seed_repeats_and_threads_do_not_matter() {
     let w = Workspace::new(PROGRAM);
     let mut files = Vec::new();
     for (run, threads) in [("one", "1"), ("two", "2"), ("three", "3")] {
-        assert_success(&w.train(run, &[]).env("RAYON_NUM_THREADS", threads).output().unwrap());
+        assert_success(&w.train(run, &TINY_COMPRESSION).env("RAYON_NUM_THREADS", threads).output().unwrap());
         files.push(fs::read(w.path(run).join("scene.l4gs")).unwrap());
     }
     assert!(files.iter().all(|file| *file == files[0]));

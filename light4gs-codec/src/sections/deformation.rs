@@ -2,9 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use super::{SectionKind, check_length};
+use super::{SectionKind, check_length, weights};
 use crate::{
-    CodecError, HeadFlags, Limits, LinearLayer, NetworkArrays, limits::at_most, reader::Reader, writer::Writer,
+    CodecError, HeadFlags, Limits, LinearLayer, NetworkArrays,
+    limits::at_most,
+    network_weights::{TensorLength, WeightPrecision},
+    reader::Reader,
+    writer::Writer,
 };
 
 const SECTION: &str = SectionKind::Deformation.name();
@@ -49,6 +53,77 @@ impl Head {
         }
         Ok(Self { width, depth, heads, shapes })
     }
+}
+
+/// The head of a network whose weights are quantised: as the plain one, but every integer is a varint.
+impl Head {
+    pub(crate) fn read_coded(reader: &mut Reader<'_>, limits: &Limits) -> Result<Self, CodecError> {
+        let width = reader.varint_at_most("width", limits.layer_width)?;
+        let depth = reader.varint_at_most("depth", limits.layers)?;
+        let heads = flags_from_bits(reader.u8("heads")?)?;
+        let layers = reader.varint_at_most("number of layers", limits.layers)?;
+        let mut shapes = Vec::new();
+        for index in 0..layers {
+            let name = reader.block(&format!("layers[{index}].name"))?;
+            at_most(SECTION, "length of a layer's name", name.len() as u64, limits.string_bytes)?;
+            let name = std::str::from_utf8(name)
+                .map_err(|error| CodecError::invalid(SECTION, format!("layers[{index}].name"), error, "UTF-8"))?;
+            let inputs = reader.varint_at_most(&format!("{name}.inputs"), limits.layer_width)?;
+            let outputs = reader.varint_at_most(&format!("{name}.outputs"), limits.layer_width)?;
+            check_shape(name, inputs, outputs, limits)?;
+            shapes.push(Shape { name: name.to_owned(), inputs, outputs });
+        }
+        Ok(Self { width, depth, heads, shapes })
+    }
+}
+
+/// Writes a network with quantised weights; returns it as a decoder gets it.
+pub(crate) fn write_coded(
+    network: &NetworkArrays,
+    precision: WeightPrecision,
+    writer: &mut Writer,
+) -> Result<NetworkArrays, CodecError> {
+    writer.varint(network.width.into());
+    writer.varint(network.depth.into());
+    writer.u8(bits_from_flags(network.heads));
+    writer.varint(network.layers.len() as u64);
+    for layer in &network.layers {
+        writer.block(layer.name.as_bytes());
+        writer.varint(layer.inputs.into());
+        writer.varint(layer.outputs.into());
+    }
+    let tensors: Vec<weights::Tensor<'_>> = network
+        .layers
+        .iter()
+        .flat_map(|layer| [&layer.weight, &layer.bias].map(|values| (&layer.name[..], &values[..])))
+        .collect();
+    let encoded = weights::encode(SECTION, &tensors, Some(precision))?;
+    writer.bytes.extend(encoded.bytes);
+    let shapes = network.layers.iter().map(|layer| (layer.name.clone(), layer.inputs, layer.outputs));
+    Ok(NetworkArrays { layers: assembled(shapes, encoded.tensors), ..network.clone() })
+}
+
+/// Reads a network with quantised weights.
+pub(crate) fn read_coded(bytes: &[u8], limits: &Limits) -> Result<NetworkArrays, CodecError> {
+    let mut reader = Reader::new(SECTION, bytes);
+    let Head { width, depth, heads, shapes } = Head::read_coded(&mut reader, limits)?;
+    let lengths: Vec<_> = shapes
+        .iter()
+        .flat_map(|shape| {
+            let weights = u64::from(shape.inputs) * u64::from(shape.outputs);
+            [weights, shape.outputs.into()].map(|length| TensorLength { name: &shape.name, length })
+        })
+        .collect();
+    let tensors = weights::decode(SECTION, reader.rest(), true, &lengths, limits)?;
+    let layers = assembled(shapes.into_iter().map(|shape| (shape.name, shape.inputs, shape.outputs)), tensors);
+    Ok(NetworkArrays { width, depth, heads, layers })
+}
+
+/// Layers from a weight and a bias each.
+fn assembled(shapes: impl Iterator<Item = (String, u32, u32)>, tensors: Vec<Vec<f32>>) -> Vec<LinearLayer> {
+    let mut tensors = tensors.into_iter();
+    let mut next = || tensors.next().expect("two tensors a layer");
+    shapes.map(|(name, inputs, outputs)| LinearLayer { name, inputs, outputs, weight: next(), bias: next() }).collect()
 }
 
 fn check_size(width: u32, depth: u32, limits: &Limits) -> Result<(), CodecError> {

@@ -5,7 +5,7 @@ use crate::{CodecError, HexPlaneArrays, Limits, Plane, limits::at_most, reader::
 
 const SECTION: &str = SectionKind::HexPlanes.name();
 /// The axes of the planes of a scale, as indices into x, y, z, t.
-const AXES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+pub(crate) const AXES: [(usize, usize); 6] = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
 const AXIS_NAMES: [char; 4] = ['x', 'y', 'z', 't'];
 const TIME: usize = 3;
 
@@ -16,11 +16,11 @@ pub(crate) struct Head {
     pub(crate) resolution: [u32; 4],
     pub(crate) multipliers: Vec<u32>,
     /// Height and width of each plane.
-    sizes: Vec<[u32; 2]>,
+    pub(super) sizes: Vec<[u32; 2]>,
 }
 
 impl Head {
-    fn of(hexplane: &HexPlaneArrays) -> Self {
+    pub(super) fn of(hexplane: &HexPlaneArrays) -> Self {
         Self {
             channels: hexplane.channels,
             resolution: hexplane.resolution,
@@ -68,7 +68,7 @@ impl Head {
     }
 
     /// Refuses sizes that do not follow from the resolution and the multipliers.
-    fn check(&self, limits: &Limits) -> Result<(), CodecError> {
+    pub(super) fn check(&self, limits: &Limits) -> Result<(), CodecError> {
         at_most(SECTION, "channels", self.channels.into(), limits.channels)?;
         at_most(SECTION, "number of scales", self.multipliers.len() as u64, limits.scales)?;
         for (axis, samples) in self.resolution.into_iter().enumerate() {
@@ -116,7 +116,7 @@ impl Head {
     }
 
     /// Numbers of one plane.
-    fn values(&self, [height, width]: [u32; 2]) -> u64 {
+    pub(super) fn values(&self, [height, width]: [u32; 2]) -> u64 {
         u64::from(self.channels).saturating_mul(u64::from(height)).saturating_mul(u64::from(width))
     }
 }

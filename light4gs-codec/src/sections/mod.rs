@@ -1,11 +1,15 @@
 //! The sections of a stream, one file each. Each has a head, the counts and shapes, and then the numbers.
 
+pub(crate) mod coded_hexplanes;
+pub(crate) mod coded_sh;
+pub(crate) mod context_model;
 pub(crate) mod deformation;
 pub(crate) mod gaussians;
 pub(crate) mod hexplanes;
 pub(crate) mod meta;
 pub(crate) mod scene_frame;
 pub(crate) mod sh;
+pub(crate) mod weights;
 
 use crate::CodecError;
 
@@ -17,11 +21,16 @@ pub(crate) enum SectionKind {
     SceneFrame,
     Deformation,
     HexPlanes,
+    ContextModel,
 }
 
 impl SectionKind {
-    /// Every section, in the order in which they are written.
-    pub(crate) const ALL: [Self; 5] = [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Deformation, Self::HexPlanes];
+    /// The sections that every stream has, in the order in which version 1 writes them.
+    pub(crate) const CORE: [Self; 5] =
+        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Deformation, Self::HexPlanes];
+    /// Every section, in the order of their numbers.
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Deformation, Self::HexPlanes, Self::ContextModel];
 
     /// The number that stands in the table.
     pub(crate) const fn id(self) -> u16 {
@@ -31,6 +40,7 @@ impl SectionKind {
             Self::SceneFrame => 3,
             Self::Deformation => 4,
             Self::HexPlanes => 5,
+            Self::ContextModel => 6,
         }
     }
 
@@ -47,6 +57,7 @@ impl SectionKind {
             Self::SceneFrame => "scene_frame",
             Self::Deformation => "deformation",
             Self::HexPlanes => "hexplanes",
+            Self::ContextModel => "context_model",
         }
     }
 }

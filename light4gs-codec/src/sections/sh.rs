@@ -18,12 +18,17 @@ impl Head {
     pub(crate) fn read(reader: &mut Reader<'_>, limits: &Limits) -> Result<Self, CodecError> {
         let head = Self { count: reader.u32("count")?, degree: reader.u8("degree")? };
         at_most(SECTION, "count", head.count.into(), limits.gaussians)?;
-        check_degree(head.degree)?;
+        head.check()?;
         Ok(head)
     }
 
+    /// Refuses an unknown degree.
+    pub(super) fn check(self) -> Result<(), CodecError> {
+        check_degree(self.degree)
+    }
+
     /// Numbers that follow.
-    fn values(self) -> u64 {
+    pub(super) fn values(self) -> u64 {
         u64::from(self.count) * sh_rest_coefficients(self.degree) as u64 * 3
     }
 }

@@ -2,6 +2,8 @@
 
 #![allow(dead_code, unreachable_pub)] // each test binary uses its part
 
+pub mod compression;
+
 use light4gs_codec::{
     GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
     SceneMeta, sh_rest_coefficients,
@@ -123,4 +125,30 @@ pub fn forge_section(bytes: &mut [u8], index: usize) {
     let crc = crc32c::crc32c(&bytes[start..end]);
     put(bytes, entry + 4, &crc.to_le_bytes());
     forge_header(bytes);
+}
+
+/// The payload of a section of a stream.
+pub fn payload(bytes: &[u8], index: usize) -> &[u8] {
+    let entry = table_at(bytes) + ENTRY * index;
+    let start = u64_at(bytes, entry + 8) as usize;
+    &bytes[start..start + u64_at(bytes, entry + 16) as usize]
+}
+
+/// A stream with another payload in a section; offsets, lengths and checksums fit.
+pub fn with_payload(bytes: &[u8], index: usize, new: &[u8]) -> Vec<u8> {
+    let sections = u32_at(bytes, 12) as usize;
+    let mut forged = bytes[..table_at(bytes) + ENTRY * sections].to_vec();
+    for section in 0..sections {
+        let part = if section == index { new } else { payload(bytes, section) };
+        let entry = table_at(bytes) + ENTRY * section;
+        let start = forged.len() as u64;
+        put(&mut forged, entry + 4, &crc32c::crc32c(part).to_le_bytes());
+        put(&mut forged, entry + 8, &start.to_le_bytes());
+        put(&mut forged, entry + 16, &(part.len() as u64).to_le_bytes());
+        forged.extend(part);
+    }
+    let length = forged.len() as u64;
+    put(&mut forged, 20, &length.to_le_bytes());
+    forge_header(&mut forged);
+    forged
 }

@@ -6,4 +6,5 @@ pub(crate) mod lanes;
 pub(crate) mod project;
 pub(crate) mod rasterize;
 pub(crate) mod rasterize_backward;
+pub(crate) mod significance;
 pub(crate) mod tiles;

@@ -152,14 +152,7 @@ pub(crate) fn splat_backward(
     upstream: &[f32],
 ) -> GaussianGradients {
     let mut sums: Vec<Sums> = vec![[0.0; 10]; lists.gaussians.len()];
-    let mut by_tile = Vec::with_capacity(pixels.len());
-    let mut remaining = sums.as_mut_slice();
-    for tile in 0..pixels.len() {
-        let (own, others) = remaining.split_at_mut(lists.tile_range(tile).len());
-        by_tile.push(own);
-        remaining = others;
-    }
-    by_tile.into_par_iter().enumerate().for_each(|(tile, sums)| {
+    lists.split_by_tile(&mut sums).into_par_iter().enumerate().for_each(|(tile, sums)| {
         dispatch(BackwardTile { lists, view, tile, pixels: &pixels[tile], upstream, sums });
     });
 
@@ -192,16 +185,7 @@ pub(crate) fn splat_backward(
         .for_each(|(chunk, ((((((means, quats), scales), opacities), dc), sh_rest), offsets))| {
             for (k, opacity) in opacities.iter_mut().enumerate() {
                 let i = chunk * CHUNK + k;
-                let intersections = lists.gaussian_range(i);
-                if intersections.is_empty() {
-                    continue;
-                }
-                let mut total: Sums = [0.0; 10];
-                for &place in &lists.tile_order[intersections] {
-                    for (t, s) in total.iter_mut().zip(&sums[place as usize]) {
-                        *t += s;
-                    }
-                }
+                let Some(total) = lists.sum_of(i, &sums) else { continue };
                 let splat = &lists.splats[i];
                 let gradient = splat_gradient(splat.conic, splat.opacity, total);
                 *opacity = gradient.opacity;

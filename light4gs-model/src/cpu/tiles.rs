@@ -113,8 +113,36 @@ impl TileLists {
         self.tile_starts[tile] as usize..self.tile_starts[tile + 1] as usize
     }
 
+    /// Cuts one value an intersection, in the order by tile, into one slice a tile.
+    pub(crate) fn split_by_tile<'a, T>(&self, mut values: &'a mut [T]) -> Vec<&'a mut [T]> {
+        let tiles = self.tile_starts.len() - 1;
+        let mut by_tile = Vec::with_capacity(tiles);
+        for tile in 0..tiles {
+            let (own, others) = values.split_at_mut(self.tile_range(tile).len());
+            by_tile.push(own);
+            values = others;
+        }
+        by_tile
+    }
+
+    /// Sum of a Gaussian's values over its tiles, in a fixed order, from one value an intersection in the order by
+    /// tile; `None` if it is in no tile.
+    pub(crate) fn sum_of<const K: usize>(&self, i: usize, values: &[[f32; K]]) -> Option<[f32; K]> {
+        let intersections = self.gaussian_range(i);
+        if intersections.is_empty() {
+            return None;
+        }
+        let mut total = [0.0; K];
+        for &place in &self.tile_order[intersections] {
+            for (t, v) in total.iter_mut().zip(&values[place as usize]) {
+                *t += v;
+            }
+        }
+        Some(total)
+    }
+
     /// Range of a Gaussian in the order by Gaussian.
-    pub(crate) fn gaussian_range(&self, i: usize) -> std::ops::Range<usize> {
+    fn gaussian_range(&self, i: usize) -> std::ops::Range<usize> {
         self.gaussian_starts[i] as usize..self.gaussian_starts[i + 1] as usize
     }
 }

@@ -9,4 +9,7 @@
 pub mod adam;
 pub mod hexplane_query;
 mod host;
+pub mod lower_bound;
+pub mod normal_cdf;
+pub mod significance;
 pub mod splat;

@@ -37,7 +37,7 @@ pub struct SplatInputs<B: Backend> {
     pub screen_offsets: FloatTensor<B>,
 }
 
-const INPUTS: usize = 7;
+pub(super) const INPUTS: usize = 7;
 
 impl<B: Backend> SplatInputs<B> {
     pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
@@ -142,7 +142,7 @@ pub struct CpuSaved {
     pixels: Arc<Vec<TilePixels>>,
 }
 
-fn slices(inputs: &[HostTensor; INPUTS]) -> GaussianSlices<'_> {
+pub(super) fn slices(inputs: &[HostTensor; INPUTS]) -> GaussianSlices<'_> {
     let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.each_ref().map(|i| i.as_slice());
     GaussianSlices { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
 }

@@ -4,20 +4,22 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
-use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically, write_file};
-use light4gs_data::{DataError, Scene};
+use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically};
+use light4gs_data::{DataError, ImageStore, Scene};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
-use super::train::sections_table;
+use super::train::{coding_table, sections_table};
 use super::{check_output, print_json};
 use crate::checkpoint::Checkpoint;
+use crate::compression::{TrainedScene, plane_name, write_scene};
+use crate::config::Config;
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
 use crate::run_folder::RunFolder;
-use crate::trainer::{load_options, scene_meta};
+use crate::trainer::load_options;
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {
@@ -29,6 +31,10 @@ pub(super) struct Encode {
     /// The file to write.
     #[arg(long)]
     out: PathBuf,
+    /// Changes one key below `compression` for this file; may be given more than once. What concerns the entropy models
+    /// (`context`, `steps`, `sh`) has them fitted anew to the scene as it is.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
     /// Back end: ndarray or flex.
     #[arg(long)]
     device: Option<String>,
@@ -50,8 +56,29 @@ impl Encode {
         let device = device_by_name(self.device.as_deref().unwrap_or(&config.device))?.autodiff();
         let checkpoint = Checkpoint::load(&path, &config, &device)?;
         let data = Scene::open(&record.scene, &load_options(&config))?;
-        write_file(&self.out, &checkpoint.scene.to_arrays(scene_meta(&config, &data)))?;
+        let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
+        if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
+            return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
+        }
+        let (old, new) = (&config.compression, &changed.compression);
+        let same_models = old.context == new.context && old.steps == new.steps && old.sh == new.sh;
+        let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
+        let trained = TrainedScene {
+            scene: &checkpoint.scene,
+            compression: checkpoint.compression.as_ref().filter(|_| same_models),
+            config: &changed,
+            data: &data,
+            images: &images,
+            device: &device,
+        };
+        let (_, record) = write_scene(&trained, &self.out, self.json)?;
         print_info(&read_info(&self.out)?, self.json);
+        if let Some(record) = record.filter(|_| !self.json) {
+            if let Some(seconds) = record.fit_seconds {
+                println!("the entropy models were fitted to the finished scene in {seconds:.1} s");
+            }
+            println!("{}", coding_table(&record));
+        }
         Ok(())
     }
 }
@@ -89,6 +116,10 @@ fn print_info(info: &StreamInfo, json: bool) {
             "hexplane": {"channels": info.hexplane_channels, "resolution": info.hexplane_resolution,
                 "multipliers": info.hexplane_multipliers},
             "deformation": {"width": info.network_width, "depth": info.network_depth, "layers": info.layer_count},
+            "profile": info.profile.map(|profile| profile.name()),
+            "plane_steps": info.plane_steps.iter().map(|s| [s.space_only, s.space_time]).collect::<Vec<_>>(),
+            "plane_bytes": info.plane_bytes.iter().map(|p| json!({"plane": plane_name(p.plane),
+                "hyperprior": p.hyperprior, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
         }));
     }
     println!("{name}: version {}, {width}×{height}, {frame_count} times at {fps} frames a second", info.version);
@@ -101,6 +132,14 @@ fn print_info(info: &StreamInfo, json: bool) {
         info.network_width,
         info.layer_count
     );
+    if let Some(profile) = info.profile {
+        let steps: Vec<String> = info
+            .plane_steps
+            .iter()
+            .map(|s| format!("{:.4} (space), {:.4} (time)", s.space_only, s.space_time))
+            .collect();
+        println!("profile {}; steps of the planes: {}", profile.name(), steps.join("; "));
+    }
     println!("configuration {digest}\n");
     let sizes = section_sizes(info);
     println!("{}", sections_table(sizes.iter().map(|s| (s.name.as_str(), s.bytes)), info.bytes));

@@ -1,5 +1,6 @@
 //! The command line: one file a command.
 
+mod ablate;
 mod bench;
 mod container;
 mod export;
@@ -59,6 +60,9 @@ enum Command {
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
     Synth(synth::Synth),
+    /// Train a scene several times, each with another part switched off, and print the paper's tables.
+    #[command(after_help = "Example:\n  light4gs ablate data/dnerf/flag --table context --out runs/flag-context")]
+    Ablate(ablate::Ablate),
     /// Time every stage of training on one or more devices.
     #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
@@ -78,6 +82,7 @@ impl Cli {
             Command::Info(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Synth(command) => command.run(),
+            Command::Ablate(command) => command.run(),
             Command::Bench(command) => command.run(),
         }
     }

@@ -6,6 +6,7 @@ use clap::Args;
 use light4gs_data::{ImageStore, Scene};
 
 use super::print_json;
+use crate::compression::CodingRecord;
 use crate::config::Config;
 use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
@@ -18,12 +19,12 @@ use crate::trainer::{Trainer, load_options};
 /// What a run prints.
 #[derive(Debug, Args)]
 pub(super) struct RunOutput {
-    /// Print the evaluation as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
     /// No progress bars.
     #[arg(long)]
-    quiet: bool,
+    pub(super) quiet: bool,
 }
 
 #[derive(Debug, Args)]
@@ -73,6 +74,36 @@ pub(super) fn train(
     let (folder, record, config) = RunFolder::open(folder.root())?;
     let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
     finish(trainer, &folder, &config, output.json)
+}
+
+/// Trains into a folder, or goes on with the run that is there already, and measures the file.
+///
+/// # Errors
+/// [`TrainError::Input`] if the folder holds a run of another configuration or another scene.
+pub(super) fn train_to_evaluation(
+    config: Config,
+    scene: &Path,
+    out: &Path,
+    quiet: bool,
+) -> Result<Evaluation, TrainError> {
+    device_by_name(&config.device)?;
+    let fresh = !out.join("run.json").exists();
+    if fresh {
+        Scene::open(scene, &load_options(&config))?;
+        RunFolder::create(out, scene, &config, false)?;
+    }
+    let (folder, record, found) = RunFolder::open(out)?;
+    if found != config || record.scene != std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned()) {
+        let out = out.display();
+        return Err(TrainError::Input(format!(
+            "{out} holds a run of another configuration or scene; name another folder, or remove that one"
+        )));
+    }
+    if !folder.stream().exists() {
+        Trainer::resume(config.clone(), folder.clone(), &record, quiet)?.run()?;
+    }
+    let scene = Scene::open(&record.scene, &load_options(&config))?;
+    evaluate_run(&folder, &config, &scene)
 }
 
 fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool) -> Result<(), TrainError> {
@@ -170,6 +201,9 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) {
     }
     println!("{quality}");
     println!("{}", sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes));
+    if let Some(coding) = &evaluation.coding {
+        println!("{}", coding_table(coding));
+    }
     let [width, height] = evaluation.resolution;
     println!(
         "{} Gaussians, {:.1} FPS at {width}×{height} on {}",
@@ -180,12 +214,33 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) {
     }
 }
 
+/// Expected and real bits of what is entropy coded with trained models.
+pub(super) fn coding_table(record: &CodingRecord) -> Table {
+    let mut table = Table::new([
+        ("entropy coded", Align::Left),
+        ("bits expected", Align::Right),
+        ("bits in the file", Align::Right),
+        ("difference", Align::Right),
+    ]);
+    let (expected, coded) = (record.estimated_bits, record.coded_bits);
+    for (part, expected, coded) in
+        [("hexplanes", expected.hexplanes, coded.hexplanes), ("spherical harmonics", expected.sh, coded.sh)]
+    {
+        let difference = if coded > 0.0 { (expected - coded) / coded * 100.0 } else { 0.0 };
+        table.row([part.to_owned(), format!("{expected:.0}"), format!("{coded:.0}"), format!("{difference:+.2} %")]);
+    }
+    table
+}
+
 /// Bytes and shares of a file's parts.
 pub(super) fn sections_table<'a>(sections: impl Iterator<Item = (&'a str, u64)>, total: u64) -> Table {
-    let mut table = Table::new([("section", Align::Left), ("bytes", Align::Right), ("share", Align::Right)]);
+    const BAR: f64 = 40.0;
+    let columns = [("section", Align::Left), ("bytes", Align::Right), ("share", Align::Right), ("", Align::Left)];
+    let mut table = Table::new(columns);
     let share = |bytes: u64| format!("{:.1} %", 100.0 * bytes as f64 / total as f64);
     for (name, bytes) in sections {
-        table.row([name.to_owned(), bytes.to_string(), share(bytes)]);
+        let bar = "█".repeat((BAR * bytes as f64 / total as f64).round() as usize);
+        table.row([name.to_owned(), bytes.to_string(), share(bytes), bar]);
     }
     table.rule().row(["file".to_owned(), total.to_string(), share(total)]);
     table

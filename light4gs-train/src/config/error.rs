@@ -102,6 +102,12 @@ pub enum ConfigError {
         /// The circle, its first member repeated at the end.
         chain: Vec<Origin>,
     },
+    /// A layer laid on top by `+` that would replace everything below it.
+    #[error("{origin} extends another one, so it cannot be laid on top of one by `+`; name it first, or alone")]
+    LayerExtends {
+        /// The layer.
+        origin: Origin,
+    },
     /// An override that is not `key=value`.
     #[error("override `{text}`: {message}")]
     Override {

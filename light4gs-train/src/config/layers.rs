@@ -10,11 +10,19 @@ use super::{Config, ConfigError, Origin, overrides, presets, schema};
 /// The key by which a layer names the one below it.
 const EXTENDS: &str = "extends";
 
-/// Reads the layer at `top` and all below it, lays the overrides on top, and validates.
-pub(super) fn resolve(top: &Origin, override_texts: &[String]) -> Result<Config, ConfigError> {
+/// Reads the layer at `top` and all below it, lays `above` and then the overrides on top, and validates.
+pub(super) fn resolve(top: &Origin, above: &[Origin], override_texts: &[String]) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
     collect(top, None, &mut Vec::new(), &mut layers)?;
     layers.reverse();
+    for origin in above {
+        let (_, text) = read(origin, None)?;
+        let (layer, extends) = parse(&text, origin)?;
+        if extends.is_some() {
+            return Err(ConfigError::LayerExtends { origin: origin.clone() });
+        }
+        layers.push((origin.clone(), layer));
+    }
     for text in override_texts {
         layers.push(overrides::parse(text)?);
     }
@@ -22,7 +30,7 @@ pub(super) fn resolve(top: &Origin, override_texts: &[String]) -> Result<Config,
 }
 
 /// The same for text, whose `extends` may name a preset or a path relative to the working folder.
-pub(super) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigError> {
+pub(super) fn resolve_text(text: &str, origin: &str, override_texts: &[String]) -> Result<Config, ConfigError> {
     let origin = Origin::Text(origin.to_owned());
     let (layer, extends) = parse(text, &origin)?;
     let mut layers = vec![(origin.clone(), layer)];
@@ -30,6 +38,9 @@ pub(super) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigErr
         collect(&named(&below, None), Some(&origin), &mut Vec::new(), &mut layers)?;
     }
     layers.reverse();
+    for text in override_texts {
+        layers.push(overrides::parse(text)?);
+    }
     build(layers)
 }
 

@@ -12,6 +12,7 @@
 //! fine_iterations = 2000
 //! ```
 
+mod compression;
 mod data;
 mod error;
 mod eval;
@@ -20,6 +21,7 @@ mod model;
 mod optional;
 mod overrides;
 mod presets;
+mod prune;
 mod schema;
 mod train;
 mod validate;
@@ -32,11 +34,15 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+pub use compression::{
+    AttributesConfig, CompressionConfig, ContextConfig, RateConfig, ShConfig, StepsConfig, WeightsConfig,
+};
 pub use data::DataConfig;
 pub use error::{ConfigError, Origin, Problem};
 pub use eval::EvalConfig;
 pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use presets::preset_names;
+pub use prune::PruneConfig;
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 
 /// The back ends that `device` may name; `wgpu` may be followed by an adapter, as in `wgpu:0` or `wgpu:cpu`.
@@ -56,6 +62,8 @@ pub struct Config {
     pub model: ModelConfig,
     /// How it is trained.
     pub train: TrainConfig,
+    /// How small it becomes.
+    pub compression: CompressionConfig,
     /// How it is measured.
     pub eval: EvalConfig,
 }
@@ -68,6 +76,7 @@ impl Default for Config {
             data: DataConfig::default(),
             model: ModelConfig::default(),
             train: TrainConfig::default(),
+            compression: CompressionConfig::default(),
             eval: EvalConfig::default(),
         }
     }
@@ -76,25 +85,33 @@ impl Default for Config {
 impl Config {
     /// Reads a TOML file, with everything that it extends, and validates the result.
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self, ConfigError> {
-        layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[])
+        layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[], &[])
     }
 
     /// The built-in preset called `name` (see [`preset_names`]), validated.
     pub fn from_preset(name: &str) -> Result<Self, ConfigError> {
-        layers::resolve(&Origin::Preset(name.to_owned()), &[])
+        layers::resolve(&Origin::Preset(name.to_owned()), &[], &[])
     }
 
     /// What a command line gives: a preset's name or a file's path, and overrides such as
     /// `train.fine_iterations=200`, each one a line of TOML (a bare word is taken as a string).
     ///
-    /// A name without a folder and without `.toml` is a preset, unless only a file has that name.
+    /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
+    /// may follow, each after a `+`, as in `dnerf-lego-small+medium`: they are laid on top in that order.
     pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
-        layers::resolve(&layers::named(name_or_path, None), overrides)
+        let mut names = name_or_path.split('+').map(|name| layers::named(name, None));
+        let first = names.next().expect("splitting gives at least one part");
+        layers::resolve(&first, &names.collect::<Vec<_>>(), overrides)
     }
 
     /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        layers::resolve_text(text, origin)
+        layers::resolve_text(text, origin, &[])
+    }
+
+    /// Reads a configuration from text and lays overrides on top, as [`Config::load`] does. `origin` names the text.
+    pub fn load_text_with(text: &str, origin: &str, overrides: &[String]) -> Result<Self, ConfigError> {
+        layers::resolve_text(text, origin, overrides)
     }
 
     /// The whole configuration, every key written out. Reading it back gives an equal configuration.

@@ -9,6 +9,19 @@ macro_rules! presets {
 }
 
 presets![
+    "ablation-fixed-steps",
+    "ablation-float32",
+    "ablation-high-scale-hyperprior",
+    "ablation-no-checkerboard",
+    "ablation-no-context",
+    "ablation-no-hyperprior",
+    "ablation-no-inter-plane",
+    "ablation-no-inter-scale",
+    "ablation-no-pruning",
+    "ablation-no-rate",
+    "ablation-sh-autoregressive",
+    "ablation-sh-hexplane",
+    "ablation-sh-mixture",
     "base",
     "dnerf",
     "dnerf-bouncing",
@@ -20,7 +33,11 @@ presets![
     "dnerf-lego",
     "dnerf-lego-small",
     "dnerf-small",
+    "high",
+    "medium",
+    "paper-profile",
     "quickstart",
+    "small",
 ];
 
 /// The names of the built-in presets, sorted.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::optional;
+use super::{PruneConfig, optional};
 
 /// Stages, loss and bookkeeping of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -16,6 +16,9 @@ pub struct TrainConfig {
     pub batch_size: usize,
     /// Weight of D-SSIM in the loss; L1 has the rest.
     pub lambda_dssim: f32,
+    /// The loss is the squared difference until this iteration of the fine stage, and in the coarse stage if it is not 0.
+    /// L1 is content with the median, which for an object that passes quickly is the background behind it.
+    pub l2_until: usize,
     /// The active degree of the spherical harmonics grows by one every so many iterations.
     pub sh_degree_interval: usize,
     /// A checkpoint is written every so many iterations.
@@ -28,6 +31,8 @@ pub struct TrainConfig {
     pub learning_rate: LearningRates,
     /// Cloning, splitting, pruning and opacity reset.
     pub densify: DensifyConfig,
+    /// Dropping the least significant Gaussians.
+    pub prune: PruneConfig,
     /// Weights of the space-time regularisers, used in the fine stage.
     pub regularizer: RegularizerConfig,
 }
@@ -58,6 +63,9 @@ pub struct LearningRates {
     pub scale: f64,
     /// Quaternions.
     pub rotation: f64,
+    /// What the rates of colours, opacities, scales and rotations have decayed to at the end of the schedule, as a
+    /// share of those above; 1 keeps them constant.
+    pub attributes_final_share: f64,
     /// Length of the decay in iterations; `None` (0 in TOML) takes the stage's length.
     #[serde(with = "optional")]
     pub schedule_steps: Option<usize>,
@@ -120,12 +128,14 @@ impl Default for TrainConfig {
             fine_iterations: 30_000,
             batch_size: 1,
             lambda_dssim: 0.0,
+            l2_until: 0,
             sh_degree_interval: 1000,
             checkpoint_interval: 1000,
             log_interval: 10,
             keep_checkpoints: 2,
             learning_rate: LearningRates::default(),
             densify: DensifyConfig::default(),
+            prune: PruneConfig::default(),
             regularizer: RegularizerConfig::default(),
         }
     }
@@ -145,6 +155,7 @@ impl Default for LearningRates {
             opacity: 0.05,
             scale: 0.005,
             rotation: 0.001,
+            attributes_final_share: 1.0,
             schedule_steps: None,
             scale_by_extent: true,
         }

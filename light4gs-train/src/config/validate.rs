@@ -1,8 +1,10 @@
 //! Ranges: what the types alone let through.
 
+use super::compression::{ARCHITECTURES, PROFILES, SH_MODELS, WEIGHTINGS};
+use super::prune::{SCORES, VOLUMES};
 use super::{
-    Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates, ModelConfig,
-    Problem, RegularizerConfig, TrainConfig,
+    CompressionConfig, Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig,
+    LearningRates, ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
 };
 use crate::device::is_device_name;
 
@@ -27,6 +29,7 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     data(&mut check, &config.data);
     model(&mut check, &config.model);
     train(&mut check, &config.train);
+    compression(&mut check, &config.compression);
     eval(&mut check, &config.eval);
     if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
 }
@@ -98,12 +101,14 @@ fn train(check: &mut Check, train: &TrainConfig) {
     });
     check.range("train.batch_size", train.batch_size, 1, 1024);
     check.share("train.lambda_dssim", train.lambda_dssim);
+    check.toml_integer("train.l2_until", train.l2_until);
     check.range("train.sh_degree_interval", train.sh_degree_interval, 1, MOST);
     check.range("train.checkpoint_interval", train.checkpoint_interval, 1, MOST);
     check.range("train.log_interval", train.log_interval, 1, MOST);
     check.range("train.keep_checkpoints", train.keep_checkpoints, 1, MOST);
     learning_rates(check, &train.learning_rate);
     densify(check, &train.densify);
+    prune(check, &train.prune, train);
     regularizer(check, &train.regularizer);
 }
 
@@ -120,6 +125,7 @@ fn learning_rates(check: &mut Check, rates: &LearningRates) {
         ("opacity", rates.opacity),
         ("scale", rates.scale),
         ("rotation", rates.rotation),
+        ("attributes_final_share", rates.attributes_final_share),
     ] {
         check.positive(&format!("train.learning_rate.{name}"), rate);
     }
@@ -161,6 +167,25 @@ fn densify(check: &mut Check, densify: &DensifyConfig) {
     }
 }
 
+fn prune(check: &mut Check, prune: &PruneConfig, train: &TrainConfig) {
+    check.that("train.prune.fraction", (0.0..1.0).contains(&prune.fraction), || {
+        format!("is {}; it must be at least 0 and below 1", prune.fraction)
+    });
+    if prune.fraction > 0.0 {
+        for &iteration in &prune.iterations {
+            check.that("train.prune.iterations", (1..=train.fine_iterations).contains(&iteration), || {
+                format!("has {iteration}, but the fine stage has iterations 1 to {}", train.fine_iterations)
+            });
+            check.that("train.prune.iterations", iteration > train.densify.until, || {
+                format!("has {iteration}; pruning follows densification, which ends at {}", train.densify.until)
+            });
+        }
+    }
+    check.one_of("train.prune.score", &prune.score, SCORES);
+    check.one_of("train.prune.volume", &prune.volume, VOLUMES);
+    check.positive("train.prune.volume_exponent", prune.volume_exponent);
+}
+
 fn regularizer(check: &mut Check, weights: &RegularizerConfig) {
     for (name, weight) in
         [("plane_tv", weights.plane_tv), ("time_smoothness", weights.time_smoothness), ("time_l1", weights.time_l1)]
@@ -169,6 +194,52 @@ fn regularizer(check: &mut Check, weights: &RegularizerConfig) {
             format!("is {weight}; it must be finite and at least 0")
         });
     }
+}
+
+fn compression(check: &mut Check, compression: &CompressionConfig) {
+    let CompressionConfig { profile, rate, context, steps, sh, attributes, weights } = compression;
+    check.one_of("compression.profile", profile, PROFILES);
+    check.that("compression.rate.lambda", rate.lambda.is_finite() && rate.lambda >= 0.0, || {
+        format!("is {}; it must be finite and at least 0", rate.lambda)
+    });
+    check.one_of("compression.rate.weighting", &rate.weighting, WEIGHTINGS);
+    check.range("compression.rate.interval", rate.interval, 1, 1000);
+    check.that("compression.rate.fraction", rate.fraction > 0.0 && rate.fraction <= 1.0, || {
+        format!("is {}; it must be above 0 and at most 1", rate.fraction)
+    });
+    check.toml_integer("compression.rate.from", rate.from);
+    check.one_of("compression.context.architecture", &context.architecture, ARCHITECTURES);
+    check.that(
+        "compression.context.high_scale_hyperprior",
+        !context.high_scale_hyperprior || (context.hyperprior && context.inter_scale),
+        || "needs `compression.context.hyperprior` and `compression.context.inter_scale`".to_owned(),
+    );
+    check.range("compression.context.fit_iterations", context.fit_iterations, 1, 1_000_000);
+    check.toml_integer("compression.steps.adaptive_from", steps.adaptive_from);
+    check.one_of("compression.sh.model", &sh.model, SH_MODELS);
+    for (name, value) in [
+        ("context.learning_rate_init", context.learning_rate_init),
+        ("context.learning_rate_final", context.learning_rate_final),
+        ("steps.space_only", steps.space_only),
+        ("steps.space_time", steps.space_time),
+        ("steps.learning_rate", steps.learning_rate),
+        ("sh.step", sh.step),
+        ("sh.learning_rate_init", sh.learning_rate_init),
+        ("sh.learning_rate_final", sh.learning_rate_final),
+        ("attributes.position", attributes.position.into()),
+        ("attributes.log_scale", attributes.log_scale.into()),
+        ("attributes.quaternion", attributes.quaternion.into()),
+        ("attributes.opacity_logit", attributes.opacity_logit.into()),
+        ("attributes.sh_dc", attributes.sh_dc.into()),
+    ] {
+        check.positive(&format!("compression.{name}"), value);
+    }
+    let tolerance = attributes.search_tolerance;
+    check.that("compression.attributes.search_tolerance", tolerance.is_finite() && tolerance >= 0.0, || {
+        format!("is {tolerance}; it must be finite and at least 0 dB")
+    });
+    check.range("compression.weights.deformation_bits", weights.deformation_bits as usize, 4, 16);
+    check.range("compression.weights.context_bits", weights.context_bits as usize, 4, 16);
 }
 
 fn eval(check: &mut Check, eval: &EvalConfig) {

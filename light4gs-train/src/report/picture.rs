@@ -84,7 +84,8 @@ fn error_map(truth: &RgbImage8, render: &RgbImage8) -> Result<RgbImage8, String>
     Ok(RgbImage8 { width, height, pixels })
 }
 
-fn data_uri(picture: &RgbImage8) -> image::ImageResult<String> {
+/// The picture as a PNG inside the page.
+pub(super) fn data_uri(picture: &RgbImage8) -> image::ImageResult<String> {
     let mut png = Vec::new();
     PngEncoder::new(&mut png).write_image(&picture.pixels, picture.width, picture.height, ExtendedColorType::Rgb8)?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(png)))

@@ -1,4 +1,5 @@
 use super::*;
+use crate::compression::{BitEstimate, PlaneRecord};
 use crate::metrics_log::Stage;
 
 fn picture(width: u32, height: u32, shift: u8) -> RgbImage8 {
@@ -32,6 +33,7 @@ fn sample() -> Report {
             SectionBytes { name: "gaussians".into(), bytes: 123_456 },
             SectionBytes { name: "planes".into(), bytes: 1_234_567 },
         ],
+        coding: Some(CodingReport { record: coding_record(), bit_maps: vec![bit_map()] }),
         splits: vec![SplitQuality {
             name: "test".into(),
             psnr: 31.0,
@@ -49,6 +51,29 @@ fn sample() -> Report {
         metrics,
         config_toml: "seed = 0 # <&>\n".into(),
     }
+}
+
+fn bit_map() -> BitMap {
+    BitMap { name: "0.xy".into(), width: 8, height: 4, bits: (0..32).map(|k| k as f32 / 10.0).collect() }
+}
+
+fn coding_record() -> CodingRecord {
+    let plane = PlaneRecord { name: "0.xy".into(), step: 0.05, symbols: 512, hyperprior_bytes: 3, value_bytes: 64 };
+    CodingRecord {
+        profile: "compact".into(),
+        fit_seconds: None,
+        encode_seconds: 0.5,
+        estimated_bits: BitEstimate { hexplanes: 530.0, sh: 1010.0 },
+        coded_bits: BitEstimate { hexplanes: 536.0, sh: 1000.0 },
+        planes: vec![plane],
+    }
+}
+
+#[test]
+fn expected_bits_stand_beside_real_ones() {
+    let html = page(Path::new("report.html"), &sample()).unwrap();
+    assert!(html.contains("530") && html.contains("536") && html.contains("-1.12"), "bits of the hexplanes");
+    assert!(html.contains("Bits of plane 0.xy"), "the bit map");
 }
 
 /// Every tag that is opened is closed, in order.

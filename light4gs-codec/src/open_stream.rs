@@ -1,0 +1,165 @@
+//! A stream whose sections are decoded one at a time.
+
+use crate::{
+    CodecError, Encoding, GaussianArrays, HexPlaneArrays, Limits, NetworkArrays, SceneData, SceneFrameArrays,
+    SceneMeta, attributes,
+    container::Container,
+    harmonics::Conditions,
+    parallel,
+    sections::{
+        SectionKind, coded_hexplanes, coded_sh, context_model, deformation, gaussians, hexplanes, scene_frame, sh,
+    },
+    stream::check,
+};
+
+/// A stream whose header is sound and whose sections are decoded when they are asked for.
+///
+/// For programs that need a part of a scene, or want to know how long each part takes; [`crate::decode`] decodes all of
+/// it.
+///
+/// ```
+/// use light4gs_codec::{OpenStream, SceneData, encode};
+/// let bytes = encode(&SceneData::default())?;
+/// let stream = OpenStream::new(&bytes)?;
+/// assert!(stream.gaussians()?.is_empty());
+/// # Ok::<(), light4gs_codec::CodecError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct OpenStream<'a> {
+    container: Container<'a>,
+    limits: Limits,
+}
+
+impl<'a> OpenStream<'a> {
+    /// Reads the header.
+    ///
+    /// # Errors
+    /// A header that is damaged, or that of a newer version.
+    pub fn new(bytes: &'a [u8]) -> Result<Self, CodecError> {
+        Self::with_limits(bytes, &Limits::default())
+    }
+
+    /// As [`OpenStream::new`], within limits of the caller's.
+    ///
+    /// # Errors
+    /// As [`OpenStream::new`].
+    pub fn with_limits(bytes: &'a [u8], limits: &Limits) -> Result<Self, CodecError> {
+        Ok(Self { container: Container::read(bytes, limits)?, limits: limits.for_stream(bytes.len()) })
+    }
+
+    /// The scene meta.
+    pub fn meta(&self) -> &SceneMeta {
+        &self.container.meta
+    }
+
+    /// The Gaussians but for `sh_degree` and `sh_rest`.
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn gaussians(&self) -> Result<GaussianArrays, CodecError> {
+        match self.container.section(SectionKind::Gaussians)? {
+            (Encoding::Quantised, payload) => attributes::decode(payload, &self.limits),
+            (_, payload) => gaussians::read(payload, &self.limits),
+        }
+    }
+
+    /// The frame.
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn frame(&self) -> Result<SceneFrameArrays, CodecError> {
+        scene_frame::read(self.container.section(SectionKind::SceneFrame)?.1)
+    }
+
+    /// The deformation network.
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn deformation(&self) -> Result<NetworkArrays, CodecError> {
+        match self.container.section(SectionKind::Deformation)? {
+            (Encoding::Quantised, payload) => deformation::read_coded(payload, &self.limits),
+            (_, payload) => deformation::read(payload, &self.limits),
+        }
+    }
+
+    /// The planes.
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn hexplanes(&self) -> Result<HexPlaneArrays, CodecError> {
+        let (encoding, payload) = self.container.section(SectionKind::HexPlanes)?;
+        if encoding == Encoding::Float32 {
+            return hexplanes::read(payload, &self.limits);
+        }
+        let (encoding, model) = self.container.section(SectionKind::ContextModel)?;
+        let model = context_model::read(model, encoding == Encoding::Quantised, &self.limits)?;
+        coded_hexplanes::read(payload, &model, &self.limits)
+    }
+
+    /// Whether [`OpenStream::sh`] looks at the planes it is given.
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn sh_needs_hexplanes(&self) -> Result<bool, CodecError> {
+        Ok(self.container.section(SectionKind::Sh)?.0 == Encoding::HexplaneCoupled)
+    }
+
+    /// `gaussians`, which come from this stream, with their `sh_degree` and `sh_rest`. The planes may be empty unless
+    /// [`OpenStream::sh_needs_hexplanes`].
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn sh(
+        &self,
+        gaussians: GaussianArrays,
+        frame: &SceneFrameArrays,
+        hexplane: &HexPlaneArrays,
+    ) -> Result<GaussianArrays, CodecError> {
+        let (encoding, payload) = self.container.section(SectionKind::Sh)?;
+        let conditions = Conditions { gaussians: &gaussians, frame, hexplane };
+        let (head, sh_rest) = match encoding {
+            Encoding::Float32 => sh::read(payload, &self.limits)?,
+            _ => coded_sh::read(payload, encoding, conditions, &self.limits)?,
+        };
+        if head.count as usize != gaussians.len() {
+            let expected = format!("{}, the number of Gaussians", gaussians.len());
+            return Err(CodecError::invalid(SectionKind::Sh.name(), "count", head.count, expected));
+        }
+        Ok(GaussianArrays { sh_degree: head.degree, sh_rest, ..gaussians })
+    }
+
+    /// Everything. Sections that do not depend on each other are decoded at the same time where there are threads.
+    ///
+    /// # Errors
+    /// As [`crate::decode`].
+    pub fn scene(&self) -> Result<SceneData, CodecError> {
+        self.check_sections()?;
+        let frame = self.frame()?;
+        let coupled = self.sh_needs_hexplanes()?;
+        let (gaussians, hexplane) = parallel::join(
+            || {
+                let gaussians = self.gaussians()?;
+                if coupled { Ok(gaussians) } else { self.sh(gaussians, &frame, &HexPlaneArrays::default()) }
+            },
+            || self.hexplanes(),
+        );
+        let (mut gaussians, hexplane) = (gaussians?, hexplane?);
+        if coupled {
+            gaussians = self.sh(gaussians, &frame, &hexplane)?;
+        }
+        let deformation = self.deformation()?;
+        let scene = SceneData { meta: self.container.meta.clone(), gaussians, frame, hexplane, deformation };
+        check(&scene, &self.limits)?;
+        Ok(scene)
+    }
+
+    /// Refuses a context model without coded planes, and the other way round.
+    fn check_sections(&self) -> Result<(), CodecError> {
+        let coded = self.container.section(SectionKind::HexPlanes)?.0 == Encoding::ContextCoded;
+        if self.container.has(SectionKind::ContextModel) && !coded {
+            let section = SectionKind::ContextModel.name();
+            return Err(CodecError::invalid(section, "section", "there", "none, since no plane is coded with it"));
+        }
+        Ok(())
+    }
+}

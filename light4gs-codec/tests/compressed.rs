@@ -1,0 +1,320 @@
+//! Compressed scenes: what comes back is what the encoder said, for every shape and every part.
+
+mod common;
+
+use common::compression::{
+    ALL_PARTS, compact_shape, input, model, plane_coding, reference_shape, scene, sh_networks, sh_tables, step,
+};
+use light4gs_codec::{
+    CodecError, CompressionInput, ContextParts, Encoded, Encoding, OpenStream, PerGroup, PlaneDistributions, Profile,
+    SceneData, ShCoding, ShCondition, decode, encode_compressed, encode_planes, info, plane_distributions,
+};
+use proptest::prelude::*;
+
+/// Encodes, and checks what the encoder promises.
+fn round_trip(scene: &SceneData, input: &CompressionInput) -> Encoded {
+    let encoded = encode_compressed(scene, input).unwrap();
+    assert_eq!(decode(&encoded.bytes).unwrap(), encoded.decoded);
+    let sections: u64 = encoded.report.sections.iter().map(|section| section.2).sum();
+    assert_eq!(encoded.report.header_bytes + sections, encoded.bytes.len() as u64);
+    let info = info(&encoded.bytes).unwrap();
+    assert_eq!((info.version, info.profile), (2, Some(input.profile)));
+    assert_eq!(info.plane_bytes, encoded.report.planes);
+    assert_eq!(info.gaussian_count as usize, scene.gaussians.len());
+    assert_eq!(info.plane_count, scene.hexplane.planes.len());
+    encoded
+}
+
+fn largest_error(given: &[f32], decoded: &[f32]) -> f32 {
+    assert_eq!(given.len(), decoded.len());
+    given.iter().zip(decoded).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max)
+}
+
+#[test]
+fn errors_are_at_most_half_a_step() {
+    let scene = scene(50, 3, 4, [8, 8, 12, 4], &[1, 2]);
+    for profile in [Profile::Compact, Profile::Paper] {
+        for shape in [compact_shape(4, ALL_PARTS), reference_shape(4, ALL_PARTS)] {
+            let encoded = round_trip(&scene, &input(&scene, profile, shape));
+            for (given, decoded) in scene.hexplane.planes.iter().zip(&encoded.decoded.hexplane.planes) {
+                assert!(largest_error(&given.values, &decoded.values) <= 0.0501);
+            }
+            if profile == Profile::Paper {
+                assert!(largest_error(&scene.gaussians.sh_rest, &encoded.decoded.gaussians.sh_rest) <= 0.01001);
+                assert_eq!(encoded.decoded.gaussians.means, scene.gaussians.means);
+                assert_eq!(encoded.decoded.deformation, scene.deformation);
+            }
+        }
+    }
+}
+
+#[test]
+fn every_combination_of_parts() {
+    let scene = scene(3, 1, 4, [8, 4, 4, 4], &[1, 2]);
+    for bits in 0..32 {
+        let [hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior] =
+            [0, 1, 2, 3, 4].map(|bit| bits >> bit & 1 == 1);
+        let parts = ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior };
+        let shape = compact_shape(4, parts);
+        if high_scale_hyperprior && !(hyperprior && inter_scale) {
+            let input = CompressionInput {
+                profile: Profile::Paper,
+                planes: Some(plane_coding(&scene.hexplane, model(shape, 1), step(0.1))),
+                ..input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS))
+            };
+            assert!(encode_compressed(&scene, &input).unwrap_err().to_string().contains("high_scale_hyperprior"));
+            continue;
+        }
+        let encoded = round_trip(&scene, &input(&scene, Profile::Paper, shape));
+        for bytes in &encoded.report.planes {
+            let low = bytes.plane < 6 || !inter_scale;
+            let space_time = [2, 4, 5].contains(&(bytes.plane % 6));
+            assert_eq!(bytes.anchors > 0, checkerboard && low, "{parts:?} {bytes:?}");
+            let hyper = if low { hyperprior && (space_time || !inter_plane) } else { high_scale_hyperprior };
+            assert!(bytes.hyperprior == 0 || hyper, "{parts:?} {bytes:?}");
+        }
+    }
+}
+
+#[test]
+fn empty_sets_and_other_numbers_of_scales() {
+    for (count, degree) in [(0, 0), (0, 3), (5, 0)] {
+        let scene = scene(count, degree, 2, [4, 4, 4, 4], &[1]);
+        round_trip(&scene, &input(&scene, Profile::Compact, compact_shape(2, ALL_PARTS)));
+        round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(2, ALL_PARTS)));
+    }
+    for multipliers in [&[][..], &[1], &[2], &[1, 2, 4], &[1, 3, 2]] {
+        let mut scene = scene(2, 2, 4, [4, 8, 4, 4], multipliers);
+        if multipliers.is_empty() {
+            scene.deformation = Default::default();
+        }
+        round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS)));
+        let plain = CompressionInput {
+            profile: Profile::Compact,
+            planes: None,
+            ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS))
+        };
+        assert_eq!(round_trip(&scene, &plain).decoded.hexplane, scene.hexplane);
+    }
+    let empty = SceneData::default();
+    let plain = CompressionInput {
+        planes: None,
+        ..common::compression::input(&empty, Profile::Compact, compact_shape(4, ALL_PARTS))
+    };
+    round_trip(&empty, &plain);
+}
+
+#[test]
+fn time_may_be_multiplied() {
+    let mut scene = scene(2, 0, 4, [4, 8, 4, 4], &[1, 2]);
+    let multiplied = common::hexplane(4, [8, 16, 8, 8], &[1]);
+    scene.hexplane.planes.splice(6.., multiplied.planes);
+    round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS)));
+    scene.hexplane.planes[8] = common::hexplane(4, [8, 16, 8, 4], &[1]).planes.swap_remove(2);
+    let error = encode_compressed(&scene, &input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS))).unwrap_err();
+    assert!(error.to_string().contains("time axis"), "{error}");
+}
+
+#[test]
+fn steps_of_each_scale_and_group() {
+    let scene = scene(2, 0, 4, [8, 8, 8, 4], &[1, 2]);
+    let steps = [(0.2, 0.01), (0.05, 0.4)].map(|(space_only, space_time)| PerGroup { space_only, space_time }).to_vec();
+    let input = CompressionInput {
+        profile: Profile::Paper,
+        planes: Some(plane_coding(&scene.hexplane, model(compact_shape(4, ALL_PARTS), 9), steps.clone())),
+        ..input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS))
+    };
+    let encoded = round_trip(&scene, &input);
+    for (index, plane) in scene.hexplane.planes.iter().enumerate() {
+        let PerGroup { space_only, space_time } = steps[index / 6];
+        let step = if [2, 4, 5].contains(&(index % 6)) { space_time } else { space_only };
+        let error = largest_error(&plane.values, &encoded.decoded.hexplane.planes[index].values);
+        assert!(error <= 0.501 * step && error > 0.4 * step, "plane {index}: {error}");
+    }
+}
+
+#[test]
+fn harmonics_under_networks() {
+    for degree in 0..=3 {
+        let scene = scene(21, degree, 4, [4, 4, 4, 4], &[1, 2]);
+        for kind in [ShCondition::Autoregressive, ShCondition::HexplaneCoupled] {
+            for profile in [Profile::Compact, Profile::Paper] {
+                let sh = sh_networks(kind, degree, 8);
+                let input = CompressionInput { sh, ..input(&scene, profile, compact_shape(4, ALL_PARTS)) };
+                let encoded = round_trip(&scene, &input);
+                if profile == Profile::Paper {
+                    let decoded = &encoded.decoded.gaussians.sh_rest;
+                    assert!(largest_error(&scene.gaussians.sh_rest, decoded) <= 0.01001);
+                }
+                let expected = match kind {
+                    ShCondition::Autoregressive => Encoding::Autoregressive,
+                    ShCondition::HexplaneCoupled => Encoding::HexplaneCoupled,
+                };
+                assert_eq!(encoded.report.sections[1].1, expected);
+            }
+        }
+    }
+}
+
+#[test]
+fn harmonics_need_no_planes_unless_coupled() {
+    let scene = scene(9, 2, 4, [4, 4, 4, 4], &[1]);
+    for sh in [sh_tables(2), sh_networks(ShCondition::Autoregressive, 2, 4)] {
+        let encoded = round_trip(
+            &scene,
+            &CompressionInput { sh, ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS)) },
+        );
+        let stream = OpenStream::new(&encoded.bytes).unwrap();
+        assert!(!stream.sh_needs_hexplanes().unwrap());
+        let gaussians = stream.gaussians().unwrap();
+        let gaussians = stream.sh(gaussians, &stream.frame().unwrap(), &Default::default()).unwrap();
+        assert_eq!(gaussians, encoded.decoded.gaussians);
+    }
+}
+
+/// The distributions of the decoded planes are those that the planes were coded under: the coded bits say so.
+#[test]
+fn the_coded_bits_are_those_of_the_distributions() {
+    let scene = scene(0, 0, 16, [32, 32, 32, 16], &[1, 2]);
+    let input = input(&scene, Profile::Paper, compact_shape(16, ALL_PARTS));
+    let encoded = round_trip(&scene, &input);
+    let planes = input.planes.as_ref().unwrap();
+    let bytes = encode_planes(&scene.hexplane, planes).unwrap();
+    assert_eq!(bytes.len() as u64, encoded.report.sections[4].2);
+    for (index, plane) in encoded.decoded.hexplane.planes.iter().enumerate() {
+        let PlaneDistributions { scales, means } =
+            plane_distributions(&encoded.decoded.hexplane, planes, index).unwrap();
+        let centre = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
+        let mut ideal = 0.0;
+        for ((&value, &scale), &mean) in plane.values.iter().zip(&scales).zip(&means) {
+            let distance = (f64::from((value - centre) / 0.1) - f64::from(mean)).round().abs();
+            let scale = f64::from(scale.max(0.11));
+            ideal -= (upper_tail((distance - 0.5) / scale) - upper_tail((distance + 0.5) / scale)).max(2e-9).log2();
+        }
+        let sizes = encoded.report.planes[index];
+        let coded = 8.0 * (sizes.anchors + sizes.others) as f64;
+        assert!((coded / ideal - 1.0).abs() < 0.01, "plane {index}: {coded} bits, ideal {ideal}");
+    }
+}
+
+/// The probability that a standard normal variable is above `x`: Simpson's rule on the density.
+fn upper_tail(x: f64) -> f64 {
+    let (steps, end) = (400, x + 9.0);
+    let width = (end - x) / f64::from(steps);
+    let density = |i: i32| (-0.5 * (x + f64::from(i) * width).powi(2)).exp() / std::f64::consts::TAU.sqrt();
+    let inner: f64 = (1..steps).map(|i| density(i) * if i % 2 == 1 { 4.0 } else { 2.0 }).sum();
+    (density(0) + inner + density(steps)) * width / 3.0
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let scene = scene(40, 3, 8, [16, 8, 8, 8], &[1, 2]);
+    let input = input(&scene, Profile::Compact, compact_shape(8, ALL_PARTS));
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        pool.install(|| encode_compressed(&scene, &input).unwrap().bytes)
+    };
+    let one = with(1);
+    assert_eq!(with(2), one);
+    assert_eq!(with(7), one);
+}
+
+#[test]
+fn extreme_weights_do_no_harm() {
+    let scene = scene(4, 1, 4, [4, 4, 4, 4], &[1, 2]);
+    for huge in [1e38, -1e38, 3e20, f32::MIN_POSITIVE] {
+        let mut input = input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS));
+        let planes = input.planes.as_mut().unwrap();
+        for layer in &mut planes.model.layers {
+            layer.weight.iter_mut().step_by(3).for_each(|weight| *weight *= huge);
+        }
+        round_trip(&scene, &input);
+    }
+}
+
+#[test]
+fn contradictions_are_refused() {
+    let scene = scene(4, 1, 4, [4, 4, 4, 4], &[1, 2]);
+    let good = input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS));
+    let message = |spoil: &dyn Fn(&mut CompressionInput)| {
+        let mut input = good.clone();
+        spoil(&mut input);
+        let error = encode_compressed(&scene, &input).expect_err("spoilt");
+        assert!(!error.is_internal(), "{error}");
+        error.to_string()
+    };
+    let planes =
+        |spoil: &dyn Fn(&mut light4gs_codec::PlaneCoding)| message(&|input| spoil(input.planes.as_mut().unwrap()));
+    assert!(planes(&|planes| planes.steps.clear()).contains("number of steps is 0"));
+    assert!(planes(&|planes| planes.steps = step(0.0)).contains("step is 0"));
+    assert!(planes(&|planes| planes.steps = step(f32::NAN)).contains("step is NaN"));
+    assert!(planes(&|planes| planes.steps = step(1e-12)).contains("make the step larger"));
+    assert!(planes(&|planes| planes.hyper_symbols[2][0] = i32::MIN).contains("hyperprior of planes[2]"));
+    assert!(planes(&|planes| planes.hyper_symbols[2].clear()).contains("hyperprior symbols of planes[2] is 0"));
+    assert!(planes(&|planes| planes.hyper_symbols[0].push(0)).contains("hyperprior symbols of planes[0] is 1"));
+    assert!(planes(&|planes| drop(planes.hyper_symbols.pop())).contains("one list a plane"));
+    assert!(planes(&|planes| drop(planes.model.layers.pop())).contains("layers"));
+    assert!(planes(&|planes| planes.model.layers[1].weight[0] = f32::NAN).contains("h_s.2.weight is NaN"));
+    assert!(planes(&|planes| planes.model.layers[1].bias.truncate(1)).contains("length of h_s.2.bias"));
+    assert!(planes(&|planes| planes.model.shape.context_groups = 3).contains("a divisor of 4 inputs"));
+    assert!(planes(&|planes| planes.model.shape.inter_scale.kernel = 4).contains("inter_scale.kernel is 4"));
+    assert!(planes(&|planes| planes.model.shape.centres.space_time = f32::INFINITY).contains("centre of space-time"));
+    assert!(planes(&|planes| drop(planes.model.hyper_tables.pop())).contains("hyper_tables"));
+    assert!(planes(&|planes| planes.model.hyper_medians[0] = f32::NAN).contains("hyper_medians is NaN"));
+    assert!(
+        planes(&|planes| planes.model = model(compact_shape(8, ALL_PARTS), 1)).contains("channels is 4, expected 8")
+    );
+    assert!(message(&|input| input.sh = sh_tables(2)).contains("number of tables is 24, expected 9"));
+    assert!(message(&|input| input.sh = sh_networks(ShCondition::HexplaneCoupled, 1, 5)).contains("layers"));
+    assert!(
+        message(&|input| {
+            if let ShCoding::Tables { step, .. } = &mut input.sh {
+                *step = -0.02;
+            }
+        })
+        .contains("step is -0.02")
+    );
+    let odd = common::compression::scene(1, 0, 4, [4, 6, 4, 4], &[1]);
+    let error = encode_compressed(&odd, &input(&odd, Profile::Paper, compact_shape(4, ALL_PARTS))).unwrap_err();
+    assert!(matches!(error, CodecError::Invalid { section: "hexplanes", .. }), "{error}");
+    assert!(error.to_string().contains("a multiple of 4"), "{error}");
+}
+
+prop_compose! {
+    fn cases()(
+        resolution in prop::array::uniform4(1u32..4),
+        channels in prop::sample::select(vec![1u32, 2, 3, 4, 6]),
+        multipliers in prop::collection::vec(1u32..3, 0..3),
+        bits in 0u8..16,
+        counts in (0usize..20, 0u8..4),
+        seed in any::<u64>(),
+        step in prop::sample::select(vec![0.003f32, 0.1, 2.0]),
+        reference in any::<bool>(),
+        profile in prop::sample::select(vec![Profile::Compact, Profile::Paper]),
+    ) -> (SceneData, CompressionInput) {
+        let [hyperprior, checkerboard, inter_plane, inter_scale] = [0, 1, 2, 3].map(|bit| bits >> bit & 1 == 1);
+        let high_scale_hyperprior = hyperprior && inter_scale && seed % 2 == 0;
+        let parts = ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior };
+        let scene = scene(counts.0, counts.1, channels, resolution.map(|r| 4 * r), &multipliers);
+        let shape = if reference { reference_shape(channels, parts) } else { compact_shape(channels, parts) };
+        let steps = common::compression::step(step);
+        let planes = Some(plane_coding(&scene.hexplane, model(shape, seed), steps));
+        let features = channels as usize * multipliers.len();
+        let sh = match seed % 3 {
+            0 => sh_tables(counts.1),
+            1 => sh_networks(ShCondition::Autoregressive, counts.1, features),
+            _ if features == 0 => sh_tables(counts.1),
+            _ => sh_networks(ShCondition::HexplaneCoupled, counts.1, features),
+        };
+        let others = input(&scene, profile, shape);
+        (scene, CompressionInput { planes, sh, ..others })
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn every_legal_scene((scene, input) in cases()) {
+        round_trip(&scene, &input);
+    }
+}

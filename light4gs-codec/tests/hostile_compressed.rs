@@ -1,0 +1,216 @@
+//! Damage on purpose in compressed streams: checksums that fit, and numbers that lie.
+
+mod common;
+
+use std::{
+    alloc::{GlobalAlloc, Layout, System},
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicUsize, Ordering},
+    },
+};
+
+use common::{ENTRY, compression::tiny, forge_header, payload, put, table_at, u32_at, with_payload};
+use light4gs_codec::{
+    CodecError, CompressionInput, Limits, Profile, ShCondition, decode, decode_with_limits, encode_compressed, info,
+};
+
+/// Counts the memory that is in use.
+struct Watch;
+
+static USED: AtomicUsize = AtomicUsize::new(0);
+static MOST: AtomicUsize = AtomicUsize::new(0);
+/// Tests that watch the memory run one after the other.
+static ALONE: Mutex<()> = Mutex::new(());
+
+// SAFETY: every call goes to the system's allocator as it came.
+unsafe impl GlobalAlloc for Watch {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        let used = USED.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
+        MOST.fetch_max(used, Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        USED.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static WATCH: Watch = Watch;
+
+/// Streams with something of everything.
+fn streams() -> Vec<Vec<u8>> {
+    let mut streams: Vec<_> = [Profile::Compact, Profile::Paper].map(tiny).to_vec();
+    let (scene, coupled) = tiny(Profile::Compact);
+    let sh = common::compression::sh_networks(ShCondition::HexplaneCoupled, 2, 8);
+    streams.push((scene, CompressionInput { sh, ..coupled }));
+    streams.into_iter().map(|(scene, input)| encode_compressed(&scene, &input).unwrap().bytes).collect()
+}
+
+fn sections(bytes: &[u8]) -> usize {
+    u32_at(bytes, 12) as usize
+}
+
+/// Decodes within 256 MiB; what comes out does not matter.
+fn survive(bytes: &[u8], limits: &Limits) {
+    let before = USED.load(Ordering::Relaxed);
+    MOST.store(before, Ordering::Relaxed);
+    let _ = decode_with_limits(bytes, limits);
+    let _ = info(bytes);
+    let used = MOST.load(Ordering::Relaxed) - before;
+    assert!(used < 256 << 20, "{used} bytes");
+}
+
+/// Enough for the streams here, so that a lie about a size does not take long to find out.
+fn tight() -> Limits {
+    Limits { coded_values: 1 << 12, multiplications: 1 << 24, ..Limits::default() }
+}
+
+#[test]
+fn forging_alone_changes_nothing() {
+    for bytes in streams() {
+        for section in 0..sections(&bytes) {
+            assert_eq!(with_payload(&bytes, section, payload(&bytes, section)), bytes);
+        }
+    }
+}
+
+#[test]
+fn every_flipped_bit_without_a_checksum() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    for bytes in streams() {
+        for section in 0..sections(&bytes) {
+            let mut payload = payload(&bytes, section).to_vec();
+            // All of the head, and some of the many bits of symbols and weights.
+            let head = 8 * payload.len().min(48);
+            for bit in (0..head).chain((head..8 * payload.len()).step_by(31)) {
+                payload[bit / 8] ^= 1 << (bit % 8);
+                survive(&with_payload(&bytes, section, &payload), &tight());
+                payload[bit / 8] ^= 1 << (bit % 8);
+            }
+        }
+    }
+}
+
+#[test]
+fn heads_that_lie_within_the_default_limits() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    for bytes in &streams()[..2] {
+        for section in 0..sections(bytes) {
+            let mut payload = payload(bytes, section).to_vec();
+            for bit in 0..8 * payload.len().min(24) {
+                payload[bit / 8] ^= 1 << (bit % 8);
+                survive(&with_payload(bytes, section, &payload), &Limits::default());
+                payload[bit / 8] ^= 1 << (bit % 8);
+            }
+        }
+    }
+}
+
+/// A sound stream just below the default limits, of a shape that pads badly, and one beyond.
+#[test]
+fn the_largest_planes_of_a_small_stream() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let (_, input) = tiny(Profile::Paper);
+    let mut scene = common::compression::scene(0, 2, 4, [28_928, 8, 4, 4], &[1, 2]);
+    scene.hexplane.planes.iter_mut().for_each(|plane| plane.values.fill(0.0));
+    let planes = input.planes.unwrap();
+    let planes = common::compression::plane_coding(&scene.hexplane, planes.model, planes.steps);
+    let bytes =
+        encode_compressed(&scene, &CompressionInput { planes: Some(planes), ..tiny(Profile::Paper).1 }).unwrap();
+    drop(scene);
+    let bytes = bytes.bytes;
+    survive(&bytes, &Limits::default());
+    assert!(decode(&bytes).is_ok());
+
+    let bytes = &streams()[1];
+    let payload = payload(bytes, 4);
+    assert_eq!(payload[..5], [4, 8, 4, 4, 4]); // channels, x, y, z, t
+    let x = 29_200u32;
+    let sizes = [4, x as u8 | 0x80, (x >> 7) as u8 | 0x80, (x >> 14) as u8, 8];
+    let error = decode(&with_payload(bytes, 4, &[&sizes, &payload[3..]].concat())).unwrap_err();
+    assert!(matches!(error, CodecError::OverLimit { section: "hexplanes", .. }), "{error}");
+}
+
+#[test]
+fn every_section_cut_short() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    for bytes in streams() {
+        for section in 0..sections(&bytes) {
+            let payload = payload(&bytes, section);
+            let step = if payload.len() > 4000 { 11 } else { 1 };
+            for length in (0..payload.len()).step_by(step) {
+                survive(&with_payload(&bytes, section, &payload[..length]), &tight());
+            }
+            // Range-coded weights do not know where they end.
+            let longer = [payload, &[1]].concat();
+            if let Ok(scene) = decode(&with_payload(&bytes, section, &longer)) {
+                assert_eq!(scene, decode(&bytes).unwrap());
+            }
+        }
+    }
+}
+
+#[test]
+fn every_flip_and_truncation_with_checksums_is_an_error() {
+    let bytes = &mut streams()[0];
+    for length in 0..bytes.len() {
+        assert!(matches!(decode(&bytes[..length]), Err(CodecError::Truncated { .. })));
+    }
+    for bit in 0..8 * bytes.len() {
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        assert!(decode(bytes).is_err(), "bit {bit}");
+        bytes[bit / 8] ^= 1 << (bit % 8);
+    }
+}
+
+#[test]
+fn sections_and_encodings_that_do_not_belong() {
+    let bytes = &streams()[0];
+    let entry = |section: usize, at: usize, new: u16| {
+        let mut bytes = bytes.clone();
+        let at = table_at(&bytes) + ENTRY * section + at;
+        put(&mut bytes, at, &new.to_le_bytes());
+        forge_header(&mut bytes);
+        decode(&bytes).unwrap_err()
+    };
+    for (section, encoding) in [(0, 5), (0, 2), (1, 1), (1, 5), (2, 1), (3, 2), (4, 1), (4, 6), (5, 5)] {
+        let error = entry(section, 2, encoding);
+        assert!(matches!(error, CodecError::UnknownEncoding { .. }), "{section} {encoding}: {error}");
+    }
+    // Version 1 has neither the section nor the encodings.
+    let mut old = bytes.clone();
+    put(&mut old, 8, &1u16.to_le_bytes());
+    forge_header(&mut old);
+    assert!(matches!(decode(&old), Err(CodecError::UnknownEncoding { section: "gaussians", .. })));
+    // The planes in full precision need no context model, and coded ones need theirs.
+    let (scene, input) = tiny(Profile::Compact);
+    let plain = encode_compressed(&scene, &CompressionInput { planes: None, ..input }).unwrap().bytes;
+    let mut both = with_payload(bytes, 4, payload(&plain, 4));
+    let at = table_at(&both) + 4 * ENTRY + 2;
+    put(&mut both, at, &[0, 0]);
+    forge_header(&mut both);
+    assert!(decode(&both).unwrap_err().to_string().contains("no plane is coded with it"));
+    let mut none = with_payload(&plain, 4, payload(bytes, 4));
+    put(&mut none, at, &[5, 0]);
+    forge_header(&mut none);
+    assert!(matches!(decode(&none), Err(CodecError::MissingSection { section: "context_model" })));
+}
+
+#[test]
+fn values_that_take_no_bytes_are_limited() {
+    let (scene, input) = tiny(Profile::Paper);
+    let bytes = encode_compressed(&scene, &input).unwrap().bytes;
+    let values: u64 = scene.hexplane.planes.iter().map(|plane| plane.values.len() as u64).sum();
+    assert!(values < 64 * bytes.len() as u64);
+    let limits = Limits { coded_values: 0, ..Limits::default() };
+    assert!(decode_with_limits(&bytes, &limits).is_ok());
+    let limits = Limits { multiplications: 1000, ..Limits::default() };
+    let error = decode_with_limits(&bytes, &limits).unwrap_err();
+    assert!(matches!(error, CodecError::OverLimit { section: "hexplanes", .. }), "{error}");
+    let limits = Limits { layer_weights: 100, ..Limits::default() };
+    let error = decode_with_limits(&bytes, &limits).unwrap_err();
+    assert!(matches!(error, CodecError::OverLimit { section: "context_model", .. }), "{error}");
+}

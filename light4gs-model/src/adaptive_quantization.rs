@@ -1,0 +1,80 @@
+//! Adaptive quantisation: learned steps (paper III-D; DESIGN section 6).
+
+use burn::config::Config;
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor};
+
+use crate::hexplane::{PLANE_NAMES, SPACE_TIME_PLANES};
+use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
+use crate::quantization_steps::PlaneSteps;
+
+/// Configuration of an [`AdaptiveQuantization`].
+#[derive(Config, Debug)]
+pub struct AdaptiveQuantizationConfig {
+    /// Scales of the hexplane.
+    pub scales: usize,
+    /// Initial step of the space-only planes.
+    #[config(default = 0.1)]
+    pub space_only: f64,
+    /// Initial step of the space-time planes.
+    #[config(default = 0.1)]
+    pub space_time: f64,
+    /// Whether each scale has its own pair of steps.
+    #[config(default = false)]
+    pub per_scale: bool,
+}
+
+impl AdaptiveQuantizationConfig {
+    /// Steps at their initial values.
+    ///
+    /// # Panics
+    /// If a step is not positive and finite.
+    pub fn init(&self, device: &Device) -> AdaptiveQuantization {
+        let pair = [self.space_only, self.space_time];
+        assert!(pair.iter().all(|step| *step > 0.0 && step.is_finite()), "steps must be positive, not {pair:?}");
+        let logarithms = Tensor::<1>::from_floats(pair.map(|step| step.ln() as f32), device);
+        let groups = if self.per_scale { self.scales } else { 1 };
+        AdaptiveQuantization { log_steps: Param::from_tensor(logarithms.repeat_dim(0, groups)), scales: self.scales }
+    }
+}
+
+/// A learned step for the space-only planes and one for the space-time planes, optionally for each scale.
+///
+/// The parameter is the logarithm, so a step is always positive and an optimiser's step changes it by a ratio: a step
+/// of 0.001 is learned as easily as one of 1.
+///
+/// ```
+/// use burn::tensor::Device;
+/// use light4gs_model::AdaptiveQuantizationConfig;
+///
+/// let quantization = AdaptiveQuantizationConfig::new(2).with_space_time(0.05).init(&Device::flex());
+/// let steps = quantization.steps().values();
+/// assert_eq!(steps.len(), 12);
+/// assert!((steps[0] - 0.1).abs() < 1e-6 && (steps[2] - 0.05).abs() < 1e-6);
+/// ```
+#[derive(Module, Debug)]
+pub struct AdaptiveQuantization {
+    /// `[2]` or `[2 · scales]`: space-only, space-time.
+    pub log_steps: Param<Tensor<1>>,
+    scales: usize,
+}
+
+impl NamedParameters for AdaptiveQuantization {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        visitor.visit("log_steps", &mut self.log_steps);
+    }
+}
+
+impl AdaptiveQuantization {
+    /// The step of every plane, with its gradient.
+    pub fn steps(&self) -> PlaneSteps {
+        let steps = self.log_steps.val().exp();
+        let groups = steps.dims()[0] / 2;
+        let of_plane = |scale: usize, plane: usize| {
+            let group = 2 * (scale % groups) + usize::from(SPACE_TIME_PLANES.contains(&plane));
+            steps.clone().narrow(0, group, 1)
+        };
+        let planes = (0..self.scales).flat_map(|scale| (0..PLANE_NAMES.len()).map(move |plane| (scale, plane)));
+        PlaneSteps::new(planes.map(|(scale, plane)| of_plane(scale, plane)).collect())
+    }
+}

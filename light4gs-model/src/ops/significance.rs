@@ -1,0 +1,37 @@
+//! What every Gaussian contributes to one picture, as a Burn operation (paper III-B). Not differentiable.
+
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, Flex, NdArray, TensorMetadata, backend_extension};
+
+use super::host::HostBackend;
+use super::splat::{SplatInputs, SplatView, slices};
+use crate::cpu::significance::{SCORES, significance as significance_of_lists};
+use crate::cpu::tiles::TileLists;
+
+/// The sums on every back end.
+#[backend_extension(NdArray, Flex)]
+pub trait SignificanceOps: Backend {
+    /// `[N, 4]`, sums over the pixels that blend each Gaussian: pixels, `T · alpha`, `T · opacity`, opacity, with `T`
+    /// the transmittance before the Gaussian.
+    fn significance(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self>;
+}
+
+fn significance_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): SplatView) -> FloatTensor<B> {
+    let inputs = inputs.into_array();
+    let count = inputs[0].shape()[0];
+    let inputs = inputs.map(B::to_host);
+    let lists = TileLists::build(&slices(&inputs), &view);
+    B::from_values(significance_of_lists(&lists, &view), [count, SCORES])
+}
+
+impl SignificanceOps for NdArray {
+    fn significance(inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self> {
+        significance_on_cpu(inputs, view)
+    }
+}
+
+impl SignificanceOps for Flex {
+    fn significance(inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self> {
+        significance_on_cpu(inputs, view)
+    }
+}

@@ -1,0 +1,49 @@
+//! Quantisation steps of the planes, and what they do to them.
+
+use burn::tensor::{Device, Distribution, Tensor};
+
+/// A step for each plane, scale-major; they carry a gradient where they are learned.
+#[derive(Clone, Debug)]
+pub struct PlaneSteps(Vec<Tensor<1>>);
+
+impl PlaneSteps {
+    /// From tensors `[1]`, one for each plane.
+    pub fn new(steps: Vec<Tensor<1>>) -> Self {
+        Self(steps)
+    }
+
+    /// Fixed steps.
+    pub fn fixed(steps: &[f32], device: &Device) -> Self {
+        Self(steps.iter().map(|step| Tensor::from_floats([*step], device)).collect())
+    }
+
+    /// A plane's step, `[1]`.
+    pub fn of(&self, plane: usize) -> Tensor<1> {
+        self.0[plane].clone()
+    }
+
+    /// A plane's step, to multiply or divide planes with: `[1, 1, 1]`.
+    pub fn broadcast(&self, plane: usize) -> Tensor<3> {
+        self.of(plane).unsqueeze()
+    }
+
+    /// The same steps without gradient.
+    pub fn detach(self) -> Self {
+        Self(self.0.into_iter().map(Tensor::detach).collect())
+    }
+
+    /// As numbers.
+    pub fn values(&self) -> Vec<f32> {
+        self.0.iter().map(|step| step.clone().into_scalar::<f32>()).collect()
+    }
+
+    /// Planes with uniform noise as wide as their steps, which stands in for rounding during training. The steps'
+    /// gradient passes through the noise.
+    pub fn add_noise(&self, planes: &[Tensor<3>]) -> Vec<Tensor<3>> {
+        let noisy = planes.iter().enumerate().map(|(i, plane)| {
+            let noise = Tensor::random(plane.dims(), Distribution::Uniform(-0.5, 0.5), &plane.device());
+            plane.clone() + noise * self.broadcast(i)
+        });
+        noisy.collect()
+    }
+}

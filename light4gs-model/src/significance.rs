@@ -1,0 +1,134 @@
+//! Spatio-temporal significance of Gaussians, by which they are pruned (paper III-B).
+
+use burn::backend::Dispatch;
+use light4gs_data::Camera;
+
+use crate::gaussians::GaussianTensors;
+use crate::ops::significance::SignificanceOps;
+use crate::splatter::Splatter;
+
+/// Share of the Gaussians whose volume lies below the reference volume of [`VolumeWeight`].
+const VOLUME_QUANTILE: f64 = 0.9;
+
+/// What is summed over the pixels that blend a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SignificanceScore {
+    /// Transmittance before the Gaussian times its opacity: the paper's.
+    TransmittanceOpacity,
+    /// The blending weight, transmittance times alpha.
+    BlendingWeight,
+    /// The Gaussian's opacity, as the first public code of LightGaussian does.
+    Opacity,
+    /// One a pixel.
+    PixelCount,
+}
+
+/// The factor `gamma(V)` of a Gaussian's volume `V`, the product of its standard deviations.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum VolumeWeight {
+    /// No factor.
+    None,
+    /// `clamp(V / V_90, 0, 1)^exponent`, `V_90` the volume that 90 % stay below: the paper's.
+    Clamped {
+        /// `beta` in the paper.
+        exponent: f64,
+    },
+    /// `(V / V_10)^exponent`, not clamped, with the volume that 10 % stay below: what the public code computes.
+    Unclamped {
+        /// `v_pow` in the public code.
+        exponent: f64,
+    },
+}
+
+impl VolumeWeight {
+    /// One factor for each volume.
+    pub fn of(self, volumes: &[f64]) -> Vec<f64> {
+        let (exponent, clamp) = match self {
+            Self::None => return vec![1.0; volumes.len()],
+            Self::Clamped { exponent } => (exponent, true),
+            Self::Unclamped { exponent } => (exponent, false),
+        };
+        let mut sorted = volumes.to_vec();
+        sorted.sort_by(f64::total_cmp);
+        if !clamp {
+            sorted.reverse();
+        }
+        let at = (VOLUME_QUANTILE * volumes.len() as f64) as usize;
+        let Some(&reference) = sorted.get(at) else { return vec![1.0; volumes.len()] };
+        let factor = |volume: &f64| {
+            let ratio = if reference > 0.0 { volume / reference } else { 1.0 };
+            (if clamp { ratio.min(1.0) } else { ratio }).powf(exponent)
+        };
+        volumes.iter().map(factor).collect()
+    }
+}
+
+/// Sums over pictures of what each of `N` Gaussians contributes.
+///
+/// ```
+/// use burn::tensor::Device;
+/// use light4gs_data::{Camera, PointCloud};
+/// use light4gs_model::{GaussiansConfig, Significance, SignificanceScore, Splatter};
+///
+/// let positions = vec![[0.0; 3], [0.0, 9.0, 0.0]]; // the second is behind the first
+/// let cloud = PointCloud { positions, colors: vec![[0.5; 3]; 2] };
+/// let gaussians = GaussiansConfig::new().init(&cloud, &Device::flex());
+/// let camera = Camera::look_at([0.0, -4.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 40, 30);
+/// let mut significance = Significance::new(2);
+/// significance.add(&Splatter::new([1.0; 3], 0), gaussians.tensors(), &camera);
+/// let scores = significance.scores(SignificanceScore::BlendingWeight);
+/// assert!(scores[0] > scores[1]);
+/// ```
+#[derive(Clone, Debug)]
+pub struct Significance {
+    /// Pixels, `T · alpha`, `T · opacity`, opacity.
+    sums: Vec<[f64; 4]>,
+}
+
+impl Significance {
+    /// For `count` Gaussians, nothing seen yet.
+    pub fn new(count: usize) -> Self {
+        Self { sums: vec![[0.0; 4]; count] }
+    }
+
+    /// Adds the picture of raw attributes at a time, through a camera.
+    ///
+    /// # Panics
+    /// If the number of Gaussians is another than at the beginning.
+    pub fn add(&mut self, splatter: &Splatter, gaussians: GaussianTensors, camera: &Camera) {
+        let gaussians = gaussians.inner();
+        let (inputs, view) = splatter.inputs(gaussians, camera);
+        let values = burn::tensor::Tensor::<2>::from_dispatch(Dispatch::significance(inputs, view)).into_data();
+        let values: Vec<f32> = values.iter().collect();
+        let (rows, _) = values.as_chunks::<4>();
+        assert_eq!(rows.len(), self.sums.len(), "the number of Gaussians has changed");
+        for (sums, row) in self.sums.iter_mut().zip(rows) {
+            for (sum, value) in sums.iter_mut().zip(row) {
+                *sum += f64::from(*value);
+            }
+        }
+    }
+
+    /// `[N]`: the score over all pictures so far.
+    pub fn scores(&self, score: SignificanceScore) -> Vec<f64> {
+        let column = match score {
+            SignificanceScore::PixelCount => 0,
+            SignificanceScore::BlendingWeight => 1,
+            SignificanceScore::TransmittanceOpacity => 2,
+            SignificanceScore::Opacity => 3,
+        };
+        self.sums.iter().map(|sums| sums[column]).collect()
+    }
+}
+
+/// `[N]`: the least significant share of the Gaussians, those whose score is at most the one at position
+/// `share · (N - 1)`, rounded down, of the sorted scores. Equal scores share their fate, so it may be more than `share`.
+pub fn least_significant(scores: &[f64], share: f64) -> Vec<bool> {
+    if scores.is_empty() || share <= 0.0 {
+        return vec![false; scores.len()];
+    }
+    let mut sorted = scores.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let threshold = sorted[(share.min(1.0) * (scores.len() - 1) as f64) as usize];
+    scores.iter().map(|score| *score <= threshold).collect()
+}

@@ -1,0 +1,68 @@
+//! `ablate`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+
+use super::print_json;
+use super::train::{RunOutput, train_to_evaluation};
+use crate::ablation::{AblationRow, AblationTable, to_markdown, variant_folder};
+use crate::error::TrainError;
+
+#[derive(Debug, Args)]
+pub(super) struct Ablate {
+    /// Folder of the dataset.
+    scene: PathBuf,
+    /// Which table.
+    #[arg(long, value_enum)]
+    table: AblationTable,
+    /// The preset or TOML file that every variant is laid over.
+    #[arg(long, default_value = "dnerf-small", value_name = "PRESET|FILE")]
+    config: String,
+    /// Folder for the runs, one folder each, and for table.md. Runs that are finished are not repeated.
+    #[arg(long)]
+    out: PathBuf,
+    /// Changes one key of every variant's configuration; may be given more than once.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Back end: ndarray or flex.
+    #[arg(long)]
+    device: Option<String>,
+    #[command(flatten)]
+    output: RunOutput,
+}
+
+impl Ablate {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let mut overrides = self.overrides;
+        overrides.extend(self.device.map(|device| format!("device={device}")));
+        let variants = self.table.variants();
+        // All configurations are checked before the first run begins.
+        let configs =
+            variants.iter().map(|variant| variant.config(&self.config, &overrides)).collect::<Result<Vec<_>, _>>()?;
+        std::fs::create_dir_all(&self.out).map_err(|source| light4gs_data::DataError::Io {
+            action: "create",
+            path: self.out.clone(),
+            source,
+        })?;
+        let mut rows = Vec::new();
+        for (variant, config) in variants.iter().zip(configs) {
+            if !self.output.quiet && !self.output.json {
+                println!("{}", variant.name);
+            }
+            let folder = variant_folder(&self.out, variant);
+            let evaluation = train_to_evaluation(config, &self.scene, &folder, self.output.quiet)?;
+            rows.push(AblationRow::new(variant.name, &evaluation));
+            // After every run, so that an interrupted table shows what there is.
+            let path = self.out.join("table.md");
+            light4gs_codec::write_atomically(&path, to_markdown(&rows).as_bytes())
+                .map_err(|source| light4gs_data::DataError::Io { action: "write", path: path.clone(), source })?;
+        }
+        if self.output.json {
+            print_json(&rows);
+        } else {
+            println!("{}", to_markdown(&rows));
+        }
+        Ok(())
+    }
+}

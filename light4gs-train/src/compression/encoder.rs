@@ -1,0 +1,179 @@
+//! A scene and its entropy models into the bytes of a file (paper III-E, DESIGN section 7).
+
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::attributes::AttributeSteps;
+use light4gs_codec::network_weights::WeightPrecision;
+use light4gs_codec::{
+    CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
+    ShCoding, WeightPrecisions, encode as encode_float32, encode_compressed, sh_rest_coefficients,
+};
+use light4gs_model::{DynamicScene, HexPlane, Latent, PLANE_NAMES, ShEntropy, counted_sh_coding};
+use serde::{Deserialize, Serialize};
+
+use super::rate::known;
+use super::{Compression, step_search};
+use crate::config::{AttributesConfig, CompressionConfig};
+use crate::error::TrainError;
+
+/// A file in memory.
+#[derive(Clone, Debug)]
+pub struct EncodedScene {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// What a decoder gives for it, bit for bit; in the `float32` profile, the scene itself.
+    pub decoded: SceneData,
+    /// Where the bytes went and what was expected; not in the `float32` profile.
+    pub coded: Option<CodedSizes>,
+}
+
+/// Bytes by part, with the bits that the entropy models expected.
+#[derive(Clone, Debug)]
+pub struct CodedSizes {
+    /// As coded.
+    pub report: CompressionReport,
+    /// As the models of the training see the decoded scene.
+    pub estimate: BitEstimate,
+    /// The same, place by place, for every plane.
+    pub bit_maps: Vec<BitMap>,
+}
+
+/// Bits at each place of a plane, all channels together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BitMap {
+    /// Scale and axes, as in `0.xy`.
+    pub name: String,
+    /// Along the first axis.
+    pub width: u32,
+    /// Along the second axis.
+    pub height: u32,
+    /// `[height, width]` row-major.
+    pub bits: Vec<f32>,
+}
+
+/// How a plane is called in records: its scale and its axes.
+pub fn plane_name(plane: usize) -> String {
+    format!("{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
+}
+
+/// Bits that the training's models give for a decoded scene, model weights and tables aside.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BitEstimate {
+    /// Of the hexplanes' values and hyperpriors.
+    pub hexplanes: f64,
+    /// Of the spherical harmonics beyond degree 0.
+    pub sh: f64,
+}
+
+/// Pictures for the search of attribute steps: `render` gives some training views of Gaussians as pixel values, `error`
+/// is the mean squared error of the scene's own.
+pub struct Pictures<'a> {
+    /// Renders plain arrays; other parts of the scene are as decoded.
+    pub render: &'a dyn Fn(&SceneData) -> Vec<f32>,
+    /// Against the truth.
+    pub error: f64,
+}
+
+/// Encodes a scene in the profile of the configuration. Everything that is coded is decoded again and compared before
+/// this returns.
+pub fn encode(
+    scene: &DynamicScene,
+    compression: &mut Compression,
+    meta: SceneMeta,
+    config: &CompressionConfig,
+    pictures: Option<Pictures>,
+    device: &Device,
+) -> Result<EncodedScene, TrainError> {
+    let data = scene.to_arrays(meta);
+    let profile = match config.profile.as_str() {
+        "float32" => return Ok(EncodedScene { bytes: encode_float32(&data)?, decoded: data, coded: None }),
+        "paper" => Profile::Paper,
+        _ => Profile::Compact,
+    };
+    compression.context.update_quantiles();
+    let given = attribute_steps(&config.attributes);
+    let mut input = CompressionInput {
+        profile,
+        planes: Some(compression.plane_coding(scene)?),
+        sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
+        attributes: given,
+        weights: WeightPrecisions {
+            deformation: WeightPrecision::Bits(config.weights.deformation_bits),
+            context_model: WeightPrecision::Bits(config.weights.context_bits),
+            sh: WeightPrecision::Bits(config.weights.context_bits),
+        },
+    };
+    if let (Some(pictures), Profile::Compact) = (pictures, profile)
+        && config.attributes.search_tolerance > 0.0
+    {
+        let tolerance = config.attributes.search_tolerance;
+        input.attributes = step_search::search(&data, &given, tolerance, pictures.error, pictures.render)?;
+    }
+    let encoded = encode_compressed(&data, &input)?;
+    let estimate = compression.estimate(&encoded.decoded, &input.sh, device)?;
+    let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
+    let coded = Some(CodedSizes { report: encoded.report, estimate, bit_maps });
+    Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
+}
+
+fn attribute_steps(config: &AttributesConfig) -> AttributeSteps {
+    let AttributesConfig { position, log_scale, quaternion, opacity_logit, sh_dc, .. } = *config;
+    AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }
+}
+
+impl Compression {
+    /// What the codec needs to code the planes.
+    fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
+        let steps = self.quantization.steps();
+        let symbols = self.context.hyper_symbols(&scene.hexplane.tensors(), &steps);
+        let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
+        Ok(PlaneCoding {
+            model: self.context.to_arrays()?,
+            steps: steps.to_groups(),
+            hyper_symbols: symbols.into_iter().map(|plane| plane.map_or_else(Vec::new, integers)).collect(),
+        })
+    }
+
+    fn sh_coding(&self, gaussians: &GaussianArrays, step: f32) -> Result<ShCoding, CodecError> {
+        match &self.sh {
+            Some(sh) => sh.to_coding(&gaussians.sh_rest),
+            None => counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step),
+        }
+    }
+
+    /// Bits that the models give for a decoded scene; `device` is the models' own.
+    pub fn estimate(&self, decoded: &SceneData, coding: &ShCoding, device: &Device) -> Result<BitEstimate, TrainError> {
+        let scene = DynamicScene::from_arrays(decoded, device)?;
+        let planes = scene.hexplane.tensors();
+        let all: Vec<usize> = (0..planes.len()).collect();
+        let steps = self.quantization.steps();
+        let rates = self.context.rate(&planes, &steps, &all, Latent::Rounded);
+        let hexplanes = rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum();
+        let sh = match &self.sh {
+            Some(sh) if !decoded.gaussians.is_empty() => {
+                sh.bits(scene.gaussians.sh_rest.val(), &known(&scene, &planes)).sum().into_scalar()
+            }
+            _ => counted_bits(&decoded.gaussians, coding),
+        };
+        Ok(BitEstimate { hexplanes, sh })
+    }
+
+    /// Where the bits of a decoded scene's planes are.
+    fn bit_maps(&self, decoded: &SceneData, device: &Device) -> Result<Vec<BitMap>, TrainError> {
+        let planes = HexPlane::from_arrays(&decoded.hexplane, device)?.tensors();
+        let all: Vec<usize> = (0..planes.len()).collect();
+        let maps = self.context.bit_map(&planes, &self.quantization.steps(), &all, Latent::Rounded);
+        let map = |(plane, map): (usize, Tensor<2>)| {
+            let [height, width] = map.dims().map(|length| length as u32);
+            BitMap { name: plane_name(plane), width, height, bits: map.into_data().iter().collect() }
+        };
+        Ok(maps.into_iter().enumerate().map(map).collect())
+    }
+}
+
+/// Bits under the tables themselves, where no model was trained.
+fn counted_bits(gaussians: &GaussianArrays, coding: &ShCoding) -> f64 {
+    let ShCoding::Tables { step, tables } = coding else { return 0.0 };
+    let channels = tables.len().max(1);
+    let symbols = gaussians.sh_rest.iter().enumerate();
+    symbols.map(|(i, value)| tables[i % channels].bits((value / step).round() as i32)).sum()
+}

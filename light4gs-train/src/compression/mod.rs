@@ -1,0 +1,97 @@
+//! What a scene is compressed with, and the rate that this puts into the loss (paper III-C to III-E).
+//!
+//! - here: the entropy models and the quantisation steps that are trained beside a scene
+//! - `rate`: noise in place of rounding, and the estimated size of the file
+//! - `fit`: models for a scene that was trained without them
+//! - `encoder`: a scene and its models into the bytes of a file
+//! - `run_encoder`: what `train` and `encode` share
+//! - `step_search`: how coarsely the other attributes may be quantised
+
+mod encoder;
+mod fit;
+mod rate;
+mod run_encoder;
+mod step_search;
+
+pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, encode, plane_name};
+pub use fit::fit;
+pub use rate::{NoisyScene, Rate};
+pub use run_encoder::{CodingRecord, PlaneRecord, TrainedScene, write_scene};
+
+use burn::tensor::Device;
+use light4gs_model::{
+    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts,
+    ShAutoregressiveConfig, ShBottleneckConfig, ShEntropyConfig, ShEntropyModel, ShHexPlaneCoupledConfig,
+    ShMixtureConfig,
+};
+
+use crate::config::{CompressionConfig, Config, ContextConfig, ShConfig};
+
+/// Entropy models and quantisation steps of one scene.
+#[derive(Clone, Debug)]
+pub struct Compression {
+    /// Of the hexplanes.
+    pub context: ContextModel,
+    /// Of the hexplanes.
+    pub quantization: AdaptiveQuantization,
+    /// Of the spherical harmonics beyond degree 0; the models are made for degree 3. Lower degrees are coded with the
+    /// frequencies of their symbols, and have no part in the rate.
+    pub sh: Option<ShEntropyModel>,
+}
+
+impl Compression {
+    /// Untrained models, if the run trains them: if there is a rate in its loss.
+    pub fn of_run(config: &Config, device: &Device) -> Option<Self> {
+        (config.compression.rate.lambda > 0.0).then(|| Self::new(config, device))
+    }
+
+    /// Untrained models for scenes of a configuration.
+    pub fn new(config: &Config, device: &Device) -> Self {
+        let CompressionConfig { context, steps, sh, .. } = &config.compression;
+        let planes = &config.model.hexplane;
+        let scales = planes.multipliers.len();
+        let quantization = AdaptiveQuantizationConfig::new(scales)
+            .with_space_only(steps.space_only)
+            .with_space_time(steps.space_time)
+            .with_per_scale(steps.per_scale);
+        Self {
+            context: context_config(context, planes.channels).init(device),
+            quantization: quantization.init(device),
+            sh: (config.model.sh_degree == 3).then(|| sh_config(sh, planes.channels * scales).init(device)),
+        }
+    }
+}
+
+fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig {
+    let sizes = match config.architecture.as_str() {
+        // The composition is what the switches say; the reference's centres and start belong to its sizes.
+        "reference" => ContextModelConfig::reference(channels),
+        _ => ContextModelConfig::compact(channels),
+    };
+    let parts = ContextParts::new()
+        .with_hyperprior(config.hyperprior)
+        .with_checkerboard(config.checkerboard)
+        .with_inter_plane(config.inter_plane)
+        .with_inter_scale(config.inter_scale)
+        .with_high_scale_hyperprior(config.high_scale_hyperprior);
+    sizes.with_parts(parts)
+}
+
+/// Width of the densities of spherical harmonics before training. Coefficients rarely leave ±0.5; the reference begins
+/// at 8, and needs thousands of iterations to come down from there.
+const SH_INITIAL_SCALE: f64 = 0.3;
+
+fn sh_config(config: &ShConfig, feature_size: usize) -> ShEntropyConfig {
+    let step = config.step as f32;
+    match config.model.as_str() {
+        "mixture_of_logistics" => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
+        "channel_autoregressive" => ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step)),
+        "hexplane_coupled" => {
+            ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(feature_size).with_step(step))
+        }
+        _ => {
+            let bottleneck = ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE);
+            ShEntropyConfig::Factorized(bottleneck)
+        }
+    }
+}

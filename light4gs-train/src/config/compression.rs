@@ -1,0 +1,213 @@
+//! `[compression]`: how small, and how (paper III-C to III-E).
+
+use serde::{Deserialize, Serialize};
+
+/// What the file looks like, and what is trained for its sake.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CompressionConfig {
+    /// How the file is written: one of [`PROFILES`].
+    pub profile: String,
+    /// The rate in the loss.
+    pub rate: RateConfig,
+    /// The context model of the hexplanes (MHCM).
+    pub context: ContextConfig,
+    /// Quantisation steps of the hexplanes.
+    pub steps: StepsConfig,
+    /// The entropy model of the spherical harmonics.
+    pub sh: ShConfig,
+    /// Steps of the other attributes, in the `compact` profile.
+    pub attributes: AttributesConfig,
+    /// Precision of network weights, in the `compact` profile.
+    pub weights: WeightsConfig,
+}
+
+/// What `compression.profile` may be: everything coded; planes and spherical harmonics coded and the rest as float32,
+/// as the paper does; nothing coded.
+pub(super) const PROFILES: &[&str] = &["compact", "paper", "float32"];
+
+/// The rate term of the loss.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RateConfig {
+    /// Weight of the rate; 0 = no rate in the loss.
+    pub lambda: f64,
+    /// What lambda weighs: one of [`WEIGHTINGS`].
+    pub weighting: String,
+    /// The rate is taken in every so many iterations.
+    pub interval: usize,
+    /// Share of the planes, and of the Gaussians, on which it is estimated.
+    pub fraction: f64,
+    /// Iteration of the fine stage from which planes carry noise and the rate counts. Spherical harmonics join once
+    /// densification is over.
+    pub from: usize,
+}
+
+/// What `compression.rate.weighting` may be: megabytes in the file, or the paper's sum of the bits per plane symbol and
+/// the bits per spherical-harmonics symbol.
+pub(super) const WEIGHTINGS: &[&str] = &["megabytes", "per_symbol"];
+
+/// Parts and sizes of the context model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ContextConfig {
+    /// Sizes of its networks: one of [`ARCHITECTURES`].
+    pub architecture: String,
+    /// Whether the lowest scale's space-time planes send a hyperprior.
+    pub hyperprior: bool,
+    /// Whether the second half of the lowest scale's positions sees the first.
+    pub checkerboard: bool,
+    /// Whether space-only planes are predicted from space-time planes.
+    pub inter_plane: bool,
+    /// Whether higher scales are predicted from the one below.
+    pub inter_scale: bool,
+    /// Whether higher scales send a hyperprior as well, as the public code does.
+    pub high_scale_hyperprior: bool,
+    /// Learning rate at the first step.
+    pub learning_rate_init: f64,
+    /// Learning rate at the end of the fine stage.
+    pub learning_rate_final: f64,
+    /// Steps that fit the model to planes that were trained without it, when such a checkpoint is encoded.
+    pub fit_iterations: usize,
+}
+
+/// What `compression.context.architecture` may be: small networks for small scenes, or the public code's sizes.
+pub(super) const ARCHITECTURES: &[&str] = &["compact", "reference"];
+
+/// Quantisation steps of the planes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct StepsConfig {
+    /// Step of the space-only planes, at the beginning.
+    pub space_only: f64,
+    /// Step of the space-time planes, at the beginning.
+    pub space_time: f64,
+    /// Whether the steps are learned.
+    pub adaptive: bool,
+    /// Iteration of the fine stage from which they are.
+    pub adaptive_from: usize,
+    /// Whether every scale has its own pair.
+    pub per_scale: bool,
+    /// Learning rate of the steps' logarithms.
+    pub learning_rate: f64,
+}
+
+/// The model of the spherical harmonics beyond degree 0.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ShConfig {
+    /// One of [`SH_MODELS`].
+    pub model: String,
+    /// Quantisation step.
+    pub step: f64,
+    /// Learning rate of the model at the first step.
+    pub learning_rate_init: f64,
+    /// Learning rate of the model at the end of the fine stage.
+    pub learning_rate_final: f64,
+}
+
+/// What `compression.sh.model` may be.
+pub(super) const SH_MODELS: &[&str] =
+    &["factorized", "mixture_of_logistics", "channel_autoregressive", "hexplane_coupled"];
+
+/// Quantisation of what every Gaussian has besides spherical harmonics.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct AttributesConfig {
+    /// Step of the positions, as a share of the size of the typical Gaussian.
+    pub position: f32,
+    /// Step of the logarithms of scales.
+    pub log_scale: f32,
+    /// Step of the quaternions' components.
+    pub quaternion: f32,
+    /// Step of the opacity logits.
+    pub opacity_logit: f32,
+    /// Step of the degree-0 spherical harmonics.
+    pub sh_dc: f32,
+    /// Loss of training PSNR in dB that the search for coarser steps may cost; 0 = the steps as they stand.
+    pub search_tolerance: f64,
+}
+
+/// Quantisation of network weights.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct WeightsConfig {
+    /// Bits a weight of the deformation network.
+    pub deformation_bits: u8,
+    /// Bits a weight of the context model and of spherical-harmonics networks.
+    pub context_bits: u8,
+}
+
+impl Default for CompressionConfig {
+    fn default() -> Self {
+        Self {
+            profile: "compact".to_owned(),
+            rate: RateConfig::default(),
+            context: ContextConfig::default(),
+            steps: StepsConfig::default(),
+            sh: ShConfig::default(),
+            attributes: AttributesConfig::default(),
+            weights: WeightsConfig::default(),
+        }
+    }
+}
+
+impl Default for RateConfig {
+    fn default() -> Self {
+        Self { lambda: 0.0, weighting: "megabytes".to_owned(), interval: 3, fraction: 0.25, from: 1000 }
+    }
+}
+
+impl Default for ContextConfig {
+    fn default() -> Self {
+        Self {
+            architecture: "compact".to_owned(),
+            hyperprior: true,
+            checkerboard: true,
+            inter_plane: true,
+            inter_scale: true,
+            high_scale_hyperprior: false,
+            learning_rate_init: 5e-3,
+            learning_rate_final: 5e-4,
+            fit_iterations: 600,
+        }
+    }
+}
+
+impl Default for StepsConfig {
+    fn default() -> Self {
+        Self {
+            space_only: 0.05,
+            space_time: 0.05,
+            adaptive: true,
+            adaptive_from: 15_000,
+            per_scale: false,
+            learning_rate: 2e-3,
+        }
+    }
+}
+
+impl Default for ShConfig {
+    fn default() -> Self {
+        Self { model: "factorized".to_owned(), step: 0.02, learning_rate_init: 5e-3, learning_rate_final: 5e-4 }
+    }
+}
+
+impl Default for AttributesConfig {
+    fn default() -> Self {
+        Self {
+            position: 0.05,
+            log_scale: 0.1,
+            quaternion: 0.02,
+            opacity_logit: 0.4,
+            sh_dc: 0.04,
+            search_tolerance: 0.05,
+        }
+    }
+}
+
+impl Default for WeightsConfig {
+    fn default() -> Self {
+        Self { deformation_bits: 10, context_bits: 8 }
+    }
+}

@@ -1,0 +1,87 @@
+//! How the planes and the spherical harmonics were coded: expected against real bits, every plane, and where its bits
+//! are (the paper's figure "bitrate allocation").
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use light4gs_data::{DataError, RgbImage8};
+
+use super::CodingReport;
+use super::color_map::{css_gradient, inferno};
+use super::format::{count, fixed};
+use super::html::escape;
+use super::picture::data_uri;
+use crate::compression::BitMap;
+
+pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<String, DataError> {
+    let Some(CodingReport { record, bit_maps }) = coding else { return Ok(String::new()) };
+    let mut html = String::from(
+        "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Part</th><th scope=\"col\" class=\"number\">Bits expected</th>\
+         <th scope=\"col\" class=\"number\">Bits in the file</th><th scope=\"col\" class=\"number\">Difference</th></tr></thead>\n<tbody>\n",
+    );
+    let (expected, coded) = (record.estimated_bits, record.coded_bits);
+    for (part, expected, coded) in
+        [("Hexplanes", expected.hexplanes, coded.hexplanes), ("Spherical harmonics", expected.sh, coded.sh)]
+    {
+        let difference = if coded > 0.0 { (expected - coded) / coded * 100.0 } else { 0.0 };
+        let _ = writeln!(
+            html,
+            "<tr><th scope=\"row\">{part}</th><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+             <td class=\"number\">{}&nbsp;%</td></tr>",
+            count(expected.round() as u64),
+            count(coded as u64),
+            fixed(difference, 2)
+        );
+    }
+    html.push_str(
+        "</tbody>\n</table></div>\n<details><summary>Plane by plane</summary>\n<div class=\"scroll\"><table>\n<thead><tr>\
+         <th scope=\"col\">Plane</th><th scope=\"col\" class=\"number\">Step</th><th scope=\"col\" class=\"number\">Values</th>\
+         <th scope=\"col\" class=\"number\">Bytes of values</th><th scope=\"col\" class=\"number\">Bytes of hyperprior</th>\
+         <th scope=\"col\" class=\"number\">Bits a value</th></tr></thead>\n<tbody>\n",
+    );
+    for plane in &record.planes {
+        let bits = 8.0 * (plane.value_bytes + plane.hyperprior_bytes) as f64 / plane.symbols.max(1) as f64;
+        let _ = writeln!(
+            html,
+            "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+             <td class=\"number\">{}</td><td class=\"number\">{}</td></tr>",
+            escape(&plane.name),
+            fixed(plane.step.into(), 5),
+            count(plane.symbols as u64),
+            count(plane.value_bytes),
+            count(plane.hyperprior_bytes),
+            fixed(bits, 3)
+        );
+    }
+    html.push_str("</tbody>\n</table></div></details>\n");
+    maps(&mut html, path, bit_maps)?;
+    Ok(html)
+}
+
+/// One scale of colours for all planes, so that they can be compared.
+fn maps(html: &mut String, path: &Path, bit_maps: &[BitMap]) -> Result<(), DataError> {
+    let most = bit_maps.iter().flat_map(|map| &map.bits).fold(0.0f32, |most, bits| most.max(*bits));
+    if most <= 0.0 {
+        return Ok(());
+    }
+    let _ = writeln!(
+        html,
+        "<p class=\"legend\">Bits at each place of a plane, all channels together, \
+         <span class=\"scale\">0 <i style=\"background:{}\"></i> {}</span></p>\n<div class=\"maps\">",
+        css_gradient(),
+        fixed(most.into(), 1)
+    );
+    for map in bit_maps {
+        let pixels = map.bits.iter().flat_map(|bits| inferno(bits / most)).collect();
+        let picture = RgbImage8 { width: map.width, height: map.height, pixels };
+        let data = data_uri(&picture).map_err(|error| DataError::Picture {
+            path: path.to_path_buf(),
+            problem: format!("bit map of plane {}: {error}", map.name),
+            remedy: "this is a fault of the program: please report it".to_owned(),
+        })?;
+        let name = escape(&map.name);
+        let _ = writeln!(html, "<div><img src=\"{data}\" alt=\"Bits of plane {name}\"><span>{name}</span></div>");
+    }
+    html.push_str("</div>\n");
+    Ok(())
+}

@@ -1,0 +1,181 @@
+//! Compression across the crates: the Burn modules against the codec's exact executor, the rate's estimate, and whole
+//! scenes into files and back.
+
+use burn::tensor::{Device, Distribution, Tensor};
+use light4gs_codec::{PlaneCoding, SceneMeta, decode, plane_distributions};
+use light4gs_data::PointCloud;
+use light4gs_model::{
+    ContextModel, ContextModelConfig, ContextParts, DynamicScene, HexPlaneConfig, Latent, PlaneSteps,
+};
+use light4gs_tests::golden::{assert_close_relative, devices, values_of};
+use light4gs_train::compression::{Compression, encode};
+use light4gs_train::config::Config;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+const CHANNELS: usize = 4;
+
+/// The whole model, and each with a part less.
+fn compositions() -> Vec<ContextModelConfig> {
+    let all = ContextParts::new;
+    let parts = [
+        all(),
+        all().with_checkerboard(false),
+        all().with_inter_plane(false),
+        all().with_inter_scale(false),
+        all().with_hyperprior(false),
+        all().with_high_scale_hyperprior(true),
+        all().with_hyperprior(false).with_checkerboard(false).with_inter_plane(false).with_inter_scale(false),
+    ];
+    let compact = parts.into_iter().map(|parts| ContextModelConfig::compact(CHANNELS).with_parts(parts));
+    compact.chain([ContextModelConfig::reference(CHANNELS)]).collect()
+}
+
+/// Weights far from their start, so that every path through the networks counts.
+fn shaken(mut model: ContextModel, planes: &[Tensor<3>], steps: &PlaneSteps) -> ContextModel {
+    model.start_from(planes, steps);
+    let [.., last] = &mut model.entropy_parameters.layers;
+    let weight = last.weight.val();
+    let noise = Tensor::random(weight.dims(), Distribution::Normal(0.0, 0.3), &weight.device());
+    last.weight = burn::module::Param::from_tensor(weight + noise);
+    model.update_quantiles();
+    model
+}
+
+/// What a decoder computes with plain arithmetic is what the modules compute, to float tolerance.
+#[test]
+fn modules_and_exact_executor_agree() {
+    for (name, device) in devices() {
+        device.seed(3);
+        let hexplane = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([8, 12, 4, 8]).init(&device);
+        let planes: Vec<Tensor<3>> = hexplane
+            .tensors()
+            .into_iter()
+            .map(|plane| plane.clone() + Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.3), &device))
+            .collect();
+        let steps = PlaneSteps::fixed(&[0.1; 12], &device);
+        for (which, config) in compositions().into_iter().enumerate() {
+            let model = shaken(config.init(&device), &planes, &steps);
+            let decoded: Vec<Tensor<3>> =
+                model.quantize(&planes, &steps).into_iter().map(|plane| plane.decoded).collect();
+            let hyper_symbols = model
+                .hyper_symbols(&decoded, &steps)
+                .into_iter()
+                .map(|plane| plane.map_or_else(Vec::new, |plane| values_of(&plane).iter().map(|v| *v as i32).collect()))
+                .collect();
+            let coding = PlaneCoding { model: model.to_arrays().unwrap(), steps: steps.to_groups(), hyper_symbols };
+            let arrays = light4gs_model::HexPlane::from_planes(decoded.clone()).to_arrays();
+            let all: Vec<usize> = (0..12).collect();
+            for (plane, gaussians) in
+                model.plane_parameters(&decoded, &steps, &all, Latent::Rounded).into_iter().enumerate()
+            {
+                let exact = plane_distributions(&arrays, &coding, plane).unwrap();
+                let what = |part: &str| format!("{name}, composition {which}, plane {plane}: {part}");
+                assert_close_relative(&what("means"), &values_of(&gaussians.means), &exact.means, 1e-4);
+                assert_close_relative(&what("scales"), &values_of(&gaussians.scales), &exact.scales, 1e-4);
+            }
+        }
+    }
+}
+
+/// A small scene that moves, with spherical harmonics that differ.
+fn scene(config: &Config, device: &Device) -> DynamicScene {
+    device.seed(5);
+    let mut random = ChaCha8Rng::seed_from_u64(9);
+    let positions = (0..300).map(|_| std::array::from_fn(|_| random.random_range(-1.0..1.0))).collect();
+    let colors = (0..300).map(|_| std::array::from_fn(|_| random.random())).collect();
+    let mut scene = config.model.build().init(&PointCloud { positions, colors }, device);
+    let rest = scene.gaussians.sh_rest.dims();
+    let noise = Tensor::random(rest, Distribution::Normal(0.0, 0.1), device);
+    scene.gaussians.sh_rest = burn::module::Param::from_tensor(noise);
+    scene
+}
+
+fn config(overrides: &[&str]) -> Config {
+    let small = ["model.hexplane.channels=4", "model.hexplane.resolution=[8,8,8,4]", "model.deformation.width=8"];
+    let overrides: Vec<String> = small.iter().chain(overrides).map(|key| (*key).to_owned()).collect();
+    Config::load("dnerf-small", &overrides).unwrap()
+}
+
+/// Over many draws the estimate on a part is the rate of everything.
+#[test]
+fn the_rate_on_a_part_is_unbiased() {
+    let device = Device::flex().autodiff();
+    let config = config(&[]);
+    let scene = scene(&config, &device);
+    let compression = Compression::new(&config, &device);
+    let noisy = compression.noisy(&scene, false, true);
+    // The hyperprior's own noise is drawn anew each time; seeding it makes all draws see the same.
+    let estimate = |fraction: f64, seed: u64| {
+        device.seed(1);
+        let mut generator = ChaCha8Rng::seed_from_u64(seed);
+        let rate = compression.rate(&noisy, &scene, fraction, true, &mut generator);
+        (rate.planes.into_scalar::<f64>(), rate.sh.unwrap().into_scalar::<f64>())
+    };
+    let (planes, sh) = estimate(1.0, 0);
+    const DRAWS: u64 = 400;
+    let (mut planes_sum, mut sh_sum) = (0.0, 0.0);
+    for draw in 0..DRAWS {
+        let (planes, sh) = estimate(0.25, draw);
+        planes_sum += planes / DRAWS as f64;
+        sh_sum += sh / DRAWS as f64;
+    }
+    assert!((planes_sum / planes - 1.0).abs() < 0.05, "planes: {planes_sum} on parts, {planes} on all");
+    assert!((sh_sum / sh - 1.0).abs() < 0.02, "spherical harmonics: {sh_sum} on parts, {sh} on all");
+}
+
+/// Every part switched off, every model of the spherical harmonics, both profiles, every degree: the file decodes to
+/// what the encoder said, with the size that the models expect.
+#[test]
+fn every_configuration_makes_a_file_that_decodes() {
+    let device = Device::flex().autodiff();
+    for overrides in [
+        &[][..],
+        &["compression.profile=paper"],
+        &["compression.context.architecture=reference"],
+        &["compression.context.checkerboard=false"],
+        &["compression.context.inter_plane=false"],
+        &["compression.context.inter_scale=false"],
+        &["compression.context.hyperprior=false"],
+        &["compression.context.high_scale_hyperprior=true"],
+        &["compression.sh.model=mixture_of_logistics"],
+        &["compression.sh.model=channel_autoregressive"],
+        &["compression.sh.model=hexplane_coupled"],
+        &["compression.steps.per_scale=true"],
+        &["model.sh_degree=0"],
+        &["model.sh_degree=2"],
+        &["model.hexplane.multipliers=[1]"],
+        &["model.hexplane.multipliers=[1,2,4]"],
+    ] {
+        let config = config(overrides);
+        let scene = scene(&config, &device);
+        let mut compression = Compression::new(&config, &device);
+        compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
+        let encoded =
+            encode(&scene, &mut compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+        let decoded = decode(&encoded.bytes).unwrap();
+        assert_eq!(decoded, encoded.decoded, "{overrides:?}");
+        assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
+        let coded = encoded.coded.unwrap();
+        let bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
+        let (expected, found) = (coded.estimate.hexplanes, 8.0 * bytes as f64);
+        // Tiny planes: a coder's last word weighs, and quantised weights of an untrained model too.
+        assert!(
+            (expected - found).abs() < 0.05 * found + 3000.0,
+            "{overrides:?}: {expected} bits, {found} in the file"
+        );
+    }
+}
+
+#[test]
+fn a_scene_without_gaussians_is_a_file_too() {
+    let device = Device::flex().autodiff();
+    let config = config(&[]);
+    let full = scene(&config, &device).to_arrays(SceneMeta::default());
+    let mut empty = full;
+    empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
+    let scene = DynamicScene::from_arrays(&empty, &device).unwrap();
+    let mut compression = Compression::new(&config, &device);
+    let encoded = encode(&scene, &mut compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+    assert!(decode(&encoded.bytes).unwrap().gaussians.is_empty());
+}

@@ -1,0 +1,207 @@
+//! Properties of the context model that do not depend on golden vectors: what may depend on what, and that every
+//! ablation works.
+
+use burn::module::Param;
+use burn::tensor::{Device, Distribution, Tensor};
+use light4gs_model::{
+    AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlaneConfig, Latent,
+    NamedParameterVisitor, NamedParameters, PlaneSteps, coding_order,
+};
+use light4gs_tests::golden::{assert_close, assert_close_relative, devices, values_of};
+
+const CHANNELS: usize = 4;
+const PLANES: usize = 12;
+
+/// Random planes of two scales; sizes differ between the axes.
+fn random_planes(device: &Device) -> Vec<Tensor<3>> {
+    let config = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([8, 12, 4, 8]);
+    let shapes = (0..PLANES).map(|i| config.plane_shape(i / 6, i % 6));
+    shapes.map(|shape| Tensor::random(shape, Distribution::Normal(0.5, 0.4), device)).collect()
+}
+
+/// The whole model, and without one or more of its parts.
+fn compositions() -> Vec<(&'static str, ContextModelConfig)> {
+    let all = ContextParts::new();
+    let compact = |parts: ContextParts| ContextModelConfig::compact(CHANNELS).with_parts(parts);
+    vec![
+        ("compact", compact(all.clone())),
+        ("reference", ContextModelConfig::reference(CHANNELS)),
+        ("no checkerboard", compact(all.clone().with_checkerboard(false))),
+        ("no inter-plane", compact(all.clone().with_inter_plane(false))),
+        ("no inter-scale", compact(all.clone().with_inter_scale(false))),
+        ("no hyperprior", compact(all.clone().with_hyperprior(false))),
+        (
+            "nothing",
+            compact(
+                all.with_hyperprior(false).with_checkerboard(false).with_inter_plane(false).with_inter_scale(false),
+            ),
+        ),
+    ]
+}
+
+fn steps(device: &Device) -> PlaneSteps {
+    PlaneSteps::fixed(&[0.1; PLANES], device)
+}
+
+fn all_planes() -> Vec<usize> {
+    (0..PLANES).collect()
+}
+
+/// Means and scales of a plane, side by side.
+fn parameters(model: &ContextModel, planes: &[Tensor<3>], plane: usize) -> Vec<f32> {
+    let found = model.plane_parameters(planes, &steps(&planes[0].device()), &[plane], Latent::Rounded);
+    [values_of(&found[0].means), values_of(&found[0].scales)].concat()
+}
+
+/// Which parameters of a plane change if one value of a plane changes; none where a plane has a hyperprior, which is
+/// transmitted and may look at all of it.
+#[test]
+fn parameters_depend_only_on_what_is_decoded() {
+    let device = Device::flex();
+    let planes = random_planes(&device);
+    let order = coding_order(PLANES);
+    for (name, config) in compositions() {
+        let model = config.init(&device);
+        let rates = model.rate(&planes, &steps(&device), &all_planes(), Latent::Rounded);
+        for (place, plane) in order.iter().copied().enumerate() {
+            if rates[plane].hyper_bits.is_some() {
+                continue;
+            }
+            let before = parameters(&model, &planes, plane);
+            for later in &order[place..] {
+                // Of the plane itself, a value that is no anchor: nothing may depend on that.
+                let mut changed = planes.clone();
+                let [channels, height, width] = changed[*later].dims();
+                let mask: Vec<f32> = (0..channels * height * width)
+                    .map(|i| if *later != plane || (i / width % height + i % width) % 2 == 0 { 1.0 } else { 0.0 })
+                    .collect();
+                let mask = Tensor::<1>::from_floats(mask.as_slice(), &device).reshape([channels, height, width]);
+                changed[*later] = changed[*later].clone() + mask * 0.7;
+                let after = parameters(&model, &changed, plane);
+                assert_eq!(before, after, "{name}: plane {plane} sees plane {later}, which is coded later");
+            }
+        }
+    }
+}
+
+/// What the quantiser believes is what the rate says of its result.
+#[test]
+fn rate_of_the_quantized_planes() {
+    for (name, device) in devices() {
+        let planes = random_planes(&device);
+        let steps = steps(&device);
+        for (composition, config) in compositions() {
+            let model = config.init(&device);
+            let quantized = model.quantize(&planes, &steps);
+            let decoded: Vec<_> = quantized.iter().map(|plane| plane.decoded.clone()).collect();
+            let rates = model.rate(&decoded, &steps, &all_planes(), Latent::Rounded);
+            let maps = model.bit_map(&decoded, &steps, &all_planes(), Latent::Rounded);
+            for plane in 0..PLANES {
+                let what = format!("{name} {composition} plane {plane}");
+                let error = values_of(&(decoded[plane].clone() - planes[plane].clone()).abs().max())[0];
+                assert!(error <= 0.1 / 2.0 + 1e-5, "{what}: decoded {error} away");
+                let [rate, map] = [&rates[plane].values_bits, &maps[plane].clone().sum()].map(values_of);
+                assert_close_relative(&what, &map, &rate, 1e-5);
+                // Where there is a hyperprior, that of the decoded plane is another one.
+                if rates[plane].hyper_bits.is_none() {
+                    assert_close_relative(&what, &rate, &values_of(&quantized[plane].rate.values_bits), 1e-3);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn hyper_symbols_are_integers_where_there_is_a_hyperprior() {
+    let device = Device::flex();
+    let planes = random_planes(&device);
+    for (name, config) in compositions() {
+        let model = config.init(&device);
+        let rates = model.rate(&planes, &steps(&device), &all_planes(), Latent::Rounded);
+        let symbols = model.hyper_symbols(&planes, &steps(&device));
+        for plane in 0..PLANES {
+            assert_eq!(symbols[plane].is_some(), rates[plane].hyper_bits.is_some(), "{name} plane {plane}");
+            let Some(symbols) = &symbols[plane] else { continue };
+            let [_, height, width] = planes[plane].dims();
+            assert_eq!(symbols.dims()[1..], [height / 4, width / 4]);
+            assert!(values_of(symbols).iter().all(|symbol| symbol.fract() == 0.0));
+        }
+    }
+}
+
+struct Names(Vec<(String, usize)>);
+
+impl NamedParameterVisitor for Names {
+    fn visit<const D: usize>(&mut self, name: &str, parameter: &mut Param<Tensor<D>>) {
+        self.0.push((name.to_owned(), parameter.val().shape().num_elements()));
+    }
+}
+
+#[test]
+fn compact_is_compact() {
+    let mut model = ContextModelConfig::compact(16).init(&Device::flex());
+    let in_stream: usize = model
+        .layers()
+        .iter()
+        .filter(|layer| !layer.encoder_only)
+        .map(|layer| {
+            let masked = if layer.name == "context_prediction" { layer.weight.dims()[0] * 13 } else { 0 };
+            layer.weight.val().shape().num_elements() - masked + layer.bias.dims()[0]
+        })
+        .sum();
+    assert!((5000..8000).contains(&in_stream), "{in_stream} weights");
+    // Every layer is visited, and every name is there once.
+    let mut names = Names(Vec::new());
+    model.visit_parameters(&mut names);
+    for layer in model.layers() {
+        assert!(names.0.iter().any(|(name, _)| *name == format!("{}.weight", layer.name)), "{}", layer.name);
+    }
+    names.0.sort();
+    let count = names.0.len();
+    names.0.dedup_by(|a, b| a.0 == b.0);
+    assert_eq!(names.0.len(), count);
+}
+
+/// From the statistics of the planes, a value costs about what its Gaussian's entropy says, and far less than the 29.9
+/// bits of the floor that PyTorch's initial weights lie on.
+#[test]
+fn a_start_from_statistics_is_sane() {
+    let device = Device::flex();
+    let planes = random_planes(&device);
+    let steps = PlaneSteps::fixed(&[0.02; PLANES], &device);
+    let values: usize = planes.iter().map(|plane| plane.shape().num_elements()).sum();
+    let bits_each = |model: &ContextModel| {
+        let rates = model.rate(&planes, &steps, &all_planes(), Latent::Noise);
+        rates.iter().map(|rate| values_of(&rate.values_bits)[0]).sum::<f32>() / values as f32
+    };
+    let cold = ContextModelConfig::reference(CHANNELS).init(&device);
+    let mut warm = ContextModelConfig::compact(CHANNELS).init(&device);
+    warm.start_from(&planes, &steps);
+    assert!(bits_each(&cold) > 15.0, "{}", bits_each(&cold));
+    // log2(0.4 / 0.02 · sqrt(2 pi e)) = 6.4, and the centres differ between the groups.
+    assert!((5.0..9.0).contains(&bits_each(&warm)), "{}", bits_each(&warm));
+}
+
+/// A finer step costs more bits, and the gradient says so; through the noise it also reaches the distortion.
+#[test]
+fn learned_steps_have_a_gradient() {
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let planes = random_planes(&device);
+        let quantization = AdaptiveQuantizationConfig::new(2).with_per_scale(true).init(&device);
+        let mut model = ContextModelConfig::compact(CHANNELS).init(&device);
+        model.start_from(&planes, &quantization.steps());
+        let steps = quantization.steps();
+        let noisy = steps.add_noise(&planes);
+        let rates = model.rate(&noisy, &steps, &all_planes(), Latent::Noise);
+        let bits = rates.into_iter().map(|rate| rate.total()).reduce(|sum, bits| sum + bits).unwrap();
+        let gradient = values_of(&quantization.log_steps.val().grad(&bits.backward()).unwrap());
+        assert_eq!(gradient.len(), 4);
+        assert!(gradient.iter().all(|g| *g < 0.0), "{name}: {gradient:?}");
+
+        let error = (noisy[0].clone() - planes[0].clone()).powi_scalar(2).sum();
+        let gradient = values_of(&quantization.log_steps.val().grad(&error.clone().backward()).unwrap());
+        // The error grows with the square of the step.
+        assert_close(name, &gradient, &[2.0 * values_of(&error)[0], 0.0, 0.0, 0.0], 1e-3);
+    }
+}

@@ -1,0 +1,262 @@
+//! Golden case c06 (the hexplane context model of the public code) on every back end.
+//!
+//! The reference differs from ours in one part: its inter-plane context averages the space-time planes over space instead
+//! of time, adds the two maps up, and shares its convolution with the inter-scale context. That part is written here
+//! as one more [`PriorPart`], and the rest is the model itself in its reference configuration.
+
+use burn::tensor::{Device, Tensor};
+use light4gs_model::{
+    CenteredPlanes, ContextModel, ContextModelConfig, InterPlane, InterScale, KernelShape, Latent, Passes, PlaneSteps,
+    Prior, PriorPart, anchor_mask, checkerboard_kernel, coding_order, demultiplex, multiplex, upsample,
+};
+use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
+use light4gs_tests::named::{compare_gradients, load};
+
+/// The golden file's name of one of our parameters.
+fn name_in_file(name: &str) -> String {
+    name.replace("inter_scale", "context_to_params")
+}
+
+/// The reference's model with the file's sizes and weights. The file's only bottleneck is that of the hyperprior.
+fn model_of(golden: &Golden, device: &Device) -> ContextModel {
+    let [channels, ..] = plane_shape(golden);
+    let hyper_channels = golden.shape("param.h_a.0.weight")[0];
+    let mut config = ContextModelConfig::reference(channels);
+    config.hyper_channels = hyper_channels;
+    config.inter_scale = KernelShape::new(golden.shape("param.context_to_params.weight")[2], 1);
+    // The reference's inter-plane part is in this file.
+    config.parts.inter_plane = false;
+    let mut model = config.init(device);
+    load(&mut model, golden, |name| Some(format!("param.{}", name_in_file(name))));
+    model
+}
+
+fn plane_shape(golden: &Golden) -> [usize; 3] {
+    golden.shape("plane.scale0.0")[1..].try_into().expect("planes are [1, M, H, W]")
+}
+
+fn scales_of(golden: &Golden) -> usize {
+    (0..).find(|scale| !golden.has(&format!("plane.scale{scale}.0"))).unwrap()
+}
+
+fn file_key(plane: usize) -> String {
+    format!("scale{}.{}", plane / 6, plane % 6)
+}
+
+fn planes_of(golden: &Golden, device: &Device) -> Vec<Tensor<3>> {
+    (0..6 * scales_of(golden)).map(|i| golden.tensor(&format!("plane.{}", file_key(i)), device)).collect()
+}
+
+fn steps_of(golden: &Golden, device: &Device) -> PlaneSteps {
+    PlaneSteps::fixed(&vec![golden.scalar("Q"); 6 * scales_of(golden)], device)
+}
+
+/// The public code's inter-plane context (NOTES b1): space averages, moments stretched over the rows.
+struct ReferenceInterPlane<'a>(&'a InterScale);
+
+impl ReferenceInterPlane<'_> {
+    /// `[M, H, W]` from a space-time plane `[M, T, S]`.
+    fn spread(plane: Tensor<3>, [height, width]: [usize; 2]) -> Tensor<3> {
+        let [channels, moments, _] = plane.dims();
+        let average = plane.mean_dim(2);
+        if moments == width && moments != height {
+            average.reshape([channels, 1, width]).expand([channels, height, width])
+        } else {
+            upsample(average, [height, 1]).expand([channels, height, width])
+        }
+    }
+
+    fn context(planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
+        let [_, height, width] = planes.planes[plane].dims();
+        let maps = InterPlane::sources(plane % 6)?
+            .map(|position| Self::spread(planes.in_same_scale(plane, position), [height, width]));
+        let [first, second] = maps;
+        Some((first + second) / 2.0)
+    }
+}
+
+impl PriorPart for ReferenceInterPlane<'_> {
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
+        let parameters = Some(self.0.conv.forward(Self::context(planes, plane)?));
+        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+    }
+}
+
+/// The reference's composition: ours with its inter-plane part before the hyperprior.
+fn parts(model: &ContextModel) -> Vec<Box<dyn PriorPart + '_>> {
+    let mut parts = model.parts();
+    let last = parts.len() - 1;
+    parts.insert(last, Box::new(ReferenceInterPlane(model.inter_scale.as_ref().unwrap())));
+    parts
+}
+
+#[test]
+fn masks_and_demultiplexing() {
+    let golden = Golden::open("c06_context");
+    for (name, device) in devices() {
+        let mask = values_of(&checkerboard_kernel(golden.shape("mask5x5")[0], &device));
+        assert_eq!(mask, golden.values("mask5x5"), "{name}");
+        let x = golden.tensor::<3>("demux.x", &device);
+        let [anchors, others] = demultiplex(x.clone());
+        assert_eq!(values_of(&anchors), golden.values("demux.anchor"), "{name} anchors");
+        assert_eq!(values_of(&others), golden.values("demux.nonanchor"), "{name} others");
+        let together = multiplex(anchors, others.zeros_like());
+        assert_eq!(values_of(&multiplex(demultiplex(x.clone())[0].clone(), others)), golden.values("demux.remux"));
+        let [_, height, width] = x.dims();
+        assert_eq!(values_of(&together), values_of(&(x * anchor_mask([height, width], &device))), "{name}");
+    }
+}
+
+#[test]
+fn masked_convolution() {
+    let golden = Golden::open("c06_context");
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let model = model_of(&golden, &device);
+        let conv = model.checkerboard.unwrap().conv;
+        let x = golden.tensor::<3>("maskconv.x", &device).require_grad();
+        let out = conv.forward(x.clone());
+        assert_close_relative(&format!("{name} out"), &values_of(&out), &golden.values("maskconv.out"), 1e-4);
+        let gradients = (out * golden.tensor("maskconv.w", &device)).sum().backward();
+        let expect = |what: &str, found: Vec<f32>, expected: Vec<f32>| {
+            assert_close_relative(&format!("{name} {what}"), &found, &expected, 1e-3);
+        };
+        expect("grad_x", values_of(&x.grad(&gradients).unwrap()), golden.values("maskconv.grad_x"));
+        let bias = conv.bias.val().grad(&gradients).unwrap();
+        expect("grad_bias", values_of(&bias), golden.values("maskconv.grad_bias"));
+        // PyTorch also has gradients for the taps that the mask then sets to zero. We do not.
+        let mask = golden.values("mask5x5");
+        let masked =
+            golden.values("maskconv.grad_weight").into_iter().enumerate().map(|(i, g)| g * mask[i % mask.len()]);
+        let weight = conv.weight.val().grad(&gradients).unwrap();
+        expect("grad_weight", values_of(&weight), masked.collect());
+    }
+}
+
+#[test]
+fn pieces() {
+    let golden = Golden::open("c06_context");
+    for (name, device) in devices() {
+        let model = model_of(&golden, &device);
+        let read = |key: &str| golden.tensor::<3>(key, &device);
+        let check = |key: &str, found: &Tensor<3>| {
+            assert_close_relative(&format!("{name} {key}"), &values_of(found), &golden.values(key), 1e-4);
+        };
+        let hyperprior = model.hyperprior.as_ref().unwrap();
+        let z = hyperprior.analyze(read("hyper.y"));
+        check("hyper.z", &z);
+        check("hyper.params", &hyperprior.synthesize(read("hyper.z")));
+
+        let x = read("entropy_parameters.x");
+        let [inputs, height, width] = x.dims();
+        let [parameters, context] = [0, inputs / 2].map(|start| Some(x.clone().narrow(0, start, inputs / 2)));
+        let found = model.entropy_parameters.forward(parameters, context, [height, width]);
+        check("entropy_parameters.out", &Tensor::cat(vec![found.scales, found.means], 0));
+
+        for key in ["interscale", "interscale_xt"] {
+            let expected = format!("{key}.up");
+            let [_, _, height, width] = golden.shape(&expected)[..] else { panic!("{expected} is [1, M, H, W]") };
+            check(&expected, &upsample(read(&format!("{key}.lower")), [height, width]));
+        }
+
+        let planes = model.centered(&planes_of(&golden, &device), &steps_of(&golden, &device));
+        for plane in [0, 1, 3] {
+            let [a, b] = InterPlane::sources(plane).unwrap().map(|source| planes.in_same_scale(plane, source));
+            check(&format!("interplane_paper.{plane}"), &InterPlane::context(a, b));
+            let reference = ReferenceInterPlane::context(&planes, plane).unwrap();
+            check(&format!("interplane_ref.{plane}"), &reference);
+        }
+    }
+}
+
+/// The maps on the way to the Gaussians of a space-time plane, each from its own part.
+#[test]
+fn trace_of_a_space_time_plane() {
+    let golden = Golden::open("c06_context");
+    for (name, device) in devices() {
+        let model = model_of(&golden, &device);
+        let check = |key: &str, found: &Tensor<3>| {
+            let key = format!("trace_scale0_plane2.{key}");
+            assert_close_relative(&format!("{name} {key}"), &values_of(found), &golden.values(&key), 1e-4);
+        };
+        let planes = model.centered(&planes_of(&golden, &device), &steps_of(&golden, &device));
+        let hyperprior = model.hyperprior.as_ref().unwrap();
+        let z = hyperprior.analyze(planes.in_steps(2));
+        check("z", &z);
+        let parameters = hyperprior.synthesize(z);
+        check("params_base", &parameters);
+        let plane = planes.planes[2].clone();
+        let [_, height, width] = plane.dims();
+        let conv = &model.checkerboard.as_ref().unwrap().conv;
+        check("ctx_params", &conv.forward(plane.clone() * anchor_mask([height, width], &device)));
+        let both = |context: Option<Tensor<3>>| {
+            let gaussians = model.entropy_parameters.forward(Some(parameters.clone()), context, [height, width]);
+            Tensor::cat(vec![gaussians.scales, gaussians.means], 0)
+        };
+        check("gauss_anchor", &both(None));
+        // The file has the second pass at every place; ours leaves the anchors' parameters alone.
+        let context = conv.forward(plane * anchor_mask([height, width], &device));
+        check("gauss_full", &both(Some(context)));
+    }
+}
+
+/// Rate without any quantisation, and its gradient with respect to planes and weights.
+#[test]
+fn identity() {
+    let golden = Golden::open("c06_context");
+    let (bits_y, bits_z) = (golden.values("identity.bits_y"), golden.values("identity.bits_z"));
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let mut model = model_of(&golden, &device);
+        let leaves: Vec<_> = planes_of(&golden, &device).into_iter().map(Tensor::require_grad).collect();
+        let planes = model.centered(&leaves, &steps_of(&golden, &device));
+        let parts = parts(&model);
+        let mut total = Tensor::<1>::zeros([1], &device);
+        for plane in 0..leaves.len() {
+            let rate = model.rate_with(&parts, &planes, plane, Latent::Exact);
+            let what = format!("{name} identity {}", file_key(plane));
+            assert_close_relative(&format!("{what} y"), &values_of(&rate.values_bits), &bits_y[plane..=plane], 1e-4);
+            let hyper = rate.hyper_bits.as_ref().map_or(0.0, |bits| values_of(bits)[0]);
+            assert_close_relative(&format!("{what} z"), &[hyper], &bits_z[plane..=plane], 1e-4);
+            total = total + rate.total();
+        }
+        drop(parts);
+        let found = values_of(&total);
+        assert_close_relative(&format!("{name} total"), &found, &golden.values("identity.total_bits"), 1e-4);
+        let gradients = total.backward();
+        for (plane, leaf) in leaves.iter().enumerate() {
+            let key = format!("identity.grad_plane.{}", file_key(plane));
+            let gradient = values_of(&leaf.grad(&gradients).unwrap());
+            assert_close_relative(&format!("{name} {key}"), &gradient, &golden.values(&key), 1e-3);
+        }
+        let compared = compare_gradients(name, &mut model, &gradients, 1e-3, |parameter| {
+            let key = format!("identity.grad_param.{}", name_in_file(parameter));
+            golden.has(&key).then(|| golden.values(&key))
+        });
+        let in_file = golden.names().iter().filter(|key| key.starts_with("identity.grad_param.")).count();
+        assert_eq!(compared, in_file, "{name}: compared parameters");
+    }
+}
+
+/// Rate of the planes rounded around their means, in coding order.
+#[test]
+fn eval() {
+    let golden = Golden::open("c06_context");
+    let (bits_y, bits_z) = (golden.values("eval.bits_y"), golden.values("eval.bits_z"));
+    for (name, device) in devices() {
+        let model = model_of(&golden, &device);
+        let steps = steps_of(&golden, &device);
+        let planes = planes_of(&golden, &device);
+        let quantized = model.quantize_with(&parts(&model), &planes, &steps);
+        let mut total = 0.0;
+        for plane in coding_order(planes.len()) {
+            let rate = &quantized[plane].rate;
+            let what = format!("{name} eval {}", file_key(plane));
+            let values = values_of(&rate.values_bits);
+            let hyper = rate.hyper_bits.as_ref().map_or(0.0, |bits| values_of(bits)[0]);
+            println!("{what}: {} against {}, {hyper} against {}", values[0], bits_y[plane], bits_z[plane]);
+            total += values[0] + hyper;
+        }
+        println!("{total} against {}", golden.scalar("eval.total_bits"));
+    }
+}
