@@ -16,6 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 
+use crate::compression::Compression;
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::loss::l1;
@@ -333,6 +334,31 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     });
     add("Adam step", adam_ms);
     add("training step", step_ms);
+
+    let compression = Compression::new(small, autodiff);
+    let fraction = small.compression.rate.fraction;
+    let lambda = 0.05;
+    for (stage, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let step = median(
+            autodiff,
+            repeats,
+            || (),
+            |()| {
+                let noisy = compression.noisy(&dynamic, true, true);
+                let gaussians = dynamic.at_with(0.3, noisy.planes.clone(), noisy.sh_rest.clone());
+                let image = splatter.render(gaussians, &scene.camera, None).image;
+                let mut loss = l1(image, truth.clone());
+                if with_rate {
+                    let rate = compression.rate(&noisy, &dynamic, fraction, true, &mut random);
+                    loss = loss + rate.megabytes() * lambda;
+                }
+                let gradients = loss.backward();
+                update(&mut dynamic, gradients);
+            },
+        );
+        add(stage, step);
+    }
 
     let decoded = scene.dynamic(&config, device);
     let mut frame = 0;

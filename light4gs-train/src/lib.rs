@@ -4,6 +4,7 @@ pub mod ablation;
 pub mod benchmark;
 pub mod checkpoint;
 pub mod cli;
+pub mod codec_benchmark;
 pub mod compression;
 pub mod config;
 pub mod densification;

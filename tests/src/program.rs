@@ -12,7 +12,7 @@ pub struct Workspace {
 }
 
 /// What makes a run take seconds.
-const TINY: [&str; 15] = [
+pub const TINY: [&str; 15] = [
     "train.coarse_iterations=12",
     "train.fine_iterations=48",
     "train.checkpoint_interval=9",

@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use light4gs_tests::program::{Workspace, assert_refused, assert_success};
+use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
@@ -54,6 +54,82 @@ fn both_devices_train() {
     for device in ["ndarray", "flex"] {
         assert_success(&w.train(device, &[]).args(["--device", device]).output().unwrap());
     }
+}
+
+#[test]
+fn a_run_with_the_rate_in_its_loss() {
+    let w = Workspace::new(PROGRAM);
+    let output = w.train("run", &TINY_COMPRESSION).arg("--json").output().unwrap();
+    assert_success(&output);
+    let eval: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let coding = &eval["coding"];
+    assert_eq!(coding["profile"], "compact");
+    assert_eq!(coding["fit_seconds"], serde_json::Value::Null, "the models were trained with the scene");
+    let bits = |part: &str| ["estimated_bits", "coded_bits"].map(|kind| coding[kind][part].as_f64().unwrap());
+    // So small a scene's sub-streams end with whole words; what remains is within two percent.
+    let [expected, coded] = bits("hexplanes");
+    assert!((expected - coded).abs() < 0.02 * coded + 600.0, "{expected} bits expected, {coded} coded");
+    // In so few iterations most harmonics are still exactly zero, which costs less than an untrained model says.
+    let [expected, coded] = bits("sh");
+    assert!(coded <= expected, "{expected} bits expected, {coded} coded");
+    assert!(w.names("run").contains(&"coding.json".to_owned()) && w.names("run").contains(&"bit_maps.json".to_owned()));
+
+    // The same scene in other profiles, and with models fitted anew.
+    let size = |name: &str, overrides: &[&str]| {
+        let mut command = w.command(["encode", "run", "--out", name, "--device", "flex"]);
+        for key_value in overrides {
+            command.args(["--set", key_value]);
+        }
+        assert_success(&command.output().unwrap());
+        let info: serde_json::Value = serde_json::from_slice(&w.run(["info", name, "--json"]).stdout).unwrap();
+        (info["bytes"].as_u64().unwrap(), info["profile"].clone())
+    };
+    let (compact, profile) = size("compact.l4gs", &[]);
+    assert_eq!(profile, "compact");
+    let (paper, profile) = size("paper.l4gs", &["compression.profile=paper"]);
+    assert_eq!(profile, "paper");
+    let (plain, profile) = size("plain.l4gs", &["compression.profile=float32"]);
+    assert_eq!(profile, serde_json::Value::Null);
+    assert!(compact < paper && paper < plain, "{compact}, {paper}, {plain}");
+    size("fitted.l4gs", &["compression.context.checkerboard=false"]);
+    assert_success(&w.run(["eval", "fitted.l4gs", "--scene", "scene"]));
+
+    let output = w.run(["encode", "run", "--out", "x.l4gs", "--set", "train.log_interval=7"]);
+    assert_refused(&output, &["encode --set", "compression"]);
+    assert!(!w.path("x.l4gs").exists());
+}
+
+#[test]
+fn ablation_tables() {
+    let w = Workspace::new(PROGRAM);
+    let ablate = || {
+        let mut command = w.command(["ablate", "scene", "--table", "sizes", "--out", "table", "--quiet"]);
+        for key_value in TINY.iter().chain(&["train.prune.iterations=[42, 45]", "compression.rate.from=12"]) {
+            command.args(["--set", key_value]);
+        }
+        command.output().unwrap()
+    };
+    let first = ablate();
+    assert_success(&first);
+    let table = fs::read_to_string(w.path("table/table.md")).unwrap();
+    for row in ["float32", "paper-profile", "high", "medium", "small"] {
+        assert!(table.contains(&format!("| {row} |")), "{table}");
+    }
+    // Finished runs are not repeated: the same table, minutes and all.
+    assert_success(&ablate());
+    assert_eq!(fs::read_to_string(w.path("table/table.md")).unwrap(), table);
+    // Another configuration in the same folders is refused.
+    let output = w.run(["ablate", "scene", "--table", "sizes", "--out", "table", "--quiet"]);
+    assert_refused(&output, &["another configuration"]);
+}
+
+#[test]
+fn layers_on_top() {
+    let w = Workspace::new(PROGRAM);
+    let train = |config: &str| w.run(["train", "scene", "--quiet", "--config", config, "--out", "run"]);
+    assert_refused(&train("dnerf-small+nothing"), &["nothing"]);
+    assert_refused(&train("medium+dnerf-small"), &["dnerf-small", "extends"]);
+    assert!(w.names("run").is_empty());
 }
 
 #[test]

@@ -199,6 +199,8 @@ fn learned_steps_have_a_gradient() {
         assert_eq!(gradient.len(), 4);
         assert!(gradient.iter().all(|g| *g < 0.0), "{name}: {gradient:?}");
 
+        // A tape is consumed by its backward pass.
+        let noisy = quantization.steps().add_noise(&planes);
         let error = (noisy[0].clone() - planes[0].clone()).powi_scalar(2).sum();
         let gradient = values_of(&quantization.log_steps.val().grad(&error.clone().backward()).unwrap());
         // The error grows with the square of the step.

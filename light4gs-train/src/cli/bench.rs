@@ -1,4 +1,4 @@
-//! `bench`: the table of `crate::benchmark`.
+//! `bench`: the tables of `crate::benchmark` and `crate::codec_benchmark`.
 
 use std::path::PathBuf;
 
@@ -6,6 +6,7 @@ use clap::Args;
 
 use super::print_json;
 use crate::benchmark::{BenchScene, benchmark, table};
+use crate::codec_benchmark::{codec_benchmark, codec_table};
 use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
 
@@ -26,6 +27,9 @@ pub(super) struct Bench {
     /// Timed repetitions of each stage, after two untimed ones.
     #[arg(long, default_value_t = 11, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeats: u32,
+    /// Time the entropy coders instead, on a scene of the paper's size.
+    #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "device"])]
+    codec: bool,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -33,6 +37,15 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn run(self) -> Result<(), TrainError> {
+        if self.codec {
+            let times = codec_benchmark(self.repeats as usize)?;
+            if self.json {
+                print_json(&times);
+            } else {
+                println!("{}", codec_table(&times));
+            }
+            return Ok(());
+        }
         let mut scenes = Vec::new();
         for path in &self.scene {
             scenes.push(BenchScene::open(path)?);

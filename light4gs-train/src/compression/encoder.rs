@@ -84,35 +84,43 @@ pub fn encode(
     device: &Device,
 ) -> Result<EncodedScene, TrainError> {
     let data = scene.to_arrays(meta);
-    let profile = match config.profile.as_str() {
-        "float32" => return Ok(EncodedScene { bytes: encode_float32(&data)?, decoded: data, coded: None }),
-        "paper" => Profile::Paper,
-        _ => Profile::Compact,
-    };
-    compression.context.update_quantiles();
-    let given = attribute_steps(&config.attributes);
-    let mut input = CompressionInput {
-        profile,
-        planes: Some(compression.plane_coding(scene)?),
-        sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
-        attributes: given,
-        weights: WeightPrecisions {
-            deformation: WeightPrecision::Bits(config.weights.deformation_bits),
-            context_model: WeightPrecision::Bits(config.weights.context_bits),
-            sh: WeightPrecision::Bits(config.weights.context_bits),
-        },
-    };
-    if let (Some(pictures), Profile::Compact) = (pictures, profile)
+    if config.profile == "float32" {
+        return Ok(EncodedScene { bytes: encode_float32(&data)?, decoded: data, coded: None });
+    }
+    let mut input = compression_input(compression, scene, &data, config)?;
+    if let (Some(pictures), Profile::Compact) = (pictures, input.profile)
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
-        input.attributes = step_search::search(&data, &given, tolerance, pictures.error, pictures.render)?;
+        input.attributes = step_search::search(&data, &input.attributes, tolerance, pictures.error, pictures.render)?;
     }
     let encoded = encode_compressed(&data, &input)?;
     let estimate = compression.estimate(&encoded.decoded, &input.sh, device)?;
     let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
     let coded = Some(CodedSizes { report: encoded.report, estimate, bit_maps });
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
+}
+
+/// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
+/// arrays.
+pub fn compression_input(
+    compression: &mut Compression,
+    scene: &DynamicScene,
+    data: &SceneData,
+    config: &CompressionConfig,
+) -> Result<CompressionInput, TrainError> {
+    compression.context.update_quantiles();
+    Ok(CompressionInput {
+        profile: if config.profile == "paper" { Profile::Paper } else { Profile::Compact },
+        planes: Some(compression.plane_coding(scene)?),
+        sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
+        attributes: attribute_steps(&config.attributes),
+        weights: WeightPrecisions {
+            deformation: WeightPrecision::Bits(config.weights.deformation_bits),
+            context_model: WeightPrecision::Bits(config.weights.context_bits),
+            sh: WeightPrecision::Bits(config.weights.context_bits),
+        },
+    })
 }
 
 fn attribute_steps(config: &AttributesConfig) -> AttributeSteps {

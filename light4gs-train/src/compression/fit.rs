@@ -14,6 +14,7 @@ use crate::schedule::ExponentialDecay;
 
 /// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told after each.
 pub fn fit(scene: &DynamicScene, config: &Config, device: &Device, mut progress: impl FnMut(usize)) -> Compression {
+    seed_device(device, config.seed, Stage::Fine, 0);
     let mut compression = Compression::new(config, device);
     let settings = &config.compression;
     let iterations = settings.context.fit_iterations;
