@@ -29,7 +29,7 @@ pub(super) struct Encode {
     /// The file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     /// Print what was written as JSON.

@@ -39,7 +39,7 @@ pub(super) struct Train {
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     /// Replace a run that is there already.
@@ -89,13 +89,17 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool)
 pub(super) struct Resume {
     /// Folder of the run.
     run: PathBuf,
+    /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    #[arg(long)]
+    device: Option<String>,
     #[command(flatten)]
     output: RunOutput,
 }
 
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let (folder, record, config) = RunFolder::open(&self.run)?;
+        let (folder, record, mut config) = RunFolder::open(&self.run)?;
+        config.device = self.device.unwrap_or(config.device);
         let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
         finish(trainer, &folder, &config, self.output.json)
     }
@@ -108,7 +112,7 @@ pub(super) struct Eval {
     /// Folder of the dataset, where it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     /// Print as JSON.
