@@ -14,6 +14,7 @@ pub mod loss;
 pub mod metrics_log;
 pub mod optimizer;
 pub mod parameters;
+pub mod profile;
 pub mod report;
 pub mod run_folder;
 pub mod schedule;

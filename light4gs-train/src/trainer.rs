@@ -24,6 +24,7 @@ use crate::loss::{photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::profile::Profile;
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
 
@@ -55,6 +56,7 @@ pub struct Trainer {
     metrics: MetricsLog,
     events: TensorBoard,
     quiet: bool,
+    profile: Profile,
 }
 
 impl Trainer {
@@ -104,7 +106,17 @@ impl Trainer {
         let metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
         let step = global_step(&config.train, state.stage, state.iteration) as u64;
         let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
-        Ok(Self { config, device, data, images, folder, state, metrics, events, quiet })
+        Ok(Self { config, device, data, images, folder, state, metrics, events, quiet, profile: Profile::off() })
+    }
+
+    /// From now on measures the stages of every step.
+    pub fn measure_stages(&mut self) {
+        self.profile = Profile::on(&self.device);
+    }
+
+    /// What [`Trainer::measure_stages`] led to.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
     }
 
     /// The dataset.
@@ -153,6 +165,7 @@ impl Trainer {
             let begin = Instant::now();
             let picture = self.step(stage, iteration)?;
             self.control_density(stage, iteration);
+            self.profile.lap("density control");
             self.state.iteration = iteration;
             self.state.seconds += begin.elapsed().as_secs_f64();
             bar.inc(1);
@@ -208,6 +221,7 @@ impl Trainer {
 
     /// Forward, backward, and one optimiser step.
     fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
+        self.profile.begin_step();
         let config = &self.config.train;
         let splatter = self.splatter(stage, iteration);
         let scene = &self.state.scene;
@@ -222,20 +236,25 @@ impl Trainer {
                 Stage::Coarse => scene.gaussians.tensors(),
                 Stage::Fine => scene.at(frame.time),
             };
+            self.profile.lap("Gaussians at the time");
             let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
             let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
+            self.profile.lap("splatting");
             let truth = image_tensor(&*self.images.get(frame)?, &self.device);
+            self.profile.lap("picture from disk");
             let term = photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim) / batch as f32;
             loss = Some(match loss {
                 Some(sum) => sum + term,
                 None => term,
             });
+            self.profile.lap("loss");
             views.push((offsets, rendering.radii));
             picture = Some((rendering.image.inner(), truth.inner()));
         }
         let mut loss = loss.expect("a batch has at least one picture");
         if stage == Stage::Fine {
             loss = loss + regularization(scene, config);
+            self.profile.lap("regularisers");
         }
         let value: f32 = loss.clone().into_scalar();
         if !value.is_finite() {
@@ -244,6 +263,7 @@ impl Trainer {
         }
         let mut gradients = loss.backward();
         drop(loss);
+        self.profile.lap("backward");
 
         if iteration <= self.config.train.densify.until {
             for (offsets, radii) in views {
@@ -253,9 +273,11 @@ impl Trainer {
                 }
             }
         }
+        self.profile.lap("density statistics");
         let rates = GroupRates::new(&self.config.train, stage, iteration, self.data.extent);
         let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
         visit_parameters(&mut self.state.scene, &mut step);
+        self.profile.lap("Adam");
         let (image, truth) = picture.expect("a batch has at least one picture");
         Ok(StepPicture { loss: value, image, truth })
     }

@@ -24,6 +24,9 @@ pub(super) struct RunOutput {
     /// No progress bars.
     #[arg(long)]
     quiet: bool,
+    /// Print the time of every stage of a training step. The run itself gets slower, since each stage is waited for.
+    #[arg(long)]
+    profile: bool,
 }
 
 #[derive(Debug, Args)]
@@ -72,14 +75,21 @@ pub(super) fn train(
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (folder, record, config) = RunFolder::open(folder.root())?;
     let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
-    finish(trainer, &folder, &config, output.json)
+    finish(trainer, &folder, &config, output)
 }
 
-fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool) -> Result<(), TrainError> {
+fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &RunOutput) -> Result<(), TrainError> {
+    if output.profile {
+        trainer.measure_stages();
+    }
     trainer.run()?;
+    if let Some(table) = trainer.profile().table() {
+        // On stderr, so that stdout stays JSON where it is asked for.
+        eprintln!("{table}\n");
+    }
     let evaluation = evaluate_run(folder, config, trainer.data())?;
-    print_evaluation(&evaluation, json);
-    if !json {
+    print_evaluation(&evaluation, output.json);
+    if !output.json {
         println!("\nreport: {}", folder.path("report.html").display());
     }
     Ok(())
@@ -101,7 +111,7 @@ impl Resume {
         let (folder, record, mut config) = RunFolder::open(&self.run)?;
         config.device = self.device.unwrap_or(config.device);
         let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
-        finish(trainer, &folder, &config, self.output.json)
+        finish(trainer, &folder, &config, &self.output)
     }
 }
 
