@@ -1,6 +1,6 @@
 // Brings one plane from [C, H · W] to the layout of `include/hexplane.wgsl`.
 //
-// One invocation owns one vector of four channels of one cell; channels that are missing become zero.
+// One invocation owns one cell with all its channels; channels that are missing to the last four become zero.
 
 struct Parameters {
     // Cells of the plane, channels, vectors a cell, first cell in `packed`.
@@ -20,19 +20,19 @@ fn main(
     @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32,
 ) {
-    // Neighbours own neighbouring cells, whose values lie next to each other in the plane.
-    let own = flat_group(group, groups) * WORKGROUP + lane;
-    if (own >= parameters.cells * parameters.quads) {
+    let cell = flat_group(group, groups) * WORKGROUP + lane;
+    if (cell >= parameters.cells) {
         return;
     }
-    let quad = own / parameters.cells;
-    let cell = own % parameters.cells;
-    var value = vec4<f32>(0.0);
-    for (var k = 0u; k < 4u; k++) {
-        let channel = 4u * quad + k;
-        if (channel < parameters.channels) {
-            value[k] = plane[channel * parameters.cells + cell];
+    let first = (parameters.first_cell + cell) * parameters.quads;
+    for (var quad = 0u; quad < parameters.quads; quad++) {
+        var value = vec4<f32>(0.0);
+        for (var k = 0u; k < 4u; k++) {
+            let channel = 4u * quad + k;
+            if (channel < parameters.channels) {
+                value[k] = plane[channel * parameters.cells + cell];
+            }
         }
+        packed[first + quad] = value;
     }
-    packed[(parameters.first_cell + cell) * parameters.quads + quad] = value;
 }

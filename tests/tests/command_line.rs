@@ -294,3 +294,21 @@ fn bench_prints_a_table_and_json() {
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(json[0]["device"], "flex");
 }
+
+#[test]
+fn an_error_of_the_gpu_is_reported_like_any_other() {
+    let w = Workspace::new(PROGRAM);
+    // 5 GiB of pixels are more than any adapter binds.
+    let output = w.run(["bench", "--device", "wgpu", "--gaussians", "10", "--size", "16384", "--repeats", "1"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(!text.contains("panicked") && text.contains("error: ") && text.contains("adapter"), "{text}");
+}
+
+#[test]
+fn adapters_that_are_not_there_are_refused() {
+    let w = Workspace::new(PROGRAM);
+    let bench = |device| w.run(["bench", "--device", device, "--gaussians", "10", "--size", "16"]);
+    assert_refused(&bench("wgpu:77"), &["wgpu:77", "mesa-vulkan-drivers", "--device flex"]);
+    assert_refused(&bench("vulkan"), &["vulkan", "ndarray, flex, wgpu", "wgpu:0"]);
+}

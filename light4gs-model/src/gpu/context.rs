@@ -29,6 +29,11 @@ impl Gpu {
         Ok(Self { client: tensor.client.clone(), device: tensor.device.clone() })
     }
 
+    /// Rounds that a loop may take. Mesa's software driver leaves any loop after 65535, without a word.
+    pub(super) fn longest_loop(&self) -> usize {
+        if self.client.properties().identity.physical.is_none() { 60_000 } else { u32::MAX as usize }
+    }
+
     /// Room for `count` values of four bytes, at least one.
     pub(super) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
         let bytes = 4 * count.max(PART_ALIGNMENT) as u64;

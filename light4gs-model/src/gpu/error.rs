@@ -73,6 +73,11 @@ impl GpuError {
         panic!("{message}");
     }
 
+    /// Whether a GPU operation has panicked with an error that nobody has taken yet.
+    pub fn is_raised() -> bool {
+        LAST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).is_some()
+    }
+
     /// The error that a GPU operation last panicked with, once.
     pub fn take() -> Option<Self> {
         LAST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take()

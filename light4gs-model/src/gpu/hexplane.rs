@@ -73,7 +73,7 @@ fn forward(inputs: QueryInputs<CubeBackend>) -> Result<(CubeTensor, GpuQuerySave
             .reads(&buffer_of(plane))
             .writes(&packed)
             .uniform(&sizes.map(|size| size as u32))
-            .invocations(layout.cells_of(k) * layout.quads())?;
+            .invocations(layout.cells_of(k))?;
     }
     let features = gpu.allocate("features", layout.points * layout.channels)?;
     Launch::new(&gpu.client, HEXPLANE_QUERY)
@@ -116,16 +116,20 @@ fn backward(
     let starts = ranges(&gpu, &sorted.keys, samples, layout.cells())?;
     let parts = Parts::new(&layout.planes.each_ref().map(|shape| shape.num_elements()));
     let gradients = gpu.allocate("gradients of planes", parts.total)?;
-    let mut uniform = layout.uniform();
-    uniform.extend(parts.starts.iter().map(|start| *start as u32));
-    Launch::new(&gpu.client, HEXPLANE_GATHER)
-        .reads(&starts)
-        .reads(&sorted.order)
-        .reads(&fractions)
-        .reads(&handed)
-        .writes(&gradients)
-        .uniform(&uniform)
-        .invocations(layout.cells() * layout.quads())?;
+    // No cell has more samples than there are points, and each takes a round of a loop a vector.
+    let at_most = (gpu.longest_loop() / layout.quads()).clamp(1, layout.points.max(1));
+    for begin in (0..layout.points.max(1)).step_by(at_most) {
+        let mut uniform = layout.uniform();
+        uniform.extend(parts.starts.iter().chain(&[begin, at_most]).map(|value| *value as u32));
+        Launch::new(&gpu.client, HEXPLANE_GATHER)
+            .reads(&starts)
+            .reads(&sorted.order)
+            .reads(&fractions)
+            .reads(&handed)
+            .updates_if(begin > 0, &gradients)
+            .uniform(&uniform)
+            .invocations(layout.cells())?;
+    }
     gpu.check("the gradients of the planes", &[&gradients])?;
 
     let points = with_points.then(|| gpu.tensor(of_points.of(&point_gradients, 0), Shape::from([layout.points, 4])));
@@ -146,5 +150,41 @@ impl HexPlaneKernels for CubeBackend {
 
     fn query_backward(saved: GpuQuerySaved, gradient: CubeTensor, with_points: bool) -> QueryGradients<Self> {
         backward(saved, gradient, with_points).unwrap_or_else(|error| error.raise())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::{Device, Tensor};
+
+    use crate::hexplane::HexPlaneConfig;
+
+    /// Far more points in one cell than a loop of Mesa's software driver takes.
+    #[test]
+    fn a_crowded_cell() {
+        const POINTS: usize = 20_000;
+        let config = HexPlaneConfig::new().with_channels(18).with_resolution([4, 4, 4, 4]).with_multipliers(vec![1]);
+        let gradients = |device: Device| {
+            let device = device.autodiff();
+            let planes = config
+                .init(&Device::flex())
+                .planes
+                .into_iter()
+                .map(|plane| Tensor::from_data(plane.val().into_data(), &device).require_grad());
+            let planes: Vec<Tensor<3>> = planes.collect();
+            let points = Tensor::<2>::full([POINTS, 4], 0.1, &device);
+            let features = crate::hexplane::query_planes(points, planes.clone());
+            let gradients = features.sum().backward();
+            let all = planes.iter().map(|plane| plane.grad(&gradients).expect("planes have gradients"));
+            let sums = all.map(|gradient| gradient.sum().into_scalar::<f32>());
+            sums.collect::<Vec<_>>()
+        };
+        Device::flex().seed(1);
+        let expected = gradients(Device::flex());
+        Device::flex().seed(1);
+        let found = gradients(Device::wgpu(Default::default()));
+        for (found, expected) in found.iter().zip(&expected) {
+            assert!((found - expected).abs() <= 1e-3 * expected.abs(), "{found} against {expected}");
+        }
     }
 }

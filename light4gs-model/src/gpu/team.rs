@@ -10,9 +10,6 @@ use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
 
-/// Cells that a Gaussian may touch on Mesa's software driver, which leaves any loop after 65535 rounds.
-const MAX_CELLS_IN_SOFTWARE: u32 = 60_000;
-
 /// Who blends a cell: a team of invocations, and how its members meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Team {
@@ -30,14 +27,15 @@ impl Team {
         let smallest = gpu.client.properties().hardware.plane_size_min;
         let known = has_subgroups_of_one_size(gpu)?;
         let cells = |side: u32| width.div_ceil(side) * height.div_ceil(side);
-        let small_cells = cells(8) <= MAX_CELLS_IN_SOFTWARE;
+        // A Gaussian visits the cells that it touches in one loop.
+        let limit = gpu.longest_loop() as u32;
         let team = match smallest {
-            8 if known && small_cells => Self { members: 8, includes: TEAM_OF_FEW, cell: 8 },
+            8 if known && cells(8) <= limit => Self { members: 8, includes: TEAM_OF_FEW, cell: 8 },
             16 | 32 | 64 if known => Self { members: smallest, includes: TEAM_OF_MANY, cell: 16 },
             _ => Self { members: 32, includes: TEAM_WITHOUT_SUBGROUPS, cell: 16 },
         };
-        if smallest == 8 && cells(team.cell) > MAX_CELLS_IN_SOFTWARE {
-            return Err(GpuError::Picture { width, height, limit: MAX_CELLS_IN_SOFTWARE });
+        if cells(team.cell) > limit {
+            return Err(GpuError::Picture { width, height, limit });
         }
         Ok(team)
     }

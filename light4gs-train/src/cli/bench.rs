@@ -13,7 +13,7 @@ use crate::error::TrainError;
 #[derive(Debug, Args)]
 pub(super) struct Bench {
     /// Back ends, separated by commas.
-    #[arg(long, value_delimiter = ',', default_value = "ndarray,flex,wgpu")]
+    #[arg(long, value_delimiter = ',', default_value = "ndarray,flex")]
     device: Vec<String>,
     /// A scene file instead of generated ones (layout: docs/benchmarks.md).
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]

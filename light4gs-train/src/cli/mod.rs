@@ -104,6 +104,12 @@ pub fn main() -> ExitCode {
 
 /// Errors of GPU operations arrive as panics, since Burn's operations return no results: makes ordinary errors of them.
 fn catching_gpu_errors(run: impl FnOnce() -> Result<(), TrainError>) -> Result<(), TrainError> {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !GpuError::is_raised() {
+            report(panic);
+        }
+    }));
     std::panic::catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| match GpuError::take() {
         Some(error) => Err(error.into()),
         None => std::panic::resume_unwind(panic),
