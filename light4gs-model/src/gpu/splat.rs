@@ -23,10 +23,10 @@ const SUMS: usize = 10;
 
 /// What the stages of one picture have in common.
 #[derive(Clone, Copy, Debug)]
-struct Frame {
+pub(super) struct Frame {
     view: View,
-    team: Team,
-    gaussians: usize,
+    pub(super) team: Team,
+    pub(super) gaussians: usize,
     /// Coefficients of `sh_rest` a Gaussian.
     rest: usize,
 }
@@ -36,16 +36,16 @@ impl Frame {
         [self.view.camera.width, self.view.camera.height]
     }
 
-    fn pixels(&self) -> usize {
+    pub(super) fn pixels(&self) -> usize {
         self.size().iter().map(|side| *side as usize).product()
     }
 
-    fn cells(&self) -> usize {
+    pub(super) fn cells(&self) -> usize {
         self.size().iter().map(|side| side.div_ceil(self.team.cell) as usize).product()
     }
 
     /// `View` of `shaders/include/view.wgsl`. `part` of the cells' lists, of `parts`.
-    fn uniform(&self, part: usize, parts: usize) -> Vec<u32> {
+    pub(super) fn uniform(&self, part: usize, parts: usize) -> Vec<u32> {
         let camera = &self.view.camera;
         let [width, height] = self.size();
         let (tan_x, tan_y) = camera.tan_half_fov();
@@ -70,7 +70,7 @@ impl Frame {
     }
 
     /// Launches that the longest possible list takes: no Gaussian is in a cell's list twice.
-    fn parts(&self, intersections: usize) -> usize {
+    pub(super) fn parts(&self, intersections: usize) -> usize {
         intersections.min(self.gaussians).div_ceil(PART).max(1)
     }
 }
@@ -89,18 +89,18 @@ struct InputBuffers {
 
 /// Gaussians on the screen, and which of them touches which cell.
 #[derive(Clone, Debug)]
-struct Intersections {
-    splats: Handle,
+pub(super) struct Intersections {
+    pub(super) splats: Handle,
     /// Number of all intersections.
-    count: usize,
+    pub(super) count: usize,
     /// `[N]`: the first intersection of each Gaussian; the others follow it.
-    first_of_gaussian: Handle,
+    pub(super) first_of_gaussian: Handle,
     /// `[count]`: the Gaussian of each intersection.
-    gaussians: Handle,
+    pub(super) gaussians: Handle,
     /// `[count]`: intersections cell by cell, nearest first.
-    order: Handle,
+    pub(super) order: Handle,
     /// `[cells + 1]`: where each cell begins in `order`.
-    starts: Handle,
+    pub(super) starts: Handle,
 }
 
 /// State between forward and backward.
@@ -194,32 +194,39 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
     Ok(picture)
 }
 
-fn forward(
-    inputs: SplatInputs<CubeBackend>,
-    view: View,
-) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
-    let gpu = Gpu::of(&inputs.means)?;
+/// A picture's Gaussians on the screen, sorted into cells: what every pass over its pixels begins with.
+pub(super) struct Begun {
+    pub(super) frame: Frame,
+    shapes: [Shape; 7],
+    inputs: InputBuffers,
+    pub(super) intersections: Intersections,
+    /// `[N]` in pixels.
+    radii: Handle,
+}
+
+/// Projects, intersects and sorts.
+pub(super) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: View) -> Result<Begun, GpuError> {
     let inputs = inputs.into_array();
     let shapes = inputs.each_ref().map(|tensor| tensor.shape());
     let frame = Frame {
         view,
-        team: Team::choose(&gpu, view.camera.width, view.camera.height)?,
+        team: Team::choose(gpu, view.camera.width, view.camera.height)?,
         gaussians: shapes[0][0],
         rest: shapes[5][1],
     };
     let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.map(buffer_of);
     let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
-    forward_with(&gpu, frame, inputs, shapes)
+    begin_with(gpu, frame, inputs, shapes)
 }
 
-fn forward_with(
-    gpu: &Gpu,
-    frame: Frame,
-    inputs: InputBuffers,
-    shapes: [Shape; 7],
-) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
+fn begin_with(gpu: &Gpu, frame: Frame, inputs: InputBuffers, shapes: [Shape; 7]) -> Result<Begun, GpuError> {
     let [splats, depth_keys, radii] = project(gpu, &frame, &inputs)?;
     let intersections = intersect(gpu, &frame, splats, &depth_keys)?;
+    Ok(Begun { frame, shapes, inputs, intersections, radii })
+}
+
+fn forward(gpu: &Gpu, begun: Begun) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
+    let Begun { frame, shapes, inputs, intersections, radii } = begun;
     let picture = rasterize(gpu, &frame, &intersections)?;
     gpu.check("the picture", &[&picture])?;
     let values = CHANNELS * frame.pixels();
@@ -280,7 +287,8 @@ impl SplatKernels for CubeBackend {
     type Saved = GpuSplatSaved;
 
     fn splat_forward(inputs: SplatInputs<Self>, SplatView(view): SplatView) -> (SplatOutputs<Self>, GpuSplatSaved) {
-        forward(inputs, view).unwrap_or_else(|error| error.raise())
+        let drawn = Gpu::of(&inputs.means).and_then(|gpu| forward(&gpu, begin(&gpu, inputs, view)?));
+        drawn.unwrap_or_else(|error| error.raise())
     }
 
     fn splat_backward(saved: GpuSplatSaved, gradient: CubeTensor) -> SplatInputs<Self> {
@@ -322,7 +330,7 @@ mod tests {
         let view = View { camera, background: [0.1, 0.5, 0.9], sh_degree: 3 };
         let shapes = widths.map(|width| Shape::from([COUNT, width]));
         let frame = Frame { view, team, gaussians: COUNT, rest: 15 };
-        let (outputs, saved) = forward_with(gpu, frame, inputs, shapes).unwrap();
+        let (outputs, saved) = forward(gpu, begin_with(gpu, frame, inputs, shapes).unwrap()).unwrap();
         let values = outputs.picture.shape().num_elements();
         let gradients = backward(saved, gpu.tensor(upstream, Shape::from([values]))).unwrap().into_array();
         std::iter::once(outputs.picture)

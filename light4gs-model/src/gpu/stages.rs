@@ -15,6 +15,7 @@ const QUATERNION: &str = wgsl!("include/quaternion");
 const COVARIANCE: &str = wgsl!("include/covariance");
 const PIXELS: &str = wgsl!("include/pixels");
 const FOOTPRINT: &str = wgsl!("include/footprint");
+const EXPONENTIAL: &str = wgsl!("include/exponential");
 const PLANES: &str = wgsl!("include/hexplane");
 
 /// Members of a team meet through subgroup operations; they are few.
@@ -57,5 +58,10 @@ stages! {
     HEXPLANE_QUERY_BACKWARD = "hexplane_query_backward" [PLANES];
     HEXPLANE_GATHER = "hexplane_gather" [PLANES];
     ADAM = "adam" [];
+    SIGNIFICANCE = "significance" [CONSTANTS, VIEW, PIXELS, FOOTPRINT];
+    SIGNIFICANCE_GATHER = "significance_gather" [];
+    NORMAL_CDF = "normal_cdf" [EXPONENTIAL];
+    NORMAL_CDF_BACKWARD = "normal_cdf_backward" [EXPONENTIAL];
+    LOWER_BOUND_BACKWARD = "lower_bound_backward" [];
     SUBGROUPS = "subgroups" [];
 }

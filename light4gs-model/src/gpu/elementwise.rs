@@ -1,0 +1,43 @@
+//! Stages that make one value of one: the distribution function and the bound of the entropy models.
+
+use burn::backend::TensorMetadata;
+use burn_cubecl::tensor::CubeTensor;
+
+use super::context::{Gpu, buffer_of, first_words};
+use super::error::GpuError;
+use super::kernel::Launch;
+use super::stages::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Stage};
+
+/// Launches a stage that reads tensors of one shape and writes another one. Its uniform is their size, then `numbers`.
+fn launch<const K: usize>(stage: Stage, inputs: [CubeTensor; K], numbers: &[f32]) -> Result<CubeTensor, GpuError> {
+    let gpu = Gpu::of(&inputs[0])?;
+    let shape = inputs[0].shape();
+    debug_assert!(inputs.iter().all(|input| input.shape() == shape), "{}: different shapes", stage.name);
+    let count = shape.num_elements();
+    let output = gpu.allocate(stage.name, count)?;
+    let uniform: Vec<u32> =
+        std::iter::once(count as u32).chain(numbers.iter().map(|number| number.to_bits())).collect();
+    let inputs = inputs.map(buffer_of);
+    let launch = inputs.iter().fold(Launch::new(&gpu.client, stage), Launch::reads);
+    launch.writes(&output).uniform(&uniform).invocations(count)?;
+    Ok(gpu.tensor(first_words(&output, count), shape))
+}
+
+fn raised(result: Result<CubeTensor, GpuError>) -> CubeTensor {
+    result.unwrap_or_else(|error| error.raise())
+}
+
+/// The standard normal distribution function.
+pub(crate) fn normal_cdf_on_gpu(places: CubeTensor) -> CubeTensor {
+    raised(launch(NORMAL_CDF, [places], &[]))
+}
+
+/// The upstream gradient times the standard normal density.
+pub(crate) fn normal_cdf_backward_on_gpu(places: CubeTensor, upstream: CubeTensor) -> CubeTensor {
+    raised(launch(NORMAL_CDF_BACKWARD, [places, upstream], &[]))
+}
+
+/// The upstream gradient where `values >= bound` or it is negative, else zero.
+pub(crate) fn lower_bound_backward_on_gpu(values: CubeTensor, upstream: CubeTensor, bound: f32) -> CubeTensor {
+    raised(launch(LOWER_BOUND_BACKWARD, [values, upstream], &[bound]))
+}
