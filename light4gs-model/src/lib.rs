@@ -29,6 +29,7 @@ mod entropy_parameters;
 mod factorized_density;
 pub mod gaussian_conditional;
 mod gaussians;
+mod gpu;
 mod hexplane;
 mod hyperprior;
 mod inter_plane;
@@ -62,6 +63,7 @@ pub use entropy_bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent}
 pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
 pub use factorized_density::{FactorizedDensity, FactorizedDensityConfig, PlainDensity};
 pub use gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
+pub use gpu::GpuError;
 pub use hexplane::{HexPlane, HexPlaneConfig, PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};

@@ -198,7 +198,7 @@ pub struct SceneTimes {
 /// All scenes on one device.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceTimes {
-    /// Name of the back end.
+    /// Name of the back end, and the adapter if it has one.
     pub device: String,
     /// Median of a 1024×1024 float32 product, to set machines side by side.
     pub calibration_ms: f64,

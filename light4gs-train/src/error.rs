@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use light4gs_codec::CodecError;
 use light4gs_data::DataError;
-use light4gs_model::ModelError;
+use light4gs_model::{GpuError, ModelError};
 
 use crate::config::ConfigError;
 
@@ -23,6 +23,9 @@ pub enum TrainError {
     /// A decoded file whose parts do not make a model.
     #[error(transparent)]
     Model(#[from] ModelError),
+    /// A GPU kernel, device or buffer.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
     /// The user asked for something that cannot be done; the text says what to do instead.
     #[error("{0}")]
     Input(String),
@@ -59,7 +62,7 @@ impl TrainError {
     pub fn is_internal(&self) -> bool {
         match self {
             Self::Codec(error) => error.is_internal(),
-            Self::NotFinite { .. } => true,
+            Self::NotFinite { .. } | Self::Gpu(_) => true,
             _ => false,
         }
     }

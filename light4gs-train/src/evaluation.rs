@@ -54,7 +54,7 @@ pub struct SectionSize {
 /// All that was measured, as `eval.json` holds it.
 #[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
-    /// Back end.
+    /// Back end, and the adapter if it has one.
     pub device: String,
     /// Size of the file on disk.
     pub bytes: u64,

@@ -5,7 +5,7 @@ use std::fs;
 use light4gs_data::{DataError, ImageStore, Scene};
 
 use crate::config::Config;
-use crate::device::device_by_name;
+use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
 use crate::metrics_log::read_metrics;
@@ -21,7 +21,7 @@ pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Resul
     let device = device_by_name(&config.device)?;
     let decoded = DecodedScene::open(&folder.stream(), &device)?;
     let images = ImageStore::new(&load_options(config), (config.data.memory_limit_mib << 20) as usize);
-    let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &config.device)?;
+    let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(&config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
     evaluation.training_seconds = metrics.last().map(|record| record.seconds);
     evaluation.coding = folder.read_json("coding.json")?;
@@ -32,7 +32,7 @@ pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Resul
     let report = Report {
         title: scene.name.clone(),
         created: created(),
-        device: config.device.clone(),
+        device: evaluation.device.clone(),
         summary: summary(&evaluation),
         sections: evaluation
             .sections

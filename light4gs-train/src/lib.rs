@@ -17,6 +17,7 @@ pub mod loss;
 pub mod metrics_log;
 pub mod optimizer;
 pub mod parameters;
+pub mod profile;
 mod randomness;
 pub mod report;
 pub mod run_folder;

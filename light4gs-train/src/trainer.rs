@@ -24,6 +24,7 @@ use crate::loss::{l2, photometric, psnr};
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::profile::Profile;
 use crate::randomness::{FrameOrder, Purpose, generator, seed_device, standard_normal};
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
@@ -57,6 +58,7 @@ pub struct Trainer {
     events: TensorBoard,
     order: FrameOrder,
     quiet: bool,
+    profile: Profile,
 }
 
 impl Trainer {
@@ -108,7 +110,18 @@ impl Trainer {
         let step = global_step(&config.train, state.stage, state.iteration) as u64;
         let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
         let order = FrameOrder::default();
-        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet })
+        let profile = Profile::off();
+        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet, profile })
+    }
+
+    /// From now on measures the stages of every step.
+    pub fn measure_stages(&mut self) {
+        self.profile = Profile::on(&self.device);
+    }
+
+    /// What [`Trainer::measure_stages`] led to.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
     }
 
     /// The dataset.
@@ -174,6 +187,7 @@ impl Trainer {
             if stage == Stage::Fine && self.config.train.prune.is_due(iteration) {
                 self.prune_insignificant(iteration);
             }
+            self.profile.lap("density control");
             self.state.iteration = iteration;
             self.state.seconds += begin.elapsed().as_secs_f64();
             bar.inc(1);
@@ -229,11 +243,13 @@ impl Trainer {
 
     /// Forward, backward, and one optimiser step.
     fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
+        self.profile.begin_step();
         let batch = self.config.train.batch_size.max(1);
         let views = self.data.train.len();
         let frames: Vec<usize> =
             (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, views)).collect();
         let noisy = self.quantization_noise(stage, iteration);
+        self.profile.lap("quantisation noise");
         let config = &self.config.train;
         let splatter = self.splatter(stage, iteration);
         let scene = &self.state.scene;
@@ -248,9 +264,12 @@ impl Trainer {
                 (Stage::Fine, None) => scene.at(frame.time),
                 (Stage::Fine, Some(noisy)) => scene.at_with(frame.time, noisy.planes.clone(), noisy.sh_rest.clone()),
             };
+            self.profile.lap("Gaussians at the time");
             let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
             let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
+            self.profile.lap("splatting");
             let truth = image_tensor(&*self.images.get(frame)?, &self.device);
+            self.profile.lap("picture from disk");
             let squared = config.l2_until > 0 && (stage == Stage::Coarse || iteration <= config.l2_until);
             let term = if squared {
                 l2(rendering.image.clone(), truth.clone())
@@ -262,17 +281,20 @@ impl Trainer {
                 Some(sum) => sum + term,
                 None => term,
             });
+            self.profile.lap("loss");
             views.push((offsets, rendering.radii));
             picture = Some((rendering.image.inner(), truth.inner()));
         }
         let mut loss = loss.expect("a batch has at least one picture");
         if stage == Stage::Fine {
             loss = loss + regularization(scene, config);
+            self.profile.lap("regularisers");
         }
         if let Some(noisy) = &noisy
             && let Some(rate) = self.rate_term(noisy, iteration)
         {
             loss = loss + rate;
+            self.profile.lap("rate");
         }
         let value: f32 = loss.clone().into_scalar();
         if !value.is_finite() {
@@ -281,6 +303,7 @@ impl Trainer {
         }
         let mut gradients = loss.backward();
         drop(loss);
+        self.profile.lap("backward");
 
         if iteration <= self.config.train.densify.until {
             for (offsets, radii) in views {
@@ -290,12 +313,14 @@ impl Trainer {
                 }
             }
         }
+        self.profile.lap("density statistics");
         let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
         let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
         visit_parameters(&mut self.state.scene, &mut step);
         if let Some(compression) = &mut self.state.compression {
             visit_compression(compression, &mut step);
         }
+        self.profile.lap("Adam");
         let (image, truth) = picture.expect("a batch has at least one picture");
         Ok(StepPicture { loss: value, image, truth })
     }

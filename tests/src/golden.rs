@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_train::config::DEVICES;
+use light4gs_train::device::device_by_name;
 use safetensors::{Dtype, SafeTensors};
 
 /// The folder: `LIGHT4GS_GOLDEN`, or the copy in `tests/golden`.
@@ -96,8 +98,16 @@ impl Golden {
 }
 
 /// Every back end that is built, by name.
+///
+/// # Panics
+/// If there is no graphics adapter, not even one in software: a back end that cannot be tested fails its tests.
 pub fn devices() -> Vec<(&'static str, Device)> {
-    vec![("ndarray", Device::ndarray()), ("flex", Device::flex())]
+    DEVICES.iter().map(|name| (*name, device_by_name(name).unwrap_or_else(|error| panic!("{error}")))).collect()
+}
+
+/// The back ends among [`devices`] that compute on the processor.
+pub fn cpu_devices() -> Vec<(&'static str, Device)> {
+    devices().into_iter().filter(|(name, _)| *name != "wgpu").collect()
 }
 
 /// Row-major values of a tensor.

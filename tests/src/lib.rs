@@ -5,6 +5,7 @@
 
 pub mod golden;
 pub mod named;
+pub mod odd_scenes;
 pub mod program;
 pub mod random;
 pub mod raster;

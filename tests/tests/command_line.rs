@@ -2,6 +2,8 @@
 
 use std::fs;
 
+use light4gs_model::DynamicScene;
+use light4gs_tests::golden::devices;
 use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
@@ -97,6 +99,22 @@ fn a_run_with_the_rate_in_its_loss() {
     let output = w.run(["encode", "run", "--out", "x.l4gs", "--set", "train.log_interval=7"]);
     assert_refused(&output, &["encode --set", "compression"]);
     assert!(!w.path("x.l4gs").exists());
+}
+
+/// Everything that compresses on a GPU, down to a file that any back end reads to the same bits.
+#[test]
+fn a_run_with_the_rate_in_its_loss_on_wgpu() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &TINY_COMPRESSION).args(["--device", "wgpu"]).output().unwrap());
+    let decoded = light4gs_codec::decode(&fs::read(w.path("run/scene.l4gs")).unwrap()).unwrap();
+    for (name, device) in devices() {
+        let scene = DynamicScene::from_arrays(&decoded, &device).unwrap();
+        assert_eq!(scene.to_arrays(decoded.meta.clone()), decoded, "{name}");
+    }
+    assert_success(&w.run(["eval", "run/scene.l4gs", "--scene", "scene", "--device", "flex"]));
+    // The checkpoint is no GPU's either.
+    assert_success(&w.run(["encode", "run", "--out", "again.l4gs", "--device", "flex"]));
+    assert!(light4gs_codec::decode(&fs::read(w.path("again.l4gs")).unwrap()).is_ok());
 }
 
 #[test]
@@ -293,4 +311,22 @@ fn bench_prints_a_table_and_json() {
     let output = w.run(small.into_iter().chain(["--json", "--device", "flex"]));
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     assert_eq!(json[0]["device"], "flex");
+}
+
+#[test]
+fn an_error_of_the_gpu_is_reported_like_any_other() {
+    let w = Workspace::new(PROGRAM);
+    // 5 GiB of pixels are more than any adapter binds.
+    let output = w.run(["bench", "--device", "wgpu", "--gaussians", "10", "--size", "16384", "--repeats", "1"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(!text.contains("panicked") && text.contains("error: ") && text.contains("adapter"), "{text}");
+}
+
+#[test]
+fn adapters_that_are_not_there_are_refused() {
+    let w = Workspace::new(PROGRAM);
+    let bench = |device| w.run(["bench", "--device", device, "--gaussians", "10", "--size", "16"]);
+    assert_refused(&bench("wgpu:77"), &["wgpu:77", "mesa-vulkan-drivers", "--device flex"]);
+    assert_refused(&bench("vulkan"), &["vulkan", "ndarray, flex, wgpu", "wgpu:0"]);
 }

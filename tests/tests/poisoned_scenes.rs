@@ -1,39 +1,18 @@
 //! The rasteriser on scenes that nobody would make on purpose, against a plain twin, and its reproducibility.
 
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 use light4gs_data::{Camera, PointCloud};
 use light4gs_model::{
     DeformationConfig, DynamicSceneConfig, GaussianTensors, GaussiansConfig, HexPlaneConfig, Splatter,
 };
-use light4gs_tests::golden::{devices, values_of};
+use light4gs_tests::golden::{cpu_devices, devices, values_of};
+use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run};
 use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{
-    ATTRIBUTES, MEANS, OPACITIES, QUATS, Ranges, SCALES, SCREEN_OFFSETS, SH_DC, SH_REST, SplatScene, WIDTHS,
-    picture_of, random_camera,
+    ATTRIBUTES, MEANS, QUATS, Ranges, SCALES, SCREEN_OFFSETS, SH_DC, SH_REST, SplatScene, WIDTHS, picture_of,
+    random_camera,
 };
 use light4gs_tests::twin;
-
-const BACKGROUND: [f32; 3] = [0.1, 0.6, 1.0];
-const SIZES: [[u32; 2]; 6] = [[1, 1], [17, 31], [40, 30], [16, 16], [64, 3], [33, 48]];
-
-/// What a rendering and its backward pass give.
-struct Run {
-    /// `[H, W, 5]`
-    picture: Vec<f32>,
-    radii: Vec<i64>,
-    invalid: usize,
-    gradients: [Vec<f32>; 7],
-}
-
-fn run(scene: &SplatScene, camera: &Camera, degree: usize, device: &Device) -> Run {
-    let leaves = scene.leaves(&device.clone().autodiff());
-    let rendering = leaves.render(camera, BACKGROUND, degree);
-    let picture = picture_of(&rendering);
-    let radii = rendering.radii.to_data().iter::<i64>().collect();
-    let invalid = rendering.invalid_count();
-    let weights = Random::new(99).normals(picture.len());
-    Run { picture, radii, invalid, gradients: leaves.gradients(rendering, &weights) }
-}
 
 fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
@@ -62,48 +41,6 @@ fn assert_same(what: &str, a: &Run, b: &Run) {
     for (k, name) in ATTRIBUTES.iter().enumerate() {
         assert_eq!(bits(&a.gradients[k]), bits(&b.gradients[k]), "{what}: gradient of {name}");
     }
-}
-
-/// A point `depth` in front of the camera, `x` and `y` in half fields of view off its axis.
-fn point_in_view(camera: &Camera, x: f32, y: f32, depth: f32) -> [f64; 3] {
-    let (tan_x, tan_y) = (camera.width as f32 / (2.0 * camera.fx), camera.height as f32 / (2.0 * camera.fy));
-    let view = glam::Vec3::new(x * tan_x, y * tan_y, 1.0) * depth;
-    (camera.rotation.transpose() * (view - camera.translation)).to_array().map(f64::from)
-}
-
-/// Makes a Gaussian odd, but leaves it valid.
-fn make_odd(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) {
-    let side = random.uniform(-1.0, 1.0) as f32;
-    match random.below(12) {
-        0 => scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(camera, side, -side, -3.0)),
-        1 => scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(camera, 40.0 * side, 9.0, 3.0)),
-        2 => scene.row_mut(MEANS, i).copy_from_slice(&point_in_view(camera, side, side, 0.201)),
-        3 => scene.row_mut(MEANS, i).copy_from_slice(&camera.center().to_array().map(f64::from)),
-        4 => scene.row_mut(SCALES, i).fill(50.0),
-        5 => scene.row_mut(SCALES, i).fill(1e-12),
-        6 => scene.row_mut(SCALES, i).fill(0.0),
-        7 => scene.row_mut(SCALES, i)[1] = 20.0,
-        8 => scene.row_mut(OPACITIES, i)[0] = 0.0,
-        9 => scene.row_mut(OPACITIES, i)[0] = 1.0,
-        10 => scene.row_mut(QUATS, i).iter_mut().for_each(|q| *q = f64::from((*q * 1e-6) as f32)),
-        _ => scene.row_mut(SH_DC, i).fill(-30.0),
-    }
-}
-
-/// Makes a Gaussian one that cannot be drawn; it stands in the picture otherwise. Returns what was done.
-fn poison(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) -> String {
-    let place = point_in_view(camera, random.uniform(-0.8, 0.8) as f32, random.uniform(-0.8, 0.8) as f32, 3.0);
-    scene.row_mut(MEANS, i).copy_from_slice(&place);
-    scene.row_mut(OPACITIES, i)[0] = 0.9;
-    let attribute = random.below(ATTRIBUTES.len() + 1);
-    if attribute == ATTRIBUTES.len() {
-        scene.row_mut(QUATS, i).fill(0.0);
-        return "zero quaternion".to_owned();
-    }
-    let value = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][random.below(3)];
-    let component = random.below(WIDTHS[attribute]);
-    scene.row_mut(attribute, i)[component] = value;
-    format!("{value} in {}[{component}]", ATTRIBUTES[attribute])
 }
 
 /// The number of Gaussians of each of the random scenes, which then differ in everything else too.
@@ -367,12 +304,13 @@ fn the_number_of_threads_changes_no_bit() {
     }
 }
 
+/// Those of the CPU share their kernels. A graphics driver rounds in its own way: `back_ends_agree.rs`.
 #[test]
-fn back_ends_agree_bit_by_bit() {
+fn back_ends_of_the_cpu_agree_bit_by_bit() {
     for (seed, count) in [(10, 1), (11, 60), (12, 700), (13, 5000)] {
         let (scene, camera) = busy_scene(seed, count);
         let runs: Vec<_> =
-            devices().into_iter().map(|(name, device)| (name, run(&scene, &camera, 3, &device))).collect();
+            cpu_devices().into_iter().map(|(name, device)| (name, run(&scene, &camera, 3, &device))).collect();
         for (name, other) in &runs[1..] {
             assert_same(&format!("{count} Gaussians: {} and {name}", runs[0].0), &runs[0].1, other);
         }

@@ -49,3 +49,27 @@ fn a_seed_repeats_and_threads_do_not_matter() {
     }
     assert!(files.iter().all(|file| *file == files[0]));
 }
+
+/// A checkpoint holds plain numbers: another back end than the one that wrote it goes on from there.
+#[test]
+fn a_run_changes_its_back_end() {
+    let w = Workspace::new(PROGRAM);
+    for (first, second) in [("ndarray", "wgpu"), ("wgpu", "flex")] {
+        let mut child = w.train(first, &["train.fine_iterations=100000"]).args(["--device", first]).spawn().unwrap();
+        let checkpoints = format!("{first}/checkpoints");
+        while w.names(&checkpoints).iter().all(|name| !name.ends_with(".safetensors")) {
+            assert!(child.try_wait().unwrap().is_none(), "the run ended without a checkpoint");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        // The rest of the run need not be as long.
+        let config = w.path(first).join("config.toml");
+        let text = fs::read_to_string(&config).unwrap();
+        assert!(text.contains("fine_iterations = 100000"));
+        fs::write(&config, text.replace("fine_iterations = 100000", "fine_iterations = 100")).unwrap();
+        assert_success(&w.run(["resume", first, "--quiet", "--device", second]));
+        let evaluation = fs::read_to_string(w.path(first).join("eval.json")).unwrap();
+        assert!(evaluation.contains(second), "{evaluation}");
+    }
+}

@@ -14,11 +14,10 @@ pub(crate) fn adam_step(
     second: &mut [f32],
     step: AdamStep,
 ) {
-    let AdamStep { learning_rate, beta_1, beta_2, epsilon, time } = step;
-    // In f64: 1 - 0.999 and 1 - 0.999^t lose digits in f32.
+    let AdamStep { beta_1, beta_2, epsilon, .. } = step;
+    // In f64: 1 - 0.999 loses digits in f32.
     let (rest_1, rest_2) = ((1.0 - beta_1) as f32, (1.0 - beta_2) as f32);
-    let step_size = (f64::from(learning_rate) / (1.0 - beta_1.powi(time as i32))) as f32;
-    let root_correction = (1.0 - beta_2.powi(time as i32)).sqrt() as f32;
+    let (step_size, root_correction) = (step.corrected_learning_rate(), step.root_correction());
     let (beta_1, beta_2) = (beta_1 as f32, beta_2 as f32);
     parameter
         .par_chunks_mut(CHUNK)

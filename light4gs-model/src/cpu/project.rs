@@ -11,7 +11,7 @@ const NEAR: f32 = 0.2;
 /// Variance in square pixels that every splat gets on top, so that none falls between pixels.
 const DILATION: f32 = 0.3;
 /// The Jacobian is taken no further out than this many half fields of view.
-const FRUSTUM_MARGIN: f32 = 1.3;
+pub(crate) const FRUSTUM_MARGIN: f32 = 1.3;
 /// Side of a tile in pixels.
 pub(crate) const TILE: usize = 16;
 /// Contributions below this opacity are skipped.

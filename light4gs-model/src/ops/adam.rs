@@ -3,9 +3,11 @@
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
 use burn::tensor::Tensor;
+use burn_cubecl::CubeBackend;
 
 use super::host::HostBackend;
 use crate::cpu::adam::adam_step as adam_step_on_slices;
+use crate::gpu::adam_on_gpu;
 
 /// Numbers of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +24,18 @@ pub struct AdamStep {
     pub time: u32,
 }
 
+impl AdamStep {
+    /// Learning rate over the first moment's bias correction.
+    pub(crate) fn corrected_learning_rate(&self) -> f32 {
+        (f64::from(self.learning_rate) / (1.0 - self.beta_1.powi(self.time as i32))) as f32
+    }
+
+    /// Root of the second moment's bias correction.
+    pub(crate) fn root_correction(&self) -> f32 {
+        (1.0 - self.beta_2.powi(self.time as i32)).sqrt() as f32
+    }
+}
+
 /// A parameter with its moments.
 #[derive(ExtensionType)]
 pub struct AdamTensors<B: Backend> {
@@ -34,7 +48,7 @@ pub struct AdamTensors<B: Backend> {
 }
 
 /// The fused step on every back end.
-#[backend_extension(NdArray, Flex)]
+#[backend_extension(NdArray, Flex, Cube)]
 pub trait AdamOps: Backend {
     /// Parameter and moments after one step along `gradient`.
     fn adam(
@@ -73,6 +87,12 @@ impl AdamOps for NdArray {
 impl AdamOps for Flex {
     fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
         adam_on_cpu(tensors, gradient, step)
+    }
+}
+
+impl AdamOps for CubeBackend {
+    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
+        adam_on_gpu(tensors, gradient, step)
     }
 }
 

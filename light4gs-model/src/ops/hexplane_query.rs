@@ -9,6 +9,7 @@ use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
+use burn_cubecl::CubeBackend;
 
 use super::host::{HostBackend, HostTensor};
 use crate::cpu::hexplane::{PackedPlanes, query, query_backward};
@@ -35,7 +36,7 @@ pub struct QueryInputs<B: Backend> {
 const INPUTS: usize = 7;
 
 impl<B: Backend> QueryInputs<B> {
-    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+    pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
         [self.points, self.xy, self.xz, self.xt, self.yz, self.yt, self.zt]
     }
 
@@ -65,7 +66,7 @@ pub trait HexPlaneKernels: Backend {
 }
 
 /// The query on every back end that has [`HexPlaneKernels`], differentiable under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Autodiff)]
+#[backend_extension(NdArray, Flex, Cube, Autodiff)]
 pub trait HexPlaneOps: Backend {
     /// Features `[N, C]`: the product over the six planes of their bilinear samples (align-corners, border clamp).
     fn hexplane_query(#[extension_type] inputs: QueryInputs<Self>) -> FloatTensor<Self>;
@@ -78,6 +79,12 @@ impl HexPlaneOps for NdArray {
 }
 
 impl HexPlaneOps for Flex {
+    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
+        Self::query_forward(inputs).0
+    }
+}
+
+impl HexPlaneOps for CubeBackend {
     fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
         Self::query_forward(inputs).0
     }

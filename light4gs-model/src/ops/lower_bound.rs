@@ -2,8 +2,7 @@
 //!
 //! The derivative of a maximum is zero below the bound, so what has once fallen below would never come back. Here a
 //! gradient also passes there if a descent step along it increases x. That depends on the sign of the incoming
-//! gradient, which no composition of ordinary operations can see; hence an operation of its own. It uses only the
-//! back end's own operations, so it runs on every one of them.
+//! gradient, which no composition of ordinary operations can see; hence an operation of its own.
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -15,9 +14,19 @@ use burn::backend::{
     Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension, get_or_init_device_settings,
 };
 use burn::tensor::Tensor;
+use burn_cubecl::CubeBackend;
 
-/// The bound on every back end, with its own gradient under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Autodiff)]
+use super::host::HostBackend;
+use crate::gpu::lower_bound_backward_on_gpu;
+
+/// A back end's gradient. [`LowerBoundOps`] adds the dispatch and the tape.
+pub trait LowerBoundKernels: Backend {
+    /// The upstream gradient where `tensor >= bound` or it is negative, else zero.
+    fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self>;
+}
+
+/// The bound on every back end that has [`LowerBoundKernels`], with its own gradient under [`Autodiff`].
+#[backend_extension(NdArray, Flex, Cube, Autodiff)]
 pub trait LowerBoundOps: Backend {
     /// `max(tensor, bound)`, any shape.
     fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self>;
@@ -35,27 +44,40 @@ impl LowerBoundOps for Flex {
     }
 }
 
-/// The gradient where `tensor >= bound` or `gradient < 0`, else zero.
-fn passed<B: Backend>(tensor: FloatTensor<B>, gradient: FloatTensor<B>, bound: f32) -> FloatTensor<B> {
-    let bool_type = get_or_init_device_settings::<B>(&tensor.device()).bool_dtype;
-    let below = B::float_lower_elem(tensor, bound.into(), bool_type);
-    let decreasing = B::float_greater_equal_elem(gradient.clone(), 0f32.into(), bool_type);
-    B::float_mask_fill(gradient, B::bool_and(below, decreasing), 0f32.into())
+impl LowerBoundOps for CubeBackend {
+    fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
+        Self::float_clamp_min(tensor, bound.into())
+    }
 }
 
-impl<B: LowerBoundOps, C: CheckpointStrategy> LowerBoundOps for Autodiff<B, C> {
+impl<B: HostBackend> LowerBoundKernels for B {
+    fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
+        let bool_type = get_or_init_device_settings::<B>(&tensor.device()).bool_dtype;
+        let below = B::float_lower_elem(tensor, bound.into(), bool_type);
+        let decreasing = B::float_greater_equal_elem(upstream.clone(), 0f32.into(), bool_type);
+        B::float_mask_fill(upstream, B::bool_and(below, decreasing), 0f32.into())
+    }
+}
+
+impl LowerBoundKernels for CubeBackend {
+    fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
+        lower_bound_backward_on_gpu(tensor, upstream, bound)
+    }
+}
+
+impl<B: LowerBoundOps + LowerBoundKernels, C: CheckpointStrategy> LowerBoundOps for Autodiff<B, C> {
     fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
         #[derive(Debug)]
         struct LowerBound;
 
-        impl<B: Backend> Backward<B, 1> for LowerBound {
+        impl<B: LowerBoundKernels> Backward<B, 1> for LowerBound {
             type State = (FloatTensor<B>, f32);
 
             fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
                 let gradient = grads.consume::<B>(&ops.node);
                 let (tensor, bound) = ops.state;
                 if let [Some(node)] = ops.parents {
-                    grads.register::<B>(node.id, passed::<B>(tensor, gradient, bound));
+                    grads.register::<B>(node.id, B::lower_bound_backward(tensor, gradient, bound));
                 }
             }
         }

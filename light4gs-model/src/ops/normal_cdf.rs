@@ -2,7 +2,7 @@
 //!
 //! `(1 + erf(x / sqrt 2)) / 2` has no digit left below -5, where an entropy model still wants the probability of an
 //! interval and its logarithm. Chebyshev's fit of `erfc` (Press et al., Numerical Recipes, section 6.2) keeps a *relative*
-//! error of 1.2e-7 everywhere. It uses only the back end's own operations, so it runs on every one of them.
+//! error of 1.2e-7 everywhere.
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -13,8 +13,12 @@ use burn::backend::{
     Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension, get_or_init_device_settings,
 };
 use burn::tensor::Tensor;
+use burn_cubecl::CubeBackend;
 
-/// Of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first.
+use super::host::HostBackend;
+use crate::gpu::{normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
+
+/// Of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first. `shaders/normal_cdf.wgsl` has them too.
 const COEFFICIENTS: [f64; 10] = [
     -1.26551223,
     1.00002368,
@@ -28,8 +32,14 @@ const COEFFICIENTS: [f64; 10] = [
     0.17087277,
 ];
 
-/// The function on every back end, differentiable under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Autodiff)]
+/// A back end's gradient. [`NormalCdfOps`] adds the dispatch and the tape.
+pub trait NormalCdfKernels: Backend {
+    /// The upstream gradient times the density at `tensor`.
+    fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self>;
+}
+
+/// The function on every back end that has [`NormalCdfKernels`], differentiable under [`Autodiff`].
+#[backend_extension(NdArray, Flex, Cube, Autodiff)]
 pub trait NormalCdfOps: Backend {
     /// Elementwise, any shape.
     fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self>;
@@ -44,6 +54,24 @@ impl NormalCdfOps for NdArray {
 impl NormalCdfOps for Flex {
     fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
         distribution::<Self>(tensor)
+    }
+}
+
+impl NormalCdfOps for CubeBackend {
+    fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
+        normal_cdf_on_gpu(tensor)
+    }
+}
+
+impl<B: HostBackend> NormalCdfKernels for B {
+    fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
+        B::float_mul(upstream, density::<B>(tensor))
+    }
+}
+
+impl NormalCdfKernels for CubeBackend {
+    fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
+        normal_cdf_backward_on_gpu(tensor, upstream)
     }
 }
 
@@ -73,18 +101,18 @@ fn density<B: Backend>(x: FloatTensor<B>) -> FloatTensor<B> {
     B::float_mul_scalar(B::float_exp(exponent), normalizer.into())
 }
 
-impl<B: NormalCdfOps, C: CheckpointStrategy> NormalCdfOps for Autodiff<B, C> {
+impl<B: NormalCdfOps + NormalCdfKernels, C: CheckpointStrategy> NormalCdfOps for Autodiff<B, C> {
     fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
         #[derive(Debug)]
         struct NormalCdf;
 
-        impl<B: Backend> Backward<B, 1> for NormalCdf {
+        impl<B: NormalCdfKernels> Backward<B, 1> for NormalCdf {
             type State = FloatTensor<B>;
 
             fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
                 let gradient = grads.consume::<B>(&ops.node);
                 if let [Some(node)] = ops.parents {
-                    grads.register::<B>(node.id, B::float_mul(gradient, density::<B>(ops.state)));
+                    grads.register::<B>(node.id, B::normal_cdf_backward(ops.state, gradient));
                 }
             }
         }

@@ -2,14 +2,16 @@
 
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Flex, NdArray, TensorMetadata, backend_extension};
+use burn_cubecl::CubeBackend;
 
 use super::host::HostBackend;
 use super::splat::{SplatInputs, SplatView, slices};
 use crate::cpu::significance::{SCORES, significance as significance_of_lists};
 use crate::cpu::tiles::TileLists;
+use crate::gpu::significance_on_gpu;
 
 /// The sums on every back end.
-#[backend_extension(NdArray, Flex)]
+#[backend_extension(NdArray, Flex, Cube)]
 pub trait SignificanceOps: Backend {
     /// `[N, 4]`, sums over the pixels that blend each Gaussian: pixels, `T · alpha`, `T · opacity`, opacity, with `T`
     /// the transmittance before the Gaussian.
@@ -33,5 +35,11 @@ impl SignificanceOps for NdArray {
 impl SignificanceOps for Flex {
     fn significance(inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self> {
         significance_on_cpu(inputs, view)
+    }
+}
+
+impl SignificanceOps for CubeBackend {
+    fn significance(inputs: SplatInputs<Self>, SplatView(view): SplatView) -> FloatTensor<Self> {
+        significance_on_gpu(inputs, view)
     }
 }

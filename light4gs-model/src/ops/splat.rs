@@ -10,6 +10,7 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::{FloatTensor, IntTensor};
 use burn::backend::{Autodiff, Backend, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
 use burn::tensor::TensorData;
+use burn_cubecl::CubeBackend;
 
 use super::host::{HostBackend, HostTensor};
 use crate::cpu::project::{GaussianSlices, View};
@@ -39,11 +40,13 @@ pub struct SplatInputs<B: Backend> {
 pub(super) const INPUTS: usize = 7;
 
 impl<B: Backend> SplatInputs<B> {
-    pub(super) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+    pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
         [self.means, self.quats, self.scales, self.opacities, self.sh_dc, self.sh_rest, self.screen_offsets]
     }
 
-    fn from_array([means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets]: [FloatTensor<B>; INPUTS]) -> Self {
+    pub(crate) fn from_array(
+        [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets]: [FloatTensor<B>; INPUTS],
+    ) -> Self {
         Self { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
     }
 }
@@ -74,7 +77,7 @@ pub trait SplatKernels: Backend {
 pub struct SplatView(pub(crate) View);
 
 /// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Autodiff)]
+#[backend_extension(NdArray, Flex, Cube, Autodiff)]
 pub trait SplatOps: Backend {
     /// Draws Gaussians.
     fn splat(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self>;
@@ -87,6 +90,12 @@ impl SplatOps for NdArray {
 }
 
 impl SplatOps for Flex {
+    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
+        Self::splat_forward(inputs, view).0
+    }
+}
+
+impl SplatOps for CubeBackend {
     fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
         Self::splat_forward(inputs, view).0
     }

@@ -25,7 +25,7 @@ pub(super) struct Ablate {
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     #[command(flatten)]
@@ -51,7 +51,7 @@ impl Ablate {
                 println!("{}", variant.name);
             }
             let folder = variant_folder(&self.out, variant);
-            let evaluation = train_to_evaluation(config, &self.scene, &folder, self.output.quiet)?;
+            let evaluation = train_to_evaluation(config, &self.scene, &folder, &self.output)?;
             rows.push(AblationRow::new(variant.name, &evaluation));
             // After every run, so that an interrupted table shows what there is.
             let path = self.out.join("table.md");

@@ -35,7 +35,7 @@ pub(super) struct Encode {
     /// (`context`, `steps`, `sh`) has them fitted anew to the scene as it is.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     /// Print what was written as JSON.

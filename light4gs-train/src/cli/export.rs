@@ -19,7 +19,7 @@ pub(super) struct Export {
     /// Number of frames over time 0 to 1; as many as the file was made from if not given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value = "ndarray")]
     device: String,
 }

@@ -9,10 +9,12 @@ mod render;
 mod synth;
 mod train;
 
+use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use light4gs_model::GpuError;
 
 use crate::error::TrainError;
 
@@ -62,7 +64,7 @@ enum Command {
     #[command(after_help = "Example:\n  light4gs ablate data/dnerf/flag --table context --out runs/flag-context")]
     Ablate(ablate::Ablate),
     /// Time every stage of training on one or more devices.
-    #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex --gaussians 20000 --size 400")]
+    #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
 }
 
@@ -91,13 +93,27 @@ impl Cli {
 pub fn main() -> ExitCode {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    match Cli::parse().run() {
+    match catching_gpu_errors(|| Cli::parse().run()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
             ExitCode::from(if error.is_internal() { 1 } else { 2 })
         }
     }
+}
+
+/// Errors of GPU operations arrive as panics, since Burn's operations return no results: makes ordinary errors of them.
+fn catching_gpu_errors(run: impl FnOnce() -> Result<(), TrainError>) -> Result<(), TrainError> {
+    let report = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !GpuError::is_raised() {
+            report(panic);
+        }
+    }));
+    std::panic::catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| match GpuError::take() {
+        Some(error) => Err(error.into()),
+        None => std::panic::resume_unwind(panic),
+    })
 }
 
 /// Prints a value as pretty JSON.

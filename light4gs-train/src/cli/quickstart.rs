@@ -14,7 +14,7 @@ pub(super) struct Quickstart {
     /// Folder of the run; the scene is made beside it, in a folder of the same name with `-scene` at its end.
     #[arg(long, default_value = "runs/quickstart")]
     out: PathBuf,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value = "ndarray")]
     device: String,
     /// Replace a run that is there already.

@@ -55,7 +55,7 @@ pub(super) struct Render {
     /// Frames a second of a GIF.
     #[arg(long, default_value_t = 20.0)]
     fps: f32,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value = "ndarray")]
     device: String,
 }

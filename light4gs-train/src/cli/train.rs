@@ -8,7 +8,7 @@ use light4gs_data::{ImageStore, Scene};
 use super::print_json;
 use crate::compression::CodingRecord;
 use crate::config::Config;
-use crate::device::device_by_name;
+use crate::device::{describe, device_by_name};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::finish::evaluate_run;
@@ -25,6 +25,9 @@ pub(super) struct RunOutput {
     /// No progress bars.
     #[arg(long)]
     pub(super) quiet: bool,
+    /// Print the time of every stage of a training step. The run itself gets slower, since each stage is waited for.
+    #[arg(long)]
+    profile: bool,
 }
 
 #[derive(Debug, Args)]
@@ -40,7 +43,7 @@ pub(super) struct Train {
     /// Changes one key of the configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     /// Replace a run that is there already.
@@ -73,7 +76,7 @@ pub(super) fn train(
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (folder, record, config) = RunFolder::open(folder.root())?;
     let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
-    finish(trainer, &folder, &config, output.json)
+    finish(trainer, &folder, &config, output)
 }
 
 /// Trains into a folder, or goes on with the run that is there already, and measures the file.
@@ -84,7 +87,7 @@ pub(super) fn train_to_evaluation(
     config: Config,
     scene: &Path,
     out: &Path,
-    quiet: bool,
+    output: &RunOutput,
 ) -> Result<Evaluation, TrainError> {
     device_by_name(&config.device)?;
     let fresh = !out.join("run.json").exists();
@@ -100,17 +103,30 @@ pub(super) fn train_to_evaluation(
         )));
     }
     if !folder.stream().exists() {
-        Trainer::resume(config.clone(), folder.clone(), &record, quiet)?.run()?;
+        run(&mut Trainer::resume(config.clone(), folder.clone(), &record, output.quiet)?, output)?;
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
     evaluate_run(&folder, &config, &scene)
 }
 
-fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool) -> Result<(), TrainError> {
+/// Trains to the end, and prints what the stages took if that is asked for.
+fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
+    if output.profile {
+        trainer.measure_stages();
+    }
     trainer.run()?;
+    if let Some(table) = trainer.profile().table() {
+        // On stderr, so that stdout stays JSON where it is asked for.
+        eprintln!("{table}\n");
+    }
+    Ok(())
+}
+
+fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &RunOutput) -> Result<(), TrainError> {
+    run(&mut trainer, output)?;
     let evaluation = evaluate_run(folder, config, trainer.data())?;
-    print_evaluation(&evaluation, json);
-    if !json {
+    print_evaluation(&evaluation, output.json);
+    if !output.json {
         println!("\nreport: {}", folder.path("report.html").display());
     }
     Ok(())
@@ -120,15 +136,19 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, json: bool)
 pub(super) struct Resume {
     /// Folder of the run.
     run: PathBuf,
+    /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    #[arg(long)]
+    device: Option<String>,
     #[command(flatten)]
     output: RunOutput,
 }
 
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let (folder, record, config) = RunFolder::open(&self.run)?;
+        let (folder, record, mut config) = RunFolder::open(&self.run)?;
+        config.device = self.device.unwrap_or(config.device);
         let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
-        finish(trainer, &folder, &config, self.output.json)
+        finish(trainer, &folder, &config, &self.output)
     }
 }
 
@@ -139,7 +159,7 @@ pub(super) struct Eval {
     /// Folder of the dataset, where it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// Back end: ndarray or flex.
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<String>,
     /// Print as JSON.
@@ -171,14 +191,15 @@ impl Eval {
             return Err(TrainError::Input("a .l4gs file holds no pictures; name the dataset with --scene DIR".into()));
         };
         let name = self.device.unwrap_or_else(|| "ndarray".into());
-        let decoded = DecodedScene::open(&self.run, &device_by_name(&name)?)?;
+        let device = device_by_name(&name)?;
+        let decoded = DecodedScene::open(&self.run, &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
         let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
-        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &name)?;
+        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(&name, &device))?;
         print_evaluation(&evaluation, self.json);
         Ok(())
     }

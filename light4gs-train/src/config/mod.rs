@@ -45,8 +45,8 @@ pub use presets::preset_names;
 pub use prune::PruneConfig;
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 
-/// The devices that `device` may name.
-pub const DEVICES: &[&str] = &["ndarray", "flex"];
+/// The back ends that `device` may name; `wgpu` may be followed by an adapter, as in `wgpu:0` or `wgpu:cpu`.
+pub const DEVICES: &[&str] = &["ndarray", "flex", "wgpu"];
 
 /// The complete configuration of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,7 +54,7 @@ pub const DEVICES: &[&str] = &["ndarray", "flex"];
 pub struct Config {
     /// Seed of everything random in a run.
     pub seed: u64,
-    /// Back end that computes, one of [`DEVICES`].
+    /// Back end that computes, one of [`DEVICES`], for `wgpu` with the adapter if wanted.
     pub device: String,
     /// What is trained on.
     pub data: DataConfig,

@@ -1,0 +1,131 @@
+//! A device, its limits, and the way between Burn's tensors and plain buffers.
+
+use burn::tensor::{DType, Shape};
+use burn_cubecl::CubeDevice;
+use burn_cubecl::kernel::into_contiguous;
+use burn_cubecl::tensor::CubeTensor;
+use cubecl::client::Client;
+use cubecl::server::Handle;
+
+use super::error::GpuError;
+use super::kernel::first_lines;
+
+/// Parts of a buffer begin at multiples of this many values: every adapter can bind there.
+pub(super) const PART_ALIGNMENT: usize = 64;
+
+/// A wgpu device.
+pub(super) struct Gpu {
+    pub(super) client: Client,
+    device: CubeDevice,
+}
+
+impl Gpu {
+    /// The device of a tensor.
+    pub(super) fn of(tensor: &CubeTensor) -> Result<Self, GpuError> {
+        let runtime = tensor.client.name();
+        if runtime != "wgpu<wgsl>" {
+            return Err(GpuError::Runtime(runtime.to_owned()));
+        }
+        Ok(Self { client: tensor.client.clone(), device: tensor.device.clone() })
+    }
+
+    /// Rounds that a loop may take. Mesa's software driver leaves any loop after 65535, without a word.
+    pub(super) fn longest_loop(&self) -> usize {
+        if self.client.properties().identity.physical.is_none() { 60_000 } else { u32::MAX as usize }
+    }
+
+    /// Room for `count` values of four bytes, at least one.
+    pub(super) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
+        let bytes = 4 * count.max(PART_ALIGNMENT) as u64;
+        let limit = self.client.properties().memory.max_page_size;
+        if bytes > limit {
+            return Err(GpuError::TooLarge { buffer, bytes, limit });
+        }
+        Ok(self.client.empty(bytes as usize))
+    }
+
+    /// A float32 tensor over a buffer or a part of it.
+    pub(super) fn tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
+        CubeTensor::new_contiguous(self.client.clone(), self.device.clone(), shape, handle, DType::F32)
+    }
+
+    /// An int32 tensor over a buffer.
+    pub(super) fn int_tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
+        CubeTensor::new_contiguous(self.client.clone(), self.device.clone(), shape, handle, DType::I32)
+    }
+
+    /// Reads one word and waits for all that was launched before.
+    pub(super) fn read_word(&self, operation: &'static str, buffer: &Handle) -> Result<u32, GpuError> {
+        let bytes = self.client.read_one(first_words(buffer, 1)).map_err(|error| failed(operation, &error))?;
+        Ok(u32::from_le_bytes(bytes[..4].try_into().expect("a word has four bytes")))
+    }
+
+    /// Says whether anything that was asked for so far and ends up in these buffers could not be done.
+    pub(super) fn check(&self, operation: &'static str, buffers: &[&Handle]) -> Result<(), GpuError> {
+        self.client.check(buffers.iter().copied()).map_err(|error| failed(operation, &error))
+    }
+}
+
+fn failed(operation: &'static str, error: &impl std::fmt::Display) -> GpuError {
+    GpuError::Device { operation, reason: first_lines(&error.to_string()) }
+}
+
+/// A tensor's values in row-major order. An empty tensor becomes a buffer that may be bound but holds nothing.
+pub(super) fn buffer_of(tensor: CubeTensor) -> Handle {
+    assert_eq!(tensor.dtype, DType::F32, "the custom operations take float32 tensors");
+    if tensor.meta.shape().num_elements() == 0 {
+        return tensor.client.empty(4 * PART_ALIGNMENT);
+    }
+    into_contiguous(tensor).handle
+}
+
+/// The first `count` words of a buffer, which may be larger.
+pub(super) fn first_words(buffer: &Handle, count: usize) -> Handle {
+    let unused = buffer.size_in_used() - 4 * count as u64;
+    buffer.clone().offset_end(unused)
+}
+
+/// Several arrays in one buffer, each beginning where it may be bound.
+pub(super) struct Parts {
+    pub(super) starts: Vec<usize>,
+    lengths: Vec<usize>,
+    pub(super) total: usize,
+}
+
+impl Parts {
+    pub(super) fn new(lengths: &[usize]) -> Self {
+        let mut total = 0;
+        let starts = lengths
+            .iter()
+            .map(|length| {
+                let start = total;
+                total += length.next_multiple_of(PART_ALIGNMENT).max(PART_ALIGNMENT);
+                start
+            })
+            .collect();
+        Self { starts, lengths: lengths.to_vec(), total }
+    }
+
+    /// Part `k` of the buffer that holds them all.
+    pub(super) fn of(&self, buffer: &Handle, k: usize) -> Handle {
+        let start = 4 * self.starts[k] as u64;
+        let end = start + 4 * self.lengths[k].max(1) as u64;
+        buffer.clone().offset_start(start).offset_end(buffer.size_in_used() - end)
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use cubecl::client::Client;
+
+    use cubecl::wgpu::WgpuDevice;
+
+    use super::*;
+
+    /// The default adapter, without Burn.
+    pub(in crate::gpu) fn gpu() -> Gpu {
+        let device = WgpuDevice::default();
+        let client: Client = CubeDevice::Wgpu(device.clone()).client();
+        Gpu { client, device: CubeDevice::Wgpu(device) }
+    }
+}

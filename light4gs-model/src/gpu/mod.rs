@@ -1,0 +1,18 @@
+//! Kernels of the wgpu back end: the host's side of the WGSL in `shaders/`.
+
+mod adam;
+mod context;
+mod elementwise;
+mod error;
+mod hexplane;
+mod kernel;
+mod significance;
+mod sort;
+mod splat;
+mod stages;
+mod team;
+
+pub(crate) use adam::adam_on_gpu;
+pub(crate) use elementwise::{lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
+pub use error::GpuError;
+pub(crate) use significance::significance_on_gpu;

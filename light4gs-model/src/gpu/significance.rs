@@ -1,0 +1,121 @@
+//! The sums behind significance pruning on a GPU: the stages of splatting without colour.
+
+use burn::tensor::Shape;
+use burn_cubecl::CubeBackend;
+use burn_cubecl::tensor::CubeTensor;
+
+use super::context::{Gpu, first_words};
+use super::error::GpuError;
+use super::kernel::Launch;
+use super::splat::{Begun, begin};
+use super::stages::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
+use crate::cpu::project::View;
+use crate::cpu::significance::SCORES;
+use crate::ops::splat::SplatInputs;
+
+/// Values of an intersection's sums.
+const SUMS: usize = 3;
+
+fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
+    let gpu = Gpu::of(&inputs.means)?;
+    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, view)?;
+    let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
+    let parts = frame.parts(lists.count);
+    let carried = gpu.allocate("pixels between parts", if parts > 1 { frame.pixels() } else { 0 })?;
+    for part in 0..parts {
+        frame
+            .team
+            .launch(&gpu, SIGNIFICANCE)
+            .reads(&lists.starts)
+            .reads(&lists.order)
+            .reads(&lists.gaussians)
+            .reads(&lists.splats)
+            .updates_if(part > 0, &sums)
+            .updates_if(part > 0, &carried)
+            .uniform(&frame.uniform(part, parts))
+            .groups(frame.cells())?;
+    }
+
+    let values = SCORES * frame.gaussians;
+    let scores = gpu.allocate("scores of Gaussians", values)?;
+    Launch::new(&gpu.client, SIGNIFICANCE_GATHER)
+        .reads(&lists.splats)
+        .reads(&lists.first_of_gaussian)
+        .reads(&sums)
+        .writes(&scores)
+        .uniform(&[frame.gaussians as u32])
+        .invocations(frame.gaussians)?;
+    gpu.check("the significance of Gaussians", &[&scores])?;
+    Ok(gpu.tensor(first_words(&scores, values), Shape::from([frame.gaussians, SCORES])))
+}
+
+/// Scores `[N, 4]` on a wgpu device; see [`SCORES`].
+pub(crate) fn significance_on_gpu(inputs: SplatInputs<CubeBackend>, view: View) -> CubeTensor {
+    scores(inputs, view).unwrap_or_else(|error| error.raise())
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::{Device, Tensor, TensorData};
+    use glam::Vec3;
+    use light4gs_data::Camera;
+
+    use crate::gaussians::GaussianTensors;
+    use crate::significance::{Significance, SignificanceScore};
+    use crate::splatter::Splatter;
+
+    const SIDE: u32 = 8;
+
+    /// Faint dots, each in the middle of one pixel of a picture that is one cell, no two at one depth: nothing hangs on
+    /// the last bit.
+    fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
+        let camera = Camera::look_at(Vec3::new(0.3, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIDE, SIDE);
+        let place = |i: usize| {
+            let pixel = i as u32 % (SIDE * SIDE);
+            let across = ((pixel % SIDE) as f32 + 0.5 - camera.cx) / camera.fx;
+            let down = ((pixel / SIDE) as f32 + 0.5 - camera.cy) / camera.fy;
+            let depth = 2.0 + 1e-4 * i as f32;
+            (camera.rotation.transpose() * (Vec3::new(across, down, 1.0) * depth - camera.translation)).to_array()
+        };
+        let means: Vec<f32> = (0..count).flat_map(place).collect();
+        let quats = [1.0, 0.0, 0.0, 0.0].repeat(count);
+        let gaussians = GaussianTensors {
+            means: Tensor::from_data(TensorData::new(means, [count, 3]), device),
+            quats: Tensor::from_data(TensorData::new(quats, [count, 4]), device),
+            log_scales: Tensor::full([count, 3], -7.0, device),
+            // An alpha of 0.0055: above 1/255 in its pixel, below it in the next.
+            opacity_logits: Tensor::full([count, 1], -5.2, device),
+            sh_dc: Tensor::zeros([count, 1, 3], device),
+            sh_rest: Tensor::zeros([count, 15, 3], device),
+        };
+        (gaussians, camera)
+    }
+
+    /// No Gaussian, one, and more in one cell than one launch takes.
+    #[test]
+    fn scores_are_those_of_the_cpu() {
+        for count in [0, 1, 40_000] {
+            let run = |device: Device| {
+                let (gaussians, camera) = dots(count, &device);
+                let mut significance = Significance::new(count);
+                significance.add(&Splatter::new([0.0; 3], 0), gaussians, &camera);
+                significance
+            };
+            let (found, expected) = (run(Device::wgpu(Default::default())), run(Device::flex()));
+            assert_eq!(found.scores(SignificanceScore::PixelCount), vec![1.0; count]);
+            for score in [
+                SignificanceScore::PixelCount,
+                SignificanceScore::Opacity,
+                SignificanceScore::BlendingWeight,
+                SignificanceScore::TransmittanceOpacity,
+            ] {
+                for (i, (found, expected)) in found.scores(score).iter().zip(expected.scores(score)).enumerate() {
+                    assert!(
+                        (found - expected).abs() <= 1e-4 * expected,
+                        "{score:?} of {i} in {count}: {found} against {expected}"
+                    );
+                }
+            }
+        }
+    }
+}

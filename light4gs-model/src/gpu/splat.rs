@@ -1,0 +1,373 @@
+//! Splatting on a GPU: the stages of `shaders/` in their order.
+
+use burn::backend::TensorMetadata;
+use burn::tensor::Shape;
+use burn_cubecl::CubeBackend;
+use burn_cubecl::tensor::CubeTensor;
+use cubecl::server::Handle;
+
+use super::context::{Gpu, Parts, buffer_of, first_words};
+use super::error::GpuError;
+use super::kernel::Launch;
+use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
+use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
+use super::team::Team;
+use crate::cpu::project::{FRUSTUM_MARGIN, TILE, View};
+use crate::cpu::rasterize::CHANNELS;
+use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
+
+/// Intersections of a cell that one launch blends: PART in `shaders/include/constants.wgsl`.
+const PART: usize = 32768;
+/// Values of an intersection's sums.
+const SUMS: usize = 10;
+
+/// What the stages of one picture have in common.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frame {
+    view: View,
+    pub(super) team: Team,
+    pub(super) gaussians: usize,
+    /// Coefficients of `sh_rest` a Gaussian.
+    rest: usize,
+}
+
+impl Frame {
+    fn size(&self) -> [u32; 2] {
+        [self.view.camera.width, self.view.camera.height]
+    }
+
+    pub(super) fn pixels(&self) -> usize {
+        self.size().iter().map(|side| *side as usize).product()
+    }
+
+    pub(super) fn cells(&self) -> usize {
+        self.size().iter().map(|side| side.div_ceil(self.team.cell) as usize).product()
+    }
+
+    /// `View` of `shaders/include/view.wgsl`. `part` of the cells' lists, of `parts`.
+    pub(super) fn uniform(&self, part: usize, parts: usize) -> Vec<u32> {
+        let camera = &self.view.camera;
+        let [width, height] = self.size();
+        let (tan_x, tan_y) = camera.tan_half_fov();
+        let limits = [FRUSTUM_MARGIN * tan_x, FRUSTUM_MARGIN * tan_y, 0.5 * width as f32, 0.5 * height as f32];
+        let rotation = &camera.rotation;
+        let floats = [
+            rotation.x_axis.extend(camera.fx).to_array(),
+            rotation.y_axis.extend(camera.fy).to_array(),
+            rotation.z_axis.extend(camera.cx).to_array(),
+            camera.translation.extend(camera.cy).to_array(),
+            camera.center().extend(0.0).to_array(),
+            glam::Vec3::from_array(self.view.background).extend(0.0).to_array(),
+            limits,
+        ];
+        let side = self.team.cell;
+        let words = [
+            [width, height, width.div_ceil(TILE as u32), height.div_ceil(TILE as u32)],
+            [width.div_ceil(side), height.div_ceil(side), part as u32, u32::from(part + 1 == parts)],
+            [self.gaussians as u32, self.view.sh_degree as u32, self.rest as u32, 0],
+        ];
+        floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
+    }
+
+    /// Launches that the longest possible list takes: no Gaussian is in a cell's list twice.
+    pub(super) fn parts(&self, intersections: usize) -> usize {
+        intersections.min(self.gaussians).div_ceil(PART).max(1)
+    }
+}
+
+/// The buffers of the inputs, in their order.
+#[derive(Clone, Debug)]
+struct InputBuffers {
+    means: Handle,
+    quats: Handle,
+    scales: Handle,
+    opacities: Handle,
+    sh_dc: Handle,
+    sh_rest: Handle,
+    screen_offsets: Handle,
+}
+
+/// Gaussians on the screen, and which of them touches which cell.
+#[derive(Clone, Debug)]
+pub(super) struct Intersections {
+    pub(super) splats: Handle,
+    /// Number of all intersections.
+    pub(super) count: usize,
+    /// `[N]`: the first intersection of each Gaussian; the others follow it.
+    pub(super) first_of_gaussian: Handle,
+    /// `[count]`: the Gaussian of each intersection.
+    pub(super) gaussians: Handle,
+    /// `[count]`: intersections cell by cell, nearest first.
+    pub(super) order: Handle,
+    /// `[cells + 1]`: where each cell begins in `order`.
+    pub(super) starts: Handle,
+}
+
+/// State between forward and backward.
+#[derive(Clone, Debug)]
+pub struct GpuSplatSaved {
+    frame: Frame,
+    shapes: [Shape; 7],
+    inputs: InputBuffers,
+    intersections: Intersections,
+    picture: Handle,
+}
+
+fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3], GpuError> {
+    let count = frame.gaussians;
+    let splats = gpu.allocate("splats", 16 * count)?;
+    let depth_keys = gpu.allocate("depths", count)?;
+    let radii = gpu.allocate("radii", count)?;
+    let uniform = frame.uniform(0, 1);
+    Launch::new(&gpu.client, COLOR)
+        .reads(&inputs.means)
+        .reads(&inputs.sh_dc)
+        .reads(&inputs.sh_rest)
+        .writes(&splats)
+        .uniform(&uniform)
+        .invocations(count)?;
+    Launch::new(&gpu.client, PROJECT)
+        .constant("CELL", frame.team.cell)
+        .reads(&inputs.means)
+        .reads(&inputs.quats)
+        .reads(&inputs.scales)
+        .reads(&inputs.opacities)
+        .reads(&inputs.screen_offsets)
+        .updates(&splats)
+        .writes(&depth_keys)
+        .writes(&radii)
+        .uniform(&uniform)
+        .invocations(count)?;
+    Ok([splats, depth_keys, radii])
+}
+
+fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> Result<Intersections, GpuError> {
+    let gaussian_count = frame.gaussians;
+    let by_depth = sort(gpu, depth_keys, gaussian_count, 32)?.order;
+    let first_places = gpu.allocate("places of intersections", gaussian_count)?;
+    Launch::new(&gpu.client, CELL_COUNTS)
+        .reads(&by_depth)
+        .reads(&splats)
+        .writes(&first_places)
+        .uniform(&[gaussian_count as u32])
+        .invocations(gaussian_count)?;
+    let total = prefix_sum(gpu, &first_places, gaussian_count)?;
+    // The one read-back of a picture: all further buffers are made to its measure.
+    let count = match gaussian_count {
+        0 => 0,
+        _ => gpu.read_word("the number of intersections", &total)? as usize,
+    };
+
+    let first_of_gaussian = gpu.allocate("intersections of Gaussians", gaussian_count)?;
+    let cells = gpu.allocate("cells of intersections", count)?;
+    let gaussians = gpu.allocate("Gaussians of intersections", count)?;
+    Launch::new(&gpu.client, INTERSECT)
+        .constant("CELL", frame.team.cell)
+        .reads(&by_depth)
+        .reads(&first_places)
+        .reads(&splats)
+        .writes(&first_of_gaussian)
+        .writes(&cells)
+        .writes(&gaussians)
+        .uniform(&frame.uniform(0, 1))
+        .invocations(gaussian_count)?;
+    let Sorted { keys, order } = sort(gpu, &cells, count, bits_for(frame.cells()))?;
+    let starts = ranges(gpu, &keys, count, frame.cells())?;
+    Ok(Intersections { splats, count, first_of_gaussian, gaussians, order, starts })
+}
+
+fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, GpuError> {
+    let picture = gpu.allocate("picture", CHANNELS * frame.pixels())?;
+    let parts = frame.parts(lists.count);
+    for part in 0..parts {
+        frame
+            .team
+            .launch(gpu, RASTERIZE)
+            .reads(&lists.starts)
+            .reads(&lists.order)
+            .reads(&lists.gaussians)
+            .reads(&lists.splats)
+            .updates_if(part > 0, &picture)
+            .uniform(&frame.uniform(part, parts))
+            .groups(frame.cells())?;
+    }
+    Ok(picture)
+}
+
+/// A picture's Gaussians on the screen, sorted into cells: what every pass over its pixels begins with.
+pub(super) struct Begun {
+    pub(super) frame: Frame,
+    shapes: [Shape; 7],
+    inputs: InputBuffers,
+    pub(super) intersections: Intersections,
+    /// `[N]` in pixels.
+    radii: Handle,
+}
+
+/// Projects, intersects and sorts.
+pub(super) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: View) -> Result<Begun, GpuError> {
+    let inputs = inputs.into_array();
+    let shapes = inputs.each_ref().map(|tensor| tensor.shape());
+    let frame = Frame {
+        view,
+        team: Team::choose(gpu, view.camera.width, view.camera.height)?,
+        gaussians: shapes[0][0],
+        rest: shapes[5][1],
+    };
+    let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.map(buffer_of);
+    let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
+    begin_with(gpu, frame, inputs, shapes)
+}
+
+fn begin_with(gpu: &Gpu, frame: Frame, inputs: InputBuffers, shapes: [Shape; 7]) -> Result<Begun, GpuError> {
+    let [splats, depth_keys, radii] = project(gpu, &frame, &inputs)?;
+    let intersections = intersect(gpu, &frame, splats, &depth_keys)?;
+    Ok(Begun { frame, shapes, inputs, intersections, radii })
+}
+
+fn forward(gpu: &Gpu, begun: Begun) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
+    let Begun { frame, shapes, inputs, intersections, radii } = begun;
+    let picture = rasterize(gpu, &frame, &intersections)?;
+    gpu.check("the picture", &[&picture])?;
+    let values = CHANNELS * frame.pixels();
+    let outputs = SplatOutputs {
+        picture: gpu.tensor(first_words(&picture, values), Shape::from([values])),
+        radii: gpu.int_tensor(first_words(&radii, frame.gaussians), Shape::from([frame.gaussians])),
+    };
+    Ok((outputs, GpuSplatSaved { frame, shapes, inputs, intersections, picture }))
+}
+
+fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<CubeBackend>, GpuError> {
+    let gpu = Gpu::of(&upstream)?;
+    let upstream = buffer_of(upstream);
+    let GpuSplatSaved { frame, shapes, inputs, intersections: lists, picture } = saved;
+    let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
+    let parts = frame.parts(lists.count);
+    let carried = gpu.allocate("pixels between parts", if parts > 1 { 2 * frame.pixels() } else { 0 })?;
+    for part in 0..parts {
+        frame
+            .team
+            .launch(&gpu, RASTERIZE_BACKWARD)
+            .reads(&lists.starts)
+            .reads(&lists.order)
+            .reads(&lists.gaussians)
+            .reads(&lists.splats)
+            .reads(&picture)
+            .reads(&upstream)
+            .writes(&sums)
+            .updates_if(part > 0, &carried)
+            .uniform(&frame.uniform(part, parts))
+            .groups(frame.cells())?;
+    }
+
+    let layout = Parts::new(&shapes.each_ref().map(|shape| shape.num_elements()));
+    let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
+    let mut uniform = frame.uniform(0, 1);
+    uniform.extend(layout.starts.iter().map(|start| *start as u32));
+    Launch::new(&gpu.client, PROJECT_BACKWARD)
+        .reads(&inputs.means)
+        .reads(&inputs.quats)
+        .reads(&inputs.scales)
+        .reads(&inputs.sh_rest)
+        .reads(&lists.splats)
+        .reads(&lists.first_of_gaussian)
+        .reads(&sums)
+        .writes(&gradients)
+        .uniform(&uniform)
+        .invocations(frame.gaussians)?;
+    gpu.check("the gradients of a picture", &[&gradients])?;
+    let mut k = 0;
+    Ok(SplatInputs::from_array(shapes.map(|shape| {
+        k += 1;
+        gpu.tensor(layout.of(&gradients, k - 1), shape)
+    })))
+}
+
+impl SplatKernels for CubeBackend {
+    type Saved = GpuSplatSaved;
+
+    fn splat_forward(inputs: SplatInputs<Self>, SplatView(view): SplatView) -> (SplatOutputs<Self>, GpuSplatSaved) {
+        let drawn = Gpu::of(&inputs.means).and_then(|gpu| forward(&gpu, begin(&gpu, inputs, view)?));
+        drawn.unwrap_or_else(|error| error.raise())
+    }
+
+    fn splat_backward(saved: GpuSplatSaved, gradient: CubeTensor) -> SplatInputs<Self> {
+        backward(saved, gradient).unwrap_or_else(|error| error.raise())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use light4gs_data::Camera;
+
+    use super::super::context::tests::gpu;
+    use super::super::stages::{TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+    use super::*;
+
+    const COUNT: usize = 300;
+    const SIZE: [u32; 2] = [50, 37];
+
+    /// Picture and gradients of one scene, blended by a team.
+    fn run(gpu: &Gpu, team: Team) -> Vec<Vec<f32>> {
+        // Any numbers will do that look random.
+        let mut state = 1u32;
+        let mut uniform = move |low: f32, high: f32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            low + (high - low) * (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let widths = [3, 4, 3, 1, 3, 45, 2];
+        let ranges = [(-1.0, 1.0), (-1.0, 1.0), (0.03, 0.3), (0.05, 1.0), (-0.5, 1.5), (-0.2, 0.2), (-0.01, 0.01)];
+        let mut upload = |count: usize, (low, high): (f32, f32)| {
+            let bytes: Vec<u8> = (0..count).flat_map(|_| uniform(low, high).to_le_bytes()).collect();
+            gpu.client.create_from_slice(&bytes)
+        };
+        let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] =
+            std::array::from_fn(|k| upload(widths[k] * COUNT, ranges[k]));
+        let upstream = upload(CHANNELS * (SIZE[0] * SIZE[1]) as usize, (-1.0, 1.0));
+        let inputs = InputBuffers { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets };
+        let camera = Camera::look_at(Vec3::new(0.0, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIZE[0], SIZE[1]);
+        let view = View { camera, background: [0.1, 0.5, 0.9], sh_degree: 3 };
+        let shapes = widths.map(|width| Shape::from([COUNT, width]));
+        let frame = Frame { view, team, gaussians: COUNT, rest: 15 };
+        let (outputs, saved) = forward(gpu, begin_with(gpu, frame, inputs, shapes).unwrap()).unwrap();
+        let values = outputs.picture.shape().num_elements();
+        let gradients = backward(saved, gpu.tensor(upstream, Shape::from([values]))).unwrap().into_array();
+        std::iter::once(outputs.picture)
+            .chain(gradients)
+            .map(|tensor| {
+                let bytes = gpu.client.read_one(tensor.handle).unwrap();
+                bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+            })
+            .collect()
+    }
+
+    #[test]
+    fn every_team_draws_the_same() {
+        let gpu = gpu();
+        let chosen = Team::choose(&gpu, SIZE[0], SIZE[1]).unwrap();
+        let expected = run(&gpu, chosen);
+        assert!(expected[0].iter().any(|value| *value > 1.0), "the scene is empty");
+        let mut teams =
+            vec![(32, TEAM_WITHOUT_SUBGROUPS, 16), (32, TEAM_WITHOUT_SUBGROUPS, 8), (8, TEAM_WITHOUT_SUBGROUPS, 8)];
+        if chosen.includes != TEAM_WITHOUT_SUBGROUPS {
+            let cells: &[u32] = if chosen.members <= 16 { &[8, 16] } else { &[16] };
+            for cell in cells {
+                teams.extend([(chosen.members, TEAM_OF_FEW, *cell), (chosen.members, TEAM_OF_MANY, *cell)]);
+            }
+        }
+        for (members, includes, cell) in teams {
+            // An invocation owns its pixels in fours.
+            if cell * cell / members < 4 || members < cell {
+                continue;
+            }
+            let team = Team { members, includes, cell };
+            for (k, (found, expected)) in run(&gpu, team).iter().zip(&expected).enumerate() {
+                let largest = expected.iter().fold(0.0f32, |m, v| m.max(v.abs()));
+                let pairs = found.iter().zip(expected);
+                let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest;
+                assert!(error < 1e-5, "{members} members, cell {cell}: output {k} is off by {error}");
+            }
+        }
+    }
+}

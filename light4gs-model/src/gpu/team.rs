@@ -1,0 +1,70 @@
+//! Who blends a cell of the picture.
+
+use std::collections::HashMap;
+use std::sync::Mutex;
+
+use cubecl::device::DeviceId;
+
+use super::context::Gpu;
+use super::error::GpuError;
+use super::kernel::Launch;
+use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+
+/// Who blends a cell: a team of invocations, and how its members meet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Team {
+    pub(super) members: u32,
+    /// What of `shaders/include` says how they meet.
+    pub(super) includes: &'static [&'static str],
+    /// Side of the cell in pixels.
+    pub(super) cell: u32,
+}
+
+impl Team {
+    /// A team is a subgroup where their size is known: eight lanes blend 8×8 pixels, 32 lanes 16×16, so that each has
+    /// eight pixels, which a fetched splat then serves.
+    pub(super) fn choose(gpu: &Gpu, width: u32, height: u32) -> Result<Self, GpuError> {
+        let smallest = gpu.client.properties().hardware.plane_size_min;
+        let known = has_subgroups_of_one_size(gpu)?;
+        let cells = |side: u32| width.div_ceil(side) * height.div_ceil(side);
+        // A Gaussian visits the cells that it touches in one loop.
+        let limit = gpu.longest_loop() as u32;
+        let team = match smallest {
+            8 if known && cells(8) <= limit => Self { members: 8, includes: TEAM_OF_FEW, cell: 8 },
+            16 | 32 | 64 if known => Self { members: smallest, includes: TEAM_OF_MANY, cell: 16 },
+            _ => Self { members: 32, includes: TEAM_WITHOUT_SUBGROUPS, cell: 16 },
+        };
+        if cells(team.cell) > limit {
+            return Err(GpuError::Picture { width, height, limit });
+        }
+        Ok(team)
+    }
+
+    /// Begins the launch of a stage that blends.
+    pub(super) fn launch<'a>(&self, gpu: &'a Gpu, stage: Stage) -> Launch<'a> {
+        Launch::new(&gpu.client, stage).team(self.members, self.includes).constant("CELL", self.cell)
+    }
+}
+
+/// What was found on each device.
+static FOUND: Mutex<Option<HashMap<DeviceId, bool>>> = Mutex::new(None);
+
+/// Whether a workgroup of the subgroups' size is one subgroup, found by trying.
+fn has_subgroups_of_one_size(gpu: &Gpu) -> Result<bool, GpuError> {
+    let mut found = FOUND.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+    let found = found.get_or_insert_default();
+    let device = gpu.client.service_id().device;
+    if let Some(known) = found.get(&device) {
+        return Ok(*known);
+    }
+    let hardware = &gpu.client.properties().hardware;
+    let size = hardware.plane_size_min;
+    let mut known = size == hardware.plane_size_max && size > 1;
+    if known {
+        let counted = gpu.allocate("size of subgroups", 1)?;
+        let launched = Launch::new(&gpu.client, SUBGROUPS).workgroup(size).writes(&counted).groups(1);
+        known = launched.is_ok() && gpu.read_word("the size of subgroups", &counted)? == size;
+    }
+    found.insert(device, known);
+    Ok(known)
+}

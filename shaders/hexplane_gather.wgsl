@@ -1,0 +1,101 @@
+// Second half of the query's derivative: every cell gathers what the samples around it hand over.
+//
+// One invocation owns one cell of one plane, with all its channels. A sample reaches its low cell and the next ones along
+// width and height, so a cell looks at the samples that begin in it and in three neighbours. Samples come sorted by low
+// cell (`order`, ranges in `starts`), and equal ones in the order of points, so the four are two ranges; every sum has one
+// order, and no atomics. Writes the planes' gradients, each [C, H · W], from the places in `parts`; a launch takes so many
+// samples of a cell that no loop gets too long, and later launches add the rest.
+
+struct Parts {
+    // Where the gradients of xy, xz, xt, yz begin.
+    a: vec4<u32>,
+    // Those of yt and zt; the first sample of every cell that this launch takes, and how many.
+    b: vec4<u32>,
+}
+
+struct Parameters {
+    planes: Planes,
+    parts: Parts,
+}
+
+@group(0) @binding(0) var<storage, read_write> starts: array<u32>;
+@group(0) @binding(1) var<storage, read_write> order: array<u32>;
+@group(0) @binding(2) var<storage, read_write> fractions: array<vec2<f32>>;
+@group(0) @binding(3) var<storage, read_write> handed: array<vec4<f32>>;
+@group(0) @binding(4) var<storage, read_write> gradients: array<f32>;
+@group(0) @binding(5) var<uniform> parameters: Parameters;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let planes = parameters.planes;
+    let own = flat_group(group, groups) * WORKGROUP + lane;
+    if (own >= planes.first_cells_b.z) {
+        return;
+    }
+    var plane = 0u;
+    for (var k = 1u; k < 6u; k++) {
+        plane += select(0u, 1u, own >= first_cell(planes, k));
+    }
+    let width = planes.resolution[plane_axes(plane).x];
+    let cell = own - first_cell(planes, plane);
+    let row = cell / width;
+    let at_left = cell - row * width == 0u;
+
+    // Places in `order`: from the left neighbour's samples on, from the own column's on, and the end; first those that
+    // begin in the row above, then those of the own row.
+    var above = vec3<u32>(0u);
+    if (row > 0u) {
+        let up = own - width;
+        above = vec3<u32>(starts[select(up - 1u, up, at_left)], starts[up], starts[up + 1u]);
+    }
+    let level = vec3<u32>(starts[select(own - 1u, own, at_left)], starts[own], starts[own + 1u]);
+    let count_above = above.z - above.x;
+    let begin = parameters.parts.b.z;
+    let end = min(begin + parameters.parts.b.w, count_above + level.z - level.x);
+    if (begin > 0u && begin >= end) {
+        return;
+    }
+
+    let cells = select(planes.first_cells_b.z, first_cell(planes, min(plane + 1u, 5u)), plane < 5u)
+        - first_cell(planes, plane);
+    var first = parameters.parts.a[plane % 4u];
+    if (plane >= 4u) {
+        first = parameters.parts.b[plane - 4u];
+    }
+    // One loop over samples within vectors of channels: Mesa's software driver runs the body of an inner loop once even
+    // where there is nothing to do, as in most cells.
+    var sum = vec4<f32>(0.0);
+    var next = begin;
+    var quad = 0u;
+    while (quad < planes.sizes.y) {
+        if (next < end) {
+            let is_above = next < count_above;
+            let place = select(level.x + next - count_above, above.x + next, is_above);
+            let is_left = place < select(level.y, above.y, is_above);
+            let sample = order[place];
+            let fraction = fractions[sample];
+            let weight = select(1.0 - fraction, fraction, vec2<bool>(is_left, is_above));
+            sum += weight.x * weight.y * handed[sample * planes.sizes.y + quad];
+        }
+        next += 1u;
+        if (next >= end) {
+            for (var k = 0u; k < 4u; k++) {
+                let channel = 4u * quad + k;
+                let at = first + channel * cells + cell;
+                if (channel < planes.sizes.x) {
+                    if (begin > 0u) {
+                        sum[k] += gradients[at];
+                    }
+                    gradients[at] = sum[k];
+                }
+            }
+            sum = vec4<f32>(0.0);
+            next = begin;
+            quad += 1u;
+        }
+    }
+}

@@ -1,0 +1,58 @@
+// Bilinear samples of the six planes of a scale, over xy, xz, xt, yz, yt, zt.
+//
+// The planes lie one after the other in `packed`, cell by cell, a cell's channels in QUADS vectors of four. `first_cell`
+// says where each plane begins; the last entry is the end.
+
+struct Planes {
+    // Cells along x, y, z, t.
+    resolution: vec4<u32>,
+    // First cells of the planes xy, xz, xt, yz; then of yt and zt, the end, and the number of points.
+    first_cells_a: vec4<u32>,
+    first_cells_b: vec4<u32>,
+    // Channels, vectors of four channels a cell, then free.
+    sizes: vec4<u32>,
+}
+
+// The axes of the planes: along the width, along the height.
+fn plane_axes(plane: u32) -> vec2<u32> {
+    switch plane {
+        case 0u: { return vec2<u32>(0u, 1u); }
+        case 1u: { return vec2<u32>(0u, 2u); }
+        case 2u: { return vec2<u32>(0u, 3u); }
+        case 3u: { return vec2<u32>(1u, 2u); }
+        case 4u: { return vec2<u32>(1u, 3u); }
+        default: { return vec2<u32>(2u, 3u); }
+    }
+}
+
+fn first_cell(planes: Planes, plane: u32) -> u32 {
+    if (plane < 4u) {
+        return planes.first_cells_a[plane];
+    }
+    return planes.first_cells_b[plane - 4u];
+}
+
+// Where a point falls, axis by axis. Align-corners: -1 is the first cell's centre, 1 the last one's; border clamp.
+struct AxisSamples {
+    low: vec4<u32>,
+    high: vec4<u32>,
+    fraction: vec4<f32>,
+    // Cells a unit of the coordinate, 0 where it is clamped to the border.
+    slope: vec4<f32>,
+}
+
+fn axis_samples(point: vec4<f32>, resolution: vec4<u32>) -> AxisSamples {
+    let last = vec4<f32>(resolution - 1u);
+    let position = (point + 1.0) * 0.5 * last;
+    let inside = (position > vec4<f32>(0.0)) & (position < last);
+    // NaN falls to 0 and cannot index.
+    let is_number = (bitcast<vec4<u32>>(position) & vec4<u32>(0x7fffffffu)) <= vec4<u32>(0x7f800000u);
+    let clamped = select(vec4<f32>(0.0), clamp(position, vec4<f32>(0.0), last), is_number);
+    let low = min(vec4<u32>(clamped), max(resolution, vec4<u32>(2u)) - 2u);
+    return AxisSamples(
+        low,
+        min(low + 1u, resolution - 1u),
+        clamped - vec4<f32>(low),
+        select(vec4<f32>(0.0), 0.5 * last, inside),
+    );
+}

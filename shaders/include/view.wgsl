@@ -1,0 +1,21 @@
+// What is drawn, from where: one uniform for all stages of a picture. A stage declares it as `view`.
+
+struct View {
+    // Columns of the rotation from world to camera. In w: focal lengths x and y, principal point x, all in pixels.
+    axis_x: vec4<f32>,
+    axis_y: vec4<f32>,
+    axis_z: vec4<f32>,
+    // Translation from world to camera. In w: principal point y.
+    translation: vec4<f32>,
+    // Position of the camera in the world.
+    center: vec4<f32>,
+    background: vec4<f32>,
+    // Largest slopes x/z and y/z of the Jacobian, then half the picture's width and height.
+    limits: vec4<f32>,
+    // Width and height in pixels, then in tiles.
+    size: vec4<u32>,
+    // Columns and rows of cells, then: which part of the lists is blended, and whether it is the last one.
+    cells: vec4<u32>,
+    // Gaussians, active SH degree, coefficients of `sh_rest` a Gaussian.
+    counts: vec4<u32>,
+}

@@ -1,0 +1,62 @@
+// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
+//
+// One invocation owns one Gaussian, at a place in the order of depths, and writes its intersections one after the other
+// from the place's entry of `first_places`: the cell and the Gaussian. A Gaussian keeps the number of its first
+// intersection in `first_of_gaussian`, so that the backward pass finds them all.
+
+@group(0) @binding(0) var<storage, read_write> by_depth: array<u32>;
+@group(0) @binding(1) var<storage, read_write> first_places: array<u32>;
+@group(0) @binding(2) var<storage, read_write> splats: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> first_of_gaussian: array<u32>;
+@group(0) @binding(4) var<storage, read_write> cells: array<u32>;
+@group(0) @binding(5) var<storage, read_write> gaussians: array<u32>;
+@group(0) @binding(6) var<uniform> view: View;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let place = flat_group(group, groups) * WORKGROUP + lane;
+    if (place >= view.counts.x) {
+        return;
+    }
+    let i = by_depth[place];
+    var next = first_places[place];
+    first_of_gaussian[i] = next;
+    let shape = splats[4u * i + 3u];
+    let end = next + u32(shape.w);
+    if (next == end) {
+        return;
+    }
+    let center = splats[4u * i];
+    let conic = splats[4u * i + 1u];
+    var splat: Splat;
+    splat.position = center.xy;
+    splat.conic = conic.xyz;
+    splat.reach = conic.w;
+    splat.variance = shape.xy;
+    splat.radius = shape.z;
+    let rectangle = cell_rectangle(splat);
+    var column = rectangle.low.x;
+    var row = rectangle.low.y;
+    while (row < rectangle.high.y && next < end) {
+        if (reaches(splat, column, row)) {
+            cells[next] = row * view.cells.x + column;
+            gaussians[next] = i;
+            next += 1u;
+        }
+        column += 1u;
+        if (column == rectangle.high.x) {
+            column = rectangle.low.x;
+            row += 1u;
+        }
+    }
+    // Should this compilation round otherwise than that of `project.wgsl`, a place may be left: no cell is there.
+    while (next < end) {
+        cells[next] = view.cells.x * view.cells.y;
+        gaussians[next] = i;
+        next += 1u;
+    }
+}

@@ -1,0 +1,123 @@
+// Projects every Gaussian to the screen and counts the cells that it touches.
+//
+// One invocation owns one Gaussian. Reads its attributes and vector 2 of its splat (`color.wgsl`); writes the other
+// three vectors, its radius, and its key in the order of depths. Depths are positive, so their bits sort as they do; a
+// Gaussian without cells has the largest key.
+
+@group(0) @binding(0) var<storage, read_write> means: array<f32>;
+@group(0) @binding(1) var<storage, read_write> quats: array<f32>;
+@group(0) @binding(2) var<storage, read_write> scales: array<f32>;
+@group(0) @binding(3) var<storage, read_write> opacities: array<f32>;
+@group(0) @binding(4) var<storage, read_write> screen_offsets: array<f32>;
+@group(0) @binding(5) var<storage, read_write> splats: array<vec4<f32>>;
+@group(0) @binding(6) var<storage, read_write> depth_keys: array<u32>;
+@group(0) @binding(7) var<storage, read_write> radii: array<i32>;
+@group(0) @binding(8) var<uniform> view: View;
+
+fn write_nothing(i: u32, radius: i32) {
+    splats[4u * i] = vec4<f32>(0.0);
+    splats[4u * i + 1u] = vec4<f32>(0.0);
+    splats[4u * i + 3u] = vec4<f32>(0.0);
+    depth_keys[i] = 0xffffffffu;
+    radii[i] = radius;
+}
+
+fn count_cells(splat: Splat) -> u32 {
+    if (splat.reach < 0.0) {
+        return 0u;
+    }
+    let rectangle = cell_rectangle(splat);
+    if (any(rectangle.low >= rectangle.high)) {
+        return 0u;
+    }
+    var count = 0u;
+    var column = rectangle.low.x;
+    var row = rectangle.low.y;
+    while (row < rectangle.high.y) {
+        count += select(0u, 1u, reaches(splat, column, row));
+        column += 1u;
+        if (column == rectangle.high.x) {
+            column = rectangle.low.x;
+            row += 1u;
+        }
+    }
+    return count;
+}
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let i = flat_group(group, groups) * WORKGROUP + lane;
+    if (i >= view.counts.x) {
+        return;
+    }
+    let mean = vec3<f32>(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
+    let scale = vec3<f32>(scales[3u * i], scales[3u * i + 1u], scales[3u * i + 2u]);
+    let quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
+    let screen_offset = vec2<f32>(screen_offsets[2u * i], screen_offsets[2u * i + 1u]);
+    let opacity = opacities[i];
+    let color_state = splats[4u * i + 2u].w;
+    let g = geometry_of(mean, quat, scale);
+    let position = g.position;
+    let attributes_finite = is_finite3(mean) && is_finite3(scale) && is_finite3(quat.xyz) && is_finite(quat.w)
+        && is_finite(screen_offset.x) && is_finite(screen_offset.y) && is_finite(opacity);
+    if (!(attributes_finite && is_finite(g.quat_norm) && g.quat_norm > 1e-12 && is_finite3(position))
+        || color_state == 8.0) {
+        write_nothing(i, INVALID_RADIUS);
+        return;
+    }
+    if (position.z <= NEAR) {
+        write_nothing(i, 0);
+        return;
+    }
+
+    let xx = dot3(g.factor_x, g.factor_x) + DILATION;
+    let xy = dot3(g.factor_x, g.factor_y);
+    let yy = dot3(g.factor_y, g.factor_y) + DILATION;
+    let determinant = xx * yy - xy * xy;
+    if (!is_finite(determinant)) {
+        write_nothing(i, INVALID_RADIUS);
+        return;
+    }
+    if (determinant <= 0.0) {
+        write_nothing(i, 0);
+        return;
+    }
+    let middle = 0.5 * (xx + yy);
+    let largest = middle + sqrt(max(middle * middle - determinant, 0.1));
+    let radius = ceil(3.0 * sqrt(largest));
+    let offset = screen_offset * view.limits.zw;
+    let x = view.axis_x.w * position.x / position.z + view.axis_z.w - 0.5 + offset.x;
+    let y = view.axis_y.w * position.y / position.z + view.translation.w - 0.5 + offset.y;
+    if (!(is_finite(x) && is_finite(y) && is_finite(radius))) {
+        write_nothing(i, INVALID_RADIUS);
+        return;
+    }
+
+    var splat: Splat;
+    splat.position = vec2<f32>(x, y);
+    splat.depth = position.z;
+    splat.opacity = opacity;
+    splat.conic = vec3<f32>(yy / determinant, -xy / determinant, xx / determinant);
+    splat.reach = -1.0;
+    if (opacity >= MIN_ALPHA) {
+        splat.reach = 2.0 * log(opacity / MIN_ALPHA);
+    }
+    splat.variance = vec2<f32>(xx, yy);
+    splat.radius = radius;
+    let tiles = tile_rectangle(splat.position, radius);
+    if (any(tiles.low >= tiles.high)) {
+        write_nothing(i, 0);
+        return;
+    }
+    let count = count_cells(splat);
+    splats[4u * i] = vec4<f32>(x, y, position.z, opacity);
+    splats[4u * i + 1u] = vec4<f32>(splat.conic, splat.reach);
+    splats[4u * i + 3u] = vec4<f32>(splat.variance, radius, f32(count));
+    depth_keys[i] = select(bitcast<u32>(position.z), 0xffffffffu, count == 0u);
+    // 2^31 - 1, the largest that there is, for what is larger.
+    radii[i] = select(i32(min(radius, 2147483520.0)), 2147483647, radius >= 2147483648.0);
+}

@@ -1,0 +1,40 @@
+// Adds up every Gaussian's sums over its cells.
+//
+// One invocation owns one Gaussian. Reads its splat and the sums of its intersections, which lie next to each other from
+// three times `first_of_gaussian`, and adds them in that order. Writes `scores` [N, 4]: pixels, sum of T · alpha, sum of
+// T · opacity, sum of the opacity.
+
+struct Parameters {
+    count: u32,
+}
+
+@group(0) @binding(0) var<storage, read_write> splats: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read_write> first_of_gaussian: array<u32>;
+@group(0) @binding(2) var<storage, read_write> sums: array<f32>;
+@group(0) @binding(3) var<storage, read_write> scores: array<vec4<f32>>;
+@group(0) @binding(4) var<uniform> parameters: Parameters;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let i = flat_group(group, groups) * WORKGROUP + lane;
+    if (i >= parameters.count) {
+        return;
+    }
+    let cells = u32(splats[4u * i + 3u].w);
+    if (cells == 0u) {
+        scores[i] = vec4<f32>(0.0);
+        return;
+    }
+    var sum = vec3<f32>(0.0);
+    var at = 3u * first_of_gaussian[i];
+    for (var k = 0u; k < cells; k++) {
+        sum += vec3<f32>(sums[at], sums[at + 1u], sums[at + 2u]);
+        at += 3u;
+    }
+    let opacity = splats[4u * i].w;
+    scores[i] = vec4<f32>(sum.x, sum.y, opacity * sum.z, opacity * sum.x);
+}
