@@ -1,7 +1,7 @@
 //! Who blends a cell of the picture.
 
 use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 use cubecl::device::DeviceId;
 
@@ -47,12 +47,11 @@ impl Team {
 }
 
 /// What was found on each device.
-static FOUND: Mutex<Option<HashMap<DeviceId, bool>>> = Mutex::new(None);
+static FOUND: LazyLock<Mutex<HashMap<DeviceId, bool>>> = LazyLock::new(Mutex::default);
 
 /// Whether a workgroup of the subgroups' size is one subgroup, found by trying.
 fn has_subgroups_of_one_size(gpu: &Gpu) -> Result<bool, GpuError> {
     let mut found = FOUND.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let found = found.get_or_insert_default();
     let device = gpu.client.service_id().device;
     if let Some(known) = found.get(&device) {
         return Ok(*known);
