@@ -10,6 +10,10 @@ use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
 
+/// Intersections of a cell that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
+/// graphics driver may stop a launch that runs for seconds.
+pub(super) const PART: usize = 32768;
+
 /// Who blends a cell: a team of invocations, and how its members meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Team {
@@ -42,7 +46,10 @@ impl Team {
 
     /// Begins the launch of a stage that blends.
     pub(super) fn launch<'a>(&self, gpu: &'a Gpu, stage: Stage) -> Launch<'a> {
-        Launch::new(&gpu.client, stage).team(self.members, self.includes).constant("CELL", self.cell)
+        Launch::new(&gpu.client, stage)
+            .team(self.members, self.includes)
+            .constant("CELL", self.cell)
+            .constant("PART", PART as u32)
     }
 }
 
