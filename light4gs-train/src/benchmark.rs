@@ -18,6 +18,7 @@ use serde::Serialize;
 
 use crate::compression::Compression;
 use crate::config::Config;
+use crate::device::adapter_name;
 use crate::error::TrainError;
 use crate::loss::l1;
 use crate::optimizer::Adam;
@@ -198,8 +199,10 @@ pub struct SceneTimes {
 /// All scenes on one device.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceTimes {
-    /// Name of the back end, and the adapter if it has one.
+    /// Name of the back end.
     pub device: String,
+    /// What its graphics adapter calls itself, if it has one.
+    pub adapter: Option<String>,
     /// Median of a 1024×1024 float32 product, to set machines side by side.
     pub calibration_ms: f64,
     /// One entry a scene.
@@ -244,7 +247,7 @@ pub fn benchmark(
             stages: stages(scene, device, &autodiff, &small, repeats),
         })
         .collect();
-    Ok(DeviceTimes { device: name.to_owned(), calibration_ms, scenes })
+    Ok(DeviceTimes { device: name.to_owned(), adapter: adapter_name(name, device), calibration_ms, scenes })
 }
 
 fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config, repeats: usize) -> Vec<StageTime> {
@@ -413,5 +416,6 @@ pub fn table(results: &[DeviceTimes]) -> String {
     table.row(cells("training it/s", &stage_of("training step")));
     table.row(cells("render FPS", &stage_of("render")));
     table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
-    table.to_string()
+    let adapters = results.iter().filter_map(|device| Some((&device.device, device.adapter.as_ref()?)));
+    adapters.fold(table.to_string(), |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
 }

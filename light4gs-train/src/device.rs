@@ -101,11 +101,16 @@ fn wgpu(name: &str, adapter: Adapter) -> Result<Device, TrainError> {
     Ok(device)
 }
 
+/// The name that a wgpu device's adapter has for itself.
+pub fn adapter_name(name: &str, device: &Device) -> Option<String> {
+    matches!(parse(name), Some(Name::Wgpu(_))).then(|| device.clone().inner().identity()).flatten().map(|i| i.name)
+}
+
 /// What reports say of a device: its name, and for wgpu the adapter's own, as in `wgpu (llvmpipe)`.
 pub fn describe(name: &str, device: &Device) -> String {
-    match (parse(name), device.clone().inner().identity()) {
-        (Some(Name::Wgpu(_)), Some(identity)) => format!("{name} ({})", identity.name),
-        _ => name.to_owned(),
+    match adapter_name(name, device) {
+        Some(adapter) => format!("{name} ({adapter})"),
+        None => name.to_owned(),
     }
 }
 

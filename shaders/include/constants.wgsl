@@ -8,10 +8,6 @@ const MAX_ALPHA: f32 = 0.99;
 const MIN_TRANSMITTANCE: f32 = 1e-4;
 const INVALID_RADIUS: i32 = -1;
 
-// Part of a cell's list that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
-// graphics driver may stop a launch that runs for seconds.
-const PART: u32 = 32768u;
-
 // By bits: WGSL lets a compiler assume that there are neither infinities nor NaN.
 fn is_finite(value: f32) -> bool {
     return (bitcast<u32>(value) & 0x7f800000u) != 0x7f800000u;

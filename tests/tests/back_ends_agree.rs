@@ -5,8 +5,10 @@
 //! twin says at which pixels that may be; those have no weight in the loss and are left out of the comparison. Gaussians
 //! whose tiles or place in the order hang on the last bit are not in the scenes at all.
 
+use burn::tensor::{Tensor, TensorData};
 use light4gs_data::Camera;
-use light4gs_tests::golden::{assert_close_relative, devices};
+use light4gs_model::Splatter;
+use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run_weighed};
 use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SCALES, SplatScene, random_camera};
@@ -148,4 +150,50 @@ fn all_but_one_behind_the_camera() {
         scene.row_mut(MEANS, i).copy_from_slice(&place);
     }
     assert_agreement("behind", &scene, &[true; 100], &camera, 3, 0.1, &mut random);
+}
+
+/// So many that the pairs of a tile and a Gaussian must be sorted, blended and summed in more than one launch.
+#[test]
+fn a_million_gaussians_in_one_tile() {
+    const COUNT: usize = 1_000_000;
+    let mut random = Random::new(8);
+    let camera = random_camera(11, 13, &mut random);
+    let mut column = |width: usize, low: f64, high: f64| -> Vec<f32> {
+        (0..COUNT * width).map(|_| random.uniform(low, high) as f32).collect()
+    };
+    let columns = [
+        (column(3, -0.3, 0.3), 3),
+        (column(4, 0.1, 1.0), 4),
+        (column(3, 0.05, 0.3), 3),
+        (column(1, 0.02, 0.05), 1),
+        (column(3, -1.0, 1.0), 3),
+    ];
+    let runs: Vec<(&str, Vec<Vec<f32>>)> = devices()
+        .into_iter()
+        .map(|(name, device)| {
+            let device = device.autodiff();
+            let leaves: Vec<Tensor<2>> = columns
+                .iter()
+                .map(|(values, width)| {
+                    Tensor::from_data(TensorData::new(values.clone(), [COUNT, *width]), &device).require_grad()
+                })
+                .collect();
+            let [means, quats, scales, opacities, dc] = std::array::from_fn(|k| leaves[k].clone());
+            let rest = Tensor::<3>::zeros([COUNT, 0, 3], &device);
+            let dc = dc.reshape([COUNT, 1, 3]);
+            let splatter = Splatter::new(BACKGROUND, 0);
+            let rendering = splatter.render_activated(means, quats, scales, opacities, dc, rest, &camera, None);
+            let picture = values_of(&rendering.image);
+            let gradients = (rendering.image.sum() + rendering.depth.sum()).backward();
+            let of_leaves = leaves.iter().map(|leaf| values_of(&leaf.grad(&gradients).expect("a gradient")));
+            (name, std::iter::once(picture).chain(of_leaves).collect())
+        })
+        .collect();
+    let (first, expected) = &runs[0];
+    for (name, found) in &runs[1..] {
+        for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
+            let tolerance = if k == 0 { PICTURE } else { GRADIENT };
+            assert_close_relative(&format!("output {k} on {name} and {first}"), found, expected, tolerance);
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Launching a WGSL kernel through CubeCL, with errors that name it.
 
 use std::collections::HashSet;
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 use burn_cubecl::template::{KernelSource, SourceKernel, SourceTemplate};
 use cubecl::client::Client;
@@ -59,8 +59,11 @@ pub(super) struct Launch<'a> {
     written: Vec<Handle>,
 }
 
-/// What has been launched before on a device.
-static LAUNCHED: Mutex<Option<HashSet<(DeviceId, &'static str, Constants)>>> = Mutex::new(None);
+/// A kernel on a device.
+type Launched = (DeviceId, &'static str, Constants);
+
+/// What has been launched before.
+static LAUNCHED: LazyLock<Mutex<HashSet<Launched>>> = LazyLock::new(Mutex::default);
 
 impl<'a> Launch<'a> {
     pub(super) fn new(client: &'a Client, stage: Stage) -> Self {
@@ -145,7 +148,6 @@ impl<'a> Launch<'a> {
         self.client.launch(Box::new(SourceKernel::new(self.kernel, cube_dim)), count, self.arguments);
 
         let mut launched = LAUNCHED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-        let launched = launched.get_or_insert_default();
         if !launched.contains(&key) {
             self.client.check(&self.written).map_err(|error| GpuError::Kernel {
                 kernel: name,

@@ -11,13 +11,11 @@ use super::error::GpuError;
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
 use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
-use super::team::Team;
+use super::team::{PART, Team};
 use crate::cpu::project::{FRUSTUM_MARGIN, TILE, View};
 use crate::cpu::rasterize::CHANNELS;
 use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
-/// Intersections of a cell that one launch blends: PART in `shaders/include/constants.wgsl`.
-const PART: usize = 32768;
 /// Values of an intersection's sums.
 const SUMS: usize = 10;
 

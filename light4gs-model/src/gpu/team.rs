@@ -1,7 +1,7 @@
 //! Who blends a cell of the picture.
 
 use std::collections::HashMap;
-use std::sync::Mutex;
+use std::sync::{LazyLock, Mutex};
 
 use cubecl::device::DeviceId;
 
@@ -9,6 +9,10 @@ use super::context::Gpu;
 use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+
+/// Intersections of a cell that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
+/// graphics driver may stop a launch that runs for seconds.
+pub(super) const PART: usize = 32768;
 
 /// Who blends a cell: a team of invocations, and how its members meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,17 +46,19 @@ impl Team {
 
     /// Begins the launch of a stage that blends.
     pub(super) fn launch<'a>(&self, gpu: &'a Gpu, stage: Stage) -> Launch<'a> {
-        Launch::new(&gpu.client, stage).team(self.members, self.includes).constant("CELL", self.cell)
+        Launch::new(&gpu.client, stage)
+            .team(self.members, self.includes)
+            .constant("CELL", self.cell)
+            .constant("PART", PART as u32)
     }
 }
 
 /// What was found on each device.
-static FOUND: Mutex<Option<HashMap<DeviceId, bool>>> = Mutex::new(None);
+static FOUND: LazyLock<Mutex<HashMap<DeviceId, bool>>> = LazyLock::new(Mutex::default);
 
 /// Whether a workgroup of the subgroups' size is one subgroup, found by trying.
 fn has_subgroups_of_one_size(gpu: &Gpu) -> Result<bool, GpuError> {
     let mut found = FOUND.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    let found = found.get_or_insert_default();
     let device = gpu.client.service_id().device;
     if let Some(known) = found.get(&device) {
         return Ok(*known);

@@ -7,7 +7,7 @@ use clap::Args;
 use super::print_json;
 use crate::benchmark::{BenchScene, benchmark, table};
 use crate::codec_benchmark::{codec_benchmark, codec_table};
-use crate::device::{describe, device_by_name};
+use crate::device::device_by_name;
 use crate::error::TrainError;
 
 #[derive(Debug, Args)]
@@ -67,7 +67,7 @@ impl Bench {
         let mut results = Vec::new();
         for name in &self.device {
             let device = device_by_name(name)?;
-            results.push(benchmark(&describe(name, &device), &device, &scenes, self.repeats as usize)?);
+            results.push(benchmark(name, &device, &scenes, self.repeats as usize)?);
         }
         if self.json {
             print_json(&results);
