@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CompressionConfig {
-    /// How the file is written: one of [`PROFILES`].
+    /// How the file is written: `compact`, `paper` or `float32`.
     pub profile: String,
     /// The rate in the loss.
     pub rate: RateConfig,
@@ -32,7 +32,7 @@ pub(super) const PROFILES: &[&str] = &["compact", "paper", "float32"];
 pub struct RateConfig {
     /// Weight of the rate; 0 = no rate in the loss.
     pub lambda: f64,
-    /// What lambda weighs: one of [`WEIGHTINGS`].
+    /// What lambda weighs: `megabytes` or `per_symbol`.
     pub weighting: String,
     /// The rate is taken in every so many iterations.
     pub interval: usize,
@@ -51,7 +51,7 @@ pub(super) const WEIGHTINGS: &[&str] = &["megabytes", "per_symbol"];
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ContextConfig {
-    /// Sizes of its networks: one of [`ARCHITECTURES`].
+    /// Sizes of its networks: `compact` or `reference`.
     pub architecture: String,
     /// Whether the lowest scale's space-time planes send a hyperprior.
     pub hyperprior: bool,
@@ -96,7 +96,7 @@ pub struct StepsConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ShConfig {
-    /// One of [`SH_MODELS`].
+    /// `factorized`, `mixture_of_logistics`, `channel_autoregressive` or `hexplane_coupled`.
     pub model: String,
     /// Quantisation step.
     pub step: f64,

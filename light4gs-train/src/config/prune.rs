@@ -11,9 +11,9 @@ pub struct PruneConfig {
     pub fraction: f64,
     /// Iterations of the fine stage after which a pass takes place.
     pub iterations: Vec<usize>,
-    /// What a pixel adds to the score of a Gaussian that it blends: one of [`SCORES`].
+    /// What a pixel adds to the score of a Gaussian that it blends: `transmittance`, `weight`, `opacity` or `count`.
     pub score: String,
-    /// The factor of a Gaussian's volume: one of [`VOLUMES`].
+    /// The factor of a Gaussian's volume: `none`, `clamped` or `unclamped`.
     pub volume: String,
     /// Exponent of the volume's factor.
     pub volume_exponent: f64,

@@ -105,7 +105,7 @@ fn a_report_is_one_well_formed_file() {
     write_report(&path, &sample()).expect("a report");
     let html = std::fs::read_to_string(&path).expect("text");
     assert_balanced(&html);
-    assert_eq!(html.matches("<img src=\"data:image/png;base64,").count(), 3);
+    assert_eq!(html.matches("<img src=\"data:image/png;base64,").count(), 4);
     assert_eq!(html.matches("<svg ").count(), 5);
     assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("//www"), "no request");
     assert!(
