@@ -53,7 +53,12 @@ fn main(
             row += 1u;
         }
     }
-    // Should this compilation round otherwise than that of `project.wgsl`, a place may be left: no cell is there.
+    if (next == end) {
+        return;
+    }
+    // Should this compilation round otherwise than that of `project.wgsl`, a place may be left: no cell is there, and
+    // nobody writes sums for it, so the Gaussian is told how many it really has.
+    splats[4u * i + 3u].w = f32(next - first_places[place]);
     while (next < end) {
         cells[next] = view.cells.x * view.cells.y;
         gaussians[next] = i;

@@ -163,7 +163,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
         .constant("CELL", frame.team.cell)
         .reads(&by_depth)
         .reads(&first_places)
-        .reads(&splats)
+        .updates(&splats)
         .writes(&first_of_gaussian)
         .writes(&cells)
         .writes(&gaussians)
