@@ -15,7 +15,7 @@ pub(super) struct Quickstart {
     #[arg(long, default_value = "runs/quickstart")]
     out: PathBuf,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
-    #[arg(long, default_value = "ndarray")]
+    #[arg(long, default_value = "flex")]
     device: String,
     /// Replace a run that is there already.
     #[arg(long)]
