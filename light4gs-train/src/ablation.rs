@@ -1,7 +1,5 @@
 //! The paper's ablation tables: one scene, several runs, each with another part switched off.
 
-use std::path::Path;
-
 use serde::Serialize;
 
 use crate::config::Config;
@@ -149,9 +147,4 @@ pub fn to_markdown(rows: &[AblationRow]) -> String {
         );
     }
     text
-}
-
-/// The folder of a variant's run.
-pub fn variant_folder(out: &Path, variant: &Variant) -> std::path::PathBuf {
-    out.join(variant.name)
 }

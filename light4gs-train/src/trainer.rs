@@ -1,22 +1,25 @@
 //! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
+//!
+//! - here: stages, steps, checkpoints, what is logged
+//! - `density`: how many Gaussians there are
+//! - `rate`: what a small file asks of a step
 
-use std::collections::BTreeMap;
+mod density;
+mod rate;
+
 use std::time::Instant;
 
 use burn::module::Param;
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
-use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
-use light4gs_model::{DynamicScene, Significance, Splatter, least_significant, regularizer};
-use rand::Rng;
+use light4gs_data::{ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
+use light4gs_model::{DynamicScene, Splatter, regularizer};
 
 use crate::checkpoint::{self, Checkpoint};
-use crate::compression::{Compression, NoisyScene, TrainedScene, write_scene};
+use crate::compression::{Compression, TrainedScene, write_scene};
 use crate::config::{Config, TrainConfig};
-use crate::densification::{
-    DensifyMasks, DensityStatistics, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
-};
+use crate::densification::DensityStatistics;
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::learning_rates::GroupRates;
@@ -25,14 +28,9 @@ use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
 use crate::profile::Profile;
-use crate::randomness::{FrameOrder, Purpose, generator, seed_device, standard_normal};
+use crate::randomness::FrameOrder;
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
-
-/// Gaussians larger than this on the screen, in pixels, are dropped once opacities have been reset.
-const MAX_SCREEN_RADIUS: f32 = 20.0;
-/// Gaussians larger than this share of the scene's extent are dropped once opacities have been reset.
-const MAX_EXTENT_SHARE: f32 = 0.1;
 
 /// How a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
@@ -149,14 +147,12 @@ impl Trainer {
             images: &self.images,
             device: &self.device,
         };
-        let (encoded, record) = write_scene(&trained, &self.folder.stream(), self.quiet)?;
-        if let Some(record) = record {
-            self.folder.write_json("coding.json", &record)?;
+        let written = write_scene(&trained, &self.folder.stream(), self.quiet)?;
+        if let Some((record, bit_maps)) = &written.coding {
+            self.folder.write_json("coding.json", record)?;
+            self.folder.write_json("bit_maps.json", bit_maps)?;
         }
-        if let Some(coded) = &encoded.coded {
-            self.folder.write_json("bit_maps.json", &coded.bit_maps)?;
-        }
-        Ok(encoded.bytes.len() as u64)
+        Ok(written.bytes)
     }
 
     /// The fine stage starts with a new optimiser and new statistics.
@@ -325,130 +321,10 @@ impl Trainer {
         Ok(StepPicture { loss: value, image, truth })
     }
 
-    /// The scene as it will roughly be decoded, once the rate has entered the training.
-    fn quantization_noise(&mut self, stage: Stage, iteration: usize) -> Option<NoisyScene> {
-        let Config { seed, compression: config, .. } = &self.config;
-        let from = config.rate.from.max(1);
-        if stage == Stage::Coarse || iteration < from {
-            return None;
-        }
-        let with_sh = self.sh_counts(iteration);
-        let compression = self.state.compression.as_mut()?;
-        let scene = &self.state.scene;
-        if iteration == from {
-            compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
-        }
-        seed_device(&self.device, *seed, stage, iteration);
-        let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
-        Some(compression.noisy(scene, learn_steps, with_sh))
-    }
-
-    /// Whether spherical harmonics have a part in the rate: once Gaussians neither come nor split any more.
-    fn sh_counts(&self, iteration: usize) -> bool {
-        iteration > self.config.train.densify.until
-    }
-
-    /// The weighted rate, in the iterations in which it is due.
-    fn rate_term(&self, noisy: &NoisyScene, iteration: usize) -> Option<Tensor<1>> {
-        let config = &self.config.compression.rate;
-        let compression = self.state.compression.as_ref().filter(|_| iteration.is_multiple_of(config.interval))?;
-        let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
-        let with_sh = self.sh_counts(iteration);
-        let rate = compression.rate(noisy, &self.state.scene, config.fraction, with_sh, &mut generator);
-        Some(match config.weighting.as_str() {
-            "per_symbol" => rate.bits_per_symbol() * config.lambda,
-            // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
-            _ => rate.megabytes() * (config.lambda * config.interval as f64),
-        })
-    }
-
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
         let step = global_step(&self.config.train, stage, iteration);
         let degree = (step / self.config.train.sh_degree_interval.max(1)).min(usize::from(self.config.model.sh_degree));
         Splatter::new(self.config.data.background, degree)
-    }
-
-    /// Drops the Gaussians that contribute least to the training views at their times (STP, paper III-B).
-    fn prune_insignificant(&mut self, iteration: usize) {
-        let config = &self.config.train.prune;
-        let scene = &self.state.scene;
-        let splatter = self.splatter(Stage::Fine, iteration);
-        let mut significance = Significance::new(scene.gaussians.len());
-        for frame in self.pruning_views(iteration) {
-            significance.add(&splatter, scene.at(frame.time), &frame.camera);
-        }
-        let volumes: Vec<f64> =
-            scene.gaussians.log_scales.val().inner().sum_dim(1).exp().into_data().iter::<f64>().collect();
-        let mut scores = significance.scores(config.score());
-        for (score, factor) in scores.iter_mut().zip(config.volume_weight().of(&volumes)) {
-            *score *= factor;
-        }
-        let keep: Vec<bool> = least_significant(&scores, config.fraction).iter().map(|drop| !drop).collect();
-        // Never everything: an empty scene has no gradient to come back from.
-        if keep.contains(&true) && keep.contains(&false) {
-            prune(&mut self.state.scene.gaussians, &mut self.state.adam, &keep);
-            self.state.statistics.keep(&keep);
-        }
-    }
-
-    /// Every training view, or one random view a time.
-    fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
-        if !self.config.train.prune.one_camera_per_time {
-            return self.data.train.iter().collect();
-        }
-        let mut by_time: BTreeMap<u32, Vec<&Frame>> = BTreeMap::new();
-        for frame in &self.data.train {
-            by_time.entry(frame.time.to_bits()).or_default().push(frame);
-        }
-        let mut generator = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
-        by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()
-    }
-
-    fn control_density(&mut self, stage: Stage, iteration: usize) {
-        let config = self.config.train.densify.clone();
-        if iteration > config.until {
-            return;
-        }
-        let progress = iteration as f32 / config.until.max(1) as f32;
-        let between = |from: f32, to: f32| from + (to - from) * progress;
-        let (threshold, min_opacity) = match stage {
-            Stage::Coarse => (config.grad_threshold_coarse, config.opacity_threshold),
-            Stage::Fine => (
-                between(config.grad_threshold_fine_init, config.grad_threshold_fine_final),
-                between(config.opacity_threshold_fine_init, config.opacity_threshold_fine_final),
-            ),
-        };
-        let due = |from: usize, interval: usize| interval > 0 && iteration > from && iteration.is_multiple_of(interval);
-        let extent = self.data.extent;
-
-        let count = self.state.scene.gaussians.len();
-        if due(config.prune_from, config.prune_interval) && count > config.prune_above {
-            let size_limit = (config.opacity_reset_interval > 0 && iteration > config.opacity_reset_interval)
-                .then_some(SizeLimit { max_radius: MAX_SCREEN_RADIUS, max_scale: MAX_EXTENT_SHARE * extent });
-            let gaussians = &self.state.scene.gaussians;
-            let keep = survivors(gaussians, min_opacity, size_limit, &self.state.statistics.largest_radius);
-            // Never everything: an empty scene has no gradient to come back from.
-            if keep.contains(&true) && keep.contains(&false) {
-                prune(&mut self.state.scene.gaussians, &mut self.state.adam, &keep);
-                self.state.statistics.keep(&keep);
-            }
-        }
-        if due(config.from, config.interval) && self.state.scene.gaussians.len() < config.max_gaussians {
-            let gaussians = &self.state.scene.gaussians;
-            let masks = DensifyMasks::new(
-                &self.state.statistics.mean_gradients(),
-                &largest_scales(gaussians),
-                threshold,
-                config.percent_dense * extent,
-            );
-            let mut generator = generator(self.config.seed, Purpose::Split, stage, iteration);
-            let normals: Vec<f32> = (0..masks.normals_needed()).map(|_| standard_normal(&mut generator)).collect();
-            densify(&mut self.state.scene.gaussians, &mut self.state.adam, &masks, &normals);
-            self.reset_statistics();
-        }
-        if due(0, config.opacity_reset_interval) && iteration < config.until {
-            reset_opacity(&mut self.state.scene.gaussians, &mut self.state.adam);
-        }
     }
 
     /// PSNR of a few test views by the model in memory, when it is due.
@@ -527,7 +403,8 @@ pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
     SceneMeta {
         name: data.name.clone(),
         frame_count: times.len() as u32,
-        fps: 30.0,
+        // Times are a share of the whole; nobody says how long it lasts.
+        fps: 0.0,
         bounds,
         background: data.background,
         config_digest: config.digest(),

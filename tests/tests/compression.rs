@@ -156,14 +156,12 @@ fn every_configuration_makes_a_file_that_decodes() {
         let decoded = decode(&encoded.bytes).unwrap();
         assert_eq!(decoded, encoded.decoded, "{overrides:?}");
         assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
-        let coded = encoded.coded.unwrap();
+        let coded = encoded.coded;
         let bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
         let (expected, found) = (coded.estimate.hexplanes, 8.0 * bytes as f64);
-        // Tiny planes: a coder's last word weighs, and quantised weights of an untrained model too.
-        assert!(
-            (expected - found).abs() < 0.05 * found + 3000.0,
-            "{overrides:?}: {expected} bits, {found} in the file"
-        );
+        // What the sub-streams of a plane spend on whole words at their ends, and quantised weights.
+        let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
+        assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
     }
 }
 

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::print_json;
 use super::train::{RunOutput, train_to_evaluation};
-use crate::ablation::{AblationRow, AblationTable, to_markdown, variant_folder};
+use crate::ablation::{AblationRow, AblationTable, to_markdown};
 use crate::error::TrainError;
 
 #[derive(Debug, Args)]
@@ -50,7 +50,7 @@ impl Ablate {
             if !self.output.quiet && !self.output.json {
                 println!("{}", variant.name);
             }
-            let folder = variant_folder(&self.out, variant);
+            let folder = self.out.join(variant.name);
             let evaluation = train_to_evaluation(config, &self.scene, &folder, &self.output)?;
             rows.push(AblationRow::new(variant.name, &evaluation));
             // After every run, so that an interrupted table shows what there is.

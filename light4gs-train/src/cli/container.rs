@@ -71,9 +71,9 @@ impl Encode {
             images: &images,
             device: &device,
         };
-        let (_, record) = write_scene(&trained, &self.out, self.json)?;
+        let written = write_scene(&trained, &self.out, self.json)?;
         print_info(&read_info(&self.out)?, self.json);
-        if let Some(record) = record.filter(|_| !self.json) {
+        if let Some((record, _)) = written.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 println!("the entropy models were fitted to the finished scene in {seconds:.1} s");
             }
@@ -122,7 +122,8 @@ fn print_info(info: &StreamInfo, json: bool) {
                 "hyperprior": p.hyperprior, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
         }));
     }
-    println!("{name}: version {}, {width}×{height}, {frame_count} times at {fps} frames a second", info.version);
+    let rate = if *fps > 0.0 { format!(" at {fps} frames a second") } else { String::new() };
+    println!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version);
     println!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree);
     println!(
         "hexplanes: {} channels, {:?} cells times {:?}; network: width {}, {} layers",

@@ -5,7 +5,7 @@ use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
-    ShCoding, WeightPrecisions, encode as encode_float32, encode_compressed, sh_rest_coefficients,
+    ShCoding, WeightPrecisions, encode_compressed, sh_rest_coefficients,
 };
 use light4gs_model::{DynamicScene, HexPlane, Latent, PLANE_NAMES, ShEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
@@ -20,10 +20,10 @@ use crate::error::TrainError;
 pub struct EncodedScene {
     /// The file.
     pub bytes: Vec<u8>,
-    /// What a decoder gives for it, bit for bit; in the `float32` profile, the scene itself.
+    /// What a decoder gives for it, bit for bit.
     pub decoded: SceneData,
-    /// Where the bytes went and what was expected; not in the `float32` profile.
-    pub coded: Option<CodedSizes>,
+    /// Where the bytes went and what was expected.
+    pub coded: CodedSizes,
 }
 
 /// Bytes by part, with the bits that the entropy models expected.
@@ -73,7 +73,7 @@ pub struct Pictures<'a> {
     pub error: f64,
 }
 
-/// Encodes a scene in the profile of the configuration. Everything that is coded is decoded again and compared before
+/// Encodes a scene in one of the coded profiles, `compact` or `paper`. Everything that is coded is decoded again and compared before
 /// this returns.
 pub fn encode(
     scene: &DynamicScene,
@@ -84,9 +84,6 @@ pub fn encode(
     device: &Device,
 ) -> Result<EncodedScene, TrainError> {
     let data = scene.to_arrays(meta);
-    if config.profile == "float32" {
-        return Ok(EncodedScene { bytes: encode_float32(&data)?, decoded: data, coded: None });
-    }
     let mut input = compression_input(compression, scene, &data, config)?;
     if let (Some(pictures), Profile::Compact) = (pictures, input.profile)
         && config.attributes.search_tolerance > 0.0
@@ -97,7 +94,7 @@ pub fn encode(
     let encoded = encode_compressed(&data, &input)?;
     let estimate = compression.estimate(&encoded.decoded, &input.sh, device)?;
     let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
-    let coded = Some(CodedSizes { report: encoded.report, estimate, bit_maps });
+    let coded = CodedSizes { report: encoded.report, estimate, bit_maps };
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
@@ -158,7 +155,7 @@ impl Compression {
         let hexplanes = rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum();
         let sh = match &self.sh {
             Some(sh) if !decoded.gaussians.is_empty() => {
-                sh.bits(scene.gaussians.sh_rest.val(), &known(&scene, &planes)).sum().into_scalar()
+                sh.bits(scene.gaussians.sh_rest.val(), &known(&scene, &planes, None)).sum().into_scalar()
             }
             _ => counted_bits(&decoded.gaussians, coding),
         };

@@ -16,7 +16,7 @@ mod step_search;
 pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, plane_name};
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
-pub use run_encoder::{CodingRecord, PlaneRecord, TrainedScene, write_scene};
+pub use run_encoder::{CodingRecord, PlaneRecord, TrainedScene, WrittenScene, write_scene};
 
 use burn::tensor::Device;
 use light4gs_model::{
@@ -77,8 +77,8 @@ fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig
     sizes.with_parts(parts)
 }
 
-/// Width of the densities of spherical harmonics before training. Coefficients rarely leave ±0.5; the reference begins
-/// at 8, and needs thousands of iterations to come down from there.
+/// Width of the densities of spherical harmonics before training, in the units of the values. The reference begins at 8,
+/// and in its log the rate needs hundreds of iterations to come down from there; our runs are shorter.
 const SH_INITIAL_SCALE: f64 = 0.3;
 
 fn sh_config(config: &ShConfig, feature_size: usize) -> ShEntropyConfig {

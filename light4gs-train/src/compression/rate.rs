@@ -88,7 +88,7 @@ impl Compression {
             let share = count as f64 / chosen.len() as f64;
             let rows: Vec<i64> = chosen.iter().map(|row| *row as i64).collect();
             let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &noisy.sh_rest.device());
-            let known = known(scene, planes).select(rows.clone());
+            let known = known(scene, planes, Some(rows.clone()));
             sh.bits(noisy.sh_rest.clone().select(0, rows), &known).sum() * share
         });
         let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
@@ -96,13 +96,14 @@ impl Compression {
     }
 }
 
-/// What a decoder knows of the Gaussians before it comes to their spherical harmonics.
-pub(super) fn known(scene: &DynamicScene, planes: &[Tensor<3>]) -> ShKnown {
-    ShKnown {
-        sh_dc: scene.gaussians.sh_dc.val(),
-        positions: scene.frame.normalize(scene.gaussians.means.val()),
-        planes: planes.to_vec(),
+/// What a decoder knows of the Gaussians, or of some rows of them, before it comes to their spherical harmonics.
+pub(super) fn known(scene: &DynamicScene, planes: &[Tensor<3>], rows: Option<Tensor<1, Int>>) -> ShKnown {
+    let (mut sh_dc, mut means) = (scene.gaussians.sh_dc.val(), scene.gaussians.means.val());
+    if let Some(rows) = rows {
+        sh_dc = sh_dc.select(0, rows.clone());
+        means = means.select(0, rows);
     }
+    ShKnown { sh_dc, positions: scene.frame.normalize(means), planes: planes.to_vec() }
 }
 
 /// A random share of `0..count` without repetition, at least one, in rising order.

@@ -6,15 +6,15 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
-use light4gs_codec::{SceneData, write_atomically};
+use light4gs_codec::{PlaneBytes, SceneData, write_atomically};
 use light4gs_data::{DataError, Frame, ImageStore, Scene};
 use light4gs_model::{DynamicScene, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::{BitEstimate, CodedSizes, Compression, EncodedScene, Pictures, encode, fit, plane_name};
+use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit, plane_name};
 use crate::config::Config;
 use crate::error::TrainError;
-use crate::trainer::{image_tensor, scene_meta};
+use crate::trainer::scene_meta;
 
 /// Training views that the step search looks at.
 const SEARCH_VIEWS: usize = 8;
@@ -51,15 +51,6 @@ pub struct PlaneRecord {
     pub value_bytes: u64,
 }
 
-impl CodingRecord {
-    /// Largest relative difference between expected and coded bits, of the coded ones.
-    pub fn largest_error(&self) -> f64 {
-        let (e, c) = (self.estimated_bits, self.coded_bits);
-        let error = |estimated: f64, coded: f64| if coded > 0.0 { (estimated - coded).abs() / coded } else { 0.0 };
-        error(e.hexplanes, c.hexplanes).max(error(e.sh, c.sh))
-    }
-}
-
 /// A scene as trained, and where its pictures are.
 pub struct TrainedScene<'a> {
     /// The model.
@@ -76,42 +67,41 @@ pub struct TrainedScene<'a> {
     pub device: &'a Device,
 }
 
-/// Encodes a trained scene and writes the file, whole or not at all. Returns what was written, and how it was coded
-/// unless the profile is `float32`.
-pub fn write_scene(
-    trained: &TrainedScene,
-    path: &Path,
-    quiet: bool,
-) -> Result<(EncodedScene, Option<CodingRecord>), TrainError> {
+/// A file on disk.
+#[derive(Clone, Debug)]
+pub struct WrittenScene {
+    /// Its size.
+    pub bytes: u64,
+    /// How it was coded, and where its planes' bits are; not in the `float32` profile.
+    pub coding: Option<(CodingRecord, Vec<BitMap>)>,
+}
+
+/// Encodes a trained scene in the profile of its configuration and writes the file, whole or not at all.
+pub fn write_scene(trained: &TrainedScene, path: &Path, quiet: bool) -> Result<WrittenScene, TrainError> {
     let TrainedScene { scene, config, data, device, .. } = trained;
     let meta = scene_meta(config, data);
     let settings = &config.compression;
-    let mut fit_seconds = None;
-    let mut compression = match trained.compression {
-        Some(compression) => compression.clone(),
-        None if settings.profile == "float32" => Compression::new(config, device),
+    if settings.profile == "float32" {
+        let bytes = light4gs_codec::write_file(path, &scene.to_arrays(meta))?;
+        return Ok(WrittenScene { bytes, coding: None });
+    }
+    let (mut compression, fit_seconds) = match trained.compression {
+        Some(compression) => (compression.clone(), None),
         None => {
             let begin = Instant::now();
-            let iterations = settings.context.fit_iterations;
-            let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(iterations as u64) };
-            let style = "   fit {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}";
-            bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
-            let compression = fit(scene, config, device, |iteration| bar.set_position(iteration as u64));
-            bar.finish();
-            fit_seconds = Some(begin.elapsed().as_secs_f64());
-            compression
+            let compression = fit_with_bar(scene, config, device, quiet);
+            (compression, Some(begin.elapsed().as_secs_f64()))
         }
     };
     let begin = Instant::now();
     let views = search_views(data);
     let inner = (*device).clone().inner();
     let render = |data: &SceneData| render_views(data, &views, &inner);
-    let pictures = match settings.attributes.search_tolerance > 0.0 && settings.profile == "compact" {
-        true => {
-            let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images, &inner)?;
-            Some(Pictures { render: &render, error })
-        }
-        false => None,
+    let pictures = if settings.attributes.search_tolerance > 0.0 && settings.profile == "compact" {
+        let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images)?;
+        Some(Pictures { render: &render, error })
+    } else {
+        None
     };
     let encoded = encode(scene, &mut compression, meta, settings, pictures, device)?;
     write_atomically(path, &encoded.bytes).map_err(|source| DataError::Io {
@@ -119,39 +109,41 @@ pub fn write_scene(
         path: path.to_owned(),
         source,
     })?;
-    let record = encoded.coded.as_ref().map(|coded| CodingRecord {
+    let sizes = &encoded.coded.report;
+    let hexplane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
+    let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
+    let record = CodingRecord {
         profile: settings.profile.clone(),
         fit_seconds,
         encode_seconds: begin.elapsed().as_secs_f64(),
-        ..record(coded, &encoded.decoded, &compression)
-    });
-    Ok((encoded, record))
+        estimated_bits: encoded.coded.estimate,
+        coded_bits: BitEstimate { hexplanes: 8.0 * hexplane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
+        planes: plane_records(&encoded, &compression),
+    };
+    let bytes = encoded.bytes.len() as u64;
+    Ok(WrittenScene { bytes, coding: Some((record, encoded.coded.bit_maps)) })
 }
 
-fn record(coded: &CodedSizes, decoded: &SceneData, compression: &Compression) -> CodingRecord {
+fn fit_with_bar(scene: &DynamicScene, config: &Config, device: &Device, quiet: bool) -> Compression {
+    let iterations = config.compression.context.fit_iterations as u64;
+    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(iterations) };
+    let style = "   fit {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}";
+    bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
+    let compression = fit(scene, config, device, |iteration| bar.set_position(iteration as u64));
+    bar.finish();
+    compression
+}
+
+fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {
     let steps = compression.quantization.steps().values();
-    let planes: Vec<PlaneRecord> = coded
-        .report
-        .planes
-        .iter()
-        .map(|bytes| PlaneRecord {
-            name: plane_name(bytes.plane),
-            step: steps[bytes.plane],
-            symbols: decoded.hexplane.planes[bytes.plane].values.len(),
-            hyperprior_bytes: bytes.hyperprior,
-            value_bytes: bytes.anchors + bytes.others,
-        })
-        .collect();
-    let hexplane_bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
-    let sh_bytes: u64 = coded.report.sh.degrees.iter().sum();
-    CodingRecord {
-        profile: String::new(),
-        fit_seconds: None,
-        encode_seconds: 0.0,
-        estimated_bits: coded.estimate,
-        coded_bits: BitEstimate { hexplanes: 8.0 * hexplane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
-        planes,
-    }
+    let record = |bytes: &PlaneBytes| PlaneRecord {
+        name: plane_name(bytes.plane),
+        step: steps[bytes.plane],
+        symbols: encoded.decoded.hexplane.planes[bytes.plane].values.len(),
+        hyperprior_bytes: bytes.hyperprior,
+        value_bytes: bytes.anchors + bytes.others,
+    };
+    encoded.coded.report.planes.iter().map(record).collect()
 }
 
 fn search_views(data: &Scene) -> Vec<&Frame> {
@@ -170,18 +162,14 @@ fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32>
     views.iter().flat_map(picture).collect()
 }
 
-fn mean_squared_error(
-    pixels: &[f32],
-    views: &[&Frame],
-    images: &ImageStore,
-    device: &Device,
-) -> Result<f64, TrainError> {
+fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &ImageStore) -> Result<f64, TrainError> {
     let mut sum = 0.0;
     let mut rest = pixels;
     for frame in views {
-        let truth: Vec<f32> = image_tensor(&*images.get(frame)?, device).into_data().iter().collect();
-        let (own, others) = rest.split_at(truth.len());
-        sum += own.iter().zip(&truth).map(|(a, b)| f64::from(a - b).powi(2)).sum::<f64>();
+        let truth = images.get(frame)?;
+        let (own, others) = rest.split_at(truth.pixels.len());
+        let errors = own.iter().zip(&truth.pixels).map(|(value, byte)| f64::from(*value) - f64::from(*byte) / 255.0);
+        sum += errors.map(|error| error.powi(2)).sum::<f64>();
         rest = others;
     }
     Ok(sum / pixels.len().max(1) as f64)
