@@ -112,6 +112,19 @@ impl RunFolder {
         self.path("checkpoints")
     }
 
+    /// Takes over the newest checkpoint and the log of another run, to go on from there.
+    pub fn adopt(&self, other: &Self) -> Result<(), TrainError> {
+        let log = other.path("metrics.jsonl");
+        let checkpoint = other.last_checkpoint().map(|from| {
+            let to = self.checkpoints().join(from.file_name().expect("a checkpoint is a file"));
+            (from, to)
+        });
+        for (from, to) in checkpoint.into_iter().chain([(log, self.path("metrics.jsonl"))]) {
+            fs::copy(&from, &to).map_err(io("copy", &from))?;
+        }
+        Ok(())
+    }
+
     /// The newest checkpoint.
     pub fn last_checkpoint(&self) -> Option<PathBuf> {
         checkpoint::list(&self.checkpoints()).pop()

@@ -9,7 +9,7 @@ mod rate;
 
 use std::time::Instant;
 
-use burn::module::Param;
+use burn::module::{Module, Param};
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
@@ -244,7 +244,7 @@ impl Trainer {
         let views = self.data.train.len();
         let frames: Vec<usize> =
             (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, views)).collect();
-        let noisy = self.quantization_noise(stage, iteration);
+        let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantisation noise");
         let config = &self.config.train;
         let splatter = self.splatter(stage, iteration);
@@ -282,7 +282,7 @@ impl Trainer {
             picture = Some((rendering.image.inner(), truth.inner()));
         }
         let mut loss = loss.expect("a batch has at least one picture");
-        if stage == Stage::Fine {
+        if stage == Stage::Fine && !self.planes_are_settled(stage, iteration) {
             loss = loss + regularization(scene, config);
             self.profile.lap("regularisers");
         }
@@ -337,13 +337,14 @@ impl Trainer {
         }
         let splatter = self.splatter(stage, iteration);
         let stride = frames.len().div_ceil(eval.views);
+        let scene = self.state.scene.valid();
         let mut values = Vec::new();
         for frame in frames.iter().step_by(stride) {
             let gaussians = match stage {
-                Stage::Coarse => self.state.scene.gaussians.tensors(),
-                Stage::Fine => self.state.scene.at(frame.time),
+                Stage::Coarse => scene.gaussians.tensors(),
+                Stage::Fine => scene.at(frame.time),
             };
-            let image = splatter.render(gaussians, &frame.camera, None).image.inner().clamp(0.0, 1.0);
+            let image = splatter.render(gaussians, &frame.camera, None).image.clamp(0.0, 1.0);
             values.push(psnr(image, image_tensor(&*self.images.get(frame)?, &self.device.clone().inner())));
         }
         Ok(Some(values.iter().sum::<f64>() / values.len() as f64))

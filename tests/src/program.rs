@@ -31,9 +31,10 @@ pub const TINY: [&str; 15] = [
 ];
 
 /// Overrides that put everything that compresses into a tiny run.
-pub const TINY_COMPRESSION: [&str; 5] = [
+pub const TINY_COMPRESSION: [&str; 6] = [
     "compression.rate.lambda=0.05",
     "compression.rate.from=12",
+    "compression.rate.planes_until=44",
     "compression.steps.adaptive_from=20",
     "train.prune.fraction=0.2",
     "train.prune.iterations=[42, 45]",

@@ -133,6 +133,10 @@ fn ablation_tables() {
     for row in ["float32", "paper-profile", "high", "medium", "small"] {
         assert!(table.contains(&format!("| {row} |")), "{table}");
     }
+    // The middle size is not trained again for the paper's profile: the log says so to the microsecond.
+    let log = |variant: &str| fs::read(w.path(&format!("table/{variant}/metrics.jsonl"))).unwrap();
+    assert_eq!(log("paper-profile"), log("medium"));
+    assert_ne!(log("medium"), log("small"));
     // Finished runs are not repeated: the same table, minutes and all.
     assert_success(&ablate());
     assert_eq!(fs::read_to_string(w.path("table/table.md")).unwrap(), table);

@@ -8,7 +8,7 @@ use light4gs_model::{
     ContextModel, ContextModelConfig, ContextParts, DynamicScene, HexPlaneConfig, Latent, PlaneSteps,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
-use light4gs_train::compression::{Compression, encode};
+use light4gs_train::compression::{Compression, encode, settled_planes};
 use light4gs_train::config::Config;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -37,7 +37,7 @@ fn shaken(mut model: ContextModel, planes: &[Tensor<3>], steps: &PlaneSteps) -> 
     let [.., last] = &mut model.entropy_parameters.layers;
     let weight = last.weight.val();
     let noise = Tensor::random(weight.dims(), Distribution::Normal(0.0, 0.3), &weight.device());
-    last.weight = burn::module::Param::from_tensor(weight + noise);
+    last.weight = burn::module::Param::from_tensor((weight + noise).detach());
     model.update_quantiles();
     model
 }
@@ -162,6 +162,29 @@ fn every_configuration_makes_a_file_that_decodes() {
         // What the sub-streams of a plane spend on whole words at their ends, and quantised weights.
         let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
+    }
+}
+
+/// Once settled, planes are what the file has, bit for bit: what learns around them learns around the right thing.
+#[test]
+fn settled_planes_are_those_of_the_file() {
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let config = config(&["model.hexplane.resolution=[16,16,16,8]", "compression.steps.space_time=0.01"]);
+        let mut scene = scene(&config, &device);
+        for plane in &mut scene.hexplane.planes {
+            let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.05), &device);
+            *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
+        }
+        let mut compression = Compression::new(&config, &device);
+        let steps = compression.quantization.steps();
+        compression.context = shaken(compression.context, &scene.hexplane.tensors(), &steps);
+        let before = scene.hexplane.to_arrays();
+        scene.hexplane = settled_planes(&scene, &mut compression, &config.compression, &device).unwrap();
+        let settled = scene.hexplane.to_arrays();
+        assert_ne!(settled, before, "{name}");
+        let file = encode(&scene, &mut compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+        assert_eq!(file.decoded.hexplane, settled, "{name}");
     }
 }
 

@@ -19,7 +19,8 @@ pub(super) struct Ablate {
     /// The preset or TOML file that every variant is laid over.
     #[arg(long, default_value = "dnerf-small", value_name = "PRESET|FILE")]
     config: String,
-    /// Folder for the runs, one folder each, and for table.md. Runs that are finished are not repeated.
+    /// Folder for the runs, one folder each, and for table.md. Runs that are finished are not repeated, and variants that
+    /// differ only in how the file is written are trained once.
     #[arg(long)]
     out: PathBuf,
     /// Changes one key of every variant's configuration; may be given more than once.
@@ -46,12 +47,14 @@ impl Ablate {
             source,
         })?;
         let mut rows = Vec::new();
-        for (variant, config) in variants.iter().zip(configs) {
+        for (i, (variant, config)) in variants.iter().zip(&configs).enumerate() {
             if !self.output.quiet && !self.output.json {
                 println!("{}", variant.name);
             }
             let folder = self.out.join(variant.name);
-            let evaluation = train_to_evaluation(config, &self.scene, &folder, &self.output)?;
+            let like = configs[..i].iter().position(|earlier| earlier.trains_like(config));
+            let like = like.map(|i| self.out.join(variants[i].name));
+            let evaluation = train_to_evaluation(config.clone(), &self.scene, &folder, like.as_deref(), &self.output)?;
             rows.push(AblationRow::new(variant.name, &evaluation));
             // After every run, so that an interrupted table shows what there is.
             let path = self.out.join("table.md");

@@ -79,7 +79,8 @@ pub(super) fn train(
     finish(trainer, &folder, &config, output)
 }
 
-/// Trains into a folder, or goes on with the run that is there already, and measures the file.
+/// Trains into a folder, or goes on with the run that is there already, and measures the file. A new run takes over what
+/// was trained in `like`, if that is a run which differs only in how the file is written.
 ///
 /// # Errors
 /// [`TrainError::Input`] if the folder holds a run of another configuration or another scene.
@@ -87,13 +88,17 @@ pub(super) fn train_to_evaluation(
     config: Config,
     scene: &Path,
     out: &Path,
+    like: Option<&Path>,
     output: &RunOutput,
 ) -> Result<Evaluation, TrainError> {
     device_by_name(&config.device)?;
     let fresh = !out.join("run.json").exists();
     if fresh {
         Scene::open(scene, &load_options(&config))?;
-        RunFolder::create(out, scene, &config, false)?;
+        let folder = RunFolder::create(out, scene, &config, false)?;
+        if let Some(like) = like {
+            folder.adopt(&RunFolder::open(like)?.0)?;
+        }
     }
     let (folder, record, found) = RunFolder::open(out)?;
     if found != config || record.scene != std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned()) {

@@ -98,6 +98,31 @@ pub fn encode(
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
+/// Rounds in which [`settled_planes`] looks for planes that stay as they are; two or three are the rule.
+const SETTLING_ROUNDS: usize = 8;
+
+/// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
+/// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn.
+pub fn settled_planes(
+    scene: &DynamicScene,
+    compression: &mut Compression,
+    config: &CompressionConfig,
+    device: &Device,
+) -> Result<HexPlane, TrainError> {
+    let mut scene = scene.clone();
+    let mut data = scene.to_arrays(SceneMeta::default());
+    for _ in 0..SETTLING_ROUNDS {
+        let input = compression_input(compression, &scene, &data, config)?;
+        let decoded = encode_compressed(&data, &CompressionInput { profile: Profile::Compact, ..input })?.decoded;
+        if decoded.hexplane == data.hexplane {
+            break;
+        }
+        scene.hexplane = HexPlane::from_arrays(&decoded.hexplane, device)?;
+        data.hexplane = decoded.hexplane;
+    }
+    Ok(scene.hexplane)
+}
+
 /// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
 /// arrays.
 pub fn compression_input(

@@ -12,8 +12,9 @@ use super::Compression;
 pub struct NoisyScene {
     /// `[C, H, W]`, scale-major.
     pub planes: Vec<Tensor<3>>,
-    /// Of the planes; with a gradient where they are learned.
-    pub steps: PlaneSteps,
+    /// Of the planes; with a gradient where they are learned. None if the planes are settled: as the file will have them,
+    /// without noise, without gradient and without a part in the rate.
+    pub steps: Option<PlaneSteps>,
     /// `[N, K, 3]`; without noise as long as the spherical harmonics have no part in the rate.
     pub sh_rest: Tensor<3>,
 }
@@ -21,7 +22,7 @@ pub struct NoisyScene {
 /// Estimated bits of a file's planes and spherical harmonics.
 #[derive(Clone, Debug)]
 pub struct Rate {
-    /// `[1]`: of all planes, hyperpriors included.
+    /// `[1]`: of all planes, hyperpriors included; 0 for settled planes.
     pub planes: Tensor<1>,
     /// Values of all planes.
     pub plane_symbols: usize,
@@ -57,12 +58,22 @@ impl Compression {
     pub fn noisy(&self, scene: &DynamicScene, learn_steps: bool, with_sh: bool) -> NoisyScene {
         let steps = self.quantization.steps();
         let steps = if learn_steps { steps } else { steps.detach() };
+        let planes = steps.add_noise(&scene.hexplane.tensors());
+        NoisyScene { planes, steps: Some(steps), sh_rest: self.noisy_sh(scene, with_sh) }
+    }
+
+    /// The same for a scene whose planes are settled.
+    pub fn noisy_beside_settled_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
+        let planes = scene.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect();
+        NoisyScene { planes, steps: None, sh_rest: self.noisy_sh(scene, with_sh) }
+    }
+
+    fn noisy_sh(&self, scene: &DynamicScene, with_sh: bool) -> Tensor<3> {
         let sh_rest = scene.gaussians.sh_rest.val();
-        let sh_rest = match &self.sh {
+        match &self.sh {
             Some(sh) if with_sh => sh.add_noise(sh_rest),
             _ => sh_rest,
-        };
-        NoisyScene { planes: steps.add_noise(&scene.hexplane.tensors()), steps, sh_rest }
+        }
     }
 
     /// Estimates the rate on a random share of the planes and of the Gaussians. Unbiased: over many draws the mean is
@@ -76,11 +87,14 @@ impl Compression {
         generator: &mut impl Rng,
     ) -> Rate {
         let planes = &noisy.planes;
-        let chosen = sample(generator, planes.len(), fraction);
-        let share = planes.len() as f64 / chosen.len() as f64;
-        let bits = self.context.rate(planes, &noisy.steps, &chosen, Latent::Noise);
-        let bits = bits.into_iter().map(|rate| rate.total()).reduce(|sum, plane| sum + plane);
-        let plane_bits = bits.expect("at least one plane is chosen") * share;
+        let plane_bits = noisy.steps.as_ref().map(|steps| {
+            let chosen = sample(generator, planes.len(), fraction);
+            let share = planes.len() as f64 / chosen.len() as f64;
+            let bits = self.context.rate(planes, steps, &chosen, Latent::Noise);
+            let bits = bits.into_iter().map(|rate| rate.total()).reduce(|sum, plane| sum + plane);
+            bits.expect("at least one plane is chosen") * share
+        });
+        let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &noisy.sh_rest.device()));
 
         let [count, coefficients, colors] = noisy.sh_rest.dims();
         let sh = self.sh.as_ref().filter(|_| with_sh && count > 0).map(|sh| {

@@ -41,6 +41,9 @@ pub struct RateConfig {
     /// Iteration of the fine stage from which planes carry noise and the rate counts. Spherical harmonics join once
     /// densification is over.
     pub from: usize,
+    /// Iteration of the fine stage after which the planes are settled: they take the values that the file will have, and
+    /// the rest of the scene goes on learning around them. 0 = never.
+    pub planes_until: usize,
 }
 
 /// What `compression.rate.weighting` may be: megabytes in the file, or the paper's sum of the bits per plane symbol and
@@ -154,7 +157,14 @@ impl Default for CompressionConfig {
 
 impl Default for RateConfig {
     fn default() -> Self {
-        Self { lambda: 0.0, weighting: "megabytes".to_owned(), interval: 3, fraction: 0.125, from: 1000 }
+        Self {
+            lambda: 0.0,
+            weighting: "megabytes".to_owned(),
+            interval: 3,
+            fraction: 0.125,
+            from: 1000,
+            planes_until: 27_000,
+        }
     }
 }
 

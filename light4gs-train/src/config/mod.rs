@@ -127,6 +127,14 @@ impl Config {
         Sha256::digest(self.to_toml().as_bytes()).into()
     }
 
+    /// Whether training is the same with both, so that they differ at most in how the result is written.
+    pub fn trains_like(&self, other: &Self) -> bool {
+        let mut like = self.clone();
+        let CompressionConfig { profile, attributes, .. } = other.compression.clone();
+        like.compression = CompressionConfig { profile, attributes, ..like.compression };
+        like == *other
+    }
+
     /// Checks every range. All problems are reported at once.
     pub fn validate(&self) -> Result<(), ConfigError> {
         validate::validate(self)

@@ -208,6 +208,10 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
         format!("is {}; it must be above 0 and at most 1", rate.fraction)
     });
     check.toml_integer("compression.rate.from", rate.from);
+    check.toml_integer("compression.rate.planes_until", rate.planes_until);
+    check.that("compression.rate.planes_until", rate.planes_until == 0 || rate.planes_until > rate.from, || {
+        format!("is {}; it must be 0 (never) or above compression.rate.from, {}", rate.planes_until, rate.from)
+    });
     check.one_of("compression.context.architecture", &context.architecture, ARCHITECTURES);
     check.that(
         "compression.context.high_scale_hyperprior",

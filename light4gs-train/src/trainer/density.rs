@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use burn::module::Module;
 use light4gs_data::Frame;
 use light4gs_model::{Significance, least_significant};
 use rand::Rng;
@@ -20,14 +21,14 @@ impl Trainer {
     /// Drops the Gaussians that contribute least to the training views at their times (STP, paper III-B).
     pub(super) fn prune_insignificant(&mut self, iteration: usize) {
         let config = &self.config.train.prune;
-        let scene = &self.state.scene;
+        // Off the tape, which would hold on to every picture's tensors until the next backward pass.
+        let scene = self.state.scene.valid();
         let splatter = self.splatter(Stage::Fine, iteration);
         let mut significance = Significance::new(scene.gaussians.len());
         for frame in self.pruning_views(iteration) {
             significance.add(&splatter, scene.at(frame.time), &frame.camera);
         }
-        let volumes: Vec<f64> =
-            scene.gaussians.log_scales.val().inner().sum_dim(1).exp().into_data().iter::<f64>().collect();
+        let volumes: Vec<f64> = scene.gaussians.log_scales.val().sum_dim(1).exp().into_data().iter::<f64>().collect();
         let mut scores = significance.scores(config.score());
         for (score, factor) in scores.iter_mut().zip(config.volume_weight().of(&volumes)) {
             *score *= factor;

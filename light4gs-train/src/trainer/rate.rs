@@ -3,28 +3,46 @@
 use burn::tensor::Tensor;
 
 use super::Trainer;
-use crate::compression::NoisyScene;
+use crate::compression::{NoisyScene, settled_planes};
 use crate::config::Config;
+use crate::error::TrainError;
 use crate::metrics_log::Stage;
 use crate::randomness::{Purpose, generator, seed_device};
 
 impl Trainer {
     /// The scene as it will roughly be decoded, once the rate has entered the training.
-    pub(super) fn quantization_noise(&mut self, stage: Stage, iteration: usize) -> Option<NoisyScene> {
+    pub(super) fn quantization_noise(
+        &mut self,
+        stage: Stage,
+        iteration: usize,
+    ) -> Result<Option<NoisyScene>, TrainError> {
         let Config { seed, compression: config, .. } = &self.config;
         let from = config.rate.from.max(1);
         if stage == Stage::Coarse || iteration < from {
-            return None;
+            return Ok(None);
         }
         let with_sh = self.sh_counts(iteration);
-        let compression = self.state.compression.as_mut()?;
-        let scene = &self.state.scene;
+        let settled = self.planes_are_settled(stage, iteration);
+        let Some(compression) = self.state.compression.as_mut() else { return Ok(None) };
+        let scene = &mut self.state.scene;
         if iteration == from {
             compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
         }
+        if settled && iteration == config.rate.planes_until + 1 {
+            scene.hexplane = settled_planes(scene, compression, config, &self.device)?;
+        }
         seed_device(&self.device, *seed, stage, iteration);
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
-        Some(compression.noisy(scene, learn_steps, with_sh))
+        Ok(Some(match settled {
+            true => compression.noisy_beside_settled_planes(scene, with_sh),
+            false => compression.noisy(scene, learn_steps, with_sh),
+        }))
+    }
+
+    /// Whether the planes have the values that the file will have: nothing changes them, nor what codes them, any more.
+    pub(super) fn planes_are_settled(&self, stage: Stage, iteration: usize) -> bool {
+        let until = self.config.compression.rate.planes_until;
+        stage == Stage::Fine && until > 0 && iteration > until && self.state.compression.is_some()
     }
 
     /// Whether spherical harmonics have a part in the rate: once Gaussians neither come nor split any more.
