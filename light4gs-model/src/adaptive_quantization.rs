@@ -68,7 +68,17 @@ impl NamedParameters for AdaptiveQuantization {
 impl AdaptiveQuantization {
     /// The step of every plane, with its gradient.
     pub fn steps(&self) -> PlaneSteps {
-        let steps = self.log_steps.val().exp();
+        self.steps_of(self.log_steps.val())
+    }
+
+    /// The step of every plane, off the tape from the beginning: operations on the tape that no backward pass ever comes
+    /// to would stay there for good, and every later pass would look through them.
+    pub fn steps_without_gradient(&self) -> PlaneSteps {
+        self.steps_of(self.log_steps.val().set_require_grad(false))
+    }
+
+    fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {
+        let steps = log_steps.exp();
         let groups = steps.dims()[0] / 2;
         let of_plane = |scale: usize, plane: usize| {
             let group = 2 * (scale % groups) + usize::from(SPACE_TIME_PLANES.contains(&plane));

@@ -27,11 +27,6 @@ impl PlaneSteps {
         self.of(plane).unsqueeze()
     }
 
-    /// The same steps without gradient.
-    pub fn detach(self) -> Self {
-        Self(self.0.into_iter().map(Tensor::detach).collect())
-    }
-
     /// As numbers.
     pub fn values(&self) -> Vec<f32> {
         self.0.iter().map(|step| step.clone().into_scalar::<f32>()).collect()

@@ -37,6 +37,11 @@ pub struct ShKnown {
 }
 
 impl ShKnown {
+    /// For models that are not interested.
+    pub fn nothing(device: &Device) -> Self {
+        Self { sh_dc: Tensor::zeros([0, 1, 3], device), positions: Tensor::zeros([0, 3], device), planes: Vec::new() }
+    }
+
     /// The part of these Gaussians, by row.
     pub fn select(&self, rows: Tensor<1, burn::tensor::Int>) -> Self {
         Self {

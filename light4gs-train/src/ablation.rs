@@ -15,7 +15,7 @@ pub enum AblationTable {
     RateDistortion,
     /// Models of the spherical harmonics.
     SphericalHarmonics,
-    /// The three sizes, the paper's profile and the uncompressed baseline.
+    /// The three sizes, the middle one in the paper's profile, and the uncompressed baseline.
     Sizes,
 }
 
@@ -73,9 +73,9 @@ impl AblationTable {
                 const {
                     &[
                         variant("float32", &["ablation-float32"]),
-                        variant("paper-profile", &["medium", "paper-profile"]),
                         variant("high", &["high"]),
                         variant("medium", &["medium"]),
+                        variant("paper-profile", &["medium", "paper-profile"]),
                         variant("small", &["small"]),
                     ]
                 }

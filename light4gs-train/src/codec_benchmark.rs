@@ -64,7 +64,7 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&config, &device);
-    compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
+    compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
     let data = scene.to_arrays(SceneMeta::default());
     let input: CompressionInput = compression_input(&mut compression, &scene, &data, &config.compression)?;
     let planes = input.planes.as_ref().expect("the compact profile codes planes");

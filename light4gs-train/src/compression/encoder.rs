@@ -153,7 +153,7 @@ fn attribute_steps(config: &AttributesConfig) -> AttributeSteps {
 impl Compression {
     /// What the codec needs to code the planes.
     fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
-        let steps = self.quantization.steps();
+        let steps = self.quantization.steps_without_gradient();
         let symbols = self.context.hyper_symbols(&scene.hexplane.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(PlaneCoding {
@@ -175,7 +175,7 @@ impl Compression {
         let scene = DynamicScene::from_arrays(decoded, device)?;
         let planes = scene.hexplane.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
-        let steps = self.quantization.steps();
+        let steps = self.quantization.steps_without_gradient();
         let rates = self.context.rate(&planes, &steps, &all, Latent::Rounded);
         let hexplanes = rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum();
         let sh = match &self.sh {
@@ -191,7 +191,7 @@ impl Compression {
     fn bit_maps(&self, decoded: &SceneData, device: &Device) -> Result<Vec<BitMap>, TrainError> {
         let planes = HexPlane::from_arrays(&decoded.hexplane, device)?.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
-        let maps = self.context.bit_map(&planes, &self.quantization.steps(), &all, Latent::Rounded);
+        let maps = self.context.bit_map(&planes, &self.quantization.steps_without_gradient(), &all, Latent::Rounded);
         let map = |(plane, map): (usize, Tensor<2>)| {
             let [height, width] = map.dims().map(|length| length as u32);
             BitMap { name: plane_name(plane), width, height, bits: map.into_data().iter().collect() }

@@ -56,8 +56,8 @@ impl Compression {
     /// The scene with uniform noise as wide as the steps. `learn_steps` lets gradients through to the planes' steps;
     /// `with_sh` puts noise on the spherical harmonics too.
     pub fn noisy(&self, scene: &DynamicScene, learn_steps: bool, with_sh: bool) -> NoisyScene {
-        let steps = self.quantization.steps();
-        let steps = if learn_steps { steps } else { steps.detach() };
+        let quantization = &self.quantization;
+        let steps = if learn_steps { quantization.steps() } else { quantization.steps_without_gradient() };
         let planes = steps.add_noise(&scene.hexplane.tensors());
         NoisyScene { planes, steps: Some(steps), sh_rest: self.noisy_sh(scene, with_sh) }
     }
@@ -102,7 +102,11 @@ impl Compression {
             let share = count as f64 / chosen.len() as f64;
             let rows: Vec<i64> = chosen.iter().map(|row| *row as i64).collect();
             let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &noisy.sh_rest.device());
-            let known = known(scene, planes, Some(rows.clone()));
+            let known = match sh.tables() {
+                // Tables look at nothing, and what is not computed does not stay on the tape.
+                Some(_) => ShKnown::nothing(&rows.device()),
+                None => known(scene, planes, Some(rows.clone())),
+            };
             sh.bits(noisy.sh_rest.clone().select(0, rows), &known).sum() * share
         });
         let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();

@@ -135,7 +135,7 @@ fn fit_with_bar(scene: &DynamicScene, config: &Config, device: &Device, quiet: b
 }
 
 fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {
-    let steps = compression.quantization.steps().values();
+    let steps = compression.quantization.steps_without_gradient().values();
     let record = |bytes: &PlaneBytes| PlaneRecord {
         name: plane_name(bytes.plane),
         step: steps[bytes.plane],

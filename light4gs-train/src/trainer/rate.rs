@@ -26,7 +26,9 @@ impl Trainer {
         let Some(compression) = self.state.compression.as_mut() else { return Ok(None) };
         let scene = &mut self.state.scene;
         if iteration == from {
-            compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
+            compression
+                .context
+                .start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
         }
         if settled && iteration == config.rate.planes_until + 1 {
             scene.hexplane = settled_planes(scene, compression, config, &self.device)?;
