@@ -151,8 +151,7 @@ fn every_configuration_makes_a_file_that_decodes() {
         let scene = scene(&config, &device);
         let mut compression = Compression::new(&config, &device);
         compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
-        let encoded =
-            encode(&scene, &mut compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+        let encoded = encode(&scene, &compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
         let decoded = decode(&encoded.bytes).unwrap();
         assert_eq!(decoded, encoded.decoded, "{overrides:?}");
         assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
@@ -180,10 +179,10 @@ fn settled_planes_are_those_of_the_file() {
         let steps = compression.quantization.steps();
         compression.context = shaken(compression.context, &scene.hexplane.tensors(), &steps);
         let before = scene.hexplane.to_arrays();
-        scene.hexplane = settled_planes(&scene, &mut compression, &config.compression, &device).unwrap();
+        scene.hexplane = settled_planes(&scene, &compression, &config.compression, &device).unwrap();
         let settled = scene.hexplane.to_arrays();
         assert_ne!(settled, before, "{name}");
-        let file = encode(&scene, &mut compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+        let file = encode(&scene, &compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
         assert_eq!(file.decoded.hexplane, settled, "{name}");
     }
 }
@@ -196,7 +195,7 @@ fn a_scene_without_gaussians_is_a_file_too() {
     let mut empty = full;
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
     let scene = DynamicScene::from_arrays(&empty, &device).unwrap();
-    let mut compression = Compression::new(&config, &device);
-    let encoded = encode(&scene, &mut compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+    let compression = Compression::new(&config, &device);
+    let encoded = encode(&scene, &compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
     assert!(decode(&encoded.bytes).unwrap().gaussians.is_empty());
 }

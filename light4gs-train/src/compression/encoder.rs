@@ -1,5 +1,6 @@
 //! A scene and its entropy models into the bytes of a file (paper III-E, DESIGN section 7).
 
+use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
@@ -77,12 +78,14 @@ pub struct Pictures<'a> {
 /// this returns.
 pub fn encode(
     scene: &DynamicScene,
-    compression: &mut Compression,
+    compression: &Compression,
     meta: SceneMeta,
     config: &CompressionConfig,
     pictures: Option<Pictures>,
     device: &Device,
 ) -> Result<EncodedScene, TrainError> {
+    let (scene, device) = (&scene.valid(), &device.clone().inner());
+    let compression = &mut compression.valid();
     let data = scene.to_arrays(meta);
     let mut input = compression_input(compression, scene, &data, config)?;
     if let (Some(pictures), Profile::Compact) = (pictures, input.profile)
@@ -105,11 +108,12 @@ const SETTLING_ROUNDS: usize = 8;
 /// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn.
 pub fn settled_planes(
     scene: &DynamicScene,
-    compression: &mut Compression,
+    compression: &Compression,
     config: &CompressionConfig,
     device: &Device,
 ) -> Result<HexPlane, TrainError> {
-    let mut scene = scene.clone();
+    let mut scene = scene.valid();
+    let compression = &mut compression.valid();
     let mut data = scene.to_arrays(SceneMeta::default());
     for _ in 0..SETTLING_ROUNDS {
         let input = compression_input(compression, &scene, &data, config)?;
@@ -117,10 +121,10 @@ pub fn settled_planes(
         if decoded.hexplane == data.hexplane {
             break;
         }
-        scene.hexplane = HexPlane::from_arrays(&decoded.hexplane, device)?;
+        scene.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
         data.hexplane = decoded.hexplane;
     }
-    Ok(scene.hexplane)
+    Ok(HexPlane::from_arrays(&data.hexplane, device)?)
 }
 
 /// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
@@ -151,6 +155,12 @@ fn attribute_steps(config: &AttributesConfig) -> AttributeSteps {
 }
 
 impl Compression {
+    /// Off the tape, on which all planes at once would take a gigabyte.
+    fn valid(&self) -> Self {
+        let Self { context, quantization, sh } = self;
+        Self { context: context.valid(), quantization: quantization.valid(), sh: sh.as_ref().map(Module::valid) }
+    }
+
     /// What the codec needs to code the planes.
     fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
         let steps = self.quantization.steps_without_gradient();

@@ -85,7 +85,7 @@ pub fn write_scene(trained: &TrainedScene, path: &Path, quiet: bool) -> Result<W
         let bytes = light4gs_codec::write_file(path, &scene.to_arrays(meta))?;
         return Ok(WrittenScene { bytes, coding: None });
     }
-    let (mut compression, fit_seconds) = match trained.compression {
+    let (compression, fit_seconds) = match trained.compression {
         Some(compression) => (compression.clone(), None),
         None => {
             let begin = Instant::now();
@@ -103,7 +103,7 @@ pub fn write_scene(trained: &TrainedScene, path: &Path, quiet: bool) -> Result<W
     } else {
         None
     };
-    let encoded = encode(scene, &mut compression, meta, settings, pictures, device)?;
+    let encoded = encode(scene, &compression, meta, settings, pictures, device)?;
     write_atomically(path, &encoded.bytes).map_err(|source| DataError::Io {
         action: "write",
         path: path.to_owned(),
