@@ -42,8 +42,8 @@ fn version_2_reads_as_it_did() {
     }
 }
 
-/// The encoder's own arithmetic is as exact as the decoder's: every build of it writes the same bytes on every machine.
-/// A better encoder may change these checksums; another compiler, flag or processor may not.
+/// The encoder's own arithmetic is as exact as the decoder's: every build of it writes the same bytes, whatever
+/// instructions the compiler may use. A better encoder may change these checksums.
 #[test]
 fn every_build_writes_the_same_bytes() {
     let checksums = [Profile::Compact, Profile::Paper].map(|profile| {

@@ -120,7 +120,9 @@ impl RunFolder {
             (from, to)
         });
         for (from, to) in checkpoint.into_iter().chain([(log, self.path("metrics.jsonl"))]) {
-            fs::copy(&from, &to).map_err(io("copy", &from))?;
+            // Whole or not at all: half a checkpoint would stop the run from being resumed.
+            let bytes = fs::read(&from).map_err(io("read", &from))?;
+            write_atomically(&to, &bytes).map_err(io("write", &to))?;
         }
         Ok(())
     }
