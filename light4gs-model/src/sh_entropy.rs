@@ -37,18 +37,9 @@ pub struct ShKnown {
 }
 
 impl ShKnown {
-    /// For models that are not interested.
+    /// For models whose densities depend on nothing (see [`ShTables`]): no Gaussian, no plane.
     pub fn nothing(device: &Device) -> Self {
         Self { sh_dc: Tensor::zeros([0, 1, 3], device), positions: Tensor::zeros([0, 3], device), planes: Vec::new() }
-    }
-
-    /// The part of these Gaussians, by row.
-    pub fn select(&self, rows: Tensor<1, burn::tensor::Int>) -> Self {
-        Self {
-            sh_dc: self.sh_dc.clone().select(0, rows.clone()),
-            positions: self.positions.clone().select(0, rows),
-            planes: self.planes.clone(),
-        }
     }
 }
 

@@ -74,8 +74,8 @@ pub struct Pictures<'a> {
     pub error: f64,
 }
 
-/// Encodes a scene in one of the coded profiles, `compact` or `paper`. Everything that is coded is decoded again and compared before
-/// this returns.
+/// Encodes a scene in one of the coded profiles, `compact` or `paper`. Everything that is coded is decoded again and
+/// compared before this returns.
 pub fn encode(
     scene: &DynamicScene,
     compression: &Compression,
@@ -101,11 +101,15 @@ pub fn encode(
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
-/// Rounds in which [`settled_planes`] looks for planes that stay as they are; two or three are the rule.
+/// Rounds in which [`settled_planes`] looks for planes that stay as they are. The last round's are near enough if none do.
 const SETTLING_ROUNDS: usize = 8;
 
 /// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
 /// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn.
+/// `device`, with autodiff, is where the result lives.
+///
+/// # Errors
+/// What the codec refuses: values that are not finite, or beyond its range of symbols.
 pub fn settled_planes(
     scene: &DynamicScene,
     compression: &Compression,
