@@ -286,6 +286,20 @@ fn a_full_disk() {
     }
 }
 
+/// A reader that goes away, as `head` does, is no error; a full disk behind the redirection is one.
+#[cfg(target_os = "linux")]
+#[test]
+fn standard_output_that_takes_nothing() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &[]).output().unwrap());
+    let info = |stdout: std::process::Stdio| w.command(["info", "run/scene.l4gs"]).stdout(stdout).output().unwrap();
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    assert_success(&info(writer.into()));
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    assert_refused(&info(full.into()), &["standard output", "redirect"]);
+}
+
 #[test]
 fn wrong_arguments() {
     let w = Workspace::new(PROGRAM);

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::print_json;
+use super::output::{say, say_json};
 use super::train::{RunOutput, train_to_evaluation};
 use crate::ablation::{AblationRow, AblationTable, to_markdown};
 use crate::error::TrainError;
@@ -49,7 +49,7 @@ impl Ablate {
         let mut rows = Vec::new();
         for (i, (variant, config)) in variants.iter().zip(&configs).enumerate() {
             if !self.output.quiet && !self.output.json {
-                println!("{}", variant.name);
+                say(variant.name)?;
             }
             let folder = self.out.join(variant.name);
             let like = configs[..i].iter().position(|earlier| earlier.trains_like(config));
@@ -62,9 +62,9 @@ impl Ablate {
                 .map_err(|source| light4gs_data::DataError::Io { action: "write", path: path.clone(), source })?;
         }
         if self.output.json {
-            print_json(&rows);
+            say_json(&rows)?;
         } else {
-            println!("{}", to_markdown(&rows));
+            say(to_markdown(&rows))?;
         }
         Ok(())
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::print_json;
+use super::output::{say, say_json};
 use crate::benchmark::{BenchScene, benchmark, table};
 use crate::codec_benchmark::{codec_benchmark, codec_table};
 use crate::device::device_by_name;
@@ -40,9 +40,9 @@ impl Bench {
         if self.codec {
             let times = codec_benchmark(self.repeats as usize)?;
             if self.json {
-                print_json(&times);
+                say_json(&times)?;
             } else {
-                println!("{}", codec_table(&times));
+                say(codec_table(&times))?;
             }
             return Ok(());
         }
@@ -70,9 +70,9 @@ impl Bench {
             results.push(benchmark(name, &device, &scenes, self.repeats as usize)?);
         }
         if self.json {
-            print_json(&results);
+            say_json(&results)?;
         } else {
-            println!("{}", table(&results));
+            say(table(&results))?;
         }
         Ok(())
     }

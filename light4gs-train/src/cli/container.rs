@@ -10,8 +10,9 @@ use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
+use super::check_output;
+use super::output::{say, say_json};
 use super::train::{coding_table, sections_table};
-use super::{check_output, print_json};
 use crate::checkpoint::Checkpoint;
 use crate::compression::{TrainedScene, plane_name, write_scene};
 use crate::config::Config;
@@ -72,12 +73,12 @@ impl Encode {
             device: &device,
         };
         let written = write_scene(&trained, &self.out, self.json)?;
-        print_info(&read_info(&self.out)?, self.json);
+        print_info(&read_info(&self.out)?, self.json)?;
         if let Some((record, _)) = written.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
-                println!("the entropy models were fitted to the finished scene in {seconds:.1} s");
+                say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
             }
-            println!("{}", coding_table(&record));
+            say(coding_table(&record))?;
         }
         Ok(())
     }
@@ -94,12 +95,11 @@ pub(super) struct Info {
 
 impl Info {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        print_info(&read_info(&self.file)?, self.json);
-        Ok(())
+        print_info(&read_info(&self.file)?, self.json)
     }
 }
 
-fn print_info(info: &StreamInfo, json: bool) {
+fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let SceneMeta { name, frame_count, fps, bounds, background, config_digest, width, height, fov_x, .. } = &info.meta;
     let digest: String = config_digest.iter().map(|byte| format!("{byte:02x}")).collect();
     if json {
@@ -108,7 +108,7 @@ fn print_info(info: &StreamInfo, json: bool) {
             .iter()
             .map(|s| json!({"name": s.name, "encoding": s.encoding.name(), "offset": s.offset, "bytes": s.bytes}))
             .collect();
-        return print_json(&json!({
+        return say_json(&json!({
             "version": info.version, "bytes": info.bytes, "header_bytes": info.header_bytes, "sections": sections,
             "name": name, "frames": frame_count, "fps": fps, "bounds": bounds, "background": background,
             "config_digest": digest, "width": width, "height": height, "fov_x": fov_x,
@@ -123,27 +123,27 @@ fn print_info(info: &StreamInfo, json: bool) {
         }));
     }
     let rate = if *fps > 0.0 { format!(" at {fps} frames a second") } else { String::new() };
-    println!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version);
-    println!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree);
-    println!(
+    say(format_args!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version))?;
+    say(format_args!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree))?;
+    say(format_args!(
         "hexplanes: {} channels, {:?} cells times {:?}; network: width {}, {} layers",
         info.hexplane_channels,
         info.hexplane_resolution,
         info.hexplane_multipliers,
         info.network_width,
         info.layer_count
-    );
+    ))?;
     if let Some(profile) = info.profile {
         let steps: Vec<String> = info
             .plane_steps
             .iter()
             .map(|s| format!("{:.4} (space), {:.4} (time)", s.space_only, s.space_time))
             .collect();
-        println!("profile {}; steps of the planes: {}", profile.name(), steps.join("; "));
+        say(format_args!("profile {}; steps of the planes: {}", profile.name(), steps.join("; ")))?;
     }
-    println!("configuration {digest}\n");
+    say(format_args!("configuration {digest}\n"))?;
     let sizes = section_sizes(info);
-    println!("{}", sections_table(sizes.iter().map(|s| (s.name.as_str(), s.bytes)), info.bytes));
+    say(sections_table(sizes.iter().map(|s| (s.name.as_str(), s.bytes)), info.bytes))
 }
 
 #[derive(Debug, Args)]
@@ -169,7 +169,7 @@ impl Decode {
             path: self.out.clone(),
             source,
         })?;
-        println!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len());
+        say(format_args!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len()))?;
         Ok(())
     }
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use light4gs_data::{DataError, GaussianPly};
 
+use super::output::say;
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::evaluation::DecodedScene;
@@ -56,7 +57,7 @@ impl Export {
             };
             ply.write(&self.out.join(format!("{k:04}.ply")))?;
         }
-        println!("wrote {frames} PLY files to {}", self.out.display());
+        say(format_args!("wrote {frames} PLY files to {}", self.out.display()))?;
         Ok(())
     }
 }

@@ -4,6 +4,7 @@ mod ablate;
 mod bench;
 mod container;
 mod export;
+mod output;
 mod quickstart;
 mod render;
 mod synth;
@@ -114,11 +115,6 @@ fn catching_gpu_errors(run: impl FnOnce() -> Result<(), TrainError>) -> Result<(
         Some(error) => Err(error.into()),
         None => std::panic::resume_unwind(panic),
     })
-}
-
-/// Prints a value as pretty JSON.
-fn print_json(value: &impl serde::Serialize) {
-    println!("{}", serde_json::to_string_pretty(value).expect("plain data has a JSON form"));
 }
 
 /// Refuses an output path whose folder does not exist, before any work is done.

@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
 
 use super::check_output;
+use super::output::say;
 use crate::device::device_by_name;
 use crate::error::TrainError;
 use crate::evaluation::DecodedScene;
@@ -74,10 +75,10 @@ impl Render {
         let pictures = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
         if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
             let count = write_gif(&self.out, pictures, self.fps, Looping::Forever)?;
-            println!("wrote {} ({count} frames)", self.out.display());
+            say(format_args!("wrote {} ({count} frames)", self.out.display()))?;
         } else {
             let files = write_png_sequence(&self.out, pictures)?;
-            println!("wrote {} frames to {}", files.len(), self.out.display());
+            say(format_args!("wrote {} frames to {}", files.len(), self.out.display()))?;
         }
         Ok(())
     }

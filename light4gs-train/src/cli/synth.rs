@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use light4gs_data::{SyntheticOptions, write_synthetic};
 
+use super::output::say;
 use crate::error::TrainError;
 
 #[derive(Debug, Args)]
@@ -38,7 +39,7 @@ impl Synth {
             seed: self.seed,
         };
         write_synthetic(&self.out, &options)?;
-        println!("wrote {}", self.out.display());
+        say(format_args!("wrote {}", self.out.display()))?;
         Ok(())
     }
 }

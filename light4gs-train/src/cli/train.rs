@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use light4gs_data::{ImageStore, Scene};
 
-use super::print_json;
+use super::output::{say, say_json};
 use crate::compression::CodingRecord;
 use crate::config::Config;
 use crate::device::{describe, device_by_name};
@@ -130,9 +130,9 @@ fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
 fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &RunOutput) -> Result<(), TrainError> {
     run(&mut trainer, output)?;
     let evaluation = evaluate_run(folder, config, trainer.data())?;
-    print_evaluation(&evaluation, output.json);
+    print_evaluation(&evaluation, output.json)?;
     if !output.json {
-        println!("\nreport: {}", folder.path("report.html").display());
+        say(format_args!("\nreport: {}", folder.path("report.html").display()))?;
     }
     Ok(())
 }
@@ -187,8 +187,7 @@ impl Eval {
         config.device = self.device.unwrap_or(config.device);
         record.scene = self.scene.unwrap_or(record.scene);
         let scene = Scene::open(&record.scene, &load_options(&config))?;
-        print_evaluation(&evaluate_run(&folder, &config, &scene)?, self.json);
-        Ok(())
+        print_evaluation(&evaluate_run(&folder, &config, &scene)?, self.json)
     }
 
     fn eval_file(self) -> Result<(), TrainError> {
@@ -205,14 +204,13 @@ impl Eval {
         let scene = Scene::open(&scene, &options)?;
         let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
         let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(&name, &device))?;
-        print_evaluation(&evaluation, self.json);
-        Ok(())
+        print_evaluation(&evaluation, self.json)
     }
 }
 
-fn print_evaluation(evaluation: &Evaluation, json: bool) {
+fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainError> {
     if json {
-        return print_json(evaluation);
+        return say_json(evaluation);
     }
     let mut quality = Table::new([
         ("split", Align::Left),
@@ -224,19 +222,20 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) {
         let (psnr, ssim) = (format!("{:.2}", split.psnr), format!("{:.4}", split.ssim));
         quality.row([split.split.clone(), split.views.len().to_string(), psnr, ssim]);
     }
-    println!("{quality}");
-    println!("{}", sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes));
+    say(quality)?;
+    say(sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes))?;
     if let Some(coding) = &evaluation.coding {
-        println!("{}", coding_table(coding));
+        say(coding_table(coding))?;
     }
     let [width, height] = evaluation.resolution;
-    println!(
+    say(format_args!(
         "{} Gaussians, {:.1} FPS at {width}×{height} on {}",
         evaluation.gaussians, evaluation.fps, evaluation.device
-    );
+    ))?;
     if let Some(seconds) = evaluation.training_seconds {
-        println!("trained for {:.1} min", seconds / 60.0);
+        say(format_args!("trained for {:.1} min", seconds / 60.0))?;
     }
+    Ok(())
 }
 
 /// Expected and real bits of what is entropy coded with trained models.
