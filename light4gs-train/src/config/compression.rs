@@ -179,7 +179,7 @@ impl Default for ContextConfig {
             high_scale_hyperprior: false,
             learning_rate_init: 5e-3,
             learning_rate_final: 5e-4,
-            fit_iterations: 600,
+            fit_iterations: 1500,
         }
     }
 }
