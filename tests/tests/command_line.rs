@@ -298,6 +298,10 @@ fn standard_output_that_takes_nothing() {
     assert_success(&info(writer.into()));
     let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
     assert_refused(&info(full.into()), &["standard output", "redirect"]);
+    let (reader, writer) = std::io::pipe().unwrap();
+    drop(reader);
+    let complaint = w.command(["info", "nowhere.l4gs"]).stderr(writer).status().unwrap();
+    assert_eq!(complaint.code(), Some(2), "an error that nobody reads is still wrong input");
 }
 
 #[test]

@@ -169,8 +169,7 @@ impl Decode {
             path: self.out.clone(),
             source,
         })?;
-        say(format_args!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len()))?;
-        Ok(())
+        say(format_args!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len()))
     }
 }
 

@@ -57,7 +57,6 @@ impl Export {
             };
             ply.write(&self.out.join(format!("{k:04}.ply")))?;
         }
-        say(format_args!("wrote {frames} PLY files to {}", self.out.display()))?;
-        Ok(())
+        say(format_args!("wrote {frames} PLY files to {}", self.out.display()))
     }
 }

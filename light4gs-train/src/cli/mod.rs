@@ -97,7 +97,7 @@ pub fn main() -> ExitCode {
     match catching_gpu_errors(|| Cli::parse().run()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error}");
+            output::tell(format_args!("error: {error}"));
             ExitCode::from(if error.is_internal() { 1 } else { 2 })
         }
     }

@@ -1,4 +1,4 @@
-//! What a command prints on standard output.
+//! What a command prints.
 
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
@@ -13,6 +13,11 @@ pub(super) fn say(text: impl Display) -> Result<(), TrainError> {
         ))),
         _ => Ok(()),
     }
+}
+
+/// Prints a line, or a table, on standard error. Where even that takes nothing there is nobody left to tell.
+pub(super) fn tell(text: impl Display) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
 /// Prints a value as pretty JSON.

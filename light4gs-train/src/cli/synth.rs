@@ -39,7 +39,6 @@ impl Synth {
             seed: self.seed,
         };
         write_synthetic(&self.out, &options)?;
-        say(format_args!("wrote {}", self.out.display()))?;
-        Ok(())
+        say(format_args!("wrote {}", self.out.display()))
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use light4gs_data::{ImageStore, Scene};
 
-use super::output::{say, say_json};
+use super::output::{say, say_json, tell};
 use crate::compression::CodingRecord;
 use crate::config::Config;
 use crate::device::{describe, device_by_name};
@@ -122,7 +122,7 @@ fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
     trainer.run()?;
     if let Some(table) = trainer.profile().table() {
         // On stderr, so that stdout stays JSON where it is asked for.
-        eprintln!("{table}\n");
+        tell(format_args!("{table}\n"));
     }
     Ok(())
 }
