@@ -33,6 +33,7 @@ presets![
     "dnerf-lego",
     "dnerf-lego-small",
     "dnerf-small",
+    "four-views",
     "high",
     "medium",
     "paper-profile",
