@@ -7,7 +7,7 @@ use light4gs_data::PointCloud;
 
 use crate::deformation::{Deformation, DeformationConfig};
 use crate::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
-use crate::hexplane::{HexPlane, HexPlaneConfig, query_planes};
+use crate::hexplane::{HexPlane, HexPlaneConfig};
 use crate::scene_frame::{Pca, SceneFrame};
 
 /// Configuration of a [`DynamicScene`].
@@ -70,19 +70,13 @@ pub struct DynamicScene {
 impl DynamicScene {
     /// Raw attributes at a time in [0, 1].
     pub fn at(&self, time: f32) -> GaussianTensors {
-        self.at_with(time, self.hexplane.tensors(), self.gaussians.sh_rest.val())
-    }
-
-    /// [`DynamicScene::at`] with other values in place of the planes `[C, H, W]` and of `sh_rest [N, K, 3]`: while a
-    /// scene is trained for a small file they carry the noise of quantisation.
-    pub fn at_with(&self, time: f32, planes: Vec<Tensor<3>>, sh_rest: Tensor<3>) -> GaussianTensors {
-        let rest = GaussianTensors { sh_rest, ..self.gaussians.tensors() };
+        let rest = self.gaussians.tensors();
         if self.gaussians.is_empty() {
             // Dense layers of some back ends refuse a batch of none.
             return rest;
         }
         let points = self.query_points(rest.means.clone(), time);
-        self.deform(rest, query_planes(points, planes))
+        self.deform(rest, self.hexplane.query(points))
     }
 
     /// Hexplane coordinates `[N, 4]` of world points `[N, 3]` at a time in [0, 1].

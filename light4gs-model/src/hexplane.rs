@@ -115,7 +115,7 @@ impl HexPlane {
     }
 }
 
-/// [`HexPlane::query`] with other tensors in place of the planes, say with quantisation noise on them.
+/// [`HexPlane::query`] with other tensors in place of the planes, say with decoded ones.
 pub(crate) fn query_planes(points: Tensor<2>, planes: Vec<Tensor<3>>) -> Tensor<2> {
     assert_eq!(points.dims()[1], 4, "points must be [N, 4]: x, y, z, t");
     let mut features: Vec<Tensor<2>> = planes

@@ -17,6 +17,11 @@ impl PlaneSteps {
         Self(steps.iter().map(|step| Tensor::from_floats([*step], device)).collect())
     }
 
+    /// The same steps as the beginning of a tape, if they are `learned`, or off any.
+    pub fn leaves(&self, learned: bool) -> Self {
+        Self(self.0.iter().map(|step| step.clone().detach().set_require_grad(learned)).collect())
+    }
+
     /// A plane's step, `[1]`.
     pub fn of(&self, plane: usize) -> Tensor<1> {
         self.0[plane].clone()

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use burn::module::Param;
-use burn::tensor::{Device, Distribution, Gradients, Tensor, TensorData};
+use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError, PointCloud};
 use light4gs_model::{
@@ -20,6 +20,7 @@ use crate::compression::Compression;
 use crate::config::Config;
 use crate::device::adapter_name;
 use crate::error::TrainError;
+use crate::gradients::GradientSums;
 use crate::loss::l1;
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
@@ -315,13 +316,15 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     };
     let mut adam = Adam::default();
     // Rates so small that the scene stays what it is while it is timed.
-    let mut update = |dynamic: &mut DynamicScene, mut gradients: Gradients| {
+    let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
         visit_parameters(dynamic, &mut TinySteps { adam: &mut adam, gradients: &mut gradients });
     };
     let mut times = [Vec::new(), Vec::new()];
     for repetition in 0..WARM_UP + repeats {
         let begin = Instant::now();
-        let gradients = loss_of(&dynamic, repetition).backward();
+        let mut tape = loss_of(&dynamic, repetition).backward();
+        let mut gradients = GradientSums::default();
+        gradients.add_scene(&mut dynamic, &mut tape);
         let _ = device.sync();
         let middle = Instant::now();
         update(&mut dynamic, gradients);
@@ -348,16 +351,15 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
             repeats,
             || (),
             |()| {
-                let noisy = compression.noisy(&dynamic, true, true);
-                let gaussians = dynamic.at_with(0.3, noisy.planes.clone(), noisy.sh_rest.clone());
-                let image = splatter.render(gaussians, &scene.camera, None).image;
-                let mut loss = l1(image, truth.clone());
+                let mut noisy = compression.noisy(&dynamic, true, true);
+                let mut sums = GradientSums::default();
+                let image = splatter.render(noisy.scene.at(0.3), &scene.camera, None).image;
+                sums.add_scene(&mut noisy.scene, &mut l1(image, truth.clone()).backward());
                 if with_rate {
-                    let rate = compression.rate(&noisy, &dynamic, fraction, true, &mut random);
-                    loss = loss + rate.megabytes() * lambda;
+                    let rate = compression.rate(&noisy, fraction, true, &mut random);
+                    sums.add_scene(&mut noisy.scene, &mut (rate.megabytes() * lambda).backward());
                 }
-                let gradients = loss.backward();
-                update(&mut dynamic, gradients);
+                update(&mut dynamic, sums);
             },
         );
         add(stage, step);
@@ -382,12 +384,15 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
 
 struct TinySteps<'a> {
     adam: &'a mut Adam,
-    gradients: &'a mut Gradients,
+    gradients: &'a mut GradientSums,
 }
 
 impl ParameterVisitor for TinySteps<'_> {
     fn visit<const D: usize>(&mut self, _: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        self.adam.step(name, parameter, self.gradients, 1e-12);
+        if let Some(gradient) = self.gradients.remove(name) {
+            let gradient = gradient.reshape(parameter.val().dims());
+            self.adam.step(name, parameter, gradient, 1e-12);
+        }
     }
 }
 

@@ -54,6 +54,11 @@ pub fn is_device_name(name: &str) -> bool {
     parse(name).is_some()
 }
 
+/// Whether a device's work is done by the processor's own threads, as the caller's is.
+pub fn computes_on_processor(name: &str) -> bool {
+    matches!(parse(name), Some(Name::NdArray | Name::Flex))
+}
+
 /// The device that a name stands for, without autodiff: `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by
 /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (a software driver).
 ///

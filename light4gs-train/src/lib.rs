@@ -12,6 +12,7 @@ pub mod device;
 pub mod error;
 pub mod evaluation;
 pub mod finish;
+pub mod gradients;
 pub mod learning_rates;
 pub mod loss;
 pub mod metrics_log;

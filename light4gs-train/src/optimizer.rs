@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use burn::module::Param;
-use burn::tensor::{Gradients, Int, Tensor};
+use burn::tensor::{Int, Tensor};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
 
 /// Moments of one parameter.
@@ -25,15 +25,14 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Steps a parameter along its gradient. One without a gradient keeps its value and its step count.
+    /// Steps a parameter along its gradient, which has the parameter's shape and is off the tape.
     pub fn step<const D: usize>(
         &mut self,
         name: &str,
         parameter: &mut Param<Tensor<D>>,
-        gradients: &mut Gradients,
+        gradient: Tensor<D>,
         learning_rate: f64,
     ) {
-        let Some(gradient) = parameter.val().grad_remove(gradients) else { return };
         let id = parameter.id;
         // Take the tensor out, so that nobody shares it and the step can be made in place.
         let empty = Param::initialized(id, Tensor::empty([0; D], &gradient.device()));

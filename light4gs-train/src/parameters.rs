@@ -52,6 +52,11 @@ pub const GAUSSIAN_PARAMETERS: [&str; 6] = [
     "gaussians.sh_rest",
 ];
 
+/// Name of a plane's parameter; planes are counted scale-major.
+pub fn plane_parameter(plane: usize) -> String {
+    format!("hexplane.{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
+}
+
 /// Something to do with every parameter, whatever its rank.
 pub trait ParameterVisitor {
     /// Called once a parameter, in a fixed order.
@@ -69,7 +74,7 @@ pub fn visit_parameters(scene: &mut DynamicScene, visitor: &mut impl ParameterVi
     visitor.visit(ShDc, GAUSSIAN_PARAMETERS[4], &mut gaussians.sh_dc);
     visitor.visit(ShRest, GAUSSIAN_PARAMETERS[5], &mut gaussians.sh_rest);
     for (i, plane) in scene.hexplane.planes.iter_mut().enumerate() {
-        visitor.visit(Grid, &format!("hexplane.{}.{}", i / 6, PLANE_NAMES[i % 6]), plane);
+        visitor.visit(Grid, &plane_parameter(i), plane);
     }
     for (i, layer) in scene.deformation.trunk.iter_mut().enumerate() {
         visit_linear(visitor, &format!("deformation.trunk.{i}"), layer);

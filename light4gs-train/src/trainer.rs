@@ -3,27 +3,30 @@
 //! - here: stages, steps, checkpoints, what is logged
 //! - `density`: how many Gaussians there are
 //! - `rate`: what a small file asks of a step
+//! - `views`: what the pictures ask of it
 
 mod density;
 mod rate;
+mod views;
 
 use std::time::Instant;
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Gradients, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData};
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
-use light4gs_data::{ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
-use light4gs_model::{DynamicScene, Splatter, regularizer};
+use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
+use light4gs_model::{Splatter, regularizer};
 
 use crate::checkpoint::{self, Checkpoint};
 use crate::compression::{Compression, TrainedScene, write_scene};
 use crate::config::{Config, TrainConfig};
 use crate::densification::DensityStatistics;
-use crate::device::device_by_name;
+use crate::device::{computes_on_processor, device_by_name};
 use crate::error::TrainError;
+use crate::gradients::GradientSums;
 use crate::learning_rates::GroupRates;
-use crate::loss::{l2, photometric, psnr};
+use crate::loss::psnr;
 use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
 use crate::optimizer::Adam;
 use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
@@ -31,6 +34,7 @@ use crate::profile::Profile;
 use crate::randomness::FrameOrder;
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
+use views::ViewPass;
 
 /// How a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
@@ -241,71 +245,46 @@ impl Trainer {
     fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
         self.profile.begin_step();
         let batch = self.config.train.batch_size.max(1);
-        let views = self.data.train.len();
+        let count = self.data.train.len();
         let frames: Vec<usize> =
-            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, views)).collect();
+            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, count)).collect();
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantisation noise");
+        let frames: Vec<&Frame> = frames.into_iter().map(|frame| &self.data.train[frame]).collect();
         let config = &self.config.train;
-        let splatter = self.splatter(stage, iteration);
-        let scene = &self.state.scene;
-        let count = scene.gaussians.len();
-        let mut loss: Option<Tensor<1>> = None;
-        let mut picture = None;
-        let mut views = Vec::with_capacity(batch);
-        for frame in frames {
-            let frame = &self.data.train[frame];
-            let gaussians = match (stage, &noisy) {
-                (Stage::Coarse, _) => scene.gaussians.tensors(),
-                (Stage::Fine, None) => scene.at(frame.time),
-                (Stage::Fine, Some(noisy)) => scene.at_with(frame.time, noisy.planes.clone(), noisy.sh_rest.clone()),
-            };
-            self.profile.lap("Gaussians at the time");
-            let offsets = Tensor::<2>::zeros([count, 2], &self.device).require_grad();
-            let rendering = splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
-            self.profile.lap("splatting");
-            let truth = image_tensor(&*self.images.get(frame)?, &self.device);
-            self.profile.lap("picture from disk");
-            let squared = config.l2_until > 0 && (stage == Stage::Coarse || iteration <= config.l2_until);
-            let term = if squared {
-                l2(rendering.image.clone(), truth.clone())
-            } else {
-                photometric(rendering.image.clone(), truth.clone(), config.lambda_dssim)
-            };
-            let term = term / batch as f32;
-            loss = Some(match loss {
-                Some(sum) => sum + term,
-                None => term,
-            });
-            self.profile.lap("loss");
-            views.push((offsets, rendering.radii));
-            picture = Some((rendering.image.inner(), truth.inner()));
+        let pass = ViewPass {
+            stage,
+            splatter: self.splatter(stage, iteration),
+            images: &self.images,
+            device: &self.device,
+            squared: config.l2_until > 0 && (stage == Stage::Coarse || iteration <= config.l2_until),
+            lambda_dssim: config.lambda_dssim,
+            weight: 1.0 / batch as f32,
+        };
+        let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
+        let mut views = pass.run(seen, &frames, self.view_threads(batch), &self.profile)?;
+        let mut loss = 0.0;
+        let mut gradients = GradientSums::default();
+        for view in &mut views {
+            loss += view.loss;
+            gradients.add(std::mem::take(&mut view.gradients));
         }
-        let mut loss = loss.expect("a batch has at least one picture");
-        if stage == Stage::Fine && !self.planes_are_settled(stage, iteration) {
-            loss = loss + regularization(scene, config);
-            self.profile.lap("regularisers");
+        if let Some(noisy) = &noisy {
+            loss += self.add_rate(noisy, iteration, &mut gradients);
         }
-        if let Some(noisy) = &noisy
-            && let Some(rate) = self.rate_term(noisy, iteration)
-        {
-            loss = loss + rate;
-            self.profile.lap("rate");
-        }
-        let value: f32 = loss.clone().into_scalar();
-        if !value.is_finite() {
+        loss += self.add_regularizers(stage, iteration, &mut gradients);
+        if !loss.is_finite() {
             let checkpoint = self.folder.last_checkpoint().map_or("none".into(), |path| path.display().to_string());
-            return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss: value, checkpoint });
+            return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss, checkpoint });
         }
-        let mut gradients = loss.backward();
-        drop(loss);
-        self.profile.lap("backward");
+        let last = views.last().expect("a batch has at least one picture");
+        let picture = StepPicture { loss, image: last.image.clone(), truth: last.truth.clone() };
 
         if iteration <= self.config.train.densify.until {
-            for (offsets, radii) in views {
-                if let Some(gradient) = offsets.grad_remove(&mut gradients) {
+            for view in views {
+                if let Some(gradient) = view.screen_gradient {
                     // The loss is a mean over the batch; thresholds are meant for one picture.
-                    self.state.statistics.add(gradient * batch as f32, radii);
+                    self.state.statistics.add(gradient * batch as f32, view.radii);
                 }
             }
         }
@@ -317,8 +296,29 @@ impl Trainer {
             visit_compression(compression, &mut step);
         }
         self.profile.lap("Adam");
-        let (image, truth) = picture.expect("a batch has at least one picture");
-        Ok(StepPicture { loss: value, image, truth })
+        Ok(picture)
+    }
+
+    /// Views at a time: as many as there are threads, where the processor computes. A graphics card is kept busy by one.
+    fn view_threads(&self, views: usize) -> usize {
+        // Stages can only be measured one after the other.
+        let side_by_side = computes_on_processor(&self.config.device) && !self.profile.is_on();
+        if side_by_side { rayon::current_num_threads().min(views) } else { 1 }
+    }
+
+    /// Adds the gradients of the regularisers, and returns their value.
+    fn add_regularizers(&mut self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> f32 {
+        if stage == Stage::Coarse || self.planes_are_settled(stage, iteration) {
+            return 0.0;
+        }
+        let scene = &mut self.state.scene;
+        let weights = &self.config.train.regularizer;
+        let term =
+            regularizer::weighted_sum(&scene.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1);
+        let value = term.clone().into_scalar();
+        gradients.add_scene(scene, &mut term.backward());
+        self.profile.lap("regularisers");
+        value
     }
 
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
@@ -372,20 +372,18 @@ pub(crate) fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
     Tensor::from_data(TensorData::new(values, [image.height as usize, image.width as usize, 3]), device)
 }
 
-fn regularization(scene: &DynamicScene, config: &TrainConfig) -> Tensor<1> {
-    let weights = &config.regularizer;
-    regularizer::weighted_sum(&scene.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1)
-}
-
 struct AdamVisitor<'a> {
     adam: &'a mut Adam,
-    gradients: &'a mut Gradients,
+    gradients: &'a mut GradientSums,
     rates: GroupRates,
 }
 
 impl ParameterVisitor for AdamVisitor<'_> {
     fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        self.adam.step(name, parameter, self.gradients, self.rates.of(group));
+        if let Some(gradient) = self.gradients.remove(name) {
+            let gradient = gradient.reshape(parameter.val().dims());
+            self.adam.step(name, parameter, gradient, self.rates.of(group));
+        }
     }
 }
 

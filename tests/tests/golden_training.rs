@@ -152,7 +152,9 @@ fn step(adam: &mut Adam, groups: &mut [Group], gradients: &[Option<Tensor<2>>], 
     });
     let mut grads = terms.reduce(|sum, term| sum + term).unwrap().backward();
     for (group, rate) in groups.iter_mut().zip(rates) {
-        adam.step(group.name, &mut group.parameter, &mut grads, *rate);
+        if let Some(gradient) = group.parameter.val().grad_remove(&mut grads) {
+            adam.step(group.name, &mut group.parameter, gradient, *rate);
+        }
     }
 }
 

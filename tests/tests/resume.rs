@@ -42,12 +42,15 @@ fn killed_and_resumed_runs_are_bit_identical() {
 #[test]
 fn a_seed_repeats_and_threads_do_not_matter() {
     let w = Workspace::new(PROGRAM);
-    let mut files = Vec::new();
-    for (run, threads) in [("one", "1"), ("two", "2"), ("three", "3")] {
-        assert_success(&w.train(run, &TINY_COMPRESSION).env("RAYON_NUM_THREADS", threads).output().unwrap());
-        files.push(fs::read(w.path(run).join("scene.l4gs")).unwrap());
+    for views in ["train.batch_size=1", "train.batch_size=3"] {
+        let settings: Vec<&str> = TINY_COMPRESSION.into_iter().chain([views]).collect();
+        let files = ["1", "2", "3"].map(|threads| {
+            let run = format!("{views}-{threads}");
+            assert_success(&w.train(&run, &settings).env("RAYON_NUM_THREADS", threads).output().unwrap());
+            fs::read(w.path(&run).join("scene.l4gs")).unwrap()
+        });
+        assert!(files.iter().all(|file| *file == files[0]), "{views}");
     }
-    assert!(files.iter().all(|file| *file == files[0]));
 }
 
 /// A checkpoint holds plain numbers: another back end than the one that wrote it goes on from there.

@@ -27,7 +27,7 @@ pub fn fit(scene: &DynamicScene, config: &Config, device: &Device, mut progress:
         seed_device(device, config.seed, Stage::Fine, iteration);
         let mut random = generator(config.seed, Purpose::Rate, Stage::Fine, iteration);
         let noisy = compression.noisy(scene, false, true);
-        let rate = compression.rate(&noisy, scene, settings.rate.fraction, true, &mut random);
+        let rate = compression.rate(&noisy, settings.rate.fraction, true, &mut random);
         let mut gradients = rate.megabytes().backward();
         let mut step = FitStep {
             adam: &mut adam,
@@ -55,6 +55,8 @@ impl ParameterVisitor for FitStep<'_> {
             ParameterGroup::ShModel => self.sh,
             _ => return,
         };
-        self.adam.step(name, parameter, self.gradients, rate);
+        if let Some(gradient) = parameter.val().grad_remove(self.gradients) {
+            self.adam.step(name, parameter, gradient, rate);
+        }
     }
 }

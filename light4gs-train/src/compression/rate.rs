@@ -1,22 +1,22 @@
 //! Noise in place of rounding, and the size of the file that it stands for (paper III-C, IV-B).
 
-use burn::tensor::{Int, Tensor, TensorData};
+use burn::module::{Module, Param};
+use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::{DynamicScene, Latent, PlaneSteps, ShEntropy, ShKnown};
 use rand::Rng;
 use rand::seq::index;
 
 use super::Compression;
 
-/// A scene's planes and spherical harmonics with the noise of quantisation, which both the picture and the rate see.
+/// A scene with the noise of quantisation, which both the picture and the rate see.
 #[derive(Clone, Debug)]
 pub struct NoisyScene {
-    /// `[C, H, W]`, scale-major.
-    pub planes: Vec<Tensor<3>>,
-    /// Of the planes; with a gradient where they are learned. None if the planes are settled: as the file will have them,
-    /// without noise, without gradient and without a part in the rate.
+    /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the
+    /// scene's, since noise only adds to them; by the steps see [`NoisyScene::step_gradients`].
+    pub scene: DynamicScene,
+    /// Of the planes; they begin a tape of their own where they are learned. None if the planes are settled: as the file
+    /// will have them, without noise, without gradient and without a part in the rate.
     pub steps: Option<PlaneSteps>,
-    /// `[N, K, 3]`; without noise as long as the spherical harmonics have no part in the rate.
-    pub sh_rest: Tensor<3>,
 }
 
 /// Estimated bits of a file's planes and spherical harmonics.
@@ -53,40 +53,46 @@ impl Rate {
 }
 
 impl Compression {
-    /// The scene with uniform noise as wide as the steps. `learn_steps` lets gradients through to the planes' steps;
-    /// `with_sh` puts noise on the spherical harmonics too.
+    /// The scene with uniform noise as wide as the steps. `learn_steps` asks for the steps' gradients; `with_sh` puts noise
+    /// on the spherical harmonics too.
     pub fn noisy(&self, scene: &DynamicScene, learn_steps: bool, with_sh: bool) -> NoisyScene {
-        let quantization = &self.quantization;
-        let steps = if learn_steps { quantization.steps() } else { quantization.steps_without_gradient() };
-        let planes = steps.add_noise(&scene.hexplane.tensors());
-        NoisyScene { planes, steps: Some(steps), sh_rest: self.noisy_sh(scene, with_sh) }
+        let steps = self.quantization.steps_without_gradient();
+        let noisy = steps.add_noise(
+            &scene.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect::<Vec<_>>(),
+        );
+        let mut scene = scene.clone();
+        for (parameter, plane) in scene.hexplane.planes.iter_mut().zip(noisy) {
+            replace(parameter, plane);
+        }
+        NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: Some(steps.leaves(learn_steps)) }
     }
 
     /// The same for a scene whose planes are settled.
     pub fn noisy_beside_settled_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
-        let planes = scene.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect();
-        NoisyScene { planes, steps: None, sh_rest: self.noisy_sh(scene, with_sh) }
+        let mut scene = scene.clone();
+        for plane in &mut scene.hexplane.planes {
+            *plane = plane.clone().set_require_grad(false);
+        }
+        NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
     }
 
-    fn noisy_sh(&self, scene: &DynamicScene, with_sh: bool) -> Tensor<3> {
-        let sh_rest = scene.gaussians.sh_rest.val();
-        match &self.sh {
-            Some(sh) if with_sh => sh.add_noise(sh_rest),
-            _ => sh_rest,
+    /// Begins a tape on the way.
+    fn with_noisy_sh(&self, scene: DynamicScene, with_sh: bool) -> DynamicScene {
+        let device = scene.gaussians.means.device();
+        let mut scene = scene.fork(&device);
+        if let Some(sh) = self.sh.as_ref().filter(|_| with_sh) {
+            let noisy = sh.add_noise(scene.gaussians.sh_rest.val().set_require_grad(false));
+            replace(&mut scene.gaussians.sh_rest, noisy);
         }
+        scene
     }
 
     /// Estimates the rate on a random share of the planes and of the Gaussians. Unbiased: over many draws the mean is
     /// the rate of everything.
-    pub fn rate(
-        &self,
-        noisy: &NoisyScene,
-        scene: &DynamicScene,
-        fraction: f64,
-        with_sh: bool,
-        generator: &mut impl Rng,
-    ) -> Rate {
-        let planes = &noisy.planes;
+    pub fn rate(&self, noisy: &NoisyScene, fraction: f64, with_sh: bool, generator: &mut impl Rng) -> Rate {
+        let scene = &noisy.scene;
+        let planes = &scene.hexplane.tensors();
+        let sh_rest = scene.gaussians.sh_rest.val();
         let plane_bits = noisy.steps.as_ref().map(|steps| {
             let chosen = sample(generator, planes.len(), fraction);
             let share = planes.len() as f64 / chosen.len() as f64;
@@ -94,24 +100,38 @@ impl Compression {
             let bits = bits.into_iter().map(|rate| rate.total()).reduce(|sum, plane| sum + plane);
             bits.expect("at least one plane is chosen") * share
         });
-        let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &noisy.sh_rest.device()));
+        let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &sh_rest.device()));
 
-        let [count, coefficients, colors] = noisy.sh_rest.dims();
+        let [count, coefficients, colors] = sh_rest.dims();
         let sh = self.sh.as_ref().filter(|_| with_sh && count > 0).map(|sh| {
             let chosen = sample(generator, count, fraction);
             let share = count as f64 / chosen.len() as f64;
             let rows: Vec<i64> = chosen.iter().map(|row| *row as i64).collect();
-            let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &noisy.sh_rest.device());
+            let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &sh_rest.device());
             let known = match sh.tables() {
                 // Tables look at nothing, and what is not computed does not stay on the tape.
                 Some(_) => ShKnown::nothing(&rows.device()),
                 None => known(scene, planes, Some(rows.clone())),
             };
-            sh.bits(noisy.sh_rest.clone().select(0, rows), &known).sum() * share
+            sh.bits(sh_rest.clone().select(0, rows), &known).sum() * share
         });
         let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
         Rate { planes: plane_bits, plane_symbols, sh, sh_symbols: count * coefficients * colors }
     }
+}
+
+impl NoisyScene {
+    /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
+    /// That is without the part they play through the noise.
+    pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
+        let planes = 0..self.scene.hexplane.planes.len();
+        planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
+    }
+}
+
+/// Gives a parameter the value as the beginning of a tape.
+fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
+    *parameter = Param::initialized(parameter.id, value.require_grad());
 }
 
 /// What a decoder knows of the Gaussians, or of some rows of them, before it comes to their spherical harmonics.

@@ -1,12 +1,15 @@
 //! Quantisation noise and the rate in a training step (paper III-C to III-E, IV-B).
 
 use burn::tensor::Tensor;
+use light4gs_model::DynamicScene;
 
 use super::Trainer;
-use crate::compression::{NoisyScene, settled_planes};
+use crate::compression::{Compression, NoisyScene, settled_planes};
 use crate::config::Config;
 use crate::error::TrainError;
+use crate::gradients::GradientSums;
 use crate::metrics_log::Stage;
+use crate::parameters::plane_parameter;
 use crate::randomness::{Purpose, generator, seed_device};
 
 impl Trainer {
@@ -52,17 +55,116 @@ impl Trainer {
         iteration > self.config.train.densify.until
     }
 
-    /// The weighted rate, in the iterations in which it is due.
-    pub(super) fn rate_term(&self, noisy: &NoisyScene, iteration: usize) -> Option<Tensor<1>> {
+    /// Adds what the rate asks for, in the iterations in which it is due, and what the noise asks of the steps. Returns the
+    /// weighted rate. `gradients` are those of the views.
+    pub(super) fn add_rate(&mut self, noisy: &NoisyScene, iteration: usize, gradients: &mut GradientSums) -> f32 {
         let config = &self.config.compression.rate;
-        let compression = self.state.compression.as_ref().filter(|_| iteration.is_multiple_of(config.interval))?;
-        let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
         let with_sh = self.sh_counts(iteration);
-        let rate = compression.rate(noisy, &self.state.scene, config.fraction, with_sh, &mut generator);
-        Some(match config.weighting.as_str() {
-            "per_symbol" => rate.bits_per_symbol() * config.lambda,
-            // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
-            _ => rate.megabytes() * (config.lambda * config.interval as f64),
-        })
+        let Some(compression) = &mut self.state.compression else { return 0.0 };
+        let mut value = 0.0;
+        let mut steps = vec![None; noisy.scene.hexplane.planes.len()];
+        if iteration.is_multiple_of(config.interval) {
+            let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
+            let rate = compression.rate(noisy, config.fraction, with_sh, &mut generator);
+            let term = match config.weighting.as_str() {
+                "per_symbol" => rate.bits_per_symbol() * config.lambda,
+                // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
+                _ => rate.megabytes() * (config.lambda * config.interval as f64),
+            };
+            value = term.clone().into_scalar();
+            let mut tape = term.backward();
+            steps = noisy.step_gradients(&tape);
+            gradients.add_scene(&mut noisy.scene.clone(), &mut tape);
+            gradients.add_compression(compression, &mut tape);
+        }
+        if let Some(term) = steps_term(noisy, &self.state.scene, compression, steps, gradients) {
+            gradients.add_compression(compression, &mut term.backward());
+        }
+        self.profile.lap("rate");
+        value
+    }
+}
+
+/// A term with the steps' whole gradient: what the rate says of them (`direct`, by plane), and what the noisy planes pass
+/// on, which is the noise, in steps, times the gradient of what carries it. None where no step is learned.
+fn steps_term(
+    noisy: &NoisyScene,
+    scene: &DynamicScene,
+    compression: &Compression,
+    direct: Vec<Option<Tensor<1>>>,
+    gradients: &GradientSums,
+) -> Option<Tensor<1>> {
+    noisy.steps.as_ref().filter(|steps| steps.of(0).is_require_grad())?;
+    let steps = compression.quantization.steps();
+    let planes = scene.hexplane.planes.iter().zip(&noisy.scene.hexplane.planes).zip(direct).enumerate();
+    let terms = planes.map(|(i, ((plane, noisy), direct))| {
+        let step = steps.of(i);
+        let through_noise = gradients.get(&plane_parameter(i)).map(|gradient| {
+            let noise = (noisy.val().inner() - plane.val().inner()).flatten::<1>(0, 2);
+            (noise * gradient).sum() / step.clone().inner()
+        });
+        // Every plane's step is on the tape, so every plane has a term: see `steps_without_gradient`.
+        let gradient = [direct, through_noise].into_iter().flatten().reduce(|sum, part| sum + part);
+        step.clone() * Tensor::from_inner(gradient.unwrap_or_else(|| step.inner().zeros_like()))
+    });
+    terms.reduce(|sum, term| sum + term)
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::Device;
+    use light4gs_data::PointCloud;
+
+    use super::*;
+    use crate::config::Config;
+
+    /// Steps learn from planes on a tape of their own what they would learn on one and the same.
+    #[test]
+    fn the_noise_passes_gradients_on_to_the_steps() {
+        let device = Device::flex().autodiff();
+        let mut config = Config::default();
+        config.model.hexplane.channels = 2;
+        config.model.hexplane.resolution = [8, 8, 8, 4];
+        config.compression.steps.per_scale = true;
+        let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
+        let scene = config.model.build().init(&cloud, &device);
+        let mut compression = Compression::new(&config, &device);
+        let mut noisy = compression.noisy(&scene, true, false);
+        // Something that planes and steps both have a part in, another one in each plane.
+        let loss = |planes: &[Tensor<3>], steps: &dyn Fn(usize) -> Tensor<1>| {
+            let terms = planes.iter().enumerate().map(|(i, plane)| {
+                let divided = plane.clone() / steps(i).unsqueeze::<3>();
+                (divided.sin() * (1.0 + i as f32)).sum()
+            });
+            terms.reduce(|sum, term| sum + term).unwrap()
+        };
+        let log_steps = "quantization.log_steps";
+
+        let leaves = noisy.steps.clone().unwrap();
+        let mut tape = loss(&noisy.scene.hexplane.tensors(), &|i| leaves.of(i)).backward();
+        let direct = noisy.step_gradients(&tape);
+        let mut apart = GradientSums::default();
+        apart.add_scene(&mut noisy.scene, &mut tape);
+        let term = steps_term(&noisy, &scene, &compression, direct, &apart).unwrap();
+        apart.add_compression(&mut compression, &mut term.backward());
+
+        let steps = compression.quantization.steps();
+        let pairs = scene.hexplane.tensors().into_iter().zip(noisy.scene.hexplane.tensors()).enumerate();
+        let planes: Vec<_> = pairs
+            .map(|(i, (plane, noisy))| {
+                let step = steps.broadcast(i);
+                let noise = (noisy.inner() - plane.clone().inner()) / step.clone().inner();
+                plane + Tensor::from_inner(noise) * step
+            })
+            .collect();
+        let mut together = GradientSums::default();
+        together.add_compression(&mut compression, &mut loss(&planes, &|i| steps.of(i)).backward());
+
+        let [apart, together] = [apart, together].map(|sums| sums.get(log_steps).unwrap().into_data());
+        assert_eq!(together.num_elements(), 4);
+        for (a, b) in apart.iter::<f32>().zip(together.iter::<f32>()) {
+            assert!((a - b).abs() <= 1e-4 * b.abs().max(1.0), "{a} and {b}");
+            assert!(b != 0.0);
+        }
     }
 }
