@@ -263,16 +263,16 @@ impl Trainer {
         };
         let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
         let mut views = pass.run(seen, &frames, self.view_threads(batch), &self.profile)?;
-        let mut loss = 0.0;
         let mut gradients = GradientSums::default();
         for view in &mut views {
-            loss += view.loss;
             gradients.add(std::mem::take(&mut view.gradients));
         }
-        if let Some(noisy) = &noisy {
-            loss += self.add_rate(noisy, iteration, &mut gradients);
-        }
-        loss += self.add_regularizers(stage, iteration, &mut gradients);
+        let rate = noisy.as_ref().and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
+        let regularizers = self.add_regularizers(stage, iteration, &mut gradients);
+        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
+        let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one picture");
+        // What a step reads back from the device: this number.
+        let loss: f32 = loss.into_scalar();
         if !loss.is_finite() {
             let checkpoint = self.folder.last_checkpoint().map_or("none".into(), |path| path.display().to_string());
             return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss, checkpoint });
@@ -306,19 +306,19 @@ impl Trainer {
         if side_by_side { rayon::current_num_threads().min(views) } else { 1 }
     }
 
-    /// Adds the gradients of the regularisers, and returns their value.
-    fn add_regularizers(&mut self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> f32 {
+    /// Adds the gradients of the regularisers, and returns their value, `[1]`.
+    fn add_regularizers(&mut self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Option<Tensor<1>> {
         if stage == Stage::Coarse || self.planes_are_settled(stage, iteration) {
-            return 0.0;
+            return None;
         }
         let scene = &mut self.state.scene;
         let weights = &self.config.train.regularizer;
         let term =
             regularizer::weighted_sum(&scene.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1);
-        let value = term.clone().into_scalar();
+        let value = term.clone().inner();
         gradients.add_scene(scene, &mut term.backward());
         self.profile.lap("regularisers");
-        value
+        Some(value)
     }
 
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {

@@ -56,12 +56,17 @@ impl Trainer {
     }
 
     /// Adds what the rate asks for, in the iterations in which it is due, and what the noise asks of the steps. Returns the
-    /// weighted rate. `gradients` are those of the views.
-    pub(super) fn add_rate(&mut self, noisy: &NoisyScene, iteration: usize, gradients: &mut GradientSums) -> f32 {
+    /// weighted rate, `[1]`. `gradients` are those of the views.
+    pub(super) fn add_rate(
+        &mut self,
+        noisy: &NoisyScene,
+        iteration: usize,
+        gradients: &mut GradientSums,
+    ) -> Option<Tensor<1>> {
         let config = &self.config.compression.rate;
         let with_sh = self.sh_counts(iteration);
-        let Some(compression) = &mut self.state.compression else { return 0.0 };
-        let mut value = 0.0;
+        let compression = self.state.compression.as_mut()?;
+        let mut value = None;
         let mut steps = vec![None; noisy.scene.hexplane.planes.len()];
         if iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
@@ -71,7 +76,7 @@ impl Trainer {
                 // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
                 _ => rate.megabytes() * (config.lambda * config.interval as f64),
             };
-            value = term.clone().into_scalar();
+            value = Some(term.clone().inner());
             let mut tape = term.backward();
             steps = noisy.step_gradients(&tape);
             gradients.add_scene(&mut noisy.scene.clone(), &mut tape);

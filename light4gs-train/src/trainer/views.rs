@@ -27,8 +27,8 @@ pub(super) struct ViewPass<'a> {
 
 /// What a view adds to a step. All tensors are off the tape.
 pub(super) struct View {
-    /// Its weighted part of the loss.
-    pub(super) loss: f32,
+    /// `[1]`: its weighted part of the loss.
+    pub(super) loss: Tensor<1>,
     /// Of that part by the scene's parameters.
     pub(super) gradients: GradientSums,
     /// `[N, 2]`: of that part by the Gaussians' places in the picture.
@@ -96,7 +96,7 @@ impl ViewPass<'_> {
         };
         let loss = loss * self.weight;
         profile.lap("loss");
-        let value = loss.clone().into_scalar();
+        let value = loss.clone().inner();
         let mut tape = loss.backward();
         let mut gradients = GradientSums::default();
         gradients.add_scene(&mut scene, &mut tape);
