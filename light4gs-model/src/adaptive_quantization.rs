@@ -30,11 +30,15 @@ impl AdaptiveQuantizationConfig {
     /// # Panics
     /// If a step is not positive and finite.
     pub fn init(&self, device: &Device) -> AdaptiveQuantization {
+        AdaptiveQuantization { log_steps: Param::from_tensor(self.log_steps(device)), scales: self.scales }
+    }
+
+    /// Logarithms of the initial steps, in the order of [`AdaptiveQuantization::log_steps`].
+    fn log_steps(&self, device: &Device) -> Tensor<1> {
         let pair = [self.space_only, self.space_time];
         assert!(pair.iter().all(|step| *step > 0.0 && step.is_finite()), "steps must be positive, not {pair:?}");
-        let logarithms = Tensor::<1>::from_floats(pair.map(|step| step.ln() as f32), device);
         let groups = if self.per_scale { self.scales } else { 1 };
-        AdaptiveQuantization { log_steps: Param::from_tensor(logarithms.repeat_dim(0, groups)), scales: self.scales }
+        Tensor::<1>::from_floats(pair.map(|step| step.ln() as f32), device).repeat_dim(0, groups)
     }
 }
 
@@ -75,6 +79,18 @@ impl AdaptiveQuantization {
     /// to would stay there for good, and every later pass would look through them.
     pub fn steps_without_gradient(&self) -> PlaneSteps {
         self.steps_of(self.log_steps.val().set_require_grad(false))
+    }
+
+    /// Brings steps that have become finer than the initial ones of `config` back to those.
+    ///
+    /// # Panics
+    /// If `config` is not the one that this was made with.
+    pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
+        let log_steps = self.log_steps.val().inner();
+        let initial = config.log_steps(&log_steps.device());
+        let value = Tensor::from_inner(log_steps.max_pair(initial));
+        let learns = self.log_steps.is_require_grad();
+        self.log_steps = Param::initialized(self.log_steps.id, value.set_require_grad(learns));
     }
 
     fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {

@@ -209,6 +209,22 @@ fn learned_steps_have_a_gradient() {
     }
 }
 
+#[test]
+fn steps_no_finer_than_they_began() {
+    for (name, device) in devices() {
+        let device = device.autodiff();
+        let config = AdaptiveQuantizationConfig::new(2).with_space_only(0.05).with_space_time(0.2).with_per_scale(true);
+        let mut quantization = config.init(&device);
+        let began = values_of(&quantization.log_steps.val());
+        let learned = Tensor::from_floats([0.04f32, 0.3, 0.06, 0.1], &device).log().require_grad();
+        quantization.log_steps = Param::initialized(quantization.log_steps.id, learned.clone());
+        quantization.no_finer_than(&config);
+        let (bounded, learned) = (values_of(&quantization.log_steps.val()), values_of(&learned));
+        assert_eq!(bounded, [began[0], learned[1], learned[2], began[3]], "{name}");
+        assert!(quantization.log_steps.val().is_require_grad(), "{name}: they go on learning");
+    }
+}
+
 /// With Burn's own optimiser, on planes that are smooth and resemble each other across scales: the rate falls well below
 /// what statistics alone give, with noise in every step and a third of the planes. (Measured: to 0.7 of it, and to 0.5 in
 /// 1000 steps.)

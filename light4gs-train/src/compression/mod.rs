@@ -49,19 +49,30 @@ impl Compression {
 
     /// Untrained models for scenes of a configuration.
     pub fn new(config: &Config, device: &Device) -> Self {
-        let CompressionConfig { context, steps, sh, .. } = &config.compression;
+        let CompressionConfig { context, sh, .. } = &config.compression;
         let planes = &config.model.hexplane;
         let scales = planes.multipliers.len();
-        let quantization = AdaptiveQuantizationConfig::new(scales)
-            .with_space_only(steps.space_only)
-            .with_space_time(steps.space_time)
-            .with_per_scale(steps.per_scale);
         Self {
             context: context_config(context, planes.channels).init(device),
-            quantization: quantization.init(device),
+            quantization: quantization_config(config).init(device),
             sh: (config.model.sh_degree == 3).then(|| sh_config(sh, planes.channels * scales).init(device)),
         }
     }
+
+    /// Keeps learned steps in the range that a configuration allows.
+    pub fn bound_steps(&mut self, config: &Config) {
+        if !config.compression.steps.refine {
+            self.quantization.no_finer_than(&quantization_config(config));
+        }
+    }
+}
+
+fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
+    let steps = &config.compression.steps;
+    AdaptiveQuantizationConfig::new(config.model.hexplane.multipliers.len())
+        .with_space_only(steps.space_only)
+        .with_space_time(steps.space_time)
+        .with_per_scale(steps.per_scale)
 }
 
 fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig {

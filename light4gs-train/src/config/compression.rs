@@ -89,6 +89,8 @@ pub struct StepsConfig {
     pub adaptive: bool,
     /// Iteration of the fine stage from which they are.
     pub adaptive_from: usize,
+    /// Whether learned steps may become finer than they begin.
+    pub refine: bool,
     /// Whether every scale has its own pair.
     pub per_scale: bool,
     /// Learning rate of the steps' logarithms.
@@ -191,6 +193,7 @@ impl Default for StepsConfig {
             space_time: 0.05,
             adaptive: true,
             adaptive_from: 15_000,
+            refine: false,
             per_scale: false,
             learning_rate: 2e-3,
         }
