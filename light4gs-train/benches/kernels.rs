@@ -1,6 +1,7 @@
 //! `cargo bench`: the kernels on every back end that is built, on the generated scenes of `light4gs bench`.
 
-use burn::tensor::{Distribution, Tensor};
+use burn::module::Module;
+use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
 use light4gs_model::{HexPlaneConfig, Splatter};
@@ -11,6 +12,12 @@ use light4gs_train::device::device_by_name;
 const GAUSSIANS: usize = 20_000;
 const SIZE: u32 = 400;
 
+/// Waits for what a device was asked to do: a graphics card answers before it has done it.
+fn finished<T>(device: &Device, output: T) -> T {
+    let _ = device.sync();
+    output
+}
+
 fn splatting(criterion: &mut Criterion) {
     let scene = BenchScene::generate(GAUSSIANS, SIZE);
     let mut group = criterion.benchmark_group("splat 20k @ 400²");
@@ -20,12 +27,12 @@ fn splatting(criterion: &mut Criterion) {
         let splatter = Splatter::new([1.0; 3], 3);
         let still = scene.gaussians(&device);
         group.bench_function(BenchmarkId::new("forward", name), |bencher| {
-            bencher.iter(|| splatter.render(still.tensors(), scene.camera(), None).image);
+            bencher.iter(|| finished(&device, splatter.render(still.tensors(), scene.camera(), None).image));
         });
-        let trained = scene.gaussians(&device.autodiff());
-        let loss = || splatter.render(trained.tensors(), scene.camera(), None).image.sum();
+        let trained = scene.gaussians(&device.clone().autodiff());
+        let loss = || finished(&device, splatter.render(trained.tensors(), scene.camera(), None).image.sum());
         group.bench_function(BenchmarkId::new("backward", name), |bencher| {
-            bencher.iter_batched(loss, |loss| loss.backward(), BatchSize::PerIteration);
+            bencher.iter_batched(loss, |loss| finished(&device, loss.backward()), BatchSize::PerIteration);
         });
     }
     group.finish();
@@ -38,12 +45,14 @@ fn hexplane(criterion: &mut Criterion) {
         let device = device_by_name(name).expect("a built-in device").autodiff();
         let planes = HexPlaneConfig::new().with_resolution([64, 64, 64, 24]).init(&device);
         let points = Tensor::<2>::random([GAUSSIANS, 4], Distribution::Uniform(-1.0, 1.0), &device).require_grad();
+        // Off the tape, which no backward pass would clear.
+        let (still_planes, still_points) = (planes.valid(), points.clone().inner());
         group.bench_function(BenchmarkId::new("forward", name), |bencher| {
-            bencher.iter(|| planes.query(points.clone()));
+            bencher.iter(|| finished(&device, still_planes.query(still_points.clone())));
         });
         group.bench_function(BenchmarkId::new("backward", name), |bencher| {
-            let loss = || planes.query(points.clone()).sum();
-            bencher.iter_batched(loss, |loss| loss.backward(), BatchSize::PerIteration);
+            let loss = || finished(&device, planes.query(points.clone()).sum());
+            bencher.iter_batched(loss, |loss| finished(&device, loss.backward()), BatchSize::PerIteration);
         });
     }
     group.finish();
@@ -57,10 +66,10 @@ fn adam(criterion: &mut Criterion) {
         let random = || Tensor::<1>::random([1_000_000], Distribution::Default, &device);
         let gradient = random();
         group.bench_function(BenchmarkId::from_parameter(name), |bencher| {
-            let tensors = || [random(), random(), random()];
+            let tensors = || finished(&device, [random(), random(), random()]);
             bencher.iter_batched(
                 tensors,
-                |tensors| adam_step(tensors, gradient.clone(), step),
+                |tensors| finished(&device, adam_step(tensors, gradient.clone(), step)),
                 BatchSize::PerIteration,
             );
         });
