@@ -294,7 +294,9 @@ impl Trainer {
         visit_parameters(&mut self.state.scene, &mut step);
         if let Some(compression) = &mut self.state.compression {
             visit_compression(compression, &mut step);
-            compression.bound_steps(&self.config);
+            if noisy.is_some_and(|noisy| noisy.learns_steps()) {
+                compression.bound_steps(&self.config);
+            }
         }
         self.profile.lap("Adam");
         Ok(picture)

@@ -121,6 +121,11 @@ impl Compression {
 }
 
 impl NoisyScene {
+    /// Whether the steps are learned.
+    pub fn learns_steps(&self) -> bool {
+        self.steps.as_ref().is_some_and(|steps| steps.of(0).is_require_grad())
+    }
+
     /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
     /// That is without the part they play through the noise.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {

@@ -99,7 +99,9 @@ fn steps_term(
     direct: Vec<Option<Tensor<1>>>,
     gradients: &GradientSums,
 ) -> Option<Tensor<1>> {
-    noisy.steps.as_ref().filter(|steps| steps.of(0).is_require_grad())?;
+    if !noisy.learns_steps() {
+        return None;
+    }
     let steps = compression.quantization.steps();
     let planes = scene.hexplane.planes.iter().zip(&noisy.scene.hexplane.planes).zip(direct).enumerate();
     let terms = planes.map(|(i, ((plane, noisy), direct))| {

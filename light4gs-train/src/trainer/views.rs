@@ -44,37 +44,34 @@ pub(super) struct View {
 impl ViewPass<'_> {
     /// Renders and differentiates every frame, `threads` at a time. The outcome, in the order of the frames, does not
     /// depend on that number.
-    pub(super) fn run(
+    pub(super) fn run<'f>(
         &self,
         scene: &DynamicScene,
-        frames: &[&Frame],
+        frames: &[&'f Frame],
         threads: usize,
         profile: &Profile,
     ) -> Result<Vec<View>, TrainError> {
         // Copies share the scene's memory; each begins a tape of its own.
-        let tasks = frames.iter().map(|frame| (scene.clone().fork(self.device), *frame));
+        let with_copies = |frames: &[&'f Frame]| -> Vec<_> {
+            frames.iter().map(|frame| (scene.clone().fork(self.device), *frame)).collect()
+        };
         if threads <= 1 {
-            return tasks.map(|(scene, frame)| self.view(scene, frame, profile)).collect();
+            return self.views(with_copies(frames), profile);
         }
-        let mut shares: Vec<Vec<_>> = (0..threads).map(|_| Vec::new()).collect();
-        for (k, task) in tasks.enumerate() {
-            shares[k % threads].push((k, task));
-        }
-        let mut views: Vec<(usize, View)> = Vec::with_capacity(frames.len());
+        // Threads of their own, not rayon's: a worker of rayon's that waits inside a view would begin another one meanwhile.
         std::thread::scope(|scope| {
-            let work = |share: Vec<(usize, (DynamicScene, &Frame))>| -> Result<Vec<_>, TrainError> {
-                let views =
-                    share.into_iter().map(|(k, (scene, frame))| Ok((k, self.view(scene, frame, &Profile::off())?)));
-                views.collect()
-            };
-            let workers: Vec<_> = shares.into_iter().map(|share| scope.spawn(move || work(share))).collect();
+            let shares = frames.chunks(frames.len().div_ceil(threads)).map(with_copies);
+            let workers: Vec<_> = shares.map(|share| scope.spawn(move || self.views(share, &Profile::off()))).collect();
+            let mut views = Vec::with_capacity(frames.len());
             for worker in workers {
                 views.extend(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
             }
-            Ok::<_, TrainError>(())
-        })?;
-        views.sort_unstable_by_key(|(k, _)| *k);
-        Ok(views.into_iter().map(|(_, view)| view).collect())
+            Ok(views)
+        })
+    }
+
+    fn views(&self, tasks: Vec<(DynamicScene, &Frame)>, profile: &Profile) -> Result<Vec<View>, TrainError> {
+        tasks.into_iter().map(|(scene, frame)| self.view(scene, frame, profile)).collect()
     }
 
     fn view(&self, mut scene: DynamicScene, frame: &Frame, profile: &Profile) -> Result<View, TrainError> {
