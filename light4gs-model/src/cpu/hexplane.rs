@@ -162,6 +162,30 @@ impl Corners {
         }
         value
     }
+
+    /// The sample and its derivatives by the fractions `x` (across) and `y` (down).
+    #[inline(always)]
+    fn sample_with_slopes<L: Lanes>(&self, cells: &[Block], x: L, y: L) -> (L, [L; 2]) {
+        let [low_left, low_right] = [L::load(&cells[self.index[0]]), L::load(&cells[self.index[1]])];
+        let [high_left, high_right] = [L::load(&cells[self.index[2]]), L::load(&cells[self.index[3]])];
+        let (low_step, high_step) = (low_right.sub(low_left), high_right.sub(high_left));
+        let low = low_step.mul_add(x, low_left);
+        let by_down = high_step.mul_add(x, high_left).sub(low);
+        let by_across = high_step.sub(low_step).mul_add(y, low_step);
+        (by_down.mul_add(y, low), [by_across, by_down])
+    }
+}
+
+/// A block of channels; the last one may be short.
+#[inline(always)]
+fn padded(channels: &[f32]) -> Block {
+    // A whole block apart: a copy of unknown length is a call.
+    if let Some(block) = channels.first_chunk() {
+        return *block;
+    }
+    let mut block = [0.0; LANES];
+    block[..channels.len()].copy_from_slice(channels);
+    block
 }
 
 #[inline(always)]
@@ -196,9 +220,13 @@ impl LaneKernel for Forward<'_> {
                 for plane in 1..6 {
                     product = product.mul(corners[plane].sample::<L>(cells[plane]));
                 }
-                let mut values = [0.0; LANES];
-                product.store(&mut values);
-                out.copy_from_slice(&values[..out.len()]);
+                if let Some(block) = out.first_chunk_mut() {
+                    product.store(block);
+                } else {
+                    let mut block = [0.0; LANES];
+                    product.store(&mut block);
+                    out.copy_from_slice(&block[..out.len()]);
+                }
             }
         }
     }
@@ -221,42 +249,82 @@ pub(crate) struct QueryGradients {
     pub(crate) planes: [Vec<f32>; 6],
 }
 
+/// Points and their upstream gradients in the order of [`spatial_order`], so that the tasks read them from end to end.
+struct Sorted {
+    order: Vec<u32>,
+    /// `[N][4]`
+    points: Vec<[f32; 4]>,
+    /// `[N][blocks]`
+    upstream: Vec<Block>,
+}
+
+impl Sorted {
+    fn new(points: &[f32], upstream: &[f32], channels: usize) -> Self {
+        let order = spatial_order(points);
+        let blocks = channels.div_ceil(LANES);
+        let mut sorted =
+            Self { points: vec![[0.0; 4]; order.len()], upstream: vec![[0.0; LANES]; order.len() * blocks], order };
+        (
+            sorted.points.par_chunks_mut(CHUNK),
+            sorted.upstream.par_chunks_mut(CHUNK * blocks),
+            sorted.order.par_chunks(CHUNK),
+        )
+            .into_par_iter()
+            .for_each(|(to_points, to_upstream, order)| {
+                for ((point, row), &n) in to_points.iter_mut().zip(to_upstream.chunks_exact_mut(blocks)).zip(order) {
+                    let n = n as usize;
+                    point.copy_from_slice(&points[4 * n..4 * n + 4]);
+                    for (block, channels) in
+                        row.iter_mut().zip(upstream[channels * n..channels * (n + 1)].chunks(LANES))
+                    {
+                        *block = padded(channels);
+                    }
+                }
+            });
+        sorted
+    }
+}
+
 struct Backward<'a> {
-    points: &'a [f32],
+    sorted: &'a Sorted,
     planes: &'a PackedPlanes,
-    /// `[N, C]`
-    upstream: &'a [f32],
-    order: &'a [u32],
     block: usize,
     with_points: bool,
 }
 
+/// What one block of channels adds to the gradients.
+struct BlockGradients {
+    planes: [Vec<Block>; 6],
+    /// In the order of [`Sorted`]; empty if not asked for.
+    points: Vec<[f32; 4]>,
+}
+
 impl LaneKernel for Backward<'_> {
-    type Output = ([Vec<Block>; 6], Vec<f32>);
+    type Output = BlockGradients;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let planes = self.planes;
-        let channels = planes.channels;
+        let sorted = self.sorted;
         let cells: [&[Block]; 6] = std::array::from_fn(|plane| planes.block(plane, self.block));
         let mut gradients: [Vec<Block>; 6] = std::array::from_fn(|plane| vec![[0.0; LANES]; cells[plane].len()]);
-        let mut point_gradients = vec![0.0; if self.with_points { self.points.len() } else { 0 }];
-        let first = self.block * LANES;
-        let own = LANES.min(channels - first);
-
-        for &n in self.order {
-            let n = n as usize;
-            let point = &self.points[4 * n..4 * n + 4];
-            let upstream = &self.upstream[channels * n..channels * (n + 1)];
+        let mut point_gradients = Vec::with_capacity(if self.with_points { sorted.points.len() } else { 0 });
+        let upstream = sorted.upstream.iter().skip(self.block).step_by(planes.blocks());
+        for (point, upstream) in sorted.points.iter().zip(upstream) {
             let axes = samples(point, planes.resolution);
             let corners = corners(&axes, planes.resolution);
-            let mut padded = [0.0; LANES];
-            padded[..own].copy_from_slice(&upstream[first..first + own]);
-            let upstream = L::load(&padded);
+            let upstream = L::load(upstream);
+            let mut fractions = [upstream; 4];
+            for axis in 0..4 {
+                fractions[axis] = L::splat(axes[axis].fraction);
+            }
             // Loops, not `array::from_fn`: a call that is not inlined leaves the vector registers.
-            let mut values = [L::splat(0.0); 6];
+            let mut values = [upstream; 6];
+            let mut slopes = [[upstream; 2]; 6];
             for plane in 0..6 {
-                values[plane] = corners[plane].sample::<L>(cells[plane]);
+                let [across, down] = PLANE_AXES[plane];
+                (values[plane], slopes[plane]) =
+                    corners[plane].sample_with_slopes(cells[plane], fractions[across], fractions[down]);
             }
 
             // Product of the others without dividing: upstream · prefix · suffix.
@@ -265,7 +333,6 @@ impl LaneKernel for Backward<'_> {
                 prefix[plane] = prefix[plane - 1].mul(values[plane - 1]);
             }
             let mut suffix = L::splat(1.0);
-            let mut along = [L::splat(0.0); 4];
             for plane in (0..6).rev() {
                 let gradient = prefix[plane].mul(suffix);
                 suffix = suffix.mul(values[plane]);
@@ -274,30 +341,24 @@ impl LaneKernel for Backward<'_> {
                     let cell = &mut gradients[plane][index[k]];
                     gradient.mul_add(L::splat(weight[k]), L::load(cell)).store(cell);
                 }
-                if self.with_points {
-                    let [across, down] = PLANE_AXES[plane];
-                    let mut corner = [L::splat(0.0); 4];
-                    for k in 0..4 {
-                        corner[k] = L::load(&cells[plane][index[k]]);
-                    }
-                    let (x, y) = (L::splat(axes[across].fraction), L::splat(axes[down].fraction));
-                    let lower = corner[1].sub(corner[0]);
-                    let upper = corner[3].sub(corner[2]);
-                    let by_across = upper.sub(lower).mul_add(y, lower);
-                    let left = corner[2].sub(corner[0]);
-                    let right = corner[3].sub(corner[1]);
-                    let by_down = right.sub(left).mul_add(x, left);
-                    along[across] = gradient.mul_add(by_across, along[across]);
-                    along[down] = gradient.mul_add(by_down, along[down]);
-                }
+                slopes[plane] = [slopes[plane][0].mul(gradient), slopes[plane][1].mul(gradient)];
             }
             if self.with_points {
+                let [xy, xz, xt, yz, yt, zt] = slopes;
+                let along = [
+                    xy[0].add(xz[0]).add(xt[0]),
+                    xy[1].add(yz[0]).add(yt[0]),
+                    xz[1].add(yz[1]).add(zt[0]),
+                    xt[1].add(yt[1]).add(zt[1]),
+                ];
+                let mut gradient = [0.0; 4];
                 for axis in 0..4 {
-                    point_gradients[4 * n + axis] = along[axis].sum() * axes[axis].slope;
+                    gradient[axis] = along[axis].sum() * axes[axis].slope;
                 }
+                point_gradients.push(gradient);
             }
         }
-        (gradients, point_gradients)
+        BlockGradients { planes: gradients, points: point_gradients }
     }
 }
 
@@ -308,23 +369,23 @@ pub(crate) fn query_backward(
     upstream: &[f32],
     with_points: bool,
 ) -> QueryGradients {
-    let order = spatial_order(points);
-    let blocks: Vec<([Vec<Block>; 6], Vec<f32>)> = (0..planes.blocks())
+    let sorted = Sorted::new(points, upstream, planes.channels);
+    let blocks: Vec<BlockGradients> = (0..planes.blocks())
         .into_par_iter()
-        .map(|block| dispatch(Backward { points, planes, upstream, order: &order, block, with_points }))
+        .map(|block| dispatch(Backward { sorted: &sorted, planes, block, with_points }))
         .collect();
     let unpacked: Vec<Vec<f32>> = (0..6)
         .into_par_iter()
         .map(|plane| {
-            let parts: Vec<&[Block]> = blocks.iter().map(|(gradients, _)| gradients[plane].as_slice()).collect();
+            let parts: Vec<&[Block]> = blocks.iter().map(|block| block.planes[plane].as_slice()).collect();
             unpack(&parts, planes.channels)
         })
         .collect();
     let points = with_points.then(|| {
         let mut sum = vec![0.0; points.len()];
-        for (_, part) in &blocks {
-            for (s, p) in sum.iter_mut().zip(part) {
-                *s += p;
+        for (place, &n) in sorted.order.iter().enumerate() {
+            for (axis, sum) in sum[4 * n as usize..][..4].iter_mut().enumerate() {
+                *sum = blocks.iter().map(|block| block.points[place][axis]).sum();
             }
         }
         sum

@@ -1,6 +1,7 @@
 //! Kernels of the CPU back ends, on plain slices: they know nothing of Burn.
 
 pub(crate) mod adam;
+pub(crate) mod blend;
 pub(crate) mod hexplane;
 pub(crate) mod lanes;
 pub(crate) mod project;

@@ -9,12 +9,10 @@
 
 use rayon::prelude::*;
 
+use super::blend::{Contribution, GROUPS, TilePlane, TileVisitor, walk};
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
-use super::project::{GaussianSlices, SplatGradient, TILE, View, project_backward};
-use super::rasterize::{
-    MIN_TRANSMITTANCE, TILE_GROUPS, TilePixels, TilePlane, WideSplat, groups, initial_transmittance, pixel_columns,
-    rows, tile_of,
-};
+use super::project::{GaussianSlices, Splat, SplatGradient, View, project_backward};
+use super::rasterize::{CHANNELS, TilePixels, tile_of};
 use super::tiles::TileLists;
 
 /// Sums of one splat over one tile's pixels: gradients of colour and depth, then the moments of
@@ -38,75 +36,82 @@ impl LaneKernel for BackwardTile<'_> {
     fn run<L: Lanes>(self) {
         let view = self.view;
         let (column, row) = (self.tile % view.tiles_across(), self.tile / view.tiles_across());
-        let (origin_x, origin_y) = ((column * TILE) as f32, (row * TILE) as f32);
-        let pixels_x = pixel_columns::<L>(origin_x);
         let upstream = tile_of(self.upstream, view, column, row);
-        let mut open = initial_transmittance(view, column, row);
-        let mut rest = total_value::<L>(self.pixels, &upstream, view.background);
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let rest = total_value::<L>(self.pixels, &upstream, view.background);
+        walk::<L, _>(self.lists, view, self.tile, &mut Differentiate { upstream, rest, sums: self.sums });
+    }
+}
 
-        let members = &self.lists.gaussians[self.lists.tile_range(self.tile)];
-        for (&i, sums) in members.iter().zip(self.sums) {
-            let splat = &self.lists.splats[i as usize];
-            let wide = WideSplat::<L>::new(splat);
-            let mut linear = [zero; 4];
-            let mut moments = [zero; 6];
-            for y in rows(splat, origin_y) {
-                let dy = splat.y - (origin_y + y as f32);
-                let (mut row_p, mut row_px, mut row_pxx) = (zero, zero, zero);
-                for group in groups(splat, origin_x, dy) {
-                    let footprint = wide.footprint(pixels_x[group], L::splat(dy));
-                    if !footprint.hit.any() {
-                        continue;
-                    }
-                    let at = y * TILE_GROUPS + group;
-                    let t = L::load(&open[at]);
-                    let after = t.sub(t.mul(footprint.alpha));
-                    let taken = footprint.hit.and(after.at_least(L::splat(MIN_TRANSMITTANCE)));
-                    footprint.hit.select(taken.and(after), t).store(&mut open[at]);
+struct Differentiate<'a> {
+    upstream: [TilePlane; CHANNELS],
+    /// `S` less what the splats so far have added to it.
+    rest: TilePlane,
+    sums: &'a mut [Sums],
+}
 
-                    let weight = taken.and(t.mul(footprint.alpha));
-                    let up = load_all::<L>(&upstream, at);
-                    for c in 0..3 {
-                        linear[c] = weight.mul_add(up[c], linear[c]);
-                    }
-                    linear[3] = weight.mul_add(up[4], linear[3]);
-                    let value = wide.color[0].mul_add(
-                        up[0],
-                        wide.color[1].mul_add(up[1], wide.color[2].mul_add(up[2], wide.depth.mul(up[4]))),
-                    );
-                    let left = L::load(&rest[at]).sub(weight.mul(value));
-                    left.store(&mut rest[at]);
-                    // alpha · dS/dalpha, with alpha folded into the weight.
-                    let behind = footprint.alpha.mul(left).div(one.sub(footprint.alpha));
-                    let p = taken.and(footprint.free).and(weight.mul(value).sub(behind));
-                    let px = p.mul(footprint.dx);
-                    row_p = row_p.add(p);
-                    row_px = row_px.add(px);
-                    row_pxx = px.mul_add(footprint.dx, row_pxx);
-                }
-                let dy = L::splat(dy);
-                let row_py = row_p.mul(dy);
-                moments[0] = moments[0].add(row_p);
-                moments[1] = moments[1].add(row_px);
-                moments[2] = moments[2].add(row_py);
-                moments[3] = moments[3].add(row_pxx);
-                moments[4] = row_px.mul_add(dy, moments[4]);
-                moments[5] = row_py.mul_add(dy, moments[5]);
-            }
-            for k in 0..4 {
-                sums[k] = linear[k].sum();
-            }
-            for k in 0..6 {
-                sums[4 + k] = moments[k].sum();
-            }
+/// One splat's values and, lane by lane, its sums.
+struct Accumulator<L> {
+    color: [L; 3],
+    depth: L,
+    linear: [L; 4],
+    moments: [L; 6],
+}
+
+impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
+    type Splat = Accumulator<L>;
+
+    #[inline(always)]
+    fn begin(&self, splat: &Splat) -> Accumulator<L> {
+        let [red, green, blue] = splat.color;
+        Accumulator {
+            // Written out: a call that is not inlined leaves the vector registers.
+            color: [L::splat(red), L::splat(green), L::splat(blue)],
+            depth: L::splat(splat.depth),
+            linear: [L::splat(0.0); 4],
+            moments: [L::splat(0.0); 6],
+        }
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, splat: &mut Accumulator<L>, contribution: &Contribution<L>) {
+        let Contribution { group, dx, dy, alpha, weight, taken, free, .. } = *contribution;
+        let up = load_all::<L>(&self.upstream, group);
+        let Accumulator { color, depth, linear, moments } = splat;
+        for c in 0..3 {
+            linear[c] = weight.mul_add(up[c], linear[c]);
+        }
+        linear[3] = weight.mul_add(up[4], linear[3]);
+        let value = color[0].mul_add(up[0], color[1].mul_add(up[1], color[2].mul_add(up[2], depth.mul(up[4]))));
+        let here = weight.mul(value);
+        let left = L::load(&self.rest[group]).sub(here);
+        left.store(&mut self.rest[group]);
+        // alpha · dS/dalpha, with alpha folded into the weight.
+        let behind = alpha.mul(left).div(L::splat(1.0).sub(alpha));
+        let p = taken.and(free).and(here.sub(behind));
+        let (px, py) = (p.mul(dx), p.mul(dy));
+        moments[0] = moments[0].add(p);
+        moments[1] = moments[1].add(px);
+        moments[2] = moments[2].add(py);
+        moments[3] = px.mul_add(dx, moments[3]);
+        moments[4] = px.mul_add(dy, moments[4]);
+        moments[5] = py.mul_add(dy, moments[5]);
+    }
+
+    #[inline(always)]
+    fn end(&mut self, n: usize, splat: Accumulator<L>) {
+        let sums = &mut self.sums[n];
+        for k in 0..4 {
+            sums[k] = splat.linear[k].sum();
+        }
+        for k in 0..6 {
+            sums[4 + k] = splat.moments[k].sum();
         }
     }
 }
 
 /// A loop, not `array::from_fn`: a call that is not inlined leaves the vector registers.
 #[inline(always)]
-fn load_all<L: Lanes>(planes: &[TilePlane; 5], at: usize) -> [L; 5] {
+fn load_all<L: Lanes>(planes: &[TilePlane; CHANNELS], at: usize) -> [L; 5] {
     let mut values = [L::splat(0.0); 5];
     for (value, plane) in values.iter_mut().zip(planes) {
         *value = L::load(&plane[at]);
@@ -116,8 +121,8 @@ fn load_all<L: Lanes>(planes: &[TilePlane; 5], at: usize) -> [L; 5] {
 
 /// `S` of every pixel: the finished sums weighed by the upstream gradient.
 #[inline(always)]
-fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; 5], background: [f32; 3]) -> TilePlane {
-    let mut total = [[0.0; LANES]; TILE * TILE_GROUPS];
+fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; CHANNELS], background: [f32; 3]) -> TilePlane {
+    let mut total = [[0.0; LANES]; GROUPS];
     for at in 0..total.len() {
         let up = load_all::<L>(upstream, at);
         // The background's value; alpha is 1 - T, hence the minus.

@@ -5,9 +5,9 @@
 
 use rayon::prelude::*;
 
+use super::blend::{Contribution, TileVisitor, walk};
 use super::lanes::{LaneKernel, Lanes, dispatch};
-use super::project::{TILE, View};
-use super::rasterize::{MIN_TRANSMITTANCE, TILE_GROUPS, WideSplat, groups, initial_transmittance, pixel_columns, rows};
+use super::project::{Splat, View};
 use super::tiles::TileLists;
 
 /// Sums over the pixels that blend a splat: pixels, `T · alpha`, `T`.
@@ -27,37 +27,32 @@ impl LaneKernel for SignificanceTile<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let view = self.view;
-        let (column, row) = (self.tile % view.tiles_across(), self.tile / view.tiles_across());
-        let (origin_x, origin_y) = ((column * TILE) as f32, (row * TILE) as f32);
-        let pixels_x = pixel_columns::<L>(origin_x);
-        let mut open = initial_transmittance(view, column, row);
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let members = &self.lists.gaussians[self.lists.tile_range(self.tile)];
-        for (&i, sums) in members.iter().zip(self.sums) {
-            let splat = &self.lists.splats[i as usize];
-            let wide = WideSplat::<L>::new(splat);
-            let (mut pixels, mut weights, mut transmittances) = (zero, zero, zero);
-            for y in rows(splat, origin_y) {
-                let dy = splat.y - (origin_y + y as f32);
-                for group in groups(splat, origin_x, dy) {
-                    let footprint = wide.footprint(pixels_x[group], L::splat(dy));
-                    if !footprint.hit.any() {
-                        continue;
-                    }
-                    let at = y * TILE_GROUPS + group;
-                    let t = L::load(&open[at]);
-                    let weight = t.mul(footprint.alpha);
-                    let after = t.sub(weight);
-                    let taken = footprint.hit.and(after.at_least(L::splat(MIN_TRANSMITTANCE)));
-                    footprint.hit.select(taken.and(after), t).store(&mut open[at]);
-                    pixels = pixels.add(taken.and(one));
-                    weights = weights.add(taken.and(weight));
-                    transmittances = transmittances.add(taken.and(t));
-                }
-            }
-            *sums = [pixels.sum(), weights.sum(), transmittances.sum()];
-        }
+        walk::<L, _>(self.lists, self.view, self.tile, &mut Score(self.sums));
+    }
+}
+
+struct Score<'a>(&'a mut [Sums]);
+
+impl<L: Lanes> TileVisitor<L> for Score<'_> {
+    /// Pixels, `T · alpha`, `T`, lane by lane.
+    type Splat = [L; 3];
+
+    #[inline(always)]
+    fn begin(&self, _: &Splat) -> [L; 3] {
+        [L::splat(0.0); 3]
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, [pixels, weights, transmittances]: &mut [L; 3], contribution: &Contribution<L>) {
+        let Contribution { weight, transmittance, taken, .. } = *contribution;
+        *pixels = pixels.add(taken.and(L::splat(1.0)));
+        *weights = weights.add(weight);
+        *transmittances = transmittances.add(taken.and(transmittance));
+    }
+
+    #[inline(always)]
+    fn end(&mut self, n: usize, [pixels, weights, transmittances]: [L; 3]) {
+        self.0[n] = [pixels.sum(), weights.sum(), transmittances.sum()];
     }
 }
 

@@ -1,0 +1,269 @@
+//! Front-to-back traversal of one tile's splats, eight pixels of a row at a time: what blending, its derivative and the
+//! significance scores have in common.
+//!
+//! Only the eight-pixel groups that the splat's alpha can reach and that still take splats are visited, and the walk
+//! ends where all pixels have stopped, so the cost follows the pixels that are blended. Per pixel, front to back:
+//!
+//! ```text
+//! alpha = min(0.99, opacity · exp(-q)),  skipped below 1/255
+//! stop before the splat that would take the transmittance T below 1e-4
+//! weight = T · alpha,  T *= 1 - alpha
+//! ```
+
+use super::lanes::{LANES, Lanes};
+use super::project::{MIN_ALPHA, Splat, TILE, View};
+use super::tiles::TileLists;
+
+pub(crate) const MAX_ALPHA: f32 = 0.99;
+/// A pixel takes no splat that would leave it with less transmittance.
+pub(crate) const MIN_TRANSMITTANCE: f32 = 1e-4;
+
+/// Groups of eight pixels in a tile's row.
+const ACROSS: usize = TILE / LANES;
+/// Groups in a tile: group `g` holds the pixels from column `g / TILE · LANES` on of row `g % TILE`.
+pub(crate) const GROUPS: usize = TILE * ACROSS;
+
+/// One value for every pixel of a tile, by group.
+pub(crate) type TilePlane = [[f32; LANES]; GROUPS];
+
+/// Group and lane of a pixel, from the tile's upper left corner.
+pub(crate) fn group_and_lane(x: usize, y: usize) -> (usize, usize) {
+    (x / LANES * TILE + y, x % LANES)
+}
+
+/// What one splat adds to eight pixels.
+pub(crate) struct Contribution<L> {
+    /// The pixels.
+    pub(crate) group: usize,
+    /// Offsets from the pixels to the centre of the splat.
+    pub(crate) dx: L,
+    pub(crate) dy: L,
+    /// After the clamp at [`MAX_ALPHA`], of all lanes.
+    pub(crate) alpha: L,
+    /// T before this splat, of all lanes; negative where the pixel had stopped.
+    pub(crate) transmittance: L,
+    /// `T · alpha`, zero where the splat is not taken.
+    pub(crate) weight: L,
+    /// Mask: the pixel takes the splat.
+    pub(crate) taken: L,
+    /// Mask: the alpha was not clamped, so it still depends on the splat.
+    pub(crate) free: L,
+}
+
+/// What is done on the way.
+pub(crate) trait TileVisitor<L: Lanes> {
+    /// What belongs to one splat. Apart from the visitor, so that it stays in the vector registers.
+    type Splat;
+
+    fn begin(&self, splat: &Splat) -> Self::Splat;
+    fn visit(&mut self, splat: &mut Self::Splat, contribution: &Contribution<L>);
+    /// `n` counts the tile's splats from the front.
+    fn end(&mut self, n: usize, splat: Self::Splat);
+}
+
+/// Shows the visitor all splats of a tile. Returns the transmittance that is left; its sign is set where a pixel has
+/// stopped and outside the picture.
+#[inline(always)]
+pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
+    lists: &TileLists,
+    view: &View,
+    tile: usize,
+    visitor: &mut V,
+) -> TilePlane {
+    let (column, row) = (tile % view.tiles_across(), tile / view.tiles_across());
+    let origin = [(column * TILE) as f32, (row * TILE) as f32];
+    let pixels_x: [L; ACROSS] = consecutive(origin[0]);
+    let rows_y: [L; ACROSS] = consecutive(origin[1]);
+    let mut transmittance = initial_transmittance(view, column, row);
+    // A bit for every group that has a pixel which takes splats.
+    let mut live = transmittance
+        .iter()
+        .enumerate()
+        .fold(0u32, |bits, (g, lanes)| bits | u32::from(lanes.iter().any(|&t| t > 0.0)) << g);
+
+    for (n, &i) in lists.gaussians[lists.tile_range(tile)].iter().enumerate() {
+        if live == 0 {
+            break;
+        }
+        let splat = &lists.splats[i as usize];
+        let ellipse = Ellipse::<L>::new(splat);
+        let mut state = visitor.begin(splat);
+        let mut groups = live & reached(splat, origin[0], &rows_y);
+        while groups != 0 {
+            let group = groups.trailing_zeros() as usize;
+            groups &= groups - 1;
+            let dy = splat.y - (origin[1] + (group % TILE) as f32);
+            let Footprint { dx, alpha, free, hit } = ellipse.footprint(pixels_x[group / TILE], dy);
+            let t = L::load(&transmittance[group]);
+            let weight = t.mul(alpha);
+            let after = t.sub(weight);
+            let taken = hit.and(after.at_least(L::splat(MIN_TRANSMITTANCE)));
+            // Hit but not taken: the pixel stops.
+            let stopped = taken.and_not(hit).and(L::splat(-0.0));
+            let left = taken.select(after, t.or(stopped));
+            left.store(&mut transmittance[group]);
+            if left.signs() == (1 << LANES) - 1 {
+                live &= !(1 << group);
+            }
+            let weight = taken.and(weight);
+            let contribution =
+                Contribution { group, dx, dy: L::splat(dy), alpha, transmittance: t, weight, taken, free };
+            visitor.visit(&mut state, &contribution);
+        }
+        visitor.end(n, state);
+    }
+    transmittance
+}
+
+/// The splat's exponent, with its values spread over the lanes.
+struct Ellipse<L> {
+    x: L,
+    opacity: L,
+    /// Factors of dx², dx dy and dy² in the base-2 logarithm of the Gaussian.
+    xx: L,
+    xy: f32,
+    yy: f32,
+}
+
+/// A splat at eight pixels.
+struct Footprint<L> {
+    dx: L,
+    alpha: L,
+    free: L,
+    /// Mask: the splat is not skipped for smallness.
+    hit: L,
+}
+
+impl<L: Lanes> Ellipse<L> {
+    #[inline(always)]
+    fn new(splat: &Splat) -> Self {
+        const LOG2_E: f32 = std::f32::consts::LOG2_E;
+        let [a, b, c] = splat.conic;
+        Self {
+            x: L::splat(splat.x),
+            opacity: L::splat(splat.opacity),
+            xx: L::splat(-0.5 * LOG2_E * a),
+            xy: -LOG2_E * b,
+            yy: -0.5 * LOG2_E * c,
+        }
+    }
+
+    #[inline(always)]
+    fn footprint(&self, pixels_x: L, dy: f32) -> Footprint<L> {
+        let dx = self.x.sub(pixels_x);
+        let power = self.xx.mul_add(dx, L::splat(self.xy * dy)).mul_add(dx, L::splat(self.yy * dy * dy));
+        let raw = self.opacity.mul(power.exp2());
+        let alpha = raw.min(L::splat(MAX_ALPHA));
+        let hit = alpha.at_least(L::splat(MIN_ALPHA)).and(L::splat(0.0).at_least(power));
+        Footprint { dx, alpha, free: L::splat(MAX_ALPHA).at_least(raw), hit }
+    }
+}
+
+/// A bit for every group that the splat's alpha can reach, for all rows of the tile at once.
+#[inline(always)]
+fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; ACROSS]) -> u32 {
+    let [a, b, _] = splat.conic;
+    // In a row the form is least at dx = -b dy / a, and there it is dy² / variance. A little slack, since the pixels
+    // evaluate the form with other rounding.
+    let (inverse_a, inverse_variance) = (L::splat(1.0 / a), L::splat(-1.0 / splat.variance[1]));
+    let (reach, skew) = (L::splat(splat.reach * 1.002 + 1e-2), L::splat(b / a));
+    let (x, y) = (L::splat(splat.x - origin_x), L::splat(splat.y));
+    let mut bits = 0;
+    for half in 0..ACROSS {
+        let dy = y.sub(rows_y[half]);
+        let left = dy.mul(dy).mul_add(inverse_variance, reach);
+        let half_width = left.max(L::splat(0.0)).mul(inverse_a).sqrt().mul_add(L::splat(1.001), L::splat(0.05));
+        let center = skew.mul_add(dy, x);
+        let (low, high) = (center.sub(half_width), center.add(half_width));
+        let row_reached = left.at_least(L::splat(0.0));
+        for group in 0..ACROSS {
+            let first = (group * LANES) as f32;
+            let last = first + (LANES - 1) as f32;
+            let columns = high.at_least(L::splat(first)).and(L::splat(last).at_least(low));
+            bits |= row_reached.and(columns).signs() << (group * TILE + half * LANES);
+        }
+    }
+    bits
+}
+
+/// `first, first + 1, ...` over all lanes.
+#[inline(always)]
+fn consecutive<L: Lanes>(first: f32) -> [L; ACROSS] {
+    let mut vectors = [L::splat(0.0); ACROSS];
+    for (k, vector) in vectors.iter_mut().enumerate() {
+        let values: [f32; LANES] = std::array::from_fn(|lane| first + (k * LANES + lane) as f32);
+        *vector = L::load(&values);
+    }
+    vectors
+}
+
+/// Pixels outside the picture have stopped from the start.
+fn initial_transmittance(view: &View, column: usize, row: usize) -> TilePlane {
+    let width = view.camera.width as usize - column * TILE;
+    let height = view.camera.height as usize - row * TILE;
+    let mut plane = [[1.0; LANES]; GROUPS];
+    for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
+        if x >= width || y >= height {
+            let (group, lane) = group_and_lane(x, y);
+            plane[group][lane] = -1.0;
+        }
+    }
+    plane
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use light4gs_data::Camera;
+    use proptest::prelude::*;
+
+    use super::super::lanes::{LaneKernel, Portable, dispatch};
+    use super::super::project::{GaussianSlices, project};
+    use super::*;
+
+    const SIDE: usize = 3 * TILE;
+
+    struct Reached<'a>(&'a Splat, [f32; 2]);
+    impl LaneKernel for Reached<'_> {
+        type Output = u32;
+        fn run<L: Lanes>(self) -> u32 {
+            reached(self.0, self.1[0], &consecutive::<L>(self.1[1]))
+        }
+    }
+
+    proptest! {
+        /// Whatever the splat's shape, no pixel that it touches is left out.
+        #[test]
+        fn every_touched_pixel_is_in_a_reached_group(
+            mean in prop::array::uniform3(-1.5f32..1.5),
+            quat in prop::array::uniform4(0.1f32..1.0),
+            log_scales in prop::array::uniform3(-5.0f32..0.5),
+            opacity in 0.001f32..1.0,
+        ) {
+            let camera = Camera::look_at(Vec3::new(0.0, 0.0, 4.0), Vec3::ZERO, Vec3::Y, 0.8, SIDE as u32, SIDE as u32);
+            let view = View { camera, background: [0.0; 3], sh_degree: 0 };
+            let gaussian = GaussianSlices {
+                means: &mean,
+                quats: &quat,
+                scales: &log_scales.map(f32::exp),
+                opacities: &[opacity],
+                sh_dc: &[0.0; 3],
+                sh_rest: &[],
+                screen_offsets: &[0.0; 2],
+            };
+            let splat = project(&gaussian, 0, &view);
+            let [a, b, c] = splat.conic;
+            for (row, column) in (0..3).flat_map(|row| (0..3).map(move |column| (row, column))) {
+                let origin = [(column * TILE) as f32, (row * TILE) as f32];
+                for groups in [dispatch(Reached(&splat, origin)), Reached(&splat, origin).run::<Portable>()] {
+                    for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
+                        let (dx, dy) = (splat.x - origin[0] - x as f32, splat.y - origin[1] - y as f32);
+                        let alpha = opacity * (-0.5 * (a * dx * dx + c * dy * dy) - b * dx * dy).exp();
+                        let (group, _) = group_and_lane(x, y);
+                        prop_assert!(alpha < MIN_ALPHA || groups >> group & 1 == 1, "pixel {x} {y}: alpha {alpha}");
+                    }
+                }
+            }
+        }
+    }
+}
