@@ -34,7 +34,7 @@ use crate::profile::Profile;
 use crate::randomness::FrameOrder;
 use crate::run_folder::{RunFolder, RunRecord};
 use crate::tensorboard::TensorBoard;
-use views::ViewPass;
+use views::{ViewPass, ViewPools};
 
 /// How a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
@@ -61,6 +61,7 @@ pub struct Trainer {
     order: FrameOrder,
     quiet: bool,
     profile: Profile,
+    view_pools: ViewPools,
 }
 
 impl Trainer {
@@ -113,12 +114,17 @@ impl Trainer {
         let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
         let order = FrameOrder::default();
         let profile = Profile::off();
-        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet, profile })
+        // A graphics card is kept busy by one view at a time.
+        let side_by_side = computes_on_processor(&config.device);
+        let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
+        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet, profile, view_pools })
     }
 
     /// From now on measures the stages of every step.
     pub fn measure_stages(&mut self) {
         self.profile = Profile::on(&self.device);
+        // Stages can only be measured one after the other.
+        self.view_pools = ViewPools::none();
     }
 
     /// What [`Trainer::measure_stages`] led to.
@@ -262,7 +268,7 @@ impl Trainer {
             weight: 1.0 / batch as f32,
         };
         let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
-        let mut views = pass.run(seen, &frames, self.view_threads(batch), &self.profile)?;
+        let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
         let mut gradients = GradientSums::default();
         for view in &mut views {
             gradients.add(std::mem::take(&mut view.gradients));
@@ -300,13 +306,6 @@ impl Trainer {
         }
         self.profile.lap("Adam");
         Ok(picture)
-    }
-
-    /// Views at a time: as many as there are threads, where the processor computes. A graphics card is kept busy by one.
-    fn view_threads(&self, views: usize) -> usize {
-        // Stages can only be measured one after the other.
-        let side_by_side = computes_on_processor(&self.config.device) && !self.profile.is_on();
-        if side_by_side { rayon::current_num_threads().min(views) } else { 1 }
     }
 
     /// Adds the gradients of the regularisers, and returns their value, `[1]`.

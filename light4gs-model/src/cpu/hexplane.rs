@@ -134,6 +134,7 @@ impl AxisSample {
 }
 
 /// The four cells of a bilinear sample and their weights.
+#[derive(Clone, Copy, Default)]
 struct Corners {
     index: [usize; 4],
     weight: [f32; 4],
@@ -195,7 +196,12 @@ fn samples(point: &[f32], resolution: [usize; 4]) -> [AxisSample; 4] {
 
 #[inline(always)]
 fn corners(axes: &[AxisSample; 4], resolution: [usize; 4]) -> [Corners; 6] {
-    PLANE_AXES.map(|[across, down]| Corners::new(&axes[across], &axes[down], resolution[across]))
+    // A loop, not `array::map`: its closure is not inlined.
+    let mut corners = [Corners::default(); 6];
+    for (corners, [across, down]) in corners.iter_mut().zip(PLANE_AXES) {
+        *corners = Corners::new(&axes[across], &axes[down], resolution[across]);
+    }
+    corners
 }
 
 struct Forward<'a> {

@@ -4,6 +4,7 @@ use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use light4gs_data::{Frame, ImageStore};
 use light4gs_model::{DynamicScene, Splatter};
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::image_tensor;
 use crate::error::TrainError;
@@ -41,27 +42,53 @@ pub(super) struct View {
     pub(super) truth: Tensor<3>,
 }
 
+/// The processor's threads, shared out among the views of a step: a pool for each view that runs beside others.
+///
+/// With one pool for all, views would wait for each other at every small parallel loop, and a worker that waits inside
+/// one view would begin another meanwhile.
+pub(super) struct ViewPools(Vec<ThreadPool>);
+
+impl ViewPools {
+    /// Pools for `views` views a step, which together have all threads.
+    pub(super) fn new(views: usize) -> Self {
+        let threads = rayon::current_num_threads();
+        let share = views.div_ceil(threads).max(1);
+        let pools = views.div_ceil(share);
+        let pool = |i| ThreadPoolBuilder::new().num_threads((threads + i) / pools).build();
+        // One pool would be what there is already.
+        let pools = if pools > 1 { (0..pools).map(pool).collect() } else { Ok(Vec::new()) };
+        Self(pools.expect("threads can be started"))
+    }
+
+    /// None: one view after the other.
+    pub(super) fn none() -> Self {
+        Self(Vec::new())
+    }
+}
+
 impl ViewPass<'_> {
-    /// Renders and differentiates every frame, `threads` at a time. The outcome, in the order of the frames, does not
-    /// depend on that number.
+    /// Renders and differentiates every frame. The outcome, in the order of the frames, does not depend on the pools.
     pub(super) fn run<'f>(
         &self,
         scene: &DynamicScene,
         frames: &[&'f Frame],
-        threads: usize,
+        pools: &ViewPools,
         profile: &Profile,
     ) -> Result<Vec<View>, TrainError> {
         // Copies share the scene's memory; each begins a tape of its own.
         let with_copies = |frames: &[&'f Frame]| -> Vec<_> {
             frames.iter().map(|frame| (scene.clone().fork(self.device), *frame)).collect()
         };
-        if threads <= 1 {
+        let ViewPools(pools) = pools;
+        if pools.is_empty() {
             return self.views(with_copies(frames), profile);
         }
-        // Threads of their own, not rayon's: a worker of rayon's that waits inside a view would begin another one meanwhile.
         std::thread::scope(|scope| {
-            let shares = frames.chunks(frames.len().div_ceil(threads)).map(with_copies);
-            let workers: Vec<_> = shares.map(|share| scope.spawn(move || self.views(share, &Profile::off()))).collect();
+            let shares = frames.chunks(frames.len().div_ceil(pools.len())).map(with_copies);
+            let workers: Vec<_> = shares
+                .zip(pools)
+                .map(|(share, pool)| scope.spawn(move || pool.install(|| self.views(share, &Profile::off()))))
+                .collect();
             let mut views = Vec::with_capacity(frames.len());
             for worker in workers {
                 views.extend(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
@@ -106,5 +133,21 @@ impl ViewPass<'_> {
             image: image.inner(),
             truth: truth.inner(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pools_have_all_threads_and_no_more() {
+        for (threads, views, pools) in [(1, 4, 0), (2, 1, 0), (2, 4, 2), (3, 4, 2), (6, 4, 4), (16, 3, 3)] {
+            let outer = ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let ViewPools(made) = outer.install(|| ViewPools::new(views));
+            assert_eq!(made.len(), pools, "{threads} threads, {views} views");
+            let sum: usize = made.iter().map(ThreadPool::current_num_threads).sum();
+            assert!(made.is_empty() || sum == threads, "{sum} of {threads} threads");
+        }
     }
 }
