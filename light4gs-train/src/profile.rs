@@ -37,11 +37,6 @@ impl Profile {
         Self { laps: Some(RefCell::new(laps)) }
     }
 
-    /// Whether it measures.
-    pub fn is_on(&self) -> bool {
-        self.laps.is_some()
-    }
-
     /// A step begins.
     pub fn begin_step(&self) {
         let Some(laps) = &self.laps else { return };

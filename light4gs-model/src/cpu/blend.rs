@@ -14,14 +14,16 @@ use super::lanes::{LANES, Lanes};
 use super::project::{MIN_ALPHA, Splat, TILE, View};
 use super::tiles::TileLists;
 
-pub(crate) const MAX_ALPHA: f32 = 0.99;
+const MAX_ALPHA: f32 = 0.99;
 /// A pixel takes no splat that would leave it with less transmittance.
-pub(crate) const MIN_TRANSMITTANCE: f32 = 1e-4;
+const MIN_TRANSMITTANCE: f32 = 1e-4;
 
 /// Groups of eight pixels in a tile's row.
 const ACROSS: usize = TILE / LANES;
 /// Groups in a tile: group `g` holds the pixels from column `g / TILE · LANES` on of row `g % TILE`.
 pub(crate) const GROUPS: usize = TILE * ACROSS;
+// Sets of groups are masks of 32 bits.
+const _: () = assert!(GROUPS <= u32::BITS as usize);
 
 /// One value for every pixel of a tile, by group.
 pub(crate) type TilePlane = [[f32; LANES]; GROUPS];
