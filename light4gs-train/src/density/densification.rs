@@ -6,8 +6,8 @@ use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
 use light4gs_model::Gaussians;
 
-use crate::optimizer::Adam;
-use crate::parameters::GAUSSIAN_PARAMETERS;
+use crate::optimization::adam::Adam;
+use crate::optimization::parameters::GAUSSIAN_PARAMETERS;
 
 /// Scales of a split Gaussian's two halves are the old ones over this.
 const SPLIT_SHRINK: f32 = 1.6;

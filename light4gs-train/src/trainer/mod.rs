@@ -5,35 +5,42 @@
 //! - `rate`: what a small file asks of a step
 //! - `views`: what the pictures ask of it
 
+pub mod checkpoint;
 mod density;
+pub mod profile;
+pub(crate) mod randomness;
 mod rate;
+pub mod run_folder;
+mod stage;
 mod views;
+
+pub use stage::Stage;
 
 use std::time::Instant;
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor};
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::SceneMeta;
-use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene, Split};
+use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, Scene, Split};
 use light4gs_model::{Splatter, regularizer};
 
-use crate::checkpoint::{self, Checkpoint};
 use crate::compression::{Compression, TrainedScene, write_scene};
 use crate::config::{Config, TrainConfig};
-use crate::densification::DensityStatistics;
-use crate::device::{computes_on_processor, device_by_name};
+use crate::density::densification::DensityStatistics;
+use crate::device;
 use crate::error::TrainError;
-use crate::gradients::GradientSums;
-use crate::learning_rates::GroupRates;
-use crate::loss::psnr;
-use crate::metrics_log::{MetricsLog, MetricsRecord, Stage};
-use crate::optimizer::Adam;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
-use crate::profile::Profile;
-use crate::randomness::FrameOrder;
-use crate::run_folder::{RunFolder, RunRecord};
-use crate::tensorboard::TensorBoard;
+use crate::evaluation::metrics::{image_tensor, psnr};
+use crate::observers::metrics_log::{MetricsLog, MetricsRecord};
+use crate::observers::tensorboard::TensorBoard;
+use crate::optimization::adam::Adam;
+use crate::optimization::gradients::GradientSums;
+use crate::optimization::learning_rates::GroupRates;
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::trainer::checkpoint::{self, Checkpoint};
+use crate::trainer::profile::Profile;
+use crate::trainer::randomness::FrameOrder;
+use crate::trainer::run_folder::{RunFolder, RunRecord};
 use views::{ViewPass, ViewPools};
 
 /// How a dataset is opened for a configuration.
@@ -67,7 +74,7 @@ pub struct Trainer {
 impl Trainer {
     /// Begins a run in a fresh folder.
     pub fn start(config: Config, folder: RunFolder, record: &RunRecord, quiet: bool) -> Result<Self, TrainError> {
-        let device = device_by_name(&config.device)?.autodiff();
+        let device = device::open(config.device)?.autodiff();
         device.seed(config.seed);
         let data = Scene::open(&record.scene, &load_options(&config))?;
         let scene = config.model.build().init(&data.points, &device);
@@ -90,7 +97,7 @@ impl Trainer {
             trainer.metrics.truncate_after(Stage::Coarse, 0)?;
             return Ok(trainer);
         };
-        let device = device_by_name(&config.device)?.autodiff();
+        let device = device::open(config.device)?.autodiff();
         let data = Scene::open(&record.scene, &load_options(&config))?;
         let state = Checkpoint::load(&path, &config, &device)?;
         let (stage, iteration) = (state.stage, state.iteration);
@@ -115,7 +122,7 @@ impl Trainer {
         let order = FrameOrder::default();
         let profile = Profile::off();
         // A graphics card is kept busy by one view at a time.
-        let side_by_side = computes_on_processor(&config.device);
+        let side_by_side = config.device.computes_on_processor();
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
         Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet, profile, view_pools })
     }
@@ -366,12 +373,6 @@ struct StepPicture {
     loss: f32,
     image: Tensor<3>,
     truth: Tensor<3>,
-}
-
-/// `[H, W, 3]` in [0, 1].
-pub(crate) fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
-    let values: Vec<f32> = image.pixels.iter().map(|byte| f32::from(*byte) / 255.0).collect();
-    Tensor::from_data(TensorData::new(values, [image.height as usize, image.width as usize, 3]), device)
 }
 
 struct AdamVisitor<'a> {

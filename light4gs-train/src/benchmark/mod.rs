@@ -1,5 +1,7 @@
 //! Timing of every stage of a training step, on scenes that anybody can make again.
 
+pub mod codec;
+
 use std::path::Path;
 use std::time::Instant;
 
@@ -17,14 +19,14 @@ use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 
 use crate::compression::Compression;
-use crate::config::Config;
+use crate::config::{Config, DeviceName};
 use crate::device::adapter_name;
 use crate::error::TrainError;
-use crate::gradients::GradientSums;
-use crate::loss::l1;
-use crate::optimizer::Adam;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
-use crate::table::{Align, Table};
+use crate::evaluation::metrics::l1;
+use crate::optimization::adam::Adam;
+use crate::optimization::gradients::GradientSums;
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::report::table::{Align, Table};
 
 /// Untimed repetitions before the timed ones.
 const WARM_UP: usize = 2;
@@ -231,7 +233,7 @@ fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T,
 
 /// Times every stage on every scene.
 pub fn benchmark(
-    name: &str,
+    name: DeviceName,
     device: &Device,
     scenes: &[BenchScene],
     repeats: usize,
@@ -248,7 +250,7 @@ pub fn benchmark(
             stages: stages(scene, device, &autodiff, &small, repeats),
         })
         .collect();
-    Ok(DeviceTimes { device: name.to_owned(), adapter: adapter_name(name, device), calibration_ms, scenes })
+    Ok(DeviceTimes { device: name.to_string(), adapter: adapter_name(name, device), calibration_ms, scenes })
 }
 
 fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config, repeats: usize) -> Vec<StageTime> {

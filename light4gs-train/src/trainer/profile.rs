@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 
-use crate::table::{Align, Table};
+use crate::report::table::{Align, Table};
 
 /// Steps that compile kernels and fill caches, and are not counted.
 const WARM_UP: usize = 3;

@@ -1,9 +1,9 @@
 //! The learning rate of every parameter group at an iteration.
 
 use crate::config::Config;
-use crate::metrics_log::Stage;
-use crate::parameters::ParameterGroup;
-use crate::schedule::ExponentialDecay;
+use crate::optimization::parameters::ParameterGroup;
+use crate::optimization::schedule::ExponentialDecay;
+use crate::trainer::Stage;
 
 /// Learning rates of one iteration, by parameter group.
 #[derive(Clone, Copy, Debug)]

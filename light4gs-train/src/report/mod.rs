@@ -12,6 +12,7 @@ mod html;
 mod picture;
 mod quality;
 mod sizes;
+pub mod table;
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -21,12 +22,12 @@ use light4gs_data::atomic::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
 
 use crate::compression::{BitMap, CodingRecord};
-use crate::metrics_log::MetricsRecord;
+use crate::observers::metrics_log::MetricsRecord;
 use html::{escape, fill};
 
-const PAGE: &str = include_str!("report/page.html");
-const STYLE: &str = include_str!("report/style.css");
-const SCRIPT: &str = include_str!("report/script.js");
+const PAGE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("script.js");
 
 /// Everything that a report shows. What is empty is left out of the page.
 #[derive(Debug, Clone, Default)]

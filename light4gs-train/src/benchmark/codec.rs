@@ -17,7 +17,7 @@ use serde::Serialize;
 use crate::compression::{Compression, compression_input};
 use crate::config::Config;
 use crate::error::TrainError;
-use crate::table::{Align, Table};
+use crate::report::table::{Align, Table};
 
 /// Gaussians of the scene: what the paper keeps of *bouncing balls*.
 const GAUSSIANS: usize = 12_000;

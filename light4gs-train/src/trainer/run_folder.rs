@@ -8,9 +8,9 @@ use light4gs_codec::write_atomically;
 use light4gs_data::DataError;
 use serde::{Deserialize, Serialize};
 
-use crate::checkpoint;
 use crate::config::Config;
 use crate::error::TrainError;
+use crate::trainer::checkpoint;
 
 /// Files of a run; `--overwrite` removes them.
 const FILES: [&str; 8] = [

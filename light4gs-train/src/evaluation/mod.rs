@@ -1,5 +1,9 @@
 //! Measuring a decoded file: quality on held-out views, speed, size.
 
+pub mod ablation;
+pub mod finish;
+pub mod metrics;
+
 use std::path::Path;
 use std::time::Instant;
 
@@ -12,9 +16,9 @@ use serde::Serialize;
 use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
 use crate::error::TrainError;
-use crate::loss::{psnr, ssim};
+use crate::evaluation::metrics::image_tensor;
+use crate::evaluation::metrics::{psnr, ssim};
 use crate::report::{SplitQuality, ViewPictures, ViewQuality};
-use crate::trainer::image_tensor;
 
 /// Quality of one view.
 #[derive(Clone, Debug, Serialize)]

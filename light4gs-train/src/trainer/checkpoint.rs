@@ -15,11 +15,11 @@ use safetensors::{Dtype, SafeTensors};
 
 use crate::compression::Compression;
 use crate::config::Config;
-use crate::densification::DensityStatistics;
+use crate::density::densification::DensityStatistics;
 use crate::error::TrainError;
-use crate::metrics_log::Stage;
-use crate::optimizer::{Adam, AdamState};
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::optimization::adam::{Adam, AdamState};
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::trainer::Stage;
 
 /// A run's state after an iteration.
 #[derive(Debug)]

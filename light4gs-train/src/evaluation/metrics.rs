@@ -3,6 +3,7 @@
 use burn::tensor::module::conv2d;
 use burn::tensor::ops::ConvOptions;
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_data::RgbImage8;
 
 /// Side of the SSIM window in pixels.
 const WINDOW: usize = 11;
@@ -67,4 +68,10 @@ pub fn photometric(image: Tensor<3>, truth: Tensor<3>, lambda_dssim: f32) -> Ten
     }
     let similarity = ssim(image.clone(), truth.clone());
     l1(image, truth) * (1.0 - lambda_dssim) + (similarity.neg() + 1.0) * lambda_dssim
+}
+
+/// An 8-bit image as a tensor `[H, W, 3]` in [0, 1].
+pub(crate) fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
+    let values: Vec<f32> = image.pixels.iter().map(|byte| f32::from(*byte) / 255.0).collect();
+    Tensor::from_data(TensorData::new(values, [image.height as usize, image.width as usize, 3]), device)
 }

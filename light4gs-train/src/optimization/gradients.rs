@@ -7,7 +7,7 @@ use burn::tensor::{Gradients, Tensor};
 use light4gs_model::DynamicScene;
 
 use crate::compression::Compression;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
 
 /// Sums of gradients. Equal parts, added in the same order, give equal sums to the last bit.
 #[derive(Debug, Default)]
