@@ -37,7 +37,7 @@ use crate::optimization::adam::Adam;
 use crate::optimization::gradients::GradientSums;
 use crate::optimization::learning_rates::GroupRates;
 use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
-use crate::trainer::checkpoint::{self, Checkpoint};
+use crate::trainer::checkpoint::Checkpoint;
 use crate::trainer::profile::Profile;
 use crate::trainer::randomness::FrameOrder;
 use crate::trainer::run_folder::{RunFolder, RunRecord};
