@@ -3,14 +3,14 @@
 use std::collections::HashSet;
 use std::sync::{LazyLock, Mutex};
 
-use burn_cubecl::template::{KernelSource, SourceKernel, SourceTemplate};
+use burn_wgpu::{KernelSource, SourceKernel, SourceTemplate};
 use cubecl::client::Client;
 use cubecl::device::DeviceId;
 use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim, ExecutionMode, KernelId};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 
-use super::error::GpuError;
+use crate::gpu_error::GpuError;
 use super::stages::Stage;
 
 /// Invocations of a workgroup where nothing else is asked for.

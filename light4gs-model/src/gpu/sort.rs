@@ -3,7 +3,7 @@
 use cubecl::server::Handle;
 
 use super::context::Gpu;
-use super::error::GpuError;
+use crate::gpu_error::GpuError;
 use super::kernel::Launch;
 use super::stages::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES};
 

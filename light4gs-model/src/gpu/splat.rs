@@ -2,12 +2,12 @@
 
 use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
-use burn_cubecl::CubeBackend;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeBackend;
+use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 
 use super::context::{Gpu, Parts, buffer_of, first_words};
-use super::error::GpuError;
+use crate::gpu_error::GpuError;
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
 use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};

@@ -6,7 +6,7 @@ use std::sync::{LazyLock, Mutex};
 use cubecl::device::DeviceId;
 
 use super::context::Gpu;
-use super::error::GpuError;
+use crate::gpu_error::GpuError;
 use super::kernel::Launch;
 use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
 
