@@ -5,9 +5,9 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 
 use super::context::{Gpu, buffer_of};
-use crate::gpu_error::GpuError;
 use super::kernel::Launch;
 use super::stages::ADAM;
+use crate::gpu_error::GpuError;
 use crate::ops::adam::{AdamStep, AdamTensors};
 
 fn step_on_gpu(

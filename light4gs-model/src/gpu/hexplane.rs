@@ -7,10 +7,10 @@ use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 
 use super::context::{Gpu, Parts, buffer_of, first_words};
-use crate::gpu_error::GpuError;
 use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
 use super::stages::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
+use crate::gpu_error::GpuError;
 use crate::ops::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
 
 const PLANES: usize = 6;

@@ -10,8 +10,8 @@ use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim, ExecutionMode, KernelId};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 
-use crate::gpu_error::GpuError;
 use super::stages::Stage;
+use crate::gpu_error::GpuError;
 
 /// Invocations of a workgroup where nothing else is asked for.
 pub(super) const WORKGROUP: u32 = 64;
