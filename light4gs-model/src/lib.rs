@@ -29,7 +29,9 @@ mod entropy_parameters;
 mod factorized_density;
 pub mod gaussian_conditional;
 mod gaussians;
+#[cfg(feature = "wgpu")]
 mod gpu;
+mod gpu_error;
 mod hexplane;
 mod hyperprior;
 mod inter_plane;
@@ -63,7 +65,7 @@ pub use entropy_bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent}
 pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
 pub use factorized_density::{FactorizedDensity, FactorizedDensityConfig, PlainDensity};
 pub use gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
-pub use gpu::GpuError;
+pub use gpu_error::GpuError;
 pub use hexplane::{HexPlane, HexPlaneConfig, PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};

@@ -111,7 +111,7 @@ impl Render {
                 Path::Fixed => (first, time),
                 Path::Frozen => (camera, self.time),
             };
-            Frame::without_picture(format!("{k:04}"), camera, time)
+            Frame::without_image(format!("{k:04}"), camera, time)
         };
         Ok(path.into_iter().enumerate().map(frame).collect())
     }

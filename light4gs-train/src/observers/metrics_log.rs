@@ -9,7 +9,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use light4gs_data::DataError;
-use light4gs_data::atomic::write_atomically;
+use light4gs_data::write_atomically;
 use serde::{Deserialize, Serialize};
 
 use crate::trainer::Stage;

@@ -18,7 +18,7 @@ use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-use light4gs_data::atomic::write_atomically;
+use light4gs_data::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
 
 use crate::compression::{BitMap, CodingRecord};
@@ -129,7 +129,7 @@ pub struct ViewPictures {
 /// Writes the report. The file is complete or absent; one that exists is replaced.
 ///
 /// # Errors
-/// [`DataError::Picture`] if a render and its ground truth differ in size; [`DataError::Io`] naming `path`.
+/// [`DataError::Image`] if a render and its ground truth differ in size; [`DataError::Io`] naming `path`.
 pub fn write_report(path: &Path, report: &Report) -> Result<(), DataError> {
     let page = page(path, report)?;
     write_atomically(path, |out| out.write_all(page.as_bytes()))

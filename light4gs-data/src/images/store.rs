@@ -1,9 +1,10 @@
-//! Pictures in memory: decoded when needed, composited, resized, kept within a bound.
+//! Images in memory: decoded when needed, composited, resized, kept within a bound.
 
-use crate::composite::composite_resized;
+use super::composite::composite_resized;
+use super::rgb::RgbImage8;
 use crate::error::DataError;
-use crate::frame::{Frame, RgbImage8};
-use crate::scene::LoadOptions;
+use crate::frame::Frame;
+use crate::options::LoadOptions;
 use image::ImageReader;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap, HashSet};
@@ -11,17 +12,17 @@ use std::fmt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Decoding a single picture may take at most this much memory.
+/// Decoding a single image may take at most this much memory.
 const MAX_DECODED_BYTES: u64 = 1 << 30;
 
-/// A picture file at a size.
+/// An image file at a size.
 type Key = (PathBuf, u32, u32);
 
-/// A thread-safe store of the pictures of frames: `[H, W, 3]` bytes, on the background, at the size
+/// A thread-safe store of the images of frames: `[H, W, 3]` bytes, on the background, at the size
 /// of the frame's camera.
 ///
-/// Pictures are decoded on demand and the least recently used are dropped when the bound is
-/// reached. Clones share one store. A picture is decoded once even if several threads ask for it.
+/// Images are decoded on demand and the least recently used are dropped when the bound is
+/// reached. Clones share one store. An image is decoded once even if several threads ask for it.
 #[derive(Clone)]
 pub struct ImageStore {
     inner: Arc<Inner>,
@@ -36,13 +37,13 @@ struct Inner {
 
 #[derive(Default)]
 struct State {
-    /// The picture and when it was last asked for.
+    /// The image and when it was last asked for.
     kept: HashMap<Key, (Arc<RgbImage8>, u64)>,
     /// When, to which: the first is the least recently used.
     by_age: BTreeMap<u64, Key>,
     bytes: usize,
     clock: u64,
-    /// Pictures that some thread is decoding right now.
+    /// Images that some thread is decoding right now.
     decoding: HashSet<Key>,
 }
 
@@ -51,14 +52,14 @@ impl fmt::Debug for ImageStore {
         f.debug_struct("ImageStore")
             .field("limit", &self.inner.limit)
             .field("bytes", &self.bytes())
-            .field("pictures", &self.len())
+            .field("images", &self.len())
             .finish()
     }
 }
 
 impl ImageStore {
     /// An empty store that composites on the background of `options` and keeps at most
-    /// `memory_limit_bytes` of pictures. (Pictures that callers still hold are not counted.)
+    /// `memory_limit_bytes` of images. (Images that callers still hold are not counted.)
     pub fn new(options: &LoadOptions, memory_limit_bytes: usize) -> Self {
         Self {
             inner: Arc::new(Inner {
@@ -70,10 +71,10 @@ impl ImageStore {
         }
     }
 
-    /// The picture of a frame, decoded now if it is not kept.
+    /// The image of a frame, decoded now if it is not kept.
     ///
     /// # Errors
-    /// [`DataError::Picture`] when the frame has no picture, or it is missing, damaged, or of
+    /// [`DataError::Image`] when the frame has no image, or it is missing, damaged, or of
     /// another size than its split's first one.
     pub fn get(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
         let key = key(frame);
@@ -93,7 +94,7 @@ impl ImageStore {
         self.inner.decode_claimed(frame, key)
     }
 
-    /// The pictures of several frames, in their order, decoded in parallel.
+    /// The images of several frames, in their order, decoded in parallel.
     ///
     /// # Errors
     /// As [`Self::get`], for the first frame that has one.
@@ -101,7 +102,7 @@ impl ImageStore {
         frames.par_iter().map(|frame| self.get(frame)).collect()
     }
 
-    /// Starts to decode pictures in the background, in order, as many as fit in the bound together;
+    /// Starts to decode images in the background, in order, as many as fit in the bound together;
     /// returns at once. What fails here is reported by the [`Self::get`] of that frame.
     pub fn prefetch(&self, frames: &[Frame]) {
         let mut bytes = 0usize;
@@ -122,23 +123,23 @@ impl ImageStore {
                     return;
                 }
                 drop(state);
-                // Said by `get`, to the caller who wants the picture.
+                // Said by `get`, to the caller who wants the image.
                 let _ = inner.decode_claimed(&frame, key);
             });
         }
     }
 
-    /// Bytes of the pictures kept now.
+    /// Bytes of the images kept now.
     pub fn bytes(&self) -> usize {
         self.inner.lock().bytes
     }
 
-    /// Number of pictures kept now.
+    /// Number of images kept now.
     pub fn len(&self) -> usize {
         self.inner.lock().kept.len()
     }
 
-    /// Whether no picture is kept now.
+    /// Whether no image is kept now.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -148,7 +149,7 @@ fn key(frame: &Frame) -> Key {
     (frame.path.clone(), frame.camera.width, frame.camera.height)
 }
 
-/// Bytes of a frame's picture in the store.
+/// Bytes of a frame's image in the store.
 fn bytes_of(frame: &Frame) -> usize {
     (frame.camera.width as usize).saturating_mul(frame.camera.height as usize).saturating_mul(3)
 }
@@ -158,7 +159,7 @@ impl Inner {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Decodes a picture that this thread has marked in `decoding`, and keeps it if it fits.
+    /// Decodes an image that this thread has marked in `decoding`, and keeps it if it fits.
     fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Arc<RgbImage8>, DataError> {
         /// Takes the mark back, also if a decoder panics: others would wait for ever.
         struct Claim<'a>(&'a Inner, Key);
@@ -206,34 +207,34 @@ impl State {
     }
 }
 
-/// Opens a picture file far enough to know its format.
+/// Opens an image file far enough to know its format.
 fn open(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>, DataError> {
     ImageReader::open(path)
         .and_then(ImageReader::with_guessed_format)
-        .map_err(|e| DataError::picture(path, format!("cannot be read: {e}"), "restore the file or remove its frame"))
+        .map_err(|e| DataError::image(path, format!("cannot be read: {e}"), "restore the file or remove its frame"))
 }
 
-/// Size (width, height) of a picture, from its header alone.
+/// Size (width, height) of an image, from its header alone.
 ///
 /// # Errors
-/// [`DataError::Picture`] when the file is missing or its header is damaged.
-pub fn picture_size(path: &Path) -> Result<(u32, u32), DataError> {
+/// [`DataError::Image`] when the file is missing or its header is damaged.
+pub fn image_size(path: &Path) -> Result<(u32, u32), DataError> {
     open(path)?.into_dimensions().map_err(|e| {
-        DataError::picture(
+        DataError::image(
             path,
-            format!("its header cannot be read ({e}), expected a PNG or JPEG picture"),
+            format!("its header cannot be read ({e}), expected a PNG or JPEG image"),
             "restore the file or remove its frame",
         )
     })
 }
 
-/// Decodes, composites and resizes the picture of a frame.
+/// Decodes, composites and resizes the image of a frame.
 fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, DataError> {
     let path = &frame.path;
-    if !frame.has_picture() {
-        return Err(DataError::picture(
+    if !frame.has_image() {
+        return Err(DataError::image(
             Path::new(&frame.name),
-            "this frame has no picture, it belongs to a camera path",
+            "this frame has no image, it belongs to a camera path",
             "use a frame of the train, test or val split",
         ));
     }
@@ -242,7 +243,7 @@ fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, DataError> {
     limits.max_alloc = Some(MAX_DECODED_BYTES);
     reader.limits(limits);
     let image = reader.decode().map_err(|e| {
-        DataError::picture(
+        DataError::image(
             path,
             format!("cannot be decoded ({e}): it is truncated or damaged"),
             "restore the file or remove its frame",
@@ -251,13 +252,13 @@ fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, DataError> {
     let found = (image.width(), image.height());
     let expected = (frame.source_width, frame.source_height);
     if found != expected {
-        return Err(DataError::picture(
+        return Err(DataError::image(
             path,
             format!(
-                "it is {} x {} pixels, expected {} x {} as the first picture of its split",
+                "it is {} x {} pixels, expected {} x {} as the first image of its split",
                 found.0, found.1, expected.0, expected.1
             ),
-            "make all pictures of a split the same size",
+            "make all images of a split the same size",
         ));
     }
     let rgba = image.into_rgba8();
@@ -271,7 +272,7 @@ mod tests {
     use crate::camera::Camera;
     use glam::Vec3;
 
-    /// `count` grey 8×8 pictures; picture `i` has value `i`.
+    /// `count` grey 8×8 images; image `i` has value `i`.
     fn frames(folder: &Path, count: u8) -> Vec<Frame> {
         (0..count)
             .map(|i| {
@@ -347,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_pictures_are_errors_and_do_not_block_later_ones() {
+    fn bad_images_are_errors_and_do_not_block_later_ones() {
         let folder = tempfile::tempdir().unwrap();
         let mut frames = frames(folder.path(), 4);
         let store = ImageStore::new(&LoadOptions::default(), 1 << 20);
@@ -361,12 +362,12 @@ mod tests {
         assert!(message(1).contains("8 x 8 pixels, expected 9 x 8"), "{}", message(1));
         assert!(message(2).contains("2.png"), "{}", message(2));
         assert_eq!(store.get(&frames[3]).unwrap().pixels[0], 3);
-        let video = Frame::without_picture("v_000", frames[3].camera, 0.0);
-        assert!(store.get(&video).unwrap_err().to_string().contains("no picture"));
+        let video = Frame::without_image("v_000", frames[3].camera, 0.0);
+        assert!(store.get(&video).unwrap_err().to_string().contains("no image"));
     }
 
     #[test]
-    fn pictures_come_at_the_size_of_the_camera() {
+    fn images_come_at_the_size_of_the_camera() {
         let folder = tempfile::tempdir().unwrap();
         let mut frames = frames(folder.path(), 3);
         frames[2].camera = frames[2].camera.resized(4, 2);

@@ -1,7 +1,7 @@
 //! From the RGBA bytes of a file to the `[H, W, 3]` bytes that are trained on.
 
+use super::rgb::RgbImage8;
 use crate::error::DataError;
-use crate::frame::RgbImage8;
 use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::Image};
 
 /// Colour over background as floats in `[0, 1]`.
@@ -20,7 +20,7 @@ pub fn composite(rgba: &[u8], background: [f32; 3]) -> Vec<u8> {
     rgba.chunks_exact(4).flat_map(|p| [0, 1, 2].map(|c| (over(p[c], p[3], background[c]) * 255.0) as u8)).collect()
 }
 
-/// Composites a picture of `source` = (width, height) pixels on a background and brings it to
+/// Composites an image of `source` = (width, height) pixels on a background and brings it to
 /// `target` = (width, height): unchanged size as [`composite`]; otherwise composited in floats,
 /// filtered, and rounded.
 ///
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn flat_pictures_stay_flat_at_any_size() {
+    fn flat_images_stay_flat_at_any_size() {
         let rgba = [77, 130, 201, 255].repeat(35 * 23);
         for target in [(7, 9), (50, 40), (35, 1)] {
             let image = composite_resized(&rgba, (35, 23), target, [1.0; 3]).unwrap();

@@ -3,8 +3,9 @@
 //! `x y z nx ny nz f_dc_0..2 f_rest_0..44 opacity scale_0..2 rot_0..3`, where `f_rest` runs over the
 //! channels outside and the coefficients inside: coefficient `k` of channel `c` is `f_rest_{c*15+k}`.
 
+use super::property::{Encoding, Property, Scalar};
+use super::table::{self, VertexTable};
 use crate::error::DataError;
-use crate::ply::{self, Encoding, Property, Scalar};
 use std::path::Path;
 
 /// Coefficients a channel above degree 0, for SH degree 3.
@@ -44,7 +45,7 @@ impl GaussianPly {
     /// [`DataError::Io`] when it cannot be read; [`DataError::Ply`] when it is damaged, a property is
     /// missing, a value is not finite, or the number of `f_rest_*` is not 0, 9, 24 or 45.
     pub fn read(path: &Path) -> Result<Self, DataError> {
-        let table = ply::read(path)?;
+        let table = table::read(path)?;
         let rest = table.properties().iter().filter(|p| p.name.starts_with("f_rest_")).count();
         if ![0, 9, 24, 45].contains(&rest) {
             return Err(DataError::ply(
@@ -88,7 +89,7 @@ impl GaussianPly {
             ));
         }
         let properties: Vec<Property> = names().into_iter().map(|name| Property::new(name, Scalar::F32)).collect();
-        ply::write(path, Encoding::BinaryLittleEndian, &properties, self.len(), |i, row| {
+        table::write(path, Encoding::BinaryLittleEndian, &properties, self.len(), |i, row| {
             row.extend(self.means[i]);
             row.extend([0.0; 3]);
             row.extend(self.sh_dc[i]);
@@ -129,7 +130,7 @@ fn names() -> Vec<String> {
 }
 
 /// Several columns as one array a vertex.
-fn columns<const C: usize>(table: &ply::VertexTable, names: [&str; C]) -> Result<Vec<[f32; C]>, DataError> {
+fn columns<const C: usize>(table: &VertexTable, names: [&str; C]) -> Result<Vec<[f32; C]>, DataError> {
     let mut rows = vec![[0.0; C]; table.rows()];
     for (c, name) in names.into_iter().enumerate() {
         for (row, value) in rows.iter_mut().zip(table.column(name)?) {
@@ -140,7 +141,7 @@ fn columns<const C: usize>(table: &ply::VertexTable, names: [&str; C]) -> Result
 }
 
 /// `f_rest_{channel * per_channel + k}` as `[N, 15, 3]`.
-fn rest_columns(table: &ply::VertexTable, per_channel: usize) -> Result<Vec<[[f32; 3]; REST]>, DataError> {
+fn rest_columns(table: &VertexTable, per_channel: usize) -> Result<Vec<[[f32; 3]; REST]>, DataError> {
     let mut rows = vec![[[0.0; 3]; REST]; table.rows()];
     for channel in 0..3 {
         for k in 0..per_channel {
@@ -188,7 +189,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("g.ply");
         example(1).write(&path).unwrap();
-        let table = ply::read(&path).unwrap();
+        let table = table::read(&path).unwrap();
         assert_eq!(table.properties().len(), 62);
         // Coefficient 2 of blue: channel-major.
         assert_eq!(table.column("f_rest_32").unwrap(), [example(1).sh_rest[0][2][2]]);
@@ -205,7 +206,7 @@ mod tests {
                 .filter(|name| name.strip_prefix("f_rest_").is_none_or(|n| n.parse::<usize>().unwrap() < rest))
                 .map(|name| Property::new(name, Scalar::F32))
                 .collect();
-            ply::write(&path, Encoding::Ascii, &properties, 1, |_, row| {
+            table::write(&path, Encoding::Ascii, &properties, 1, |_, row| {
                 row.extend((0..properties.len()).map(|k| k as f32));
             })
             .unwrap();

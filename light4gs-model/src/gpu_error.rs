@@ -1,11 +1,11 @@
 //! What can go wrong on a GPU.
 
-use std::sync::Mutex;
+use std::any::Any;
 
 /// An error of a GPU operation.
 ///
-/// Burn's operations return tensors and no results, so these errors travel as panics; [`GpuError::take`] gets one back
-/// after [`std::panic::catch_unwind`].
+/// Burn's operations return tensors and no results, so these errors travel as panics with a `GpuError` as their payload.
+/// [`GpuError::catch`] gives them back as results.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {
     /// A kernel did not compile or could not be launched.
@@ -63,23 +63,50 @@ pub enum GpuError {
     Runtime(String),
 }
 
-static LAST: Mutex<Option<GpuError>> = Mutex::new(None);
-
 impl GpuError {
-    /// Panics with the error, and keeps it for [`GpuError::take`].
+    /// Panics with the error as the payload. A program that prints the error itself keeps its panic hook quiet, see [`GpuError::catch`].
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu back end raises"))]
     pub(crate) fn raise(self) -> ! {
-        let message = self.to_string();
-        *LAST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()) = Some(self);
-        panic!("{message}");
+        std::panic::panic_any(self)
     }
 
-    /// Whether a GPU operation has panicked with an error that nobody has taken yet.
-    pub fn is_raised() -> bool {
-        LAST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).is_some()
+    /// The error that a panic carries; any other payload comes back as it was.
+    ///
+    /// # Errors
+    /// The payload, if the panic was of another kind.
+    pub fn from_panic(payload: Box<dyn Any + Send>) -> Result<Self, Box<dyn Any + Send>> {
+        payload.downcast::<Self>().map(|error| *error)
     }
 
-    /// The error that a GPU operation last panicked with, once.
-    pub fn take() -> Option<Self> {
-        LAST.lock().unwrap_or_else(|poisoned| poisoned.into_inner()).take()
+    /// Runs operations and gives back the error that one of them panicked with. Other panics go on.
+    ///
+    /// The panic hook is called all the same, and cannot read the payload: a program that prints these errors itself
+    /// should install a hook that keeps quiet where `payload().is::<GpuError>()`.
+    ///
+    /// ```
+    /// use light4gs_model::GpuError;
+    ///
+    /// assert_eq!(GpuError::catch(|| 2 + 2), Ok(4));
+    /// ```
+    ///
+    /// # Errors
+    /// What the GPU could not do.
+    pub fn catch<T>(run: impl FnOnce() -> T) -> Result<T, Self> {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
+            .map_err(|payload| Self::from_panic(payload).unwrap_or_else(|other| std::panic::resume_unwind(other)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_raised_error_is_caught_and_other_panics_go_on() {
+        let error = GpuError::Runtime("cuda".into());
+        let raised = error.clone();
+        assert_eq!(GpuError::catch(|| raised.raise()), Err(error));
+        let other = std::panic::catch_unwind(|| GpuError::catch(|| panic!("another")));
+        assert_eq!(other.unwrap_err().downcast_ref::<&str>(), Some(&"another"));
     }
 }

@@ -6,25 +6,67 @@
 //! may be absent. A `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise
 //! they are random.
 
+use super::json;
+use super::layout::DatasetLayout;
 use crate::camera::{Camera, PoseError};
 use crate::error::DataError;
 use crate::frame::Frame;
-use crate::json;
-use crate::loader::picture_size;
+use crate::images::image_size;
+use crate::options::LoadOptions;
 use crate::orbit::orbit_path;
-use crate::point_cloud::PointCloud;
-use crate::scene::{Format, LoadOptions, Scene, folder_name, mean_and_extent};
+use crate::points::PointCloud;
+use crate::scene::{Scene, SplitFrames};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
 /// Frames, distance to the origin (world units) and elevation (degrees) of the video path.
-pub const VIDEO_PATH: (usize, f32, f32) = (160, 4.0, 30.0);
+const VIDEO_PATH: (usize, f32, f32) = (160, 4.0, 30.0);
+
+/// The layout `dnerf`: Blender transforms with a time for each frame, one file a split.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DNerf;
+
+impl DatasetLayout for DNerf {
+    fn name(&self) -> &'static str {
+        "dnerf"
+    }
+
+    fn signature(&self) -> &'static str {
+        "transforms_train.json"
+    }
+
+    fn detect(&self, root: &Path) -> bool {
+        root.join(self.signature()).is_file()
+    }
+
+    fn open(&self, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
+        let file = |split: &str| root.join(format!("transforms_{split}.json"));
+        let train = read_split(root, file("train"))?;
+        let test = read_split(root, file("test"))?;
+        let val = if file("val").is_file() { Some(read_split(root, file("val"))?) } else { None };
+        let timed = train.frames.iter().chain(&test.frames);
+        let last = timed.fold(0.0f64, |last, frame| last.max(frame.time));
+        let train = frames(&train, last, options)?;
+        let test = frames(&test, last, options)?;
+        let val = val.map_or(Ok(Vec::new()), |val| frames(&val, last, options))?;
+        let video = video_path(&train[0].camera);
+        let splits = SplitFrames { train, test, val, video };
+        Scene::new(self.name(), root, splits, points(root, options)?, options.background)
+    }
+}
+
+/// A camera that circles the scene once while time runs from 0 to 1.
+fn video_path(intrinsics: &Camera) -> Vec<Frame> {
+    let (count, radius, elevation) = VIDEO_PATH;
+    let cameras = orbit_path(count, radius, elevation, intrinsics).into_iter().enumerate();
+    cameras.map(|(i, (camera, time))| Frame::without_image(format!("v_{i:03}"), camera, time)).collect()
+}
 
 /// One entry of `frames`, with the time as in the file.
 struct RawFrame {
     pose: [[f32; 4]; 4],
     time: f64,
-    picture: PathBuf,
+    image: PathBuf,
 }
 
 /// One transforms file.
@@ -32,41 +74,6 @@ struct RawSplit {
     path: PathBuf,
     fov_x: f32,
     frames: Vec<RawFrame>,
-}
-
-/// Reads a D-NeRF folder; [`Scene::open`] calls this.
-///
-/// # Errors
-/// [`DataError`] naming the file, the field, what was expected and the remedy.
-pub fn read(root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
-    let file = |split: &str| root.join(format!("transforms_{split}.json"));
-    let train = read_split(root, file("train"))?;
-    let test = read_split(root, file("test"))?;
-    let val = if file("val").is_file() { Some(read_split(root, file("val"))?) } else { None };
-    let last = [&train, &test].iter().flat_map(|split| &split.frames).fold(0.0f64, |last, frame| last.max(frame.time));
-    let train = frames(&train, last, options)?;
-    let test = frames(&test, last, options)?;
-    let val = val.map_or(Ok(Vec::new()), |val| frames(&val, last, options))?;
-    let (camera_mean, extent) = mean_and_extent(&train);
-    let (count, radius, elevation) = VIDEO_PATH;
-    let video = orbit_path(count, radius, elevation, &train[0].camera)
-        .into_iter()
-        .enumerate()
-        .map(|(i, (camera, time))| Frame::without_picture(format!("v_{i:03}"), camera, time))
-        .collect();
-    Ok(Scene {
-        name: folder_name(root),
-        root: root.to_path_buf(),
-        format: Format::DNerf,
-        train,
-        test,
-        val,
-        video,
-        background: options.background,
-        points: points(root, options)?,
-        camera_mean,
-        extent,
-    })
 }
 
 /// The point cloud of the folder, or a random one.
@@ -122,7 +129,7 @@ fn read_frame(root: &Path, path: &Path, i: usize, entry: &Value) -> Result<RawFr
     Ok(RawFrame {
         pose: read_pose(path, i, entry.get("transform_matrix"))?,
         time,
-        picture: find_picture(root, path, i, entry.get("file_path"))?,
+        image: find_image(root, path, i, entry.get("file_path"))?,
     })
 }
 
@@ -149,14 +156,14 @@ fn read_pose(path: &Path, i: usize, value: Option<&Value>) -> Result<[[f32; 4]; 
     Ok(pose)
 }
 
-/// The picture of a frame: `file_path` itself, or with an extension added.
-fn find_picture(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Result<PathBuf, DataError> {
+/// The image of a frame: `file_path` itself, or with an extension added.
+fn find_image(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Result<PathBuf, DataError> {
     let name = value.and_then(Value::as_str).filter(|name| !name.is_empty()).ok_or_else(|| {
         let found = json::describe(value);
         DataError::field(
             path,
             format!("frames[{i}].file_path"),
-            format!("{found}, expected the picture's path, relative to the folder"),
+            format!("{found}, expected the image's path, relative to the folder"),
             "add the field to the frame",
         )
     })?;
@@ -176,10 +183,10 @@ fn find_picture(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Re
         .find(|candidate| candidate.is_file())
         .ok_or_else(|| {
             let tried = if has_extension { base.clone() } else { with_extension("png") };
-            DataError::picture(
+            DataError::image(
                 &tried,
                 format!("missing, but {} names it in frames[{i}].file_path", path.display()),
-                "copy the picture there or remove the frame",
+                "copy the image there or remove the frame",
             )
         })
 }
@@ -189,19 +196,19 @@ fn frames(split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Fram
     let Some(first) = split.frames.first() else {
         return Ok(Vec::new());
     };
-    // One header speaks for the split; the loader checks each picture against it.
-    let source = picture_size(&first.picture)?;
+    // One header speaks for the split; the loader checks each image against it.
+    let source = image_size(&first.image)?;
     let (width, height) = options.resolution.apply(source);
     let to_frame = |(i, raw): (usize, &RawFrame)| {
         let camera = Camera::from_camera_to_world_opengl(&raw.pose, split.fov_x, source.0, source.1)
             .map_err(|error| pose_error(&split.path, i, error))?;
         let time = if last > 0.0 { (raw.time / last).min(1.0) } else { 0.0 };
-        let name = raw.picture.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
+        let name = raw.image.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
         Ok(Frame {
             name,
             camera: camera.resized(width, height),
             time: time as f32,
-            path: raw.picture.clone(),
+            path: raw.image.clone(),
             source_width: source.0,
             source_height: source.1,
         })

@@ -1,7 +1,7 @@
 //! Coloured points: where the Gaussians start.
 
+use super::neighbors::mean_squared_distance_to_3_nearest;
 use crate::error::DataError;
-use crate::neighbors::mean_squared_distance_to_3_nearest;
 use crate::ply::{self, Encoding, Property, Scalar};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
