@@ -8,8 +8,8 @@ use std::{
 
 use crate::{
     CodecError, Limits, SceneData, StreamInfo,
-    container::{PRELUDE, Prelude},
     decode, encode, info,
+    stream::container::{PRELUDE, Prelude},
 };
 
 /// Writes a scene to a file, which is replaced if it exists. Returns the bytes on disk.
