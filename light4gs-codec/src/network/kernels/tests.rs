@@ -1,7 +1,7 @@
 //! Every operation against its definition in float64.
 
 use super::*;
-use crate::{ConvolutionLayer, ConvolutionShape, context_model::CONTEXT_PREDICTION};
+use crate::network::{Layer, LayerKind};
 
 struct Random(u64);
 
@@ -15,10 +15,11 @@ impl Random {
         (0..count).map(|_| self.next()).collect()
     }
 
-    fn layer(&mut self, inputs: u32, outputs: u32, kernel: u32, groups: u32, transposed: bool) -> ConvolutionLayer {
-        let shape = ConvolutionShape { name: CONTEXT_PREDICTION, outputs, inputs, kernel, groups, transposed };
-        let weight = self.numbers(shape.weights() as usize);
-        ConvolutionLayer { shape, weight, bias: self.numbers(outputs as usize) }
+    fn layer(&mut self, kind: LayerKind, inputs: u32, outputs: u32, kernel: u32, groups: u32) -> Layer {
+        let mut layer = Layer { kind, inputs, outputs, kernel, groups, weight: Vec::new(), bias: Vec::new() };
+        layer.weight = self.numbers(layer.weights() as usize);
+        layer.bias = self.numbers(outputs as usize);
+        layer
     }
 }
 
@@ -40,13 +41,13 @@ impl Plain {
     }
 
     fn padded(&self, border: usize) -> PaddedMap {
-        PaddedMap::centred(&self.values, self.size, 0.0, border)
+        PaddedMap::centered(&self.values, self.size, 0.0, border)
     }
 }
 
 /// The definition of a convolution of stride 1.
-fn convolved(layer: &ConvolutionLayer, map: &Plain, output: usize, y: usize, x: usize) -> f64 {
-    let ConvolutionShape { inputs, outputs, kernel, groups, .. } = layer.shape;
+fn convolved(layer: &Layer, map: &Plain, output: usize, y: usize, x: usize) -> f64 {
+    let Layer { inputs, outputs, kernel, groups, .. } = *layer;
     let [inputs, outputs, kernel, groups] = [inputs, outputs, kernel, groups].map(|size| size as usize);
     let (inputs, group) = (inputs / groups, output / (outputs / groups));
     let mut sum = f64::from(layer.bias[output]);
@@ -70,10 +71,10 @@ fn near(found: f32, expected: f64) {
 fn convolutions() {
     let mut random = Random(1);
     for (inputs, outputs, kernel, groups) in [(3, 5, 3, 1), (4, 8, 5, 4), (4, 6, 1, 2), (6, 9, 3, 3), (2, 4, 7, 1)] {
-        let layer = random.layer(inputs, outputs, kernel, groups, false);
+        let layer = random.layer(LayerKind::Convolution, inputs, outputs, kernel, groups);
         let map = Plain::random(&mut random, inputs as usize, [5, 11]);
         let convolution = Convolution::new(&layer);
-        let padded = map.padded(convolution.border());
+        let padded = map.padded(kernel as usize / 2);
         let mut sums = vec![[0.0; LANES]; outputs as usize];
         for y in 0..5 {
             for columns in [Columns { first: 0, step: 1 }, Columns { first: 3, step: 1 }, Columns { first: 1, step: 2 }]
@@ -93,14 +94,15 @@ fn convolutions() {
 fn masked_convolutions_see_the_anchors() {
     let mut random = Random(2);
     let size = [6, 20];
-    for groups in [1, 2, 4] {
-        let mut layer = random.layer(4, 8, 5, groups, false);
+    for (kernel, groups) in [(5, 1), (5, 2), (5, 4), (3, 1), (7, 2)] {
+        let mut layer = random.layer(LayerKind::Checkerboard, 4, 8, kernel, groups);
+        let area = (kernel * kernel) as usize;
         let mut map = Plain::random(&mut random, 4, size);
         let anchors = AnchorMap::new(&map.values, size, 0.0);
         let masked = MaskedConvolution::new(&layer);
         let odd = |at: usize, width: usize| (at / width + at % width) % 2 == 1;
         for (at, weight) in layer.weight.iter_mut().enumerate() {
-            *weight = if odd(at % 25, 5) { *weight } else { 0.0 };
+            *weight = if odd(at % area, kernel as usize) { *weight } else { 0.0 };
         }
         for (at, value) in map.values.iter_mut().enumerate() {
             *value = if odd(at, size[1]) { *value } else { 0.0 };
@@ -122,9 +124,9 @@ fn masked_convolutions_see_the_anchors() {
 #[test]
 fn transposed_convolutions() {
     let mut random = Random(3);
-    let layer = random.layer(3, 5, 5, 1, true);
+    let layer = random.layer(LayerKind::Doubling, 3, 5, 5, 1);
     let map = Plain::random(&mut random, 3, [2, 9]);
-    let doubled = transposed::TransposedConvolution::new(&layer).apply(&map.padded(1), 2, |_| ());
+    let doubled = TransposedConvolution::new(&layer).apply(&map.padded(1), 2, |_| ());
     for output in 0..5 {
         let mut expected = vec![f64::from(layer.bias[output]); 4 * 18];
         for input in 0..3 {
@@ -154,7 +156,7 @@ fn transposed_convolutions() {
 fn up_sampling_aligns_corners() {
     let mut random = Random(4);
     let map = Plain::random(&mut random, 2, [3, 4]);
-    let up = upsample(&map.values, [3, 4], [7, 8], 0.25, 1);
+    let up = resized(&map.padded(0), [7, 8], 1);
     for channel in 0..2 {
         for y in 0..7 {
             for x in 0..8 {
@@ -162,51 +164,25 @@ fn up_sampling_aligns_corners() {
                 let (iy, ix) = (sy.floor(), sx.floor());
                 let at = |dy: isize, dx: isize| map.at(channel, iy as isize + dy, ix as isize + dx);
                 let across = |dy| at(dy, 0) * (1.0 - (sx - ix)) + at(dy, 1) * (sx - ix);
-                near(up.row(channel, y)[x], across(0) * (1.0 - (sy - iy)) + across(1) * (sy - iy) - 0.25);
+                near(up.row(channel, y)[x], across(0) * (1.0 - (sy - iy)) + across(1) * (sy - iy));
             }
         }
     }
     // One sample, and the same size.
-    assert_eq!(upsample(&[3.0], [1, 1], [1, 4], 0.0, 0).row(0, 0), [3.0; 4]);
-    assert_eq!(upsample(&map.values, [3, 4], [3, 4], 0.0, 0).row(1, 2), &map.values[20..]);
+    let one = PaddedMap::centered(&[3.0], [1, 1], 0.0, 0);
+    assert_eq!(resized(&one, [1, 4], 0).row(0, 0), [3.0; 4]);
+    assert_eq!(resized(&map.padded(0), [3, 4], 0).row(1, 2), &map.values[20..]);
 }
 
 #[test]
-fn time_means_are_spread() {
-    // Two channels, three times; four places along the first axis, two along the second.
-    let first: Vec<f32> = (0..24).map(|i| i as f32).collect();
-    let second: Vec<f32> = (0..12).map(|i| 100.0 + i as f32).collect();
-    let first = time_means(&first, [3, 4], 1.0);
-    let second = time_means(&second, [3, 2], 1.0);
-    assert_eq!(first, [3.0, 4.0, 5.0, 6.0, 15.0, 16.0, 17.0, 18.0]);
-    let map = spread_time_means(&first, &second, [2, 4], 1);
-    assert_eq!((map.channels, map.row(1, 0), map.row(1, 1)), (4, &first[4..], &first[4..]));
-    assert_eq!((map.row(2, 0), map.row(2, 1)), (&[101.0; 4][..], &[102.0 + 1.0 - 1.0; 4][..]));
-}
-
-#[test]
-fn a_context_of_zeros_may_be_left_out() {
-    let mut random = Random(5);
-    let layers = [random.layer(8, 7, 1, 1, false), random.layer(7, 5, 1, 1, false), random.layer(5, 4, 1, 1, false)];
-    let network = EntropyParameters::new(layers.each_ref());
-    let mut inputs = vec![[0.0; LANES]; 8];
-    inputs[..4].iter_mut().flatten().for_each(|value| *value = random.next());
-    let mut with = vec![[0.0; LANES]; 4];
-    let mut without = with.clone();
-    network.apply(&inputs, &mut Default::default(), &mut with);
-    network.apply(&inputs[..4], &mut Default::default(), &mut without);
-    assert_eq!(with, without);
-
-    let sum = |layer: &ConvolutionLayer, inputs: &[f64], output: usize| {
-        let row = layer.weight[output * inputs.len()..].iter().zip(inputs);
-        row.fold(f64::from(layer.bias[output]), |sum, (&weight, input)| sum + f64::from(weight) * input)
-    };
-    let mut values: Vec<f64> = inputs.iter().map(|lanes| f64::from(lanes[3])).collect();
-    for (index, layer) in layers.iter().enumerate() {
-        values = (0..layer.shape.outputs as usize).map(|output| sum(layer, &values, output)).collect();
-        if index < 2 {
-            values.iter_mut().for_each(|value| *value = if *value < 0.0 { 0.01 * *value } else { *value });
-        }
-    }
-    with.iter().zip(values).for_each(|(lanes, expected)| near(lanes[3], expected));
+fn means_and_transposition() {
+    // Two channels, three rows, four columns.
+    let values: Vec<f32> = (0..24).map(|i| i as f32).collect();
+    let map = PaddedMap::centered(&values, [3, 4], 0.0, 1);
+    let down = mean_over_height(&map, 1);
+    assert_eq!((down.height, down.row(0, 0), down.row(1, 0)), (1, &[4.0, 5.0, 6.0, 7.0][..], &[16.0, 17.0, 18.0, 19.0][..]));
+    let across = mean_over_width(&map, 0);
+    assert_eq!((across.width, across.row(0, 1), across.row(1, 2)), (1, &[5.5][..], &[21.5][..]));
+    let other = transposed(&map, 2);
+    assert_eq!((other.height, other.width, other.row(1, 3)), (4, 3, &[15.0, 19.0, 23.0][..]));
 }
