@@ -64,6 +64,12 @@ fn open_adapter(name: DeviceName, adapter: Adapter) -> Result<Device, TrainError
     Ok(device)
 }
 
+/// Whether a device's work is done by the processor's own threads, as the caller's is.
+pub fn computes_on_processor(device: &Device) -> bool {
+    let device = device.clone().inner();
+    device == Device::ndarray() || device == Device::flex()
+}
+
 /// The name that a wgpu device's adapter has for itself; none for the processor's back ends.
 pub fn adapter_name(name: DeviceName, device: &Device) -> Option<String> {
     let wgpu = matches!(name, DeviceName::Wgpu(_));

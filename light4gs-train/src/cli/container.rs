@@ -5,22 +5,23 @@ use std::path::PathBuf;
 
 use clap::Args;
 use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically};
-use light4gs_data::{DataError, ImageStore, Scene};
+use light4gs_data::{DataError, Scene};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
 use super::check_output;
 use super::output::{say, say_json};
+use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
-use crate::compression::{TrainedScene, plane_name, write_scene};
+use crate::compression::{TrainedScene, code_scene, plane_name};
 use crate::config::{Config, DeviceName};
 use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
-use crate::trainer::checkpoint::Checkpoint;
-use crate::trainer::load_options;
-use crate::trainer::run_folder::RunFolder;
+use crate::run::Checkpoint;
+use crate::dataset::{image_store, load_options};
+use crate::run::RunFolder;
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {
@@ -63,7 +64,7 @@ impl Encode {
         }
         let (old, new) = (&config.compression, &changed.compression);
         let same_models = old.context == new.context && old.steps == new.steps && old.sh == new.sh;
-        let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
+        let images = image_store(&config);
         let trained = TrainedScene {
             scene: &checkpoint.scene,
             compression: checkpoint.compression.as_ref().filter(|_| same_models),
@@ -72,9 +73,14 @@ impl Encode {
             images: &images,
             device: &device,
         };
-        let written = write_scene(&trained, &self.out, self.json)?;
+        let mut bar = FitBar::new(self.json);
+        let coded = code_scene(&trained, &mut |done, iterations| {
+            bar.show(done, iterations);
+            Ok(())
+        })?;
+        write_file(&self.out, &coded.bytes)?;
         print_info(&read_info(&self.out)?, self.json)?;
-        if let Some((record, _)) = written.coding.filter(|_| !self.json) {
+        if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
             }

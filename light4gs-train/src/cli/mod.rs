@@ -5,6 +5,7 @@ mod bench;
 mod container;
 mod export;
 mod output;
+mod progress;
 mod quickstart;
 mod render;
 mod synth;

@@ -74,20 +74,21 @@ pub struct Pictures<'a> {
     pub error: f64,
 }
 
-/// Encodes a scene in one of the coded profiles, `compact` or `paper`. Everything that is coded is decoded again and
+/// Encodes a scene in a profile. Everything that is coded is decoded again and
 /// compared before this returns.
 pub fn encode(
     scene: &DynamicScene,
     compression: &Compression,
     meta: SceneMeta,
     config: &CompressionConfig,
+    profile: Profile,
     pictures: Option<Pictures>,
     device: &Device,
 ) -> Result<EncodedScene, TrainError> {
     let (scene, device) = (&scene.valid(), &device.clone().inner());
     let compression = &mut compression.valid();
     let data = scene.to_arrays(meta);
-    let mut input = compression_input(compression, scene, &data, config)?;
+    let mut input = compression_input(compression, scene, &data, config, profile)?;
     if let (Some(pictures), Profile::Compact) = (pictures, input.profile)
         && config.attributes.search_tolerance > 0.0
     {
@@ -101,8 +102,8 @@ pub fn encode(
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
-/// Rounds in which [`settled_planes`] looks for planes that stay as they are. The last round's are near enough if none do.
-const SETTLING_ROUNDS: usize = 8;
+/// Rounds in which [`freeze_planes`] looks for planes that stay as they are. The last round's are near enough if none do.
+const FREEZING_ROUNDS: usize = 8;
 
 /// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
 /// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn.
@@ -110,7 +111,7 @@ const SETTLING_ROUNDS: usize = 8;
 ///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
-pub fn settled_planes(
+pub fn freeze_planes(
     scene: &DynamicScene,
     compression: &Compression,
     config: &CompressionConfig,
@@ -119,9 +120,9 @@ pub fn settled_planes(
     let mut scene = scene.valid();
     let compression = &mut compression.valid();
     let mut data = scene.to_arrays(SceneMeta::default());
-    for _ in 0..SETTLING_ROUNDS {
-        let input = compression_input(compression, &scene, &data, config)?;
-        let decoded = encode_compressed(&data, &CompressionInput { profile: Profile::Compact, ..input })?.decoded;
+    for _ in 0..FREEZING_ROUNDS {
+        let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
+        let decoded = encode_compressed(&data, &input)?.decoded;
         if decoded.hexplane == data.hexplane {
             break;
         }
@@ -138,10 +139,11 @@ pub fn compression_input(
     scene: &DynamicScene,
     data: &SceneData,
     config: &CompressionConfig,
+    profile: Profile,
 ) -> Result<CompressionInput, TrainError> {
     compression.context.update_quantiles();
     Ok(CompressionInput {
-        profile: if config.profile == "paper" { Profile::Paper } else { Profile::Compact },
+        profile,
         planes: Some(compression.plane_coding(scene)?),
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
         attributes: attribute_steps(&config.attributes),

@@ -14,7 +14,7 @@ pub struct NoisyScene {
     /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the
     /// scene's, since noise only adds to them; by the steps see [`NoisyScene::step_gradients`].
     pub scene: DynamicScene,
-    /// Of the planes; they begin a tape of their own where they are learned. None if the planes are settled: as the file
+    /// Of the planes; they begin a tape of their own where they are learned. None if the planes are frozen: as the file
     /// will have them, without noise, without gradient and without a part in the rate.
     pub steps: Option<PlaneSteps>,
 }
@@ -22,7 +22,7 @@ pub struct NoisyScene {
 /// Estimated bits of a file's planes and spherical harmonics.
 #[derive(Clone, Debug)]
 pub struct Rate {
-    /// `[1]`: of all planes, hyperpriors included; 0 for settled planes.
+    /// `[1]`: of all planes, hyperpriors included; 0 for frozen planes.
     pub planes: Tensor<1>,
     /// Values of all planes.
     pub plane_symbols: usize,
@@ -67,8 +67,8 @@ impl Compression {
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: Some(steps.leaves(learn_steps)) }
     }
 
-    /// The same for a scene whose planes are settled.
-    pub fn noisy_beside_settled_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
+    /// The same for a scene whose planes are frozen.
+    pub fn noisy_beside_frozen_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
         let mut scene = scene.clone();
         for plane in &mut scene.hexplane.planes {
             *plane = plane.clone().set_require_grad(false);

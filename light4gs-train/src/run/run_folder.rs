@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::config::Config;
 use crate::error::TrainError;
-use crate::trainer::checkpoint;
+use super::list_checkpoints;
 
 /// Files of a run; `--overwrite` removes them.
 const FILES: [&str; 8] = [
@@ -129,7 +129,7 @@ impl RunFolder {
 
     /// The newest checkpoint.
     pub fn last_checkpoint(&self) -> Option<PathBuf> {
-        checkpoint::list(&self.checkpoints()).pop()
+        list_checkpoints(&self.checkpoints()).pop()
     }
 
     /// The compressed scene.

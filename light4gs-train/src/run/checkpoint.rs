@@ -15,11 +15,10 @@ use safetensors::{Dtype, SafeTensors};
 
 use crate::compression::Compression;
 use crate::config::Config;
-use crate::density::densification::DensityStatistics;
 use crate::error::TrainError;
 use crate::optimization::adam::{Adam, AdamState};
 use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
-use crate::trainer::Stage;
+use crate::stage::Stage;
 
 /// A run's state after an iteration.
 #[derive(Debug)]
@@ -30,8 +29,8 @@ pub struct Checkpoint {
     pub compression: Option<Compression>,
     /// Optimiser state.
     pub adam: Adam,
-    /// Since the last densification.
-    pub statistics: DensityStatistics,
+    /// What the density strategy keeps, by name: vectors off the tape.
+    pub density: BTreeMap<String, Tensor<1>>,
     /// The stage that the iteration belongs to.
     pub stage: Stage,
     /// Iterations done in that stage.
@@ -84,10 +83,9 @@ impl Checkpoint {
             entries.insert(format!("second.{name}"), entry(state.second.clone()));
             metadata.insert(format!("time.{name}"), state.time.to_string());
         }
-        let DensityStatistics { gradient_sum, views, largest_radius } = &self.statistics;
-        entries.insert("statistics.gradient_sum".into(), entry(gradient_sum.clone()));
-        entries.insert("statistics.views".into(), entry(views.clone()));
-        entries.insert("statistics.largest_radius".into(), entry(largest_radius.clone()));
+        for (name, tensor) in &self.density {
+            entries.insert(format!("density.{name}"), entry(tensor.clone()));
+        }
 
         let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
         let views = entries
@@ -134,25 +132,21 @@ impl Checkpoint {
         }
         let inner = device.clone().inner();
         let frame = load.values("frame", Some(15));
+        let vector = |values: Vec<f32>| {
+            let shape = [values.len()];
+            Tensor::<1>::from_data(TensorData::new(values, shape), &inner)
+        };
         let mut adam = Adam::default();
         for (key, time) in metadata.iter().filter_map(|(key, value)| Some((key.strip_prefix("time.")?, value))) {
             let (first, second) =
                 (load.values(&format!("first.{key}"), None), load.values(&format!("second.{key}"), None));
             let time = number(time).map_err(failed)?;
-            let vector =
-                |values: Vec<f32>| Tensor::<1>::from_data(TensorData::new(values.clone(), [values.len()]), &inner);
             adam.states.insert(key.to_owned(), AdamState { first: vector(first), second: vector(second), time });
         }
-        let count = scene.gaussians.len();
-        let mut statistic = |name: &str| {
-            let values = load.values(&format!("statistics.{name}"), Some(count));
-            Tensor::<1>::from_data(TensorData::new(values.clone(), [values.len()]), &inner)
-        };
-        let statistics = DensityStatistics {
-            gradient_sum: statistic("gradient_sum"),
-            views: statistic("views"),
-            largest_radius: statistic("largest_radius"),
-        };
+        let mut density = BTreeMap::new();
+        for name in file.names().into_iter().filter_map(|name| name.strip_prefix("density.")) {
+            density.insert(name.to_owned(), vector(load.values(&format!("density.{name}"), None)));
+        }
         if let Some(problem) = load.problem {
             return Err(failed(problem));
         }
@@ -163,7 +157,7 @@ impl Checkpoint {
             scene,
             compression,
             adam,
-            statistics,
+            density,
             stage,
             iteration: number(text("iteration")?).map_err(failed)?,
             seconds: number(text("seconds")?).map_err(failed)?,
@@ -213,7 +207,7 @@ impl ParameterVisitor for Load<'_> {
 }
 
 /// Checkpoints in a folder, oldest first.
-pub fn list(folder: &Path) -> Vec<PathBuf> {
+pub fn list_checkpoints(folder: &Path) -> Vec<PathBuf> {
     let position = |path: &PathBuf| {
         let name = path.file_stem()?.to_str()?;
         let (stage, iteration) = name.split_once('_')?;

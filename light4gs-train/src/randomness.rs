@@ -6,7 +6,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::trainer::Stage;
+use crate::stage::Stage;
 
 /// What a random number is drawn for.
 #[derive(Clone, Copy, Debug)]
