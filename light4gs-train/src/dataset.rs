@@ -44,7 +44,7 @@ impl FromIterator<(String, RgbImage8)> for MemoryImages {
 
 impl ImageSource for MemoryImages {
     fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
-        self.0.get(&frame.name).cloned().ok_or_else(|| DataError::Picture {
+        self.0.get(&frame.name).cloned().ok_or_else(|| DataError::Image {
             path: frame.name.clone().into(),
             problem: "no image of this name is in memory".into(),
             remedy: "give one for every frame that is trained on".into(),

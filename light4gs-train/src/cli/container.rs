@@ -1,11 +1,12 @@
 //! `encode`, `decode`, `info`.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically};
-use light4gs_data::{DataError, Scene};
+use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info};
+use light4gs_data::{Scene, write_atomically};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
@@ -78,7 +79,7 @@ impl Encode {
             bar.show(done, iterations);
             Ok(())
         })?;
-        write_file(&self.out, &coded.bytes)?;
+        write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
         print_info(&read_info(&self.out)?, self.json)?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
@@ -170,11 +171,7 @@ impl Decode {
             (name, TensorView::new(Dtype::F32, shape.clone(), bytes).expect("shapes match their values"))
         });
         let bytes = safetensors::serialize(views, None).map_err(|error| TrainError::Input(error.to_string()))?;
-        write_atomically(&self.out, &bytes).map_err(|source| DataError::Io {
-            action: "write",
-            path: self.out.clone(),
-            source,
-        })?;
+        write_atomically(&self.out, |file| file.write_all(&bytes))?;
         say(format_args!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len()))
     }
 }

@@ -86,12 +86,8 @@ pub fn code_scene(
     let TrainedScene { scene, config, data, device, .. } = trained;
     let meta = scene_meta(config, data);
     let settings = &config.compression;
-    let profile = match settings.profile {
-        FileProfile::Compact => Profile::Compact,
-        FileProfile::Paper => Profile::Paper,
-        FileProfile::Float32 => {
-            return Ok(CodedScene { bytes: light4gs_codec::encode(&scene.to_arrays(meta))?, coding: None });
-        }
+    let Some(profile) = settings.profile.coded() else {
+        return Ok(CodedScene { bytes: light4gs_codec::encode(&scene.to_arrays(meta))?, coding: None });
     };
     let (compression, fit_seconds) = match trained.compression {
         Some(compression) => (compression.clone(), None),

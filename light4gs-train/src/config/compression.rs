@@ -1,5 +1,6 @@
 //! `[compression]`: how small, and how (paper III-C to III-E).
 
+use light4gs_codec::Profile;
 use serde::{Deserialize, Serialize};
 
 use super::choice::choice;
@@ -33,6 +34,17 @@ choice! {
         Paper = "paper",
         /// Nothing.
         Float32 = "float32",
+    }
+}
+
+impl FileProfile {
+    /// The codec's name for it; none where nothing is entropy coded.
+    pub fn coded(self) -> Option<Profile> {
+        match self {
+            Self::Compact => Some(Profile::Compact),
+            Self::Paper => Some(Profile::Paper),
+            Self::Float32 => None,
+        }
     }
 }
 

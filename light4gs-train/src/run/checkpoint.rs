@@ -4,12 +4,12 @@
 //! is no generator state to keep.
 
 use std::collections::{BTreeMap, HashMap};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_codec::write_atomically;
-use light4gs_data::{DataError, PointCloud};
+use light4gs_data::{DataError, PointCloud, write_atomically};
 use light4gs_model::{DynamicScene, Pca, SceneFrame};
 use safetensors::{Dtype, SafeTensors};
 
@@ -96,8 +96,7 @@ impl Checkpoint {
             .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
             .map_err(|error| failed(error.to_string()))?;
         let bytes = safetensors::serialize(views, Some(metadata)).map_err(|error| failed(error.to_string()))?;
-        write_atomically(path, &bytes)
-            .map_err(|source| DataError::Io { action: "write", path: path.to_owned(), source }.into())
+        Ok(write_atomically(path, |file| file.write_all(&bytes))?)
     }
 
     /// Reads a checkpoint of a run with this configuration onto an autodiff device.

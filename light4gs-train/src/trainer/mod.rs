@@ -49,7 +49,9 @@ use views::ViewPools;
 /// of one's own, on images in memory:
 ///
 /// ```
-/// use light4gs_data::{Camera, Format, Frame, PointCloud, RgbImage8, Scene};
+/// use std::path::Path;
+///
+/// use light4gs_data::{Camera, Frame, PointCloud, RgbImage8, Scene, SplitFrames};
 /// use light4gs_train::config::{Config, DeviceName};
 /// use light4gs_train::loss::LossInput;
 /// use light4gs_train::dataset::MemoryImages;
@@ -66,23 +68,12 @@ use views::ViewPools;
 ///         let (sin, cos) = (k as f32 * 1.57).sin_cos();
 ///         let eye = [4.0 * cos, 4.0 * sin, 0.5].into();
 ///         let camera = Camera::look_at(eye, [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 32, 32);
-///         Frame::without_picture(format!("view-{k}"), camera, k as f32 / 3.0)
+///         Frame::without_image(format!("view-{k}"), camera, k as f32 / 3.0)
 ///     })
 ///     .collect();
 /// let images: MemoryImages = frames.iter().map(|frame| (frame.name.clone(), image(frame))).collect();
-/// let data = Scene {
-///     name: "ball".into(),
-///     root: Default::default(),
-///     format: Format::DNerf,
-///     test: frames.clone(),
-///     train: frames,
-///     val: Vec::new(),
-///     video: Vec::new(),
-///     background: [1.0; 3],
-///     points: PointCloud::random(200, 0.8, 0),
-///     camera_mean: [0.0, 0.0, 0.5],
-///     extent: 4.4,
-/// };
+/// let frames = SplitFrames { test: frames.clone(), train: frames, ..SplitFrames::default() };
+/// let data = Scene::new("memory", Path::new("ball"), frames, PointCloud::random(200, 0.8, 0), [1.0; 3])?;
 ///
 /// let mut config = Config::from_preset("dnerf-small")?;
 /// config.device = DeviceName::Flex;
