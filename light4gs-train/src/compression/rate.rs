@@ -146,7 +146,7 @@ pub(super) fn known(scene: &DynamicScene, planes: &[Tensor<3>], rows: Option<Ten
         sh_dc = sh_dc.select(0, rows.clone());
         means = means.select(0, rows);
     }
-    ShKnown { sh_dc, positions: scene.frame.normalize(means), planes: planes.to_vec() }
+    ShKnown { sh_dc, positions: scene.coordinates.normalize(means), planes: planes.to_vec() }
 }
 
 /// A random share of `0..count` without repetition, at least one, in rising order.

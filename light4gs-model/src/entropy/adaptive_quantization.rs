@@ -4,9 +4,9 @@ use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
 
-use crate::hexplane::{PLANE_NAMES, SPACE_TIME_PLANES};
+use super::quantization_steps::PlaneSteps;
 use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
-use crate::quantization_steps::PlaneSteps;
+use crate::scene::hexplane::{PLANE_NAMES, SPACE_TIME_PLANES};
 
 /// Configuration of an [`AdaptiveQuantization`].
 #[derive(Config, Debug)]

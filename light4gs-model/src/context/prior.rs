@@ -2,9 +2,9 @@
 
 use burn::tensor::Tensor;
 
-use crate::entropy_bottleneck::Latent;
-use crate::hexplane::{PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
-use crate::quantization_steps::PlaneSteps;
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::quantization_steps::PlaneSteps;
+use crate::scene::hexplane::{PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 
 const PLANES: usize = PLANE_NAMES.len();
 

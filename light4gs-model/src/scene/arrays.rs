@@ -8,11 +8,11 @@ use light4gs_codec::{
     SceneMeta,
 };
 
-use crate::deformation::{Deformation, DeformationHead};
-use crate::dynamic_scene::DynamicScene;
-use crate::gaussians::{GaussianTensors, Gaussians};
-use crate::hexplane::HexPlane;
-use crate::scene_frame::{Pca, SceneFrame};
+use super::coordinates::{Pca, SceneCoordinates};
+use super::deformation::{Deformation, DeformationHead};
+use super::dynamic_scene::DynamicScene;
+use super::gaussians::{GaussianTensors, Gaussians};
+use super::hexplane::HexPlane;
 
 /// Plain arrays that do not make a model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -91,7 +91,7 @@ impl GaussianTensors {
     }
 }
 
-impl SceneFrame {
+impl SceneCoordinates {
     fn to_arrays(&self) -> SceneFrameArrays {
         let Pca { mean, axes, std } = self.pca();
         SceneFrameArrays { mean, axes, std }
@@ -242,7 +242,7 @@ impl DynamicScene {
         SceneData {
             meta,
             gaussians: self.gaussians.to_arrays(),
-            frame: self.frame.to_arrays(),
+            frame: self.coordinates.to_arrays(),
             hexplane: self.hexplane.to_arrays(),
             deformation: self.deformation.to_arrays(),
         }
@@ -254,7 +254,7 @@ impl DynamicScene {
         let SceneFrameArrays { mean, axes, std } = data.frame;
         Ok(Self {
             gaussians: Gaussians::from_arrays(&data.gaussians, device),
-            frame: SceneFrame::new(&Pca { mean, axes, std }, device),
+            coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device),
             deformation: Deformation::from_arrays(&data.deformation, hexplane.feature_size(), device)?,
             hexplane,
             differentiate_points: true,

@@ -5,10 +5,10 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor, s};
 use light4gs_data::PointCloud;
 
-use crate::deformation::{Deformation, DeformationConfig};
-use crate::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
-use crate::hexplane::{HexPlane, HexPlaneConfig};
-use crate::scene_frame::{Pca, SceneFrame};
+use super::coordinates::{Pca, SceneCoordinates};
+use super::deformation::{Deformation, DeformationConfig};
+use super::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
+use super::hexplane::{HexPlane, HexPlaneConfig};
 
 /// Configuration of a [`DynamicScene`].
 #[derive(Config, Debug)]
@@ -32,7 +32,7 @@ impl DynamicSceneConfig {
         deformation.feature_size = hexplane.feature_size();
         DynamicScene {
             gaussians: self.gaussians.init(cloud, device),
-            frame: SceneFrame::new(&Pca::fit(&cloud.positions), device),
+            coordinates: SceneCoordinates::new(&Pca::fit(&cloud.positions), device),
             hexplane,
             deformation: deformation.init(device),
             differentiate_points: self.differentiate_points,
@@ -58,7 +58,7 @@ pub struct DynamicScene {
     /// At rest.
     pub gaussians: Gaussians,
     /// From world coordinates to the planes'.
-    pub frame: SceneFrame,
+    pub coordinates: SceneCoordinates,
     /// Features over space and time.
     pub hexplane: HexPlane,
     /// From features to changes.
@@ -84,28 +84,28 @@ impl DynamicScene {
         let means = if self.differentiate_points { means } else { means.detach() };
         let [count, _] = means.dims();
         let time = Tensor::full([count, 1], 2.0 * time - 1.0, &means.device());
-        Tensor::cat(vec![self.frame.normalize(means), time], 1)
+        Tensor::cat(vec![self.coordinates.normalize(means), time], 1)
     }
 
     /// Adds the network's output at features `[N, F]` to raw attributes.
     pub fn deform(&self, rest: GaussianTensors, features: Tensor<2>) -> GaussianTensors {
-        let deltas = self.deformation.forward(features);
-        fn add<const D: usize>(attribute: Tensor<D>, delta: Option<Tensor<D>>) -> Tensor<D> {
-            match delta {
-                Some(delta) => attribute + delta,
+        let offsets = self.deformation.forward(features);
+        fn add<const D: usize>(attribute: Tensor<D>, offset: Option<Tensor<D>>) -> Tensor<D> {
+            match offset {
+                Some(offset) => attribute + offset,
                 None => attribute,
             }
         }
         let coefficients = rest.sh_rest.dims()[1] + 1;
-        let (dc, other) = match deltas.sh {
+        let (dc, other) = match offsets.sh {
             Some(sh) => (Some(sh.clone().slice(s![.., 0..1, ..])), Some(sh.slice(s![.., 1..coefficients, ..]))),
             None => (None, None),
         };
         GaussianTensors {
-            means: add(rest.means, deltas.position),
-            log_scales: add(rest.log_scales, deltas.scale),
-            quats: add(rest.quats, deltas.rotation),
-            opacity_logits: add(rest.opacity_logits, deltas.opacity),
+            means: add(rest.means, offsets.position),
+            log_scales: add(rest.log_scales, offsets.scale),
+            quats: add(rest.quats, offsets.rotation),
+            opacity_logits: add(rest.opacity_logits, offsets.opacity),
             sh_dc: add(rest.sh_dc, dc),
             sh_rest: add(rest.sh_rest, other),
         }

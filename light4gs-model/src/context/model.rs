@@ -15,16 +15,16 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
-use crate::entropy_bottleneck::Latent;
-use crate::entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
-use crate::gaussian_conditional::{bits, gaussian_likelihood};
-use crate::hyperprior::{Hyperprior, HyperpriorConfig};
-use crate::inter_plane::{InterPlane, InterPlaneConfig};
-use crate::inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig};
+use super::checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
+use super::entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
+use super::hyperprior::{Hyperprior, HyperpriorConfig};
+use super::inter_plane::{InterPlane, InterPlaneConfig};
+use super::inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig};
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart, coding_order};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::gaussian_conditional::{bits, gaussian_likelihood};
+use crate::entropy::quantization_steps::PlaneSteps;
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
-use crate::prior::{CenteredPlanes, Passes, Prior, PriorPart, coding_order};
-use crate::quantization_steps::PlaneSteps;
 
 /// Parts of a [`ContextModel`], each of which an ablation may switch off.
 #[derive(Config, Debug, PartialEq)]

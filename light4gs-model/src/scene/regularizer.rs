@@ -2,7 +2,7 @@
 
 use burn::tensor::{Tensor, s};
 
-use crate::hexplane::{HexPlane, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
+use super::hexplane::{HexPlane, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 
 /// Mean square of the second difference along the height of a plane `[C, H, W]`: `[1]`. Zero below three rows.
 pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {

@@ -4,10 +4,10 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::entropy_bottleneck::Latent;
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig};
-use crate::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 
 /// Configuration of an [`InterPlane`].
 #[derive(Config, Debug)]

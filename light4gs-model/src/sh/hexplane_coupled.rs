@@ -4,10 +4,10 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::hexplane::{PLANE_NAMES, query_planes};
+use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
+use super::network::{Names, ShNetwork};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
-use crate::sh_entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
-use crate::sh_network::{Names, ShNetwork};
+use crate::scene::hexplane::{PLANE_NAMES, query_planes};
 
 const NAMES: Names = ["sh_hex.0", "sh_hex.2"];
 
