@@ -22,6 +22,7 @@ pub mod entropy;
 mod gpu;
 mod named_parameters;
 pub mod ops;
+pub mod parameters;
 pub mod scene;
 pub mod sh;
 mod significance;

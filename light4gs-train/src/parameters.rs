@@ -3,7 +3,8 @@
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::Tensor;
-use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters, PLANE_NAMES};
+use light4gs_codec::plane_layout::plane_name;
+use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters};
 
 use crate::compression::Compression;
 
@@ -54,7 +55,7 @@ pub const GAUSSIAN_PARAMETERS: [&str; 6] = [
 
 /// Name of a plane's parameter; planes are counted scale-major.
 pub fn plane_parameter(plane: usize) -> String {
-    format!("hexplane.{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
+    format!("hexplane.{}", plane_name(plane))
 }
 
 /// Something to do with every parameter, whatever its rank.

@@ -2,6 +2,7 @@
 
 use burn::module::Param;
 use burn::tensor::Tensor;
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 use light4gs_codec::{
     CodecError, ContextModelArrays, ContextModelShape, ContextParts as Parts, ConvolutionLayer, ConvolutionShape,
     FrequencyTable, PerGroup, SpatialKernel,
@@ -11,7 +12,6 @@ use super::model::ContextModel;
 use crate::entropy::convolution::PlaneConv;
 use crate::entropy::quantization_steps::PlaneSteps;
 use crate::named_parameters::Layer;
-use crate::scene::hexplane::{PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 
 fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
     parameter.val().into_data().iter::<f32>().collect()
@@ -22,7 +22,7 @@ impl PlaneSteps {
     pub fn to_groups(&self) -> Vec<PerGroup> {
         let steps = self.values();
         let mut groups: Vec<PerGroup> = steps
-            .chunks_exact(PLANE_NAMES.len())
+            .chunks_exact(PLANES_PER_SCALE)
             .map(|scale| PerGroup { space_only: scale[SPACE_ONLY_PLANES[0]], space_time: scale[SPACE_TIME_PLANES[0]] })
             .collect();
         if groups.iter().all(|group| *group == groups[0]) {

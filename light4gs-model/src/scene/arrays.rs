@@ -3,6 +3,7 @@
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS, position_of, scale_of};
 use light4gs_codec::{
     GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
     SceneMeta,
@@ -101,7 +102,7 @@ impl SceneCoordinates {
 impl HexPlane {
     /// Copies to plain arrays. Resolutions are read off the planes.
     pub fn to_arrays(&self) -> HexPlaneArrays {
-        let dims = |scale: usize, plane: usize| self.planes[6 * scale + plane].dims();
+        let dims = |scale: usize, plane: usize| self.planes[PLANES_PER_SCALE * scale + plane].dims();
         let [channels, res_y, res_x] = dims(0, 0);
         let [_, res_t, res_z] = dims(0, 5);
         let planes = self.planes.iter().map(|plane| {
@@ -119,15 +120,16 @@ impl HexPlane {
     /// From plain arrays.
     pub fn from_arrays(arrays: &HexPlaneArrays, device: &Device) -> Result<Self, ModelError> {
         let channels = arrays.channels as usize;
-        if arrays.planes.is_empty() || arrays.planes.len() != 6 * arrays.multipliers.len() {
+        if arrays.planes.is_empty() || arrays.planes.len() != PLANES_PER_SCALE * arrays.multipliers.len() {
             let (planes, scales) = (arrays.planes.len(), arrays.multipliers.len());
             return Err(ModelError::Planes(format!("{planes} planes for {scales} scales, expected six a scale")));
         }
         let mut tensors = Vec::with_capacity(arrays.planes.len());
         for (i, plane) in arrays.planes.iter().enumerate() {
-            let resolution =
-                |axis: usize| arrays.resolution[axis] * if axis == 3 { 1 } else { arrays.multipliers[i / 6] };
-            let [across, down] = crate::cpu::hexplane::PLANE_AXES[i % 6];
+            let resolution = |axis: usize| {
+                arrays.resolution[axis] * if axis == TIME_AXIS { 1 } else { arrays.multipliers[scale_of(i)] }
+            };
+            let [across, down] = PLANE_AXES[position_of(i)];
             let expected = (resolution(down), resolution(across));
             if (plane.height, plane.width) != expected {
                 let found = (plane.height, plane.width);

@@ -20,4 +20,4 @@ pub use coordinates::{Pca, SceneCoordinates};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead, Offsets};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
 pub use gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
-pub use hexplane::{HexPlane, HexPlaneConfig, PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
+pub use hexplane::{HexPlane, HexPlaneConfig};

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically};
 use light4gs_data::{DataError, ImageStore, Scene};
 use safetensors::Dtype;
@@ -14,7 +15,7 @@ use super::check_output;
 use super::output::{say, say_json};
 use super::train::{coding_table, sections_table};
 use crate::checkpoint::Checkpoint;
-use crate::compression::{TrainedScene, plane_name, write_scene};
+use crate::compression::{TrainedScene, write_scene};
 use crate::config::Config;
 use crate::device::device_by_name;
 use crate::error::TrainError;
@@ -193,7 +194,7 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
     add("frame.std".into(), vec![3], &data.frame.std);
     for (i, plane) in data.hexplane.planes.iter().enumerate() {
         let shape = vec![data.hexplane.channels as usize, plane.height as usize, plane.width as usize];
-        add(format!("hexplane.{}.{}", i / 6, light4gs_model::PLANE_NAMES[i % 6]), shape, &plane.values);
+        add(format!("hexplane.{}", plane_name(i)), shape, &plane.values);
     }
     for layer in &data.deformation.layers {
         let shape = vec![layer.outputs as usize, layer.inputs as usize];

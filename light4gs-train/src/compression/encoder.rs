@@ -4,11 +4,12 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, encode_compressed, sh_rest_coefficients,
 };
-use light4gs_model::{DynamicScene, HexPlane, Latent, PLANE_NAMES, ShEntropy, counted_sh_coding};
+use light4gs_model::{DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::known;
@@ -49,11 +50,6 @@ pub struct BitMap {
     pub height: u32,
     /// `[height, width]` row-major.
     pub bits: Vec<f32>,
-}
-
-/// How a plane is called in records: its scale and its axes.
-pub fn plane_name(plane: usize) -> String {
-    format!("{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
 }
 
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.

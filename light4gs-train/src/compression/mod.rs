@@ -13,9 +13,7 @@ mod rate;
 mod run_encoder;
 mod step_search;
 
-pub use encoder::{
-    BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, plane_name, settled_planes,
-};
+pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, settled_planes};
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
 pub use run_encoder::{CodingRecord, PlaneRecord, TrainedScene, WrittenScene, write_scene};

@@ -6,12 +6,13 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 use indicatif::{ProgressBar, ProgressStyle};
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{PlaneBytes, SceneData, write_atomically};
 use light4gs_data::{DataError, Frame, ImageStore, Scene};
 use light4gs_model::{DynamicScene, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit, plane_name};
+use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit};
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::trainer::scene_meta;
