@@ -19,7 +19,9 @@
 pub mod context;
 mod cpu;
 pub mod entropy;
+#[cfg(feature = "wgpu")]
 mod gpu;
+mod gpu_error;
 mod named_parameters;
 pub mod ops;
 pub mod parameters;
@@ -30,7 +32,7 @@ mod splatter;
 
 pub use context::*;
 pub use entropy::*;
-pub use gpu::GpuError;
+pub use gpu_error::GpuError;
 pub use named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
 pub use scene::*;
 pub use sh::*;

@@ -5,12 +5,12 @@ use burn::tensor::{Device, Int, Tensor, TensorData, s};
 use light4gs_data::PointCloud;
 use light4gs_model::{GaussianTensors, Gaussians, GaussiansConfig, HexPlane, regularizer};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
-use light4gs_train::densification::{
+use light4gs_train::density::densification::{
     DensifyMasks, DensityStatistics, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
 };
-use light4gs_train::loss::{l1, l2, photometric, psnr, ssim};
-use light4gs_train::optimizer::{Adam, AdamState};
-use light4gs_train::schedule::ExponentialDecay;
+use light4gs_train::evaluation::metrics::{l1, l2, photometric, psnr, ssim};
+use light4gs_train::optimization::adam::{Adam, AdamState};
+use light4gs_train::optimization::schedule::ExponentialDecay;
 
 /// One picture `[H, W, 3]` of a batch `[B, 3, H, W]`.
 fn picture(batch: &Tensor<4>, index: usize) -> Tensor<3> {

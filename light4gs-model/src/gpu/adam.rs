@@ -1,13 +1,13 @@
 //! The fused Adam step on a GPU.
 
 use burn::backend::TensorMetadata;
-use burn_cubecl::CubeBackend;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeBackend;
+use burn_wgpu::CubeTensor;
 
 use super::context::{Gpu, buffer_of};
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::ADAM;
+use crate::gpu_error::GpuError;
 use crate::ops::adam::{AdamStep, AdamTensors};
 
 fn step_on_gpu(

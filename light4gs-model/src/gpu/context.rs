@@ -1,14 +1,14 @@
 //! A device, its limits, and the way between Burn's tensors and plain buffers.
 
 use burn::tensor::{DType, Shape};
-use burn_cubecl::CubeDevice;
-use burn_cubecl::kernel::into_contiguous;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeTensor;
+use burn_wgpu::into_contiguous;
+use cubecl::Device as CubeDevice;
 use cubecl::client::Client;
 use cubecl::server::Handle;
 
-use super::error::GpuError;
 use super::kernel::first_lines;
+use crate::gpu_error::GpuError;
 
 /// Parts of a buffer begin at multiples of this many values: every adapter can bind there.
 pub(super) const PART_ALIGNMENT: usize = 64;

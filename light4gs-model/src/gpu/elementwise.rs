@@ -1,12 +1,12 @@
 //! Stages that make one value of one: the distribution function and the bound of the entropy models.
 
 use burn::backend::TensorMetadata;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeTensor;
 
 use super::context::{Gpu, buffer_of, first_words};
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Stage};
+use crate::gpu_error::GpuError;
 
 /// Launches a stage that reads tensors of one shape and writes another one. Its uniform is their size, then `numbers`.
 fn launch<const K: usize>(stage: Stage, inputs: [CubeTensor; K], numbers: &[f32]) -> Result<CubeTensor, GpuError> {

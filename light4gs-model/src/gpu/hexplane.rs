@@ -2,15 +2,15 @@
 
 use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
-use burn_cubecl::CubeBackend;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeBackend;
+use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 
 use super::context::{Gpu, Parts, buffer_of, first_words};
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
 use super::stages::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
+use crate::gpu_error::GpuError;
 use crate::ops::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
 
 const PLANES: usize = 6;

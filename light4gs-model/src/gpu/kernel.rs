@@ -3,15 +3,15 @@
 use std::collections::HashSet;
 use std::sync::{LazyLock, Mutex};
 
-use burn_cubecl::template::{KernelSource, SourceKernel, SourceTemplate};
+use burn_wgpu::{KernelSource, SourceKernel, SourceTemplate};
 use cubecl::client::Client;
 use cubecl::device::DeviceId;
 use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim, ExecutionMode, KernelId};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 
-use super::error::GpuError;
 use super::stages::Stage;
+use crate::gpu_error::GpuError;
 
 /// Invocations of a workgroup where nothing else is asked for.
 pub(super) const WORKGROUP: u32 = 64;

@@ -3,7 +3,6 @@
 mod adam;
 mod context;
 mod elementwise;
-mod error;
 mod hexplane;
 mod kernel;
 mod significance;
@@ -14,5 +13,4 @@ mod team;
 
 pub(crate) use adam::adam_on_gpu;
 pub(crate) use elementwise::{lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
-pub use error::GpuError;
 pub(crate) use significance::significance_on_gpu;

@@ -1,16 +1,16 @@
 //! The sums behind significance pruning on a GPU: the stages of splatting without colour.
 
 use burn::tensor::Shape;
-use burn_cubecl::CubeBackend;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeBackend;
+use burn_wgpu::CubeTensor;
 
 use super::context::{Gpu, first_words};
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::splat::{Begun, begin};
 use super::stages::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 use crate::cpu::project::View;
 use crate::cpu::significance::SCORES;
+use crate::gpu_error::GpuError;
 use crate::ops::splat::SplatInputs;
 
 /// Values of an intersection's sums.

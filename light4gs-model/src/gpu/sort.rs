@@ -3,9 +3,9 @@
 use cubecl::server::Handle;
 
 use super::context::Gpu;
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES};
+use crate::gpu_error::GpuError;
 
 /// Values of one workgroup of the prefix sum.
 const SUM_BLOCK: usize = 2048;

@@ -2,18 +2,18 @@
 
 use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
-use burn_cubecl::CubeBackend;
-use burn_cubecl::tensor::CubeTensor;
+use burn_wgpu::CubeBackend;
+use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 
 use super::context::{Gpu, Parts, buffer_of, first_words};
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
 use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
 use super::team::{PART, Team};
 use crate::cpu::project::{FRUSTUM_MARGIN, TILE, View};
 use crate::cpu::rasterize::CHANNELS;
+use crate::gpu_error::GpuError;
 use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
 /// Values of an intersection's sums.

@@ -1,29 +1,16 @@
-//! The files of `shaders/`, and what each of them includes.
+//! What each kernel of `light4gs-shaders` is put together from.
 
-macro_rules! wgsl {
-    ($file:literal) => {
-        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/../shaders/", $file, ".wgsl"))
-    };
-}
-
-const DISPATCH: &str = wgsl!("include/dispatch");
-const CONSTANTS: &str = wgsl!("include/constants");
-const VIEW: &str = wgsl!("include/view");
-const SPLAT: &str = wgsl!("include/splat");
-const HARMONICS: &str = wgsl!("include/spherical_harmonics");
-const QUATERNION: &str = wgsl!("include/quaternion");
-const COVARIANCE: &str = wgsl!("include/covariance");
-const PIXELS: &str = wgsl!("include/pixels");
-const FOOTPRINT: &str = wgsl!("include/footprint");
-const EXPONENTIAL: &str = wgsl!("include/exponential");
-const PLANES: &str = wgsl!("include/hexplane");
+use light4gs_shaders::include::{
+    CONSTANTS, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, HEXPLANE, PIXELS, QUATERNION, SPHERICAL_HARMONICS, SPLAT,
+    TEAM_SUBGROUP, TEAM_SUM_OF_FEW, TEAM_SUM_OF_MANY, TEAM_WORKGROUP, VIEW,
+};
 
 /// Members of a team meet through subgroup operations; they are few.
-pub(super) const TEAM_OF_FEW: &[&str] = &[wgsl!("include/team_subgroup"), wgsl!("include/team_sum_of_few")];
+pub(super) const TEAM_OF_FEW: &[&str] = &[TEAM_SUBGROUP, TEAM_SUM_OF_FEW];
 /// Members of a team meet through subgroup operations; they are many.
-pub(super) const TEAM_OF_MANY: &[&str] = &[wgsl!("include/team_subgroup"), wgsl!("include/team_sum_of_many")];
+pub(super) const TEAM_OF_MANY: &[&str] = &[TEAM_SUBGROUP, TEAM_SUM_OF_MANY];
 /// Members of a team meet in workgroup memory.
-pub(super) const TEAM_WITHOUT_SUBGROUPS: &[&str] = &[wgsl!("include/team_workgroup")];
+pub(super) const TEAM_WITHOUT_SUBGROUPS: &[&str] = &[TEAM_WORKGROUP];
 
 /// One kernel: a file of `shaders/` with what it includes.
 #[derive(Clone, Copy, Debug)]
@@ -37,12 +24,12 @@ pub(super) struct Stage {
 macro_rules! stages {
     ($($constant:ident = $name:literal [$($include:ident),*];)*) => {
         $(pub(super) const $constant: Stage =
-            Stage { name: $name, includes: &[DISPATCH, $($include),*], source: wgsl!($name) };)*
+            Stage { name: $name, includes: &[DISPATCH, $($include),*], source: light4gs_shaders::$constant };)*
     };
 }
 
 stages! {
-    COLOR = "color" [CONSTANTS, VIEW, COVARIANCE, QUATERNION, HARMONICS];
+    COLOR = "color" [CONSTANTS, VIEW, COVARIANCE, QUATERNION, SPHERICAL_HARMONICS];
     PROJECT = "project" [CONSTANTS, VIEW, SPLAT, QUATERNION, COVARIANCE];
     CELL_COUNTS = "cell_counts" [];
     INTERSECT = "intersect" [CONSTANTS, VIEW, SPLAT];
@@ -52,11 +39,11 @@ stages! {
     RANGES = "ranges" [];
     RASTERIZE = "rasterize" [CONSTANTS, VIEW, PIXELS, FOOTPRINT];
     RASTERIZE_BACKWARD = "rasterize_backward" [CONSTANTS, VIEW, PIXELS, FOOTPRINT];
-    PROJECT_BACKWARD = "project_backward" [CONSTANTS, VIEW, QUATERNION, COVARIANCE, HARMONICS];
+    PROJECT_BACKWARD = "project_backward" [CONSTANTS, VIEW, QUATERNION, COVARIANCE, SPHERICAL_HARMONICS];
     HEXPLANE_PACK = "hexplane_pack" [];
-    HEXPLANE_QUERY = "hexplane_query" [PLANES];
-    HEXPLANE_QUERY_BACKWARD = "hexplane_query_backward" [PLANES];
-    HEXPLANE_GATHER = "hexplane_gather" [PLANES];
+    HEXPLANE_QUERY = "hexplane_query" [HEXPLANE];
+    HEXPLANE_QUERY_BACKWARD = "hexplane_query_backward" [HEXPLANE];
+    HEXPLANE_GATHER = "hexplane_gather" [HEXPLANE];
     ADAM = "adam" [];
     SIGNIFICANCE = "significance" [CONSTANTS, VIEW, PIXELS, FOOTPRINT];
     SIGNIFICANCE_GATHER = "significance_gather" [];

@@ -6,9 +6,9 @@ use std::sync::{LazyLock, Mutex};
 use cubecl::device::DeviceId;
 
 use super::context::Gpu;
-use super::error::GpuError;
 use super::kernel::Launch;
 use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+use crate::gpu_error::GpuError;
 
 /// Intersections of a cell that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
 /// graphics driver may stop a launch that runs for seconds.

@@ -1,12 +1,19 @@
 //! One fused Adam step a tensor (Kingma and Ba, 2015), in place where the tensor is not shared.
 
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
+use burn::backend::{Backend, Dispatch, ExtensionType, TensorMetadata, backend_extension};
 use burn::tensor::Tensor;
-use burn_cubecl::CubeBackend;
+#[cfg(feature = "wgpu")]
+use burn_fusion::{Fusion, FusionBackend};
+#[cfg(feature = "wgpu")]
+use burn_wgpu::CubeBackend;
 
+use super::for_cpu_back_ends;
+#[cfg(feature = "wgpu")]
+use super::fusion::{leaf, resolve};
 use super::host::HostBackend;
 use crate::cpu::adam::adam_step as adam_step_on_slices;
+#[cfg(feature = "wgpu")]
 use crate::gpu::adam_on_gpu;
 
 /// Numbers of one step.
@@ -48,7 +55,7 @@ pub struct AdamTensors<B: Backend> {
 }
 
 /// The fused step on every back end.
-#[backend_extension(NdArray, Flex, Cube)]
+#[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
 pub trait AdamOps: Backend {
     /// Parameter and moments after one step along `gradient`.
     fn adam(
@@ -78,21 +85,36 @@ fn adam_on_cpu<B: HostBackend>(tensors: AdamTensors<B>, gradient: FloatTensor<B>
     }
 }
 
-impl AdamOps for NdArray {
-    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-        adam_on_cpu(tensors, gradient, step)
+for_cpu_back_ends! {
+    AdamOps {
+        fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
+            adam_on_cpu(tensors, gradient, step)
+        }
     }
 }
 
-impl AdamOps for Flex {
-    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-        adam_on_cpu(tensors, gradient, step)
-    }
-}
-
+#[cfg(feature = "wgpu")]
 impl AdamOps for CubeBackend {
     fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
         adam_on_gpu(tensors, gradient, step)
+    }
+}
+
+#[cfg(feature = "wgpu")]
+impl<B: FusionBackend + AdamOps> AdamOps for Fusion<B> {
+    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
+        let AdamTensors { parameter, first_moment, second_moment } = tensors;
+        let tensors = AdamTensors {
+            parameter: resolve::<B>(parameter),
+            first_moment: resolve::<B>(first_moment),
+            second_moment: resolve::<B>(second_moment),
+        };
+        let AdamTensors { parameter, first_moment, second_moment } = B::adam(tensors, resolve::<B>(gradient), step);
+        AdamTensors {
+            parameter: leaf::<B>(parameter),
+            first_moment: leaf::<B>(first_moment),
+            second_moment: leaf::<B>(second_moment),
+        }
     }
 }
 

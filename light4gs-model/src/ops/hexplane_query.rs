@@ -8,10 +8,14 @@ use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
-use burn_cubecl::CubeBackend;
+use burn::backend::{Autodiff, Backend, ExtensionType, TensorMetadata, backend_extension};
+#[cfg(feature = "wgpu")]
+use burn_fusion::{Fusion, FusionBackend};
 
+#[cfg(feature = "wgpu")]
+use super::fusion::{leaf, resolve};
 use super::host::{HostBackend, HostTensor};
+use super::{for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::hexplane::{PackedPlanes, query, query_backward};
 
 /// Points and the planes of one scale.
@@ -66,27 +70,19 @@ pub trait HexPlaneKernels: Backend {
 }
 
 /// The query on every back end that has [`HexPlaneKernels`], differentiable under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Cube, Autodiff)]
+#[backend_extension(
+    NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
+)]
 pub trait HexPlaneOps: Backend {
     /// Features `[N, C]`: the product over the six planes of their bilinear samples (align-corners, border clamp).
     fn hexplane_query(#[extension_type] inputs: QueryInputs<Self>) -> FloatTensor<Self>;
 }
 
-impl HexPlaneOps for NdArray {
-    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
-        Self::query_forward(inputs).0
-    }
-}
-
-impl HexPlaneOps for Flex {
-    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
-        Self::query_forward(inputs).0
-    }
-}
-
-impl HexPlaneOps for CubeBackend {
-    fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
-        Self::query_forward(inputs).0
+for_all_back_ends! {
+    HexPlaneOps with HexPlaneKernels {
+        fn hexplane_query(inputs: QueryInputs<Self>) -> FloatTensor<Self> {
+            Self::query_forward(inputs).0
+        }
     }
 }
 
@@ -156,14 +152,32 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>, wi
     }
 }
 
-impl<B: HostBackend> HexPlaneKernels for B {
-    type Saved = CpuSaved;
+for_cpu_back_ends! {
+    HexPlaneKernels {
+        type Saved = CpuSaved;
 
-    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, CpuSaved) {
-        forward_on_cpu(inputs)
+        fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, CpuSaved) {
+            forward_on_cpu(inputs)
+        }
+
+        fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self> {
+            backward_on_cpu(saved, gradient, with_points)
+        }
+    }
+}
+
+#[cfg(feature = "wgpu")]
+impl<B: FusionBackend + HexPlaneKernels> HexPlaneKernels for Fusion<B> {
+    type Saved = B::Saved;
+
+    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, B::Saved) {
+        let inputs = QueryInputs::from_array(inputs.into_array().map(resolve::<B>));
+        let (features, saved) = B::query_forward(inputs);
+        (leaf::<B>(features), saved)
     }
 
-    fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self> {
-        backward_on_cpu(saved, gradient, with_points)
+    fn query_backward(saved: B::Saved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self> {
+        let QueryGradients { points, planes } = B::query_backward(saved, resolve::<B>(gradient), with_points);
+        QueryGradients { points: points.map(leaf::<B>), planes: planes.map(leaf::<B>) }
     }
 }

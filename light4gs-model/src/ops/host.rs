@@ -1,25 +1,34 @@
 //! Access to the memory of CPU tensors, without copies where the layout allows it.
 
+use burn::backend::Backend;
+#[cfg(feature = "flex")]
+use burn::backend::Flex;
+#[cfg(feature = "ndarray")]
+use burn::backend::NdArray;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Flex, NdArray};
-use burn::tensor::{Shape, TensorData};
+use burn::tensor::Shape;
+#[cfg(feature = "flex")]
 use burn_flex::FlexTensor;
+#[cfg(feature = "ndarray")]
 use burn_ndarray::{NdArrayTensor, SharedArray};
-use ndarray::{ArrayD, IxDyn};
 
 /// A contiguous float32 tensor in main memory. Cloning shares it.
 #[derive(Clone, Debug)]
 pub(crate) enum HostTensor {
+    #[cfg(feature = "ndarray")]
     NdArray(SharedArray<f32>),
+    #[cfg(feature = "flex")]
     Flex(FlexTensor),
 }
 
 impl HostTensor {
     /// Row-major values.
     pub(crate) fn as_slice(&self) -> &[f32] {
-        match self {
-            Self::NdArray(array) => array.as_slice().expect("made contiguous by `to_host`"),
-            Self::Flex(tensor) => {
+        match *self {
+            #[cfg(feature = "ndarray")]
+            Self::NdArray(ref array) => array.as_slice().expect("made contiguous by `to_host`"),
+            #[cfg(feature = "flex")]
+            Self::Flex(ref tensor) => {
                 let (start, end) = tensor.layout().contiguous_offsets().expect("made contiguous by `to_host`");
                 &tensor.storage::<f32>()[start..end]
             }
@@ -28,9 +37,11 @@ impl HostTensor {
 
     /// Row-major values for writing; copies only where somebody else holds the tensor.
     pub(crate) fn as_mut_slice(&mut self) -> &mut [f32] {
-        match self {
-            Self::NdArray(array) => array.as_slice_mut().expect("made contiguous by `to_host`"),
-            Self::Flex(tensor) => {
+        match *self {
+            #[cfg(feature = "ndarray")]
+            Self::NdArray(ref mut array) => array.as_slice_mut().expect("made contiguous by `to_host`"),
+            #[cfg(feature = "flex")]
+            Self::Flex(ref mut tensor) => {
                 let (start, end) = tensor.layout().contiguous_offsets().expect("made contiguous by `to_host`");
                 &mut tensor.storage_mut::<f32>()[start..end]
             }
@@ -46,6 +57,7 @@ pub(crate) trait HostBackend: Backend {
     fn from_values(values: Vec<f32>, shape: impl Into<Shape>) -> FloatTensor<Self>;
 }
 
+#[cfg(feature = "ndarray")]
 impl HostBackend for NdArray {
     fn to_host(tensor: FloatTensor<Self>) -> HostTensor {
         let NdArrayTensor::F32(storage) = tensor else { panic!("the custom operations take float32 tensors") };
@@ -60,6 +72,7 @@ impl HostBackend for NdArray {
     fn from_host(tensor: HostTensor) -> FloatTensor<Self> {
         match tensor {
             HostTensor::NdArray(array) => array.into(),
+            #[cfg(feature = "flex")]
             HostTensor::Flex(_) => unreachable!("a tensor stays on its back end"),
         }
     }
@@ -67,11 +80,12 @@ impl HostBackend for NdArray {
     fn from_values(values: Vec<f32>, shape: impl Into<Shape>) -> FloatTensor<Self> {
         let shape = shape.into();
         let dimensions: Vec<usize> = shape.iter().copied().collect();
-        let array = ArrayD::from_shape_vec(IxDyn(&dimensions), values).expect("as many values as the shape asks for");
-        array.into_shared().into()
+        let array = ndarray::ArrayD::from_shape_vec(ndarray::IxDyn(&dimensions), values);
+        array.expect("as many values as the shape asks for").into_shared().into()
     }
 }
 
+#[cfg(feature = "flex")]
 impl HostBackend for Flex {
     fn to_host(tensor: FloatTensor<Self>) -> HostTensor {
         HostTensor::Flex(if tensor.is_contiguous() { tensor } else { tensor.to_contiguous() })
@@ -80,11 +94,12 @@ impl HostBackend for Flex {
     fn from_host(tensor: HostTensor) -> FloatTensor<Self> {
         match tensor {
             HostTensor::Flex(tensor) => tensor,
+            #[cfg(feature = "ndarray")]
             HostTensor::NdArray(_) => unreachable!("a tensor stays on its back end"),
         }
     }
 
     fn from_values(values: Vec<f32>, shape: impl Into<Shape>) -> FloatTensor<Self> {
-        FlexTensor::from_data(TensorData::new(values, shape))
+        FlexTensor::from_data(burn::tensor::TensorData::new(values, shape))
     }
 }

@@ -10,13 +10,15 @@ use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{
-    Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension, get_or_init_device_settings,
-};
+use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension, get_or_init_device_settings};
 use burn::tensor::Tensor;
-use burn_cubecl::CubeBackend;
+#[cfg(feature = "wgpu")]
+use burn_fusion::{Fusion, FusionBackend};
+#[cfg(feature = "wgpu")]
+use burn_wgpu::CubeBackend;
 
-use super::host::HostBackend;
+use super::{for_all_back_ends, for_cpu_back_ends};
+#[cfg(feature = "wgpu")]
 use crate::gpu::lower_bound_backward_on_gpu;
 
 /// A back end's gradient. [`LowerBoundOps`] adds the dispatch and the tape.
@@ -26,39 +28,50 @@ pub trait LowerBoundKernels: Backend {
 }
 
 /// The bound on every back end that has [`LowerBoundKernels`], with its own gradient under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Cube, Autodiff)]
+#[backend_extension(
+    NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
+)]
 pub trait LowerBoundOps: Backend {
     /// `max(tensor, bound)`, any shape.
     fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self>;
 }
 
-impl LowerBoundOps for NdArray {
-    fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        Self::float_clamp_min(tensor, bound.into())
+for_all_back_ends! {
+    LowerBoundOps with LowerBoundKernels {
+        fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
+            Self::float_clamp_min(tensor, bound.into())
+        }
     }
 }
 
-impl LowerBoundOps for Flex {
-    fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        Self::float_clamp_min(tensor, bound.into())
+for_cpu_back_ends! {
+    LowerBoundKernels {
+        fn lower_bound_backward(
+            tensor: FloatTensor<Self>,
+            upstream: FloatTensor<Self>,
+            bound: f32,
+        ) -> FloatTensor<Self> {
+            masked_gradient::<Self>(tensor, upstream, bound)
+        }
     }
 }
 
-impl LowerBoundOps for CubeBackend {
-    fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        Self::float_clamp_min(tensor, bound.into())
-    }
-}
-
-impl<B: HostBackend> LowerBoundKernels for B {
+/// A stream of operations fuses these by itself.
+#[cfg(feature = "wgpu")]
+impl<B: FusionBackend> LowerBoundKernels for Fusion<B> {
     fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        let bool_type = get_or_init_device_settings::<B>(&tensor.device()).bool_dtype;
-        let below = B::float_lower_elem(tensor, bound.into(), bool_type);
-        let decreasing = B::float_greater_equal_elem(upstream.clone(), 0f32.into(), bool_type);
-        B::float_mask_fill(upstream, B::bool_and(below, decreasing), 0f32.into())
+        masked_gradient::<Self>(tensor, upstream, bound)
     }
 }
 
+fn masked_gradient<B: Backend>(tensor: FloatTensor<B>, upstream: FloatTensor<B>, bound: f32) -> FloatTensor<B> {
+    let bool_type = get_or_init_device_settings::<B>(&tensor.device()).bool_dtype;
+    let below = B::float_lower_elem(tensor, bound.into(), bool_type);
+    let decreasing = B::float_greater_equal_elem(upstream.clone(), 0f32.into(), bool_type);
+    B::float_mask_fill(upstream, B::bool_and(below, decreasing), 0f32.into())
+}
+
+#[cfg(feature = "wgpu")]
 impl LowerBoundKernels for CubeBackend {
     fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
         lower_bound_backward_on_gpu(tensor, upstream, bound)

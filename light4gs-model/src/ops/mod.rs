@@ -1,15 +1,42 @@
 //! Custom operations as Burn backend extensions.
 //!
 //! Each has one trait with the operation (dispatched at run time to the device's back end and recorded by
-//! autodiff) and, where it is differentiable, one with the forward and backward kernels that a back end implements.
+//! autodiff) and, where it is differentiable, one with the forward and backward kernels that a back end implements:
+//! `NdArray` and `Flex` with the kernels of `cpu/`, `CubeBackend` with those of `gpu/`, and `Fusion<B>` with those of the
+//! back end that it wraps.
 
-// Burn 0.22 deprecates its `ndarray` back end in favour of `flex`; we serve both.
+// Burn 0.22 deprecates its `ndarray` back end in favor of `flex`; we serve both.
 #![allow(deprecated)]
 
 pub mod adam;
+#[cfg(feature = "wgpu")]
+mod fusion;
 pub mod hexplane_query;
 mod host;
 pub mod lower_bound;
 pub mod normal_cdf;
 pub mod significance;
 pub mod splat;
+
+/// Implements a trait for each CPU back end of this build, with the same items.
+macro_rules! for_cpu_back_ends {
+    ($trait:ident { $($items:item)* }) => {
+        #[cfg(feature = "ndarray")]
+        impl $trait for burn::backend::NdArray { $($items)* }
+        #[cfg(feature = "flex")]
+        impl $trait for burn::backend::Flex { $($items)* }
+    };
+}
+
+/// Implements an operation for each back end of this build, with the same items, which may call `$kernels`.
+macro_rules! for_all_back_ends {
+    ($trait:ident with $kernels:ident { $($items:item)* }) => {
+        $crate::ops::for_cpu_back_ends!($trait { $($items)* });
+        #[cfg(feature = "wgpu")]
+        impl $trait for burn_wgpu::CubeBackend { $($items)* }
+        #[cfg(feature = "wgpu")]
+        impl<B: burn_fusion::FusionBackend + $kernels> $trait for burn_fusion::Fusion<B> { $($items)* }
+    };
+}
+
+use {for_all_back_ends, for_cpu_back_ends};

@@ -8,14 +8,19 @@ use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
+use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{
-    Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension, get_or_init_device_settings,
-};
+use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension, get_or_init_device_settings};
 use burn::tensor::Tensor;
-use burn_cubecl::CubeBackend;
+#[cfg(feature = "wgpu")]
+use burn_fusion::{Fusion, FusionBackend};
+#[cfg(feature = "wgpu")]
+use burn_wgpu::CubeBackend;
 
-use super::host::HostBackend;
+use super::for_cpu_back_ends;
+#[cfg(feature = "wgpu")]
+use super::fusion::{leaf, resolve};
+#[cfg(feature = "wgpu")]
 use crate::gpu::{normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
 
 /// Of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first. `shaders/normal_cdf.wgsl` has them too.
@@ -39,39 +44,55 @@ pub trait NormalCdfKernels: Backend {
 }
 
 /// The function on every back end that has [`NormalCdfKernels`], differentiable under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Cube, Autodiff)]
+#[backend_extension(
+    NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
+)]
 pub trait NormalCdfOps: Backend {
     /// Elementwise, any shape.
     fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self>;
 }
 
-impl NormalCdfOps for NdArray {
-    fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
-        distribution::<Self>(tensor)
+for_cpu_back_ends! {
+    NormalCdfOps {
+        fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
+            distribution::<Self>(tensor)
+        }
     }
 }
 
-impl NormalCdfOps for Flex {
-    fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
-        distribution::<Self>(tensor)
+for_cpu_back_ends! {
+    NormalCdfKernels {
+        fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
+            Self::float_mul(upstream, density::<Self>(tensor))
+        }
     }
 }
 
+#[cfg(feature = "wgpu")]
 impl NormalCdfOps for CubeBackend {
     fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
         normal_cdf_on_gpu(tensor)
     }
 }
 
-impl<B: HostBackend> NormalCdfKernels for B {
-    fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
-        B::float_mul(upstream, density::<B>(tensor))
-    }
-}
-
+#[cfg(feature = "wgpu")]
 impl NormalCdfKernels for CubeBackend {
     fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
         normal_cdf_backward_on_gpu(tensor, upstream)
+    }
+}
+
+#[cfg(feature = "wgpu")]
+impl<B: FusionBackend + NormalCdfOps> NormalCdfOps for Fusion<B> {
+    fn normal_cdf(tensor: FloatTensor<Self>) -> FloatTensor<Self> {
+        leaf::<B>(B::normal_cdf(resolve::<B>(tensor)))
+    }
+}
+
+#[cfg(feature = "wgpu")]
+impl<B: FusionBackend + NormalCdfKernels> NormalCdfKernels for Fusion<B> {
+    fn normal_cdf_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
+        leaf::<B>(B::normal_cdf_backward(resolve::<B>(tensor), resolve::<B>(upstream)))
     }
 }
 

@@ -8,11 +8,15 @@ use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::{FloatTensor, IntTensor};
-use burn::backend::{Autodiff, Backend, ExtensionType, Flex, NdArray, TensorMetadata, backend_extension};
+use burn::backend::{Autodiff, Backend, ExtensionType, TensorMetadata, backend_extension};
 use burn::tensor::TensorData;
-use burn_cubecl::CubeBackend;
+#[cfg(feature = "wgpu")]
+use burn_fusion::{Fusion, FusionBackend};
 
+#[cfg(feature = "wgpu")]
+use super::fusion::{int_leaf, leaf, resolve};
 use super::host::{HostBackend, HostTensor};
+use super::{for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::project::{GaussianSlices, View};
 use crate::cpu::rasterize::{CHANNELS, TilePixels, assemble, rasterize};
 use crate::cpu::rasterize_backward::splat_backward;
@@ -77,27 +81,19 @@ pub trait SplatKernels: Backend {
 pub struct SplatView(pub(crate) View);
 
 /// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
-#[backend_extension(NdArray, Flex, Cube, Autodiff)]
+#[backend_extension(
+    NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
+)]
 pub trait SplatOps: Backend {
     /// Draws Gaussians.
     fn splat(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self>;
 }
 
-impl SplatOps for NdArray {
-    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
-        Self::splat_forward(inputs, view).0
-    }
-}
-
-impl SplatOps for Flex {
-    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
-        Self::splat_forward(inputs, view).0
-    }
-}
-
-impl SplatOps for CubeBackend {
-    fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
-        Self::splat_forward(inputs, view).0
+for_all_back_ends! {
+    SplatOps with SplatKernels {
+        fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
+            Self::splat_forward(inputs, view).0
+        }
     }
 }
 
@@ -173,14 +169,37 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) ->
     )
 }
 
-impl<B: HostBackend> SplatKernels for B {
-    type Saved = CpuSaved;
+for_cpu_back_ends! {
+    SplatKernels {
+        type Saved = CpuSaved;
 
-    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
-        forward_on_cpu(inputs, view)
+        fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
+            forward_on_cpu(inputs, view)
+        }
+
+        fn splat_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
+            backward_on_cpu(saved, gradient)
+        }
+    }
+}
+
+#[cfg(feature = "wgpu")]
+impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
+    type Saved = B::Saved;
+
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, B::Saved) {
+        let (SplatOutputs { picture, radii }, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
+        (SplatOutputs { picture: leaf::<B>(picture), radii: int_leaf::<B>(radii) }, saved)
     }
 
-    fn splat_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
-        backward_on_cpu(saved, gradient)
+    fn splat_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
+        let gradients = B::splat_backward(saved, resolve::<B>(gradient)).into_array();
+        SplatInputs::from_array(gradients.map(leaf::<B>))
     }
+}
+
+/// The tensors of a fusion stream themselves.
+#[cfg(feature = "wgpu")]
+pub(super) fn resolve_inputs<B: FusionBackend>(inputs: SplatInputs<Fusion<B>>) -> SplatInputs<B> {
+    SplatInputs::from_array(inputs.into_array().map(resolve::<B>))
 }

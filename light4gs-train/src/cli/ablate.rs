@@ -6,8 +6,9 @@ use clap::Args;
 
 use super::output::{say, say_json};
 use super::train::{RunOutput, train_to_evaluation};
-use crate::ablation::{AblationRow, AblationTable, to_markdown};
+use crate::config::DeviceName;
 use crate::error::TrainError;
+use crate::evaluation::ablation::{AblationRow, AblationTable, to_markdown};
 
 #[derive(Debug, Args)]
 pub(super) struct Ablate {
@@ -28,7 +29,7 @@ pub(super) struct Ablate {
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     #[command(flatten)]
     output: RunOutput,
 }

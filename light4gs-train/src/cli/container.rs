@@ -14,14 +14,14 @@ use serde_json::json;
 use super::check_output;
 use super::output::{say, say_json};
 use super::train::{coding_table, sections_table};
-use crate::checkpoint::Checkpoint;
 use crate::compression::{TrainedScene, write_scene};
-use crate::config::Config;
-use crate::device::device_by_name;
+use crate::config::{Config, DeviceName};
+use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
-use crate::run_folder::RunFolder;
+use crate::trainer::checkpoint::Checkpoint;
 use crate::trainer::load_options;
+use crate::trainer::run_folder::RunFolder;
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {
@@ -39,7 +39,7 @@ pub(super) struct Encode {
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     /// Print what was written as JSON.
     #[arg(long)]
     json: bool,
@@ -55,7 +55,7 @@ impl Encode {
                 "{run} has no checkpoint yet; train it with `light4gs resume {run}`"
             )));
         };
-        let device = device_by_name(self.device.as_deref().unwrap_or(&config.device))?.autodiff();
+        let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
         let checkpoint = Checkpoint::load(&path, &config, &device)?;
         let data = Scene::open(&record.scene, &load_options(&config))?;
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;

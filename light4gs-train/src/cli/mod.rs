@@ -10,7 +10,6 @@ mod render;
 mod synth;
 mod train;
 
-use std::panic::AssertUnwindSafe;
 use std::path::Path;
 use std::process::ExitCode;
 
@@ -107,14 +106,11 @@ pub fn main() -> ExitCode {
 fn catching_gpu_errors(run: impl FnOnce() -> Result<(), TrainError>) -> Result<(), TrainError> {
     let report = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |panic| {
-        if !GpuError::is_raised() {
+        if !panic.payload().is::<GpuError>() {
             report(panic);
         }
     }));
-    std::panic::catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|panic| match GpuError::take() {
-        Some(error) => Err(error.into()),
-        None => std::panic::resume_unwind(panic),
-    })
+    GpuError::catch(run)?
 }
 
 /// Refuses an output path whose folder does not exist, before any work is done.

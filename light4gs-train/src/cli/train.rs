@@ -7,13 +7,13 @@ use light4gs_data::{ImageStore, Scene};
 
 use super::output::{say, say_json, tell};
 use crate::compression::CodingRecord;
-use crate::config::Config;
-use crate::device::{describe, device_by_name};
+use crate::config::{Config, DeviceName};
+use crate::device::{self, describe};
 use crate::error::TrainError;
+use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::{DecodedScene, Evaluation};
-use crate::finish::evaluate_run;
-use crate::run_folder::RunFolder;
-use crate::table::{Align, Table};
+use crate::report::table::{Align, Table};
+use crate::trainer::run_folder::RunFolder;
 use crate::trainer::{Trainer, load_options};
 
 /// What a run prints.
@@ -45,7 +45,7 @@ pub(super) struct Train {
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     /// Replace a run that is there already.
     #[arg(long)]
     overwrite: bool,
@@ -70,7 +70,7 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
-    device_by_name(&config.device)?;
+    device::open(config.device)?;
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
     Scene::open(scene, &load_options(&config))?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
@@ -91,7 +91,7 @@ pub(super) fn train_to_evaluation(
     like: Option<&Path>,
     output: &RunOutput,
 ) -> Result<Evaluation, TrainError> {
-    device_by_name(&config.device)?;
+    device::open(config.device)?;
     let fresh = !out.join("run.json").exists();
     if fresh {
         Scene::open(scene, &load_options(&config))?;
@@ -143,7 +143,7 @@ pub(super) struct Resume {
     run: PathBuf,
     /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     #[command(flatten)]
     output: RunOutput,
 }
@@ -166,7 +166,7 @@ pub(super) struct Eval {
     scene: Option<PathBuf>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -194,8 +194,8 @@ impl Eval {
         let Some(scene) = self.scene else {
             return Err(TrainError::Input("a .l4gs file holds no pictures; name the dataset with --scene DIR".into()));
         };
-        let name = self.device.unwrap_or_else(|| "ndarray".into());
-        let device = device_by_name(&name)?;
+        let name = self.device.unwrap_or_default();
+        let device = device::open(name)?;
         let decoded = DecodedScene::open(&self.run, &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
@@ -203,7 +203,7 @@ impl Eval {
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
         let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
-        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(&name, &device))?;
+        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)
     }
 }

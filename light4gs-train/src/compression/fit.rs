@@ -6,11 +6,11 @@ use light4gs_model::DynamicScene;
 
 use super::Compression;
 use crate::config::Config;
-use crate::metrics_log::Stage;
-use crate::optimizer::Adam;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression};
-use crate::randomness::{Purpose, generator, seed_device};
-use crate::schedule::ExponentialDecay;
+use crate::optimization::adam::Adam;
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression};
+use crate::optimization::schedule::ExponentialDecay;
+use crate::trainer::Stage;
+use crate::trainer::randomness::{Purpose, generator, seed_device};
 
 /// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told after each.
 pub fn fit(scene: &DynamicScene, config: &Config, device: &Device, mut progress: impl FnMut(usize)) -> Compression {

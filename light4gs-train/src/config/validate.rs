@@ -5,10 +5,9 @@ use light4gs_codec::plane_layout::check_resolution;
 use super::compression::{ARCHITECTURES, PROFILES, SH_MODELS, WEIGHTINGS};
 use super::prune::{SCORES, VOLUMES};
 use super::{
-    CompressionConfig, Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig,
-    LearningRates, ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
+    CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates,
+    ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
 };
-use crate::device::is_device_name;
 
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
 const MAX_PLANE_RESOLUTION: usize = 4096;
@@ -22,10 +21,6 @@ const SPLITS: &[&str] = &["train", "test", "val"];
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check::default();
     check.that("seed", i64::try_from(config.seed).is_ok(), || format!("must be at most {} (TOML's limit)", i64::MAX));
-    check.that("device", is_device_name(&config.device), || {
-        let names = DEVICES.join(", ");
-        format!("is \"{}\"; it must be one of {names}, or wgpu with an adapter such as wgpu:0", config.device)
-    });
     data(&mut check, &config.data);
     model(&mut check, &config.model);
     train(&mut check, &config.train);

@@ -1,6 +1,6 @@
 use super::*;
 use crate::compression::{BitEstimate, PlaneRecord};
-use crate::metrics_log::Stage;
+use crate::trainer::Stage;
 
 fn picture(width: u32, height: u32, shift: u8) -> RgbImage8 {
     let at = |x: u32, y: u32| [(x * 2) as u8, (y * 2) as u8, 128].map(|v: u8| v.saturating_add(shift));

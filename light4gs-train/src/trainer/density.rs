@@ -8,9 +8,11 @@ use light4gs_model::{Significance, least_significant};
 use rand::Rng;
 
 use super::Trainer;
-use crate::densification::{DensifyMasks, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors};
-use crate::metrics_log::Stage;
-use crate::randomness::{Purpose, generator, standard_normal};
+use crate::density::densification::{
+    DensifyMasks, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
+};
+use crate::trainer::Stage;
+use crate::trainer::randomness::{Purpose, generator, standard_normal};
 
 /// Gaussians larger than this on the screen, in pixels, are dropped once opacities have been reset.
 const MAX_SCREEN_RADIUS: f32 = 20.0;

@@ -7,10 +7,10 @@ use super::Trainer;
 use crate::compression::{Compression, NoisyScene, settled_planes};
 use crate::config::Config;
 use crate::error::TrainError;
-use crate::gradients::GradientSums;
-use crate::metrics_log::Stage;
-use crate::parameters::plane_parameter;
-use crate::randomness::{Purpose, generator, seed_device};
+use crate::optimization::gradients::GradientSums;
+use crate::optimization::parameters::plane_parameter;
+use crate::trainer::Stage;
+use crate::trainer::randomness::{Purpose, generator, seed_device};
 
 impl Trainer {
     /// The scene as it will roughly be decoded, once the rate has entered the training.

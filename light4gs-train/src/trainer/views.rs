@@ -6,12 +6,12 @@ use light4gs_data::{Frame, ImageStore};
 use light4gs_model::{DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::image_tensor;
 use crate::error::TrainError;
-use crate::gradients::GradientSums;
-use crate::loss::{l2, photometric};
-use crate::metrics_log::Stage;
-use crate::profile::Profile;
+use crate::evaluation::metrics::image_tensor;
+use crate::evaluation::metrics::{l2, photometric};
+use crate::optimization::gradients::GradientSums;
+use crate::trainer::Stage;
+use crate::trainer::profile::Profile;
 
 /// What the views of a step have in common.
 pub(super) struct ViewPass<'a> {

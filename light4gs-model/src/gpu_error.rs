@@ -1,0 +1,112 @@
+//! What can go wrong on a GPU.
+
+use std::any::Any;
+
+/// An error of a GPU operation.
+///
+/// Burn's operations return tensors and no results, so these errors travel as panics with a `GpuError` as their payload.
+/// [`GpuError::catch`] gives them back as results.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GpuError {
+    /// A kernel did not compile or could not be launched.
+    #[error(
+        "GPU kernel `{kernel}` failed on {adapter}: {reason}. Update the graphics driver, choose another adapter \
+         (`wgpu:0`, `wgpu:integrated`, `wgpu:cpu`), or compute on the CPU with `--device flex`"
+    )]
+    Kernel {
+        /// File in `shaders/`, without its ending.
+        kernel: &'static str,
+        /// Name of the runtime.
+        adapter: String,
+        /// What the driver or the shader compiler says.
+        reason: String,
+    },
+    /// Results cannot be read: the device is lost, out of memory, or an earlier operation failed.
+    #[error(
+        "the GPU could not finish `{operation}`: {reason}. If memory is short, render smaller pictures or fewer \
+         Gaussians; if the device was lost, start again from the last checkpoint"
+    )]
+    Device {
+        /// What was waited for.
+        operation: &'static str,
+        /// What the driver says.
+        reason: String,
+    },
+    /// A buffer is larger than the adapter can bind.
+    #[error(
+        "the buffer `{buffer}` would take {bytes} bytes, and this adapter binds at most {limit}: render smaller \
+         pictures or fewer Gaussians, or choose another adapter"
+    )]
+    TooLarge {
+        /// What it holds.
+        buffer: &'static str,
+        /// Asked for.
+        bytes: u64,
+        /// The adapter's limit.
+        limit: u64,
+    },
+    /// The picture has more parts than a launch can name.
+    #[error("a picture of {width}×{height} is too large for this adapter; at most {limit} cells of 16×16 pixels")]
+    Picture {
+        /// Pixels.
+        width: u32,
+        /// Pixels.
+        height: u32,
+        /// Cells.
+        limit: u32,
+    },
+    /// Another CubeCL runtime than wgpu, or one whose shaders are not WGSL.
+    #[error(
+        "the custom kernels are WGSL, and the CubeCL runtime `{0}` does not take it: use `--device wgpu`, and build burn \
+         with the feature `wgpu` and without `vulkan`, `metal`, `cuda`"
+    )]
+    Runtime(String),
+}
+
+impl GpuError {
+    /// Panics with the error as the payload. A program that prints the error itself keeps its panic hook quiet, see [`GpuError::catch`].
+    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu back end raises"))]
+    pub(crate) fn raise(self) -> ! {
+        std::panic::panic_any(self)
+    }
+
+    /// The error that a panic carries; any other payload comes back as it was.
+    ///
+    /// # Errors
+    /// The payload, if the panic was of another kind.
+    pub fn from_panic(payload: Box<dyn Any + Send>) -> Result<Self, Box<dyn Any + Send>> {
+        payload.downcast::<Self>().map(|error| *error)
+    }
+
+    /// Runs operations and gives back the error that one of them panicked with. Other panics go on.
+    ///
+    /// The panic hook is called all the same, and cannot read the payload: a program that prints these errors itself
+    /// should install a hook that keeps quiet where `payload().is::<GpuError>()`.
+    ///
+    /// ```
+    /// use light4gs_model::GpuError;
+    ///
+    /// assert_eq!(GpuError::catch(|| 2 + 2), Ok(4));
+    /// ```
+    ///
+    /// # Errors
+    /// What the GPU could not do.
+    pub fn catch<T>(run: impl FnOnce() -> T) -> Result<T, Self> {
+        std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
+            .map_err(|payload| Self::from_panic(payload).unwrap_or_else(|other| std::panic::resume_unwind(other)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_raised_error_is_caught_and_other_panics_go_on() {
+        let error = GpuError::Runtime("cuda".into());
+        let raised = error.clone();
+        assert_eq!(GpuError::catch(|| raised.raise()), Err(error));
+        let other = std::panic::catch_unwind(|| GpuError::catch(|| panic!("another")));
+        assert_eq!(other.unwrap_err().downcast_ref::<&str>(), Some(&"another"));
+    }
+}

@@ -1,0 +1,3 @@
+//! How many Gaussians there are: cloning, splitting and pruning.
+
+pub mod densification;

@@ -1,0 +1,103 @@
+//! The WGSL kernels of Light4GS's wgpu back end, as strings: each constant is a file of this folder, named after it.
+//!
+//! `README.md` says what each stage does. The host's side, which puts a kernel together as constants, then includes, then
+//! the stage, is `light4gs_model::gpu`.
+
+#![no_std]
+
+macro_rules! wgsl {
+    ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
+        $($(#[$doc])* pub const $name: &str = include_str!(concat!($file, ".wgsl"));)*
+    };
+}
+
+wgsl! {
+    /// One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
+    ADAM = "adam";
+    /// Puts the Gaussians' numbers of cells into the order of depths.
+    CELL_COUNTS = "cell_counts";
+    /// Colour of every Gaussian from its spherical harmonics, seen from the camera.
+    COLOR = "color";
+    /// Second half of the query's derivative: every cell gathers what the samples around it hand over.
+    HEXPLANE_GATHER = "hexplane_gather";
+    /// Brings one plane from [C, H · W] to the layout of `include/hexplane.wgsl`.
+    HEXPLANE_PACK = "hexplane_pack";
+    /// Features at points: the product over six planes of their bilinear samples.
+    HEXPLANE_QUERY = "hexplane_query";
+    /// First half of the query's derivative: what every point hands to each of its six samples, and the points'
+    /// own gradients.
+    HEXPLANE_QUERY_BACKWARD = "hexplane_query_backward";
+    /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
+    INTERSECT = "intersect";
+    /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
+    /// (Ballé et al. 2018).
+    LOWER_BOUND_BACKWARD = "lower_bound_backward";
+    /// The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error
+    /// everywhere (Press et al., Numerical Recipes, section 6.2): the coefficients and the order of operations of
+    /// `light4gs-model/src/ops`.
+    NORMAL_CDF = "normal_cdf";
+    /// Derivative of the standard normal distribution function: its density times the upstream gradient.
+    NORMAL_CDF_BACKWARD = "normal_cdf_backward";
+    /// Exclusive prefix sum, in place.
+    PREFIX_SUM = "prefix_sum";
+    /// Projects every Gaussian to the screen and counts the cells that it touches.
+    PROJECT = "project";
+    /// Adds up every Gaussian's sums over its cells and takes them through the projection to its attributes.
+    PROJECT_BACKWARD = "project_backward";
+    /// First half of a pass of the radix sort: how often each digit occurs in each block.
+    RADIX_COUNT = "radix_count";
+    /// Second half of a pass of the radix sort: moves keys and values to their places.
+    RADIX_SCATTER = "radix_scatter";
+    /// Where each of a number of groups begins among sorted keys.
+    RANGES = "ranges";
+    /// Blends the splats of every cell, front to back.
+    RASTERIZE = "rasterize";
+    /// Derivative of the blending by every splat, front to back like the forward pass.
+    RASTERIZE_BACKWARD = "rasterize_backward";
+    /// What every splat contributes to one picture, without its colour: the sums behind significance pruning
+    /// (paper III-B).
+    SIGNIFICANCE = "significance";
+    /// Adds up every Gaussian's sums over its cells.
+    SIGNIFICANCE_GATHER = "significance_gather";
+    /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
+    SUBGROUPS = "subgroups";
+}
+
+/// What several stages share.
+pub mod include {
+    wgsl! {
+        /// Thresholds and units: those of `light4gs-model/src/cpu`, DESIGN section 3.
+        CONSTANTS = "include/constants";
+        /// The steps of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian
+        /// to the factor of its 2D covariance.
+        COVARIANCE = "include/covariance";
+        /// Workgroups are dispatched in two dimensions, since one holds at most 65535.
+        DISPATCH = "include/dispatch";
+        /// The exponential of numbers up to 0, to about one unit in the last place.
+        EXPONENTIAL = "include/exponential";
+        /// A splat's alpha at four pixels of a column.
+        FOOTPRINT = "include/footprint";
+        /// Bilinear samples of the six planes of a scale, over xy, xz, xt, yz, yt, zt.
+        HEXPLANE = "include/hexplane";
+        /// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows
+        /// to a vector.
+        PIXELS = "include/pixels";
+        /// Rotations from unit quaternions (w, x, y, z).
+        QUATERNION = "include/quaternion";
+        /// Real spherical harmonics up to degree 3 and their derivatives, with the signs of the original 3DGS
+        /// code.
+        SPHERICAL_HARMONICS = "include/spherical_harmonics";
+        /// One Gaussian on the screen: four vectors in `splats`, at 4 * Gaussian.
+        SPLAT = "include/splat";
+        /// A team is a workgroup of TEAM invocations that blends one cell.
+        TEAM_SUBGROUP = "include/team_subgroup";
+        /// Sum over a small team that is a subgroup: member by member, the same order in every run.
+        TEAM_SUM_OF_FEW = "include/team_sum_of_few";
+        /// Sum over a large team that is a subgroup: by halves, the same order in every run.
+        TEAM_SUM_OF_MANY = "include/team_sum_of_many";
+        /// A team is a workgroup of TEAM invocations that blends one cell.
+        TEAM_WORKGROUP = "include/team_workgroup";
+        /// What is drawn, from where: one uniform for all stages of a picture.
+        VIEW = "include/view";
+    }
+}
