@@ -4,8 +4,8 @@ use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, s};
 use light4gs_model::{
-    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, Pca,
-    SceneCoordinates, contract,
+    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, HexPlaneField,
+    Pca, SceneCoordinates, contract,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 
@@ -239,13 +239,12 @@ fn deformed_gaussians() {
         let scene = DynamicScene {
             gaussians,
             coordinates: SceneCoordinates::new(&identity, &device),
-            hexplane: hexplane_of(&golden, "full.", &device),
-            deformation: network,
+            field: HexPlaneField { hexplane: hexplane_of(&golden, "full.", &device), deformation: network },
             differentiate_points: false,
         };
         let rest = scene.gaussians.tensors();
         let points = reference_query_points(&golden, rest.means.clone().detach(), &device);
-        let moved = scene.deform(rest.clone(), scene.hexplane.query(points));
+        let moved = rest.clone().offset_by(scene.field.deformation.forward(scene.field.hexplane.query(points)));
 
         let check = |key: &str, found: &[f32]| {
             let key = format!("full.{key}");
@@ -278,7 +277,7 @@ fn deformed_gaussians() {
         check("grad.opacity", &gradient(&rest.opacity_logits));
         let (dc, other) = (rest.sh_dc.grad(&grads).unwrap(), rest.sh_rest.grad(&grads).unwrap());
         check("grad.shs", &values_of(&Tensor::cat(vec![dc, other], 1)));
-        for (i, plane) in scene.hexplane.planes.iter().enumerate() {
+        for (i, plane) in scene.field.hexplane.planes.iter().enumerate() {
             let key = format!("grad.scale{}.plane{}", i / 6, i % 6);
             check(&key, &values_of(&plane.val().grad(&grads).unwrap()));
         }

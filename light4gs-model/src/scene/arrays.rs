@@ -12,6 +12,7 @@ use light4gs_codec::{
 use super::coordinates::{Pca, SceneCoordinates};
 use super::deformation::{Deformation, DeformationHead};
 use super::dynamic_scene::DynamicScene;
+use super::field::DeformationField;
 use super::gaussians::{GaussianTensors, Gaussians};
 use super::hexplane::HexPlane;
 
@@ -238,27 +239,32 @@ impl Deformation {
     }
 }
 
-impl DynamicScene {
+impl<F: DeformationField> DynamicScene<F> {
     /// Copies the model to what a `.l4gs` file holds.
     pub fn to_arrays(&self, meta: SceneMeta) -> SceneData {
         SceneData {
             meta,
             gaussians: self.gaussians.to_arrays(),
             frame: self.coordinates.to_arrays(),
-            hexplane: self.hexplane.to_arrays(),
-            deformation: self.deformation.to_arrays(),
+            hexplane: self.planes().map(HexPlane::to_arrays).unwrap_or_default(),
+            deformation: self.field.to_arrays(),
         }
     }
 
     /// The model of a decoded file, on any device.
+    ///
+    /// # Errors
+    /// Planes or layers that do not belong together, or are not what this kind of field needs.
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
-        let hexplane = HexPlane::from_arrays(&data.hexplane, device)?;
+        let planes = match data.hexplane.planes.is_empty() {
+            true => None,
+            false => Some(HexPlane::from_arrays(&data.hexplane, device)?),
+        };
         let SceneFrameArrays { mean, axes, std } = data.frame;
         Ok(Self {
             gaussians: Gaussians::from_arrays(&data.gaussians, device),
             coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device),
-            deformation: Deformation::from_arrays(&data.deformation, hexplane.feature_size(), device)?,
-            hexplane,
+            field: F::from_arrays(&data.deformation, planes, device)?,
             differentiate_points: true,
         }
         .no_grad())

@@ -6,6 +6,8 @@ use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
 
+use super::field::Offsets;
+
 /// Configuration of a [`Deformation`].
 #[derive(Config, Debug)]
 pub struct DeformationConfig {
@@ -75,21 +77,6 @@ impl DeformationHead {
     fn forward(&self, rectified: Tensor<2>) -> Tensor<2> {
         self.output.forward(relu(self.hidden.forward(rectified)))
     }
-}
-
-/// Changes to add to the raw attributes; absent where the network has no such head.
-#[derive(Clone, Debug, Default)]
-pub struct Offsets {
-    /// `[N, 3]`, world units.
-    pub position: Option<Tensor<2>>,
-    /// `[N, 3]`, logarithms.
-    pub scale: Option<Tensor<2>>,
-    /// `[N, 4]`, before normalisation.
-    pub rotation: Option<Tensor<2>>,
-    /// `[N, 1]`, logits.
-    pub opacity: Option<Tensor<2>>,
-    /// `[N, 16, 3]`.
-    pub sh: Option<Tensor<3>>,
 }
 
 /// A trunk and a head for each attribute that changes.

@@ -121,7 +121,7 @@ pub fn settled_planes(
         if decoded.hexplane == data.hexplane {
             break;
         }
-        scene.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
+        scene.field.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
         data.hexplane = decoded.hexplane;
     }
     Ok(HexPlane::from_arrays(&data.hexplane, device)?)
@@ -164,7 +164,7 @@ impl Compression {
     /// What the codec needs to code the planes.
     fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
         let steps = self.quantization.steps_without_gradient();
-        let symbols = self.context.hyper_symbols(&scene.hexplane.tensors(), &steps);
+        let symbols = self.context.hyper_symbols(&scene.field.hexplane.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(PlaneCoding {
             model: self.context.to_arrays()?,
@@ -182,8 +182,8 @@ impl Compression {
 
     /// Bits that the models give for a decoded scene; `device` is the models' own.
     pub fn estimate(&self, decoded: &SceneData, coding: &ShCoding, device: &Device) -> Result<BitEstimate, TrainError> {
-        let scene = DynamicScene::from_arrays(decoded, device)?;
-        let planes = scene.hexplane.tensors();
+        let scene: DynamicScene = DynamicScene::from_arrays(decoded, device)?;
+        let planes = scene.field.hexplane.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
         let steps = self.quantization.steps_without_gradient();
         let rates = self.context.rate(&planes, &steps, &all, Latent::Rounded);

@@ -154,7 +154,7 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
 
 /// Pixel values of all views, clamped to [0, 1].
 fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
-    let scene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
+    let scene: DynamicScene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
     let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
     let picture = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;

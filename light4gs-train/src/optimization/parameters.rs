@@ -74,13 +74,13 @@ pub fn visit_parameters(scene: &mut DynamicScene, visitor: &mut impl ParameterVi
     visitor.visit(Opacity, GAUSSIAN_PARAMETERS[3], &mut gaussians.opacity_logits);
     visitor.visit(ShDc, GAUSSIAN_PARAMETERS[4], &mut gaussians.sh_dc);
     visitor.visit(ShRest, GAUSSIAN_PARAMETERS[5], &mut gaussians.sh_rest);
-    for (i, plane) in scene.hexplane.planes.iter_mut().enumerate() {
+    for (i, plane) in scene.field.hexplane.planes.iter_mut().enumerate() {
         visitor.visit(Grid, &plane_parameter(i), plane);
     }
-    for (i, layer) in scene.deformation.trunk.iter_mut().enumerate() {
+    for (i, layer) in scene.field.deformation.trunk.iter_mut().enumerate() {
         visit_linear(visitor, &format!("deformation.trunk.{i}"), layer);
     }
-    let deformation = &mut scene.deformation;
+    let deformation = &mut scene.field.deformation;
     let heads: [(&str, &mut Option<DeformationHead>); 5] = [
         ("position", &mut deformation.position),
         ("scale", &mut deformation.scale),
