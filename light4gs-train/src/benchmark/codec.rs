@@ -52,7 +52,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
     let vary = |spread: f64, shape: [usize; 3]| Tensor::random(shape, Distribution::Normal(0.0, spread), device);
     let rest = scene.gaussians.sh_rest.dims();
     scene.gaussians.sh_rest = Param::from_tensor(vary(0.05, rest));
-    for plane in &mut scene.hexplane.planes {
+    for plane in &mut scene.field.hexplane.planes {
         *plane = Param::from_tensor(plane.val() + vary(0.05, plane.dims()));
     }
     scene
@@ -64,7 +64,7 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&config, &device);
-    compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+    compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
     let data = scene.to_arrays(SceneMeta::default());
     let input: CompressionInput = compression_input(&mut compression, &scene, &data, &config.compression, Profile::Compact)?;
     let planes = input.planes.as_ref().expect("the compact profile codes planes");

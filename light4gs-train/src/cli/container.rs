@@ -5,6 +5,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info};
 use light4gs_data::{Scene, write_atomically};
 use safetensors::Dtype;
@@ -15,7 +16,7 @@ use super::check_output;
 use super::output::{say, say_json};
 use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
-use crate::compression::{TrainedScene, code_scene, plane_name};
+use crate::compression::{TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
 use crate::device;
 use crate::error::TrainError;
@@ -196,7 +197,7 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
     add("frame.std".into(), vec![3], &data.frame.std);
     for (i, plane) in data.hexplane.planes.iter().enumerate() {
         let shape = vec![data.hexplane.channels as usize, plane.height as usize, plane.width as usize];
-        add(format!("hexplane.{}.{}", i / 6, light4gs_model::PLANE_NAMES[i % 6]), shape, &plane.values);
+        add(format!("hexplane.{}", plane_name(i)), shape, &plane.values);
     }
     for layer in &data.deformation.layers {
         let shape = vec![layer.outputs as usize, layer.inputs as usize];

@@ -4,12 +4,13 @@
 use std::time::Instant;
 
 use burn::tensor::Device;
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
 use light4gs_model::{DynamicScene, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit, plane_name};
+use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit};
 use crate::config::{Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
 use crate::error::TrainError;
@@ -141,7 +142,7 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
 
 /// Pixel values of all views, clamped to [0, 1].
 fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
-    let scene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
+    let scene: DynamicScene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
     let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
     let picture = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;

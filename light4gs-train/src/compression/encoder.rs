@@ -4,11 +4,12 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, encode_compressed, sh_rest_coefficients,
 };
-use light4gs_model::{DynamicScene, HexPlane, Latent, PLANE_NAMES, ShEntropy, counted_sh_coding};
+use light4gs_model::{DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::known;
@@ -49,11 +50,6 @@ pub struct BitMap {
     pub height: u32,
     /// `[height, width]` row-major.
     pub bits: Vec<f32>,
-}
-
-/// How a plane is called in records: its scale and its axes.
-pub fn plane_name(plane: usize) -> String {
-    format!("{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
 }
 
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.
@@ -126,7 +122,7 @@ pub fn freeze_planes(
         if decoded.hexplane == data.hexplane {
             break;
         }
-        scene.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
+        scene.field.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
         data.hexplane = decoded.hexplane;
     }
     Ok(HexPlane::from_arrays(&data.hexplane, device)?)
@@ -170,7 +166,7 @@ impl Compression {
     /// What the codec needs to code the planes.
     fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
         let steps = self.quantization.steps_without_gradient();
-        let symbols = self.context.hyper_symbols(&scene.hexplane.tensors(), &steps);
+        let symbols = self.context.hyper_symbols(&scene.field.hexplane.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(PlaneCoding {
             model: self.context.to_arrays()?,
@@ -188,8 +184,8 @@ impl Compression {
 
     /// Bits that the models give for a decoded scene; `device` is the models' own.
     pub fn estimate(&self, decoded: &SceneData, coding: &ShCoding, device: &Device) -> Result<BitEstimate, TrainError> {
-        let scene = DynamicScene::from_arrays(decoded, device)?;
-        let planes = scene.hexplane.tensors();
+        let scene: DynamicScene = DynamicScene::from_arrays(decoded, device)?;
+        let planes = scene.field.hexplane.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
         let steps = self.quantization.steps_without_gradient();
         let rates = self.context.rate(&planes, &steps, &all, Latent::Rounded);

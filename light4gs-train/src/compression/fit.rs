@@ -31,7 +31,7 @@ pub fn fit(
     let decay = |first: f64, last: f64| ExponentialDecay::new(first, last, iterations);
     let context = decay(settings.context.learning_rate_init, settings.context.learning_rate_final);
     let sh = decay(settings.sh.learning_rate_init, settings.sh.learning_rate_final);
-    compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+    compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
     let mut adam = Adam::default();
     for iteration in 1..=iterations {
         seed_device(device, config.seed, Stage::Fine, iteration);

@@ -58,10 +58,10 @@ impl Compression {
     pub fn noisy(&self, scene: &DynamicScene, learn_steps: bool, with_sh: bool) -> NoisyScene {
         let steps = self.quantization.steps_without_gradient();
         let noisy = steps.add_noise(
-            &scene.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect::<Vec<_>>(),
+            &scene.field.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect::<Vec<_>>(),
         );
         let mut scene = scene.clone();
-        for (parameter, plane) in scene.hexplane.planes.iter_mut().zip(noisy) {
+        for (parameter, plane) in scene.field.hexplane.planes.iter_mut().zip(noisy) {
             replace(parameter, plane);
         }
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: Some(steps.leaves(learn_steps)) }
@@ -70,7 +70,7 @@ impl Compression {
     /// The same for a scene whose planes are frozen.
     pub fn noisy_beside_frozen_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
         let mut scene = scene.clone();
-        for plane in &mut scene.hexplane.planes {
+        for plane in &mut scene.field.hexplane.planes {
             *plane = plane.clone().set_require_grad(false);
         }
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
@@ -91,7 +91,7 @@ impl Compression {
     /// the rate of everything.
     pub fn rate(&self, noisy: &NoisyScene, fraction: f64, with_sh: bool, generator: &mut impl Rng) -> Rate {
         let scene = &noisy.scene;
-        let planes = &scene.hexplane.tensors();
+        let planes = &scene.field.hexplane.tensors();
         let sh_rest = scene.gaussians.sh_rest.val();
         let plane_bits = noisy.steps.as_ref().map(|steps| {
             let chosen = sample(generator, planes.len(), fraction);
@@ -129,7 +129,7 @@ impl NoisyScene {
     /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
     /// That is without the part they play through the noise.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
-        let planes = 0..self.scene.hexplane.planes.len();
+        let planes = 0..self.scene.field.hexplane.planes.len();
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
     }
 }
@@ -146,7 +146,7 @@ pub(super) fn known(scene: &DynamicScene, planes: &[Tensor<3>], rows: Option<Ten
         sh_dc = sh_dc.select(0, rows.clone());
         means = means.select(0, rows);
     }
-    ShKnown { sh_dc, positions: scene.frame.normalize(means), planes: planes.to_vec() }
+    ShKnown { sh_dc, positions: scene.coordinates.normalize(means), planes: planes.to_vec() }
 }
 
 /// A random share of `0..count` without repetition, at least one, in rising order.

@@ -1,12 +1,12 @@
 //! Ranges: what the types alone let through.
 
+use light4gs_codec::plane_layout::check_resolution;
+
 use super::{
     CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates,
     ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
 };
 
-/// Planes are halved twice by the context model and predicted scale by scale.
-const PLANE_MULTIPLE: usize = 4;
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
 const MAX_PLANE_RESOLUTION: usize = 4096;
 const MAX_CHANNELS: usize = 1024;
@@ -49,15 +49,9 @@ fn model(check: &mut Check, model: &ModelConfig) {
 
 fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     check.range("model.hexplane.channels", planes.channels, 1, MAX_CHANNELS);
-    // A whole multiple of a legal size is legal as well: the base resolution settles it for every scale.
-    let legal = |size: usize| size >= PLANE_MULTIPLE && size.is_multiple_of(PLANE_MULTIPLE);
+    let illegal = check_resolution(planes.resolution).err();
+    check.that("model.hexplane.resolution", illegal.is_none(), || format!("is {}", illegal.expect("it is illegal")));
     for (axis, size) in ["x", "y", "z", "t"].into_iter().zip(planes.resolution) {
-        check.that("model.hexplane.resolution", legal(size), || {
-            format!(
-                "is {size} along {axis}; it must be a multiple of {PLANE_MULTIPLE}, the nearest is {}",
-                nearest(size)
-            )
-        });
         for &multiplier in if axis == "t" { &[1][..] } else { &planes.multipliers[..] } {
             let scaled = size.saturating_mul(multiplier);
             check.that("model.hexplane.resolution", scaled <= MAX_PLANE_RESOLUTION, || {
@@ -70,18 +64,6 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     check.that("model.hexplane.multipliers", ascending && multipliers.first().is_some_and(|first| *first > 0), || {
         format!("is {multipliers:?}; it must hold at least one number, all above 0, each above the one before")
     });
-}
-
-/// The legal plane sizes next to `size`.
-fn nearest(size: usize) -> String {
-    let below = size / PLANE_MULTIPLE * PLANE_MULTIPLE;
-    let above = below.saturating_add(PLANE_MULTIPLE);
-    match size - below {
-        _ if below == 0 => above.to_string(),
-        1 => below.to_string(),
-        2 => format!("{below} or {above}"),
-        _ => above.to_string(),
-    }
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {

@@ -3,7 +3,8 @@
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::Tensor;
-use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters, PLANE_NAMES};
+use light4gs_codec::plane_layout::plane_name;
+use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters};
 
 use crate::compression::Compression;
 
@@ -79,7 +80,7 @@ impl GaussianAttribute {
 
 /// Name of a plane's parameter; planes are counted scale-major.
 pub fn plane_parameter(plane: usize) -> String {
-    format!("hexplane.{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
+    format!("hexplane.{}", plane_name(plane))
 }
 
 /// Something to do with every parameter, whatever its rank.
@@ -98,13 +99,13 @@ pub fn visit_parameters(scene: &mut DynamicScene, visitor: &mut impl ParameterVi
     visitor.visit(Opacity, GaussianAttribute::OpacityLogits.path(), &mut gaussians.opacity_logits);
     visitor.visit(ShDc, GaussianAttribute::ShDc.path(), &mut gaussians.sh_dc);
     visitor.visit(ShRest, GaussianAttribute::ShRest.path(), &mut gaussians.sh_rest);
-    for (i, plane) in scene.hexplane.planes.iter_mut().enumerate() {
+    for (i, plane) in scene.field.hexplane.planes.iter_mut().enumerate() {
         visitor.visit(Grid, &plane_parameter(i), plane);
     }
-    for (i, layer) in scene.deformation.trunk.iter_mut().enumerate() {
+    for (i, layer) in scene.field.deformation.trunk.iter_mut().enumerate() {
         visit_linear(visitor, &format!("deformation.trunk.{i}"), layer);
     }
-    let deformation = &mut scene.deformation;
+    let deformation = &mut scene.field.deformation;
     let heads: [(&str, &mut Option<DeformationHead>); 5] = [
         ("position", &mut deformation.position),
         ("scale", &mut deformation.scale),

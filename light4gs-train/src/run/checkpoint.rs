@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::{DataError, PointCloud, write_atomically};
-use light4gs_model::{DynamicScene, Pca, SceneFrame};
+use light4gs_model::{DynamicScene, Pca, SceneCoordinates};
 use safetensors::{Dtype, SafeTensors};
 
 use crate::compression::Compression;
@@ -69,7 +69,7 @@ impl Checkpoint {
             visit_compression(compression, &mut collect);
         }
         let mut entries = collect.0;
-        let Pca { mean, axes, std } = self.scene.frame.pca();
+        let Pca { mean, axes, std } = self.scene.coordinates.pca();
         let frame: Vec<u8> =
             [mean.as_slice(), axes.as_flattened(), &std].concat().iter().flat_map(|v| v.to_le_bytes()).collect();
         entries.insert("frame".into(), (vec![5, 3], frame));
@@ -151,7 +151,7 @@ impl Checkpoint {
         }
         let triple = |k: usize| [frame[3 * k], frame[3 * k + 1], frame[3 * k + 2]];
         let pca = Pca { mean: triple(0), axes: [triple(1), triple(2), triple(3)], std: triple(4) };
-        scene.frame = SceneFrame::new(&pca, device);
+        scene.coordinates = SceneCoordinates::new(&pca, device);
         Ok(Self {
             scene,
             compression,

@@ -31,10 +31,10 @@ impl Trainer {
         if iteration == from {
             compression
                 .context
-                .start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+                .start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
         }
         if frozen && iteration == config.rate.planes_until + 1 {
-            scene.hexplane = freeze_planes(scene, compression, config, &self.device)?;
+            scene.field.hexplane = freeze_planes(scene, compression, config, &self.device)?;
         }
         seed_device(&self.device, *seed, stage, iteration);
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
@@ -67,7 +67,7 @@ impl Trainer {
         let with_sh = self.sh_counts(iteration);
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
-        let mut steps = vec![None; noisy.scene.hexplane.planes.len()];
+        let mut steps = vec![None; noisy.scene.field.hexplane.planes.len()];
         if iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
             let rate = compression.rate(noisy, config.fraction, with_sh, &mut generator);
@@ -103,7 +103,7 @@ fn steps_term(
         return None;
     }
     let steps = compression.quantization.steps();
-    let planes = scene.hexplane.planes.iter().zip(&noisy.scene.hexplane.planes).zip(direct).enumerate();
+    let planes = scene.field.hexplane.planes.iter().zip(&noisy.scene.field.hexplane.planes).zip(direct).enumerate();
     let terms = planes.map(|(i, ((plane, noisy), direct))| {
         let step = steps.of(i);
         let through_noise = gradients.get(&plane_parameter(i)).map(|gradient| {
@@ -148,7 +148,7 @@ mod tests {
         let log_steps = "quantization.log_steps";
 
         let leaves = noisy.steps.clone().unwrap();
-        let mut tape = loss(&noisy.scene.hexplane.tensors(), &|i| leaves.of(i)).backward();
+        let mut tape = loss(&noisy.scene.field.hexplane.tensors(), &|i| leaves.of(i)).backward();
         let direct = noisy.step_gradients(&tape);
         let mut apart = GradientSums::default();
         apart.add_scene(&mut noisy.scene, &mut tape);
@@ -156,7 +156,7 @@ mod tests {
         apart.add_compression(&mut compression, &mut term.backward());
 
         let steps = compression.quantization.steps();
-        let pairs = scene.hexplane.tensors().into_iter().zip(noisy.scene.hexplane.tensors()).enumerate();
+        let pairs = scene.field.hexplane.tensors().into_iter().zip(noisy.scene.field.hexplane.tensors()).enumerate();
         let planes: Vec<_> = pairs
             .map(|(i, (plane, noisy))| {
                 let step = steps.broadcast(i);

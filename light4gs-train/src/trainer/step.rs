@@ -81,7 +81,7 @@ impl Trainer {
         let scene = &mut self.state.scene;
         let weights = &self.config.train.regularizer;
         let term =
-            regularizer::weighted_sum(&scene.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1);
+            regularizer::weighted_sum(&scene.field.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1);
         let value = term.clone().inner();
         gradients.add_scene(scene, &mut term.backward());
         self.profile.lap("regularizers");

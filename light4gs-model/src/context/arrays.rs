@@ -1,26 +1,17 @@
-//! Entropy models and quantisation steps as the codec's plain arrays.
+//! The context model and the quantisation steps as the codec's plain arrays.
 
 use burn::module::Param;
 use burn::tensor::Tensor;
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 use light4gs_codec::{
     CodecError, ContextModelArrays, ContextModelShape, ContextParts as Parts, ConvolutionLayer, ConvolutionShape,
-    FrequencyTable, LinearLayer, PerGroup, ShCoding, ShCondition, SpatialKernel,
+    FrequencyTable, PerGroup, SpatialKernel,
 };
 
-use crate::context_model::ContextModel;
-use crate::hexplane::{PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
+use super::model::ContextModel;
+use crate::entropy::convolution::PlaneConv;
+use crate::entropy::quantization_steps::PlaneSteps;
 use crate::named_parameters::Layer;
-use crate::plane_conv::PlaneConv;
-use crate::quantization_steps::PlaneSteps;
-use crate::sh_entropy::{ShEntropy, ShEntropyModel};
-
-/// A table goes no further than this many symbols on either side of 0; what lies beyond is escaped.
-const TABLE_REACH: i32 = 8000;
-
-/// The symbol of a value, as far as a table reaches.
-fn table_symbol(value: f32, step: f32) -> i32 {
-    ((value / step).round() as i32).clamp(-TABLE_REACH, TABLE_REACH)
-}
 
 fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
     parameter.val().into_data().iter::<f32>().collect()
@@ -31,7 +22,7 @@ impl PlaneSteps {
     pub fn to_groups(&self) -> Vec<PerGroup> {
         let steps = self.values();
         let mut groups: Vec<PerGroup> = steps
-            .chunks_exact(PLANE_NAMES.len())
+            .chunks_exact(PLANES_PER_SCALE)
             .map(|scale| PerGroup { space_only: scale[SPACE_ONLY_PLANES[0]], space_time: scale[SPACE_TIME_PLANES[0]] })
             .collect();
         if groups.iter().all(|group| *group == groups[0]) {
@@ -102,61 +93,4 @@ impl ContextModel {
 fn convolution_layer(shape: ConvolutionShape, layers: &[Layer]) -> ConvolutionLayer {
     let layer = layers.iter().find(|layer| layer.name == shape.name).expect("the stream names our own layers");
     ConvolutionLayer { shape, weight: values(layer.weight), bias: values(layer.bias) }
-}
-
-impl ShEntropyModel {
-    /// What a decoder needs to read `sh_rest`, `[N, 15, 3]` row-major. Tables go as far as these values do.
-    ///
-    /// # Errors
-    /// Values that are not finite, or too many steps apart for a table.
-    pub fn to_coding(&self, sh_rest: &[f32]) -> Result<ShCoding, CodecError> {
-        let step = self.step();
-        if let Some(tables) = self.tables() {
-            let symbols = sh_rest.iter().map(|value| table_symbol(*value, step));
-            let (low, high) = symbols.fold((0, 0), |(low, high), k| (low.min(k), high.max(k)));
-            let pmf = tables.pmf(low..=high);
-            let tables = pmf.iter().map(|pmf| FrequencyTable::from_pmf(low, pmf)).collect::<Result<_, _>>()?;
-            return Ok(ShCoding::Tables { step, tables });
-        }
-        let kind = match self {
-            Self::HexPlaneCoupled(_) => ShCondition::HexplaneCoupled,
-            _ => ShCondition::Autoregressive,
-        };
-        let layers = self.layers().iter().map(linear_layer).collect();
-        Ok(ShCoding::Conditional { step, kind, layers })
-    }
-}
-
-/// A 1×1 convolution as a linear layer.
-fn linear_layer(layer: &Layer) -> LinearLayer {
-    let [outputs, inputs, ..] = layer.weight.dims();
-    LinearLayer {
-        name: layer.name.to_owned(),
-        inputs: inputs as u32,
-        outputs: outputs as u32,
-        weight: values(layer.weight),
-        bias: values(layer.bias),
-    }
-}
-
-/// Coding of `sh_rest`, `[N, channels]` row-major, without a trained model: a table a channel, from how often each
-/// symbol occurs.
-///
-/// # Errors
-/// Values too many steps apart for a table.
-pub fn counted_sh_coding(sh_rest: &[f32], channels: usize, step: f32) -> Result<ShCoding, CodecError> {
-    let table = |channel: usize| {
-        let symbols: Vec<i32> =
-            sh_rest.iter().skip(channel).step_by(channels).map(|value| table_symbol(*value, step)).collect();
-        let (low, high) = symbols.iter().fold((0, 0), |(low, high), k| (low.min(*k), high.max(*k)));
-        let mut pmf = vec![0.0; (high - low + 1) as usize];
-        for symbol in &symbols {
-            pmf[(symbol - low) as usize] += 1.0 / symbols.len() as f64;
-        }
-        if symbols.is_empty() {
-            pmf[0] = 1.0;
-        }
-        FrequencyTable::from_pmf(low, &pmf)
-    };
-    Ok(ShCoding::Tables { step, tables: (0..channels).map(table).collect::<Result<_, _>>()? })
 }

@@ -3,10 +3,10 @@
 use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, is_space_time, scale_of};
 
-use crate::hexplane::{PLANE_NAMES, SPACE_TIME_PLANES};
+use super::quantization_steps::PlaneSteps;
 use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
-use crate::quantization_steps::PlaneSteps;
 
 /// Configuration of an [`AdaptiveQuantization`].
 #[derive(Config, Debug)]
@@ -96,11 +96,10 @@ impl AdaptiveQuantization {
     fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {
         let steps = log_steps.exp();
         let groups = steps.dims()[0] / 2;
-        let of_plane = |scale: usize, plane: usize| {
-            let group = 2 * (scale % groups) + usize::from(SPACE_TIME_PLANES.contains(&plane));
+        let of_plane = |plane: usize| {
+            let group = 2 * (scale_of(plane) % groups) + usize::from(is_space_time(plane));
             steps.clone().narrow(0, group, 1)
         };
-        let planes = (0..self.scales).flat_map(|scale| (0..PLANE_NAMES.len()).map(move |plane| (scale, plane)));
-        PlaneSteps::new(planes.map(|(scale, plane)| of_plane(scale, plane)).collect())
+        PlaneSteps::new((0..self.scales * PLANES_PER_SCALE).map(of_plane).collect())
     }
 }

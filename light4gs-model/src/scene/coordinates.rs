@@ -4,7 +4,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
-use crate::contraction::contract;
+use super::contraction::contract;
 
 /// Principal component analysis of a point cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,17 +51,17 @@ impl Pca {
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::{Pca, SceneFrame};
+/// use light4gs_model::{Pca, SceneCoordinates};
 ///
 /// let device = Device::flex();
 /// let cloud = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.5]];
-/// let frame = SceneFrame::new(&Pca::fit(&cloud), &device);
+/// let frame = SceneCoordinates::new(&Pca::fit(&cloud), &device);
 /// let coordinates = frame.normalize(Tensor::from_floats(cloud, &device));
 /// assert_eq!(coordinates.dims(), [4, 3]);
 /// assert!(coordinates.abs().max().into_scalar::<f32>() <= 1.0);
 /// ```
 #[derive(Module, Debug)]
-pub struct SceneFrame {
+pub struct SceneCoordinates {
     /// `[1, 3]`
     mean: Param<Tensor<2>>,
     /// `[3, 3]`: column j is axis j.
@@ -70,7 +70,7 @@ pub struct SceneFrame {
     std: Param<Tensor<2>>,
 }
 
-impl SceneFrame {
+impl SceneCoordinates {
     /// The frame of an analysed cloud.
     pub fn new(pca: &Pca, device: &Device) -> Self {
         let columns: Vec<f32> = (0..9).map(|k| pca.axes[k % 3][k / 3]).collect();

@@ -6,6 +6,8 @@ use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor};
 
+use super::field::Offsets;
+
 /// Configuration of a [`Deformation`].
 #[derive(Config, Debug)]
 pub struct DeformationConfig {
@@ -77,21 +79,6 @@ impl DeformationHead {
     }
 }
 
-/// Changes to add to the raw attributes; absent where the network has no such head.
-#[derive(Clone, Debug, Default)]
-pub struct Deltas {
-    /// `[N, 3]`, world units.
-    pub position: Option<Tensor<2>>,
-    /// `[N, 3]`, logarithms.
-    pub scale: Option<Tensor<2>>,
-    /// `[N, 4]`, before normalisation.
-    pub rotation: Option<Tensor<2>>,
-    /// `[N, 1]`, logits.
-    pub opacity: Option<Tensor<2>>,
-    /// `[N, 16, 3]`.
-    pub sh: Option<Tensor<3>>,
-}
-
 /// A trunk and a head for each attribute that changes.
 ///
 /// ```
@@ -100,9 +87,9 @@ pub struct Deltas {
 ///
 /// let device = Device::flex();
 /// let deformation = DeformationConfig::new(16).with_width(32).init(&device);
-/// let deltas = deformation.forward(Tensor::zeros([5, 16], &device));
-/// assert_eq!(deltas.position.unwrap().dims(), [5, 3]);
-/// assert!(deltas.sh.is_none());
+/// let offsets = deformation.forward(Tensor::zeros([5, 16], &device));
+/// assert_eq!(offsets.position.unwrap().dims(), [5, 3]);
+/// assert!(offsets.sh.is_none());
 /// ```
 #[derive(Module, Debug)]
 pub struct Deformation {
@@ -129,11 +116,11 @@ impl Deformation {
     }
 
     /// Changes of the attributes from features `[N, F]`.
-    pub fn forward(&self, features: Tensor<2>) -> Deltas {
+    pub fn forward(&self, features: Tensor<2>) -> Offsets {
         let rectified = relu(self.hidden(features));
         let run = |head: &Option<DeformationHead>| head.as_ref().map(|head| head.forward(rectified.clone()));
         let count = rectified.dims()[0];
-        Deltas {
+        Offsets {
             position: run(&self.position),
             scale: run(&self.scale),
             rotation: run(&self.rotation),

@@ -7,11 +7,11 @@ use burn::module::{Module, Param};
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 
-use crate::factorized_density::{logistic_interval, plain_logistic_interval};
-use crate::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
+use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
+use crate::entropy::factorized_density::{logistic_interval, plain_logistic_interval};
+use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
 use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
 use crate::ops::lower_bound::lower_bound;
-use crate::sh_entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
 
 /// Configuration of a [`ShMixture`].
 #[derive(Config, Debug)]

@@ -4,9 +4,8 @@ use burn::module::{Module, Param};
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
 
-use crate::hyperprior::SLOPE;
+use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig};
 
 /// Names of the two layers in the stream.
 pub(crate) type Names = [&'static str; 2];
@@ -31,7 +30,7 @@ impl ShNetwork {
 
     pub(crate) fn forward(&self, features: Tensor<3>) -> Tensor<3> {
         let [first, last] = &self.layers;
-        last.forward(leaky_relu(first.forward(features), SLOPE))
+        last.forward(leaky_relu(first.forward(features), LEAKY_SLOPE))
     }
 
     pub(crate) fn layers(&self, names: Names) -> impl Iterator<Item = Layer<'_>> {

@@ -1,12 +1,10 @@
 //! What a part of the context model contributes to a plane, and what it may look at.
 
 use burn::tensor::Tensor;
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, scale_of};
 
-use crate::entropy_bottleneck::Latent;
-use crate::hexplane::{PLANE_NAMES, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
-use crate::quantization_steps::PlaneSteps;
-
-const PLANES: usize = PLANE_NAMES.len();
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::quantization_steps::PlaneSteps;
 
 /// All planes `[M, H, W]` of a hexplane, scale-major, minus their groups' centres, with their steps.
 ///
@@ -21,16 +19,6 @@ pub struct CenteredPlanes {
 }
 
 impl CenteredPlanes {
-    /// The scale of a plane, 0 the lowest.
-    pub fn scale_of(plane: usize) -> usize {
-        plane / PLANES
-    }
-
-    /// Whether a plane holds time.
-    pub fn is_space_time(plane: usize) -> bool {
-        SPACE_TIME_PLANES.contains(&(plane % PLANES))
-    }
-
     /// A plane in units of its step, `[M, H, W]`.
     pub fn in_steps(&self, plane: usize) -> Tensor<3> {
         self.planes[plane].clone() / self.steps.broadcast(plane)
@@ -38,20 +26,13 @@ impl CenteredPlanes {
 
     /// The plane over the same axes one scale below; none for the lowest scale.
     pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
-        Some(self.planes[plane.checked_sub(PLANES)?].clone())
+        Some(self.planes[plane.checked_sub(PLANES_PER_SCALE)?].clone())
     }
 
-    /// The plane at a position of [`PLANE_NAMES`] in the same scale as `plane`.
+    /// The plane at a position of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES) in the same scale as `plane`.
     pub fn in_same_scale(&self, plane: usize, position: usize) -> Tensor<3> {
-        self.planes[Self::scale_of(plane) * PLANES + position].clone()
+        self.planes[scale_of(plane) * PLANES_PER_SCALE + position].clone()
     }
-}
-
-/// The order in which planes are coded: scale by scale, in each the space-time planes first.
-pub fn coding_order(planes: usize) -> Vec<usize> {
-    let scales = 0..planes / PLANES;
-    let in_scale = SPACE_TIME_PLANES.into_iter().chain(SPACE_ONLY_PLANES);
-    scales.flat_map(|scale| in_scale.clone().map(move |position| scale * PLANES + position)).collect()
 }
 
 /// In which order the values of a plane are coded.

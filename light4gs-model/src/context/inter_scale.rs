@@ -4,11 +4,11 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::entropy_bottleneck::Latent;
-use crate::hyperprior::Hyperprior;
+use super::hyperprior::Hyperprior;
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig};
-use crate::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 
 /// Configuration of an [`InterScale`].
 #[derive(Config, Debug)]

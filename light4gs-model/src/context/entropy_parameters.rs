@@ -5,9 +5,8 @@ use burn::module::{Module, Param};
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
 
-use crate::hyperprior::SLOPE;
+use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig};
 
 /// How the last layer starts.
 #[derive(Config, Debug, PartialEq)]
@@ -57,7 +56,7 @@ pub struct EntropyParameters {
 pub struct PlaneGaussians {
     /// `[M, H, W]`.
     pub means: Tensor<3>,
-    /// `[M, H, W]`, raw: what is below [`SCALE_BOUND`](crate::gaussian_conditional::SCALE_BOUND) counts as that.
+    /// `[M, H, W]`, raw: what is below [`SCALE_BOUND`](crate::entropy::gaussian_conditional::SCALE_BOUND) counts as that.
     pub scales: Tensor<3>,
 }
 
@@ -100,7 +99,7 @@ impl EntropyParameters {
             .reduce(|sum, product| sum + product)
             .map_or_else(|| bias.clone().expand([outputs, height * width]), |product| product + bias.clone());
         let hidden = hidden.reshape([outputs, height, width]);
-        let output = rest.iter().fold(hidden, |hidden, layer| layer.forward(leaky_relu(hidden, SLOPE)));
+        let output = rest.iter().fold(hidden, |hidden, layer| layer.forward(leaky_relu(hidden, LEAKY_SLOPE)));
         let [doubled, ..] = output.dims();
         let channels = doubled / 2;
         PlaneGaussians { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }

@@ -10,8 +10,8 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, s};
 
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig};
 
 const KERNEL: usize = 5;
 

@@ -6,10 +6,10 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
-use crate::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
-use crate::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
+use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
+use crate::entropy::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
+use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
 use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
-use crate::sh_entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
 
 /// Configuration of a [`ShBottleneck`].
 #[derive(Config, Debug)]

@@ -3,16 +3,18 @@
 use burn::module::{Module, Param};
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS, position_of, scale_of};
 use light4gs_codec::{
     GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
     SceneMeta,
 };
 
-use crate::deformation::{Deformation, DeformationHead};
-use crate::dynamic_scene::DynamicScene;
-use crate::gaussians::{GaussianTensors, Gaussians};
-use crate::hexplane::HexPlane;
-use crate::scene_frame::{Pca, SceneFrame};
+use super::coordinates::{Pca, SceneCoordinates};
+use super::deformation::{Deformation, DeformationHead};
+use super::dynamic_scene::DynamicScene;
+use super::field::DeformationField;
+use super::gaussians::{GaussianTensors, Gaussians};
+use super::hexplane::HexPlane;
 
 /// Plain arrays that do not make a model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -91,7 +93,7 @@ impl GaussianTensors {
     }
 }
 
-impl SceneFrame {
+impl SceneCoordinates {
     fn to_arrays(&self) -> SceneFrameArrays {
         let Pca { mean, axes, std } = self.pca();
         SceneFrameArrays { mean, axes, std }
@@ -101,7 +103,7 @@ impl SceneFrame {
 impl HexPlane {
     /// Copies to plain arrays. Resolutions are read off the planes.
     pub fn to_arrays(&self) -> HexPlaneArrays {
-        let dims = |scale: usize, plane: usize| self.planes[6 * scale + plane].dims();
+        let dims = |scale: usize, plane: usize| self.planes[PLANES_PER_SCALE * scale + plane].dims();
         let [channels, res_y, res_x] = dims(0, 0);
         let [_, res_t, res_z] = dims(0, 5);
         let planes = self.planes.iter().map(|plane| {
@@ -119,15 +121,16 @@ impl HexPlane {
     /// From plain arrays.
     pub fn from_arrays(arrays: &HexPlaneArrays, device: &Device) -> Result<Self, ModelError> {
         let channels = arrays.channels as usize;
-        if arrays.planes.is_empty() || arrays.planes.len() != 6 * arrays.multipliers.len() {
+        if arrays.planes.is_empty() || arrays.planes.len() != PLANES_PER_SCALE * arrays.multipliers.len() {
             let (planes, scales) = (arrays.planes.len(), arrays.multipliers.len());
             return Err(ModelError::Planes(format!("{planes} planes for {scales} scales, expected six a scale")));
         }
         let mut tensors = Vec::with_capacity(arrays.planes.len());
         for (i, plane) in arrays.planes.iter().enumerate() {
-            let resolution =
-                |axis: usize| arrays.resolution[axis] * if axis == 3 { 1 } else { arrays.multipliers[i / 6] };
-            let [across, down] = crate::cpu::hexplane::PLANE_AXES[i % 6];
+            let resolution = |axis: usize| {
+                arrays.resolution[axis] * if axis == TIME_AXIS { 1 } else { arrays.multipliers[scale_of(i)] }
+            };
+            let [across, down] = PLANE_AXES[position_of(i)];
             let expected = (resolution(down), resolution(across));
             if (plane.height, plane.width) != expected {
                 let found = (plane.height, plane.width);
@@ -236,27 +239,32 @@ impl Deformation {
     }
 }
 
-impl DynamicScene {
+impl<F: DeformationField> DynamicScene<F> {
     /// Copies the model to what a `.l4gs` file holds.
     pub fn to_arrays(&self, meta: SceneMeta) -> SceneData {
         SceneData {
             meta,
             gaussians: self.gaussians.to_arrays(),
-            frame: self.frame.to_arrays(),
-            hexplane: self.hexplane.to_arrays(),
-            deformation: self.deformation.to_arrays(),
+            frame: self.coordinates.to_arrays(),
+            hexplane: self.planes().map(HexPlane::to_arrays).unwrap_or_default(),
+            deformation: self.field.to_arrays(),
         }
     }
 
     /// The model of a decoded file, on any device.
+    ///
+    /// # Errors
+    /// Planes or layers that do not belong together, or are not what this kind of field needs.
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
-        let hexplane = HexPlane::from_arrays(&data.hexplane, device)?;
+        let planes = match data.hexplane.planes.is_empty() {
+            true => None,
+            false => Some(HexPlane::from_arrays(&data.hexplane, device)?),
+        };
         let SceneFrameArrays { mean, axes, std } = data.frame;
         Ok(Self {
             gaussians: Gaussians::from_arrays(&data.gaussians, device),
-            frame: SceneFrame::new(&Pca { mean, axes, std }, device),
-            deformation: Deformation::from_arrays(&data.deformation, hexplane.feature_size(), device)?,
-            hexplane,
+            coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device),
+            field: F::from_arrays(&data.deformation, planes, device)?,
             differentiate_points: true,
         }
         .no_grad())

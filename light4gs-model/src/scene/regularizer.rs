@@ -1,8 +1,9 @@
 //! Regularisers of the planes (4DGS: `compute_regulation`).
 
 use burn::tensor::{Tensor, s};
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 
-use crate::hexplane::{HexPlane, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
+use super::hexplane::HexPlane;
 
 /// Mean square of the second difference along the height of a plane `[C, H, W]`: `[1]`. Zero below three rows.
 pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {
@@ -17,7 +18,7 @@ pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {
 }
 
 fn sum_over(hexplane: &HexPlane, members: [usize; 3], term: impl Fn(Tensor<3>) -> Tensor<1>) -> Tensor<1> {
-    let scales = hexplane.planes.chunks_exact(6);
+    let scales = hexplane.planes.chunks_exact(PLANES_PER_SCALE);
     let terms: Vec<_> = scales.flat_map(|scale| members.map(|plane| term(scale[plane].val()))).collect();
     terms.into_iter().reduce(|sum, term| sum + term).expect("a hexplane has at least one scale")
 }

@@ -14,17 +14,18 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::{coding_order, is_space_time};
 
-use crate::checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
-use crate::entropy_bottleneck::Latent;
-use crate::entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
-use crate::gaussian_conditional::{bits, gaussian_likelihood};
-use crate::hyperprior::{Hyperprior, HyperpriorConfig};
-use crate::inter_plane::{InterPlane, InterPlaneConfig};
-use crate::inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig};
+use super::checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
+use super::entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
+use super::hyperprior::{Hyperprior, HyperpriorConfig};
+use super::inter_plane::{InterPlane, InterPlaneConfig};
+use super::inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig};
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::gaussian_conditional::{bits, gaussian_likelihood};
+use crate::entropy::quantization_steps::PlaneSteps;
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
-use crate::prior::{CenteredPlanes, Passes, Prior, PriorPart, coding_order};
-use crate::quantization_steps::PlaneSteps;
 
 /// Parts of a [`ContextModel`], each of which an ablation may switch off.
 #[derive(Config, Debug, PartialEq)]
@@ -175,7 +176,7 @@ pub struct QuantizedPlane {
 
 /// The context model. See the [module's documentation](self) for what it consists of.
 ///
-/// Planes are `[M, H, W]`, scale-major, six a scale in the order of [`PLANE_NAMES`](crate::PLANE_NAMES), H and W multiples
+/// Planes are `[M, H, W]`, scale-major, six a scale in the order of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES), H and W multiples
 /// of 4, in original units. For training they carry uniform noise of their steps' width
 /// ([`PlaneSteps::add_noise`]), and the parameters of a plane depend only on the noisy values of others, so a random
 /// subset of planes gives an unbiased estimate of the rate.
@@ -250,7 +251,7 @@ impl ContextModel {
 
     /// What is subtracted from a plane before anything else.
     pub fn center_of(&self, plane: usize) -> f64 {
-        if CenteredPlanes::is_space_time(plane) { self.space_time_center } else { self.space_only_center }
+        if is_space_time(plane) { self.space_time_center } else { self.space_only_center }
     }
 
     /// Planes in original units as the parts see them.

@@ -3,11 +3,12 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::position_of;
 
-use crate::entropy_bottleneck::Latent;
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig};
-use crate::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 
 /// Configuration of an [`InterPlane`].
 #[derive(Config, Debug)]
@@ -93,7 +94,7 @@ impl InterPlane {
 impl PriorPart for InterPlane {
     /// Applies to space-only planes.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
-        let [over_a, over_b] = Self::sources(plane % 6)?.map(|position| planes.in_same_scale(plane, position));
+        let [over_a, over_b] = Self::sources(position_of(plane))?.map(|position| planes.in_same_scale(plane, position));
         let parameters = Some(self.forward(over_a, over_b));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
     }

@@ -5,14 +5,11 @@ use burn::module::Module;
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
 
-use crate::entropy_bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
-use crate::gaussian_conditional::bits;
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
+use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
+use crate::entropy::gaussian_conditional::bits;
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, Prefixed, visit_layer};
-use crate::plane_conv::{PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
-use crate::prior::{CenteredPlanes, Passes, Prior, PriorPart};
-
-/// Slope of every rectifier of the context model below zero.
-pub(crate) const SLOPE: f64 = 0.01;
 
 /// Configuration of a [`Hyperprior`].
 #[derive(Config, Debug)]
@@ -87,13 +84,13 @@ impl Hyperprior {
     /// The latent `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
     pub fn analyze(&self, plane: Tensor<3>) -> Tensor<3> {
         let [first, second, third] = &self.analysis;
-        let hidden = leaky_relu(first.forward(plane), SLOPE);
-        third.forward(leaky_relu(second.forward(hidden), SLOPE))
+        let hidden = leaky_relu(first.forward(plane), LEAKY_SLOPE);
+        third.forward(leaky_relu(second.forward(hidden), LEAKY_SLOPE))
     }
 
     /// Parameters `[2 M, H, W]` from a received latent `[N, H / 4, W / 4]`.
     pub fn synthesize(&self, latent: Tensor<3>) -> Tensor<3> {
-        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| leaky_relu(layer.forward(hidden), SLOPE));
+        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| leaky_relu(layer.forward(hidden), LEAKY_SLOPE));
         self.synthesis_out.forward(up)
     }
 

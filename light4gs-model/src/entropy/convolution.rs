@@ -10,6 +10,9 @@ use burn::nn::Initializer;
 use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, s};
 
+/// Slope below zero of every leaky rectifier of the entropy models.
+pub const LEAKY_SLOPE: f64 = 0.01;
+
 /// Configuration of a [`PlaneConv`]; padding is half the kernel.
 #[derive(Config, Debug)]
 pub struct PlaneConvConfig {

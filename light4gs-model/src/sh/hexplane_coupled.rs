@@ -3,11 +3,12 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::PLANES_PER_SCALE;
 
-use crate::hexplane::{PLANE_NAMES, query_planes};
+use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
+use super::network::{Names, ShNetwork};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
-use crate::sh_entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
-use crate::sh_network::{Names, ShNetwork};
+use crate::scene::hexplane::query_planes;
 
 const NAMES: Names = ["sh_hex.0", "sh_hex.2"];
 
@@ -62,7 +63,7 @@ pub fn space_feature(planes: &[Tensor<3>], positions: Tensor<2>) -> Tensor<2> {
     let device = positions.device();
     let [count, _] = positions.dims();
     let points = Tensor::cat(vec![positions, Tensor::zeros([count, 1], &device)], 1);
-    let planes = planes.chunks_exact(PLANE_NAMES.len()).flat_map(|scale| {
+    let planes = planes.chunks_exact(PLANES_PER_SCALE).flat_map(|scale| {
         let [xy, xz, _, yz, ..] = scale else { unreachable!("chunks of six") };
         let ([channels, y, x], [_, z, _]) = (xy.dims(), xz.dims());
         let [xt, yt, zt] = [x, y, z].map(|length| Tensor::ones([channels, MOMENTS, length], &device));

@@ -6,8 +6,8 @@ use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Distribution, Tensor, s};
 
-use crate::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
-use crate::gaussian_conditional::LIKELIHOOD_BOUND;
+use super::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
+use super::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
 use crate::ops::lower_bound::lower_bound;
 

@@ -4,9 +4,9 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 
+use super::entropy::{ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
+use super::network::{Names, ShNetwork};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
-use crate::sh_entropy::{ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
-use crate::sh_network::{Names, ShNetwork};
 
 /// First channel and number of channels of the degrees 1, 2 and 3.
 const DEGREES: [(usize, usize); 3] = [(0, 9), (9, 15), (24, 21)];

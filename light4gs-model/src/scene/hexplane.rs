@@ -4,18 +4,11 @@ use burn::backend::Dispatch;
 use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Distribution, Tensor};
+use light4gs_codec::plane_layout::{
+    IllegalSize, PLANE_AXES, PLANES_PER_SCALE, SPACE_TIME_PLANES, TIME_AXIS, check_resolution,
+};
 
 use crate::ops::hexplane_query::{HexPlaneOps, QueryInputs};
-
-/// Names of the planes of a scale, in order. The plane over (a, b) is `[C, res b, res a]`.
-pub const PLANE_NAMES: [&str; 6] = ["xy", "xz", "xt", "yz", "yt", "zt"];
-/// Positions of the planes that hold no time.
-pub const SPACE_ONLY_PLANES: [usize; 3] = [0, 1, 3];
-/// Positions of the planes over an axis and time.
-pub const SPACE_TIME_PLANES: [usize; 3] = [2, 4, 5];
-
-const PLANE_AXES: [[usize; 2]; 6] = crate::cpu::hexplane::PLANE_AXES;
-const TIME: usize = 3;
 
 /// Configuration of a [`HexPlane`].
 #[derive(Config, Debug)]
@@ -23,7 +16,7 @@ pub struct HexPlaneConfig {
     /// Channels of each plane (`h` in the paper).
     #[config(default = 32)]
     pub channels: usize,
-    /// Cells along x, y, z and t at the lowest scale.
+    /// Cells along x, y, z and t at the lowest scale, each a multiple of 4.
     #[config(default = "[64, 64, 64, 24]")]
     pub resolution: [usize; 4],
     /// One scale each: spatial resolutions are multiplied, time keeps its own.
@@ -34,7 +27,7 @@ pub struct HexPlaneConfig {
 impl HexPlaneConfig {
     /// Cells along x, y, z, t at a scale.
     pub fn resolution_at(&self, scale: usize) -> [usize; 4] {
-        std::array::from_fn(|axis| self.resolution[axis] * if axis == TIME { 1 } else { self.multipliers[scale] })
+        std::array::from_fn(|axis| self.resolution[axis] * if axis == TIME_AXIS { 1 } else { self.multipliers[scale] })
     }
 
     /// `[C, H, W]` of a plane.
@@ -44,10 +37,24 @@ impl HexPlaneConfig {
         [self.channels, resolution[down], resolution[across]]
     }
 
+    /// Whether there can be planes of this resolution: what the codec and the context model refuse is refused here.
+    ///
+    /// # Errors
+    /// The axis, and the nearest legal size.
+    pub fn check(&self) -> Result<(), IllegalSize> {
+        check_resolution(self.resolution)
+    }
+
     /// Space-time planes start at 1, space-only planes uniform in [0.1, 0.5].
+    ///
+    /// # Panics
+    /// If [`Self::check`] refuses the resolution.
     pub fn init(&self, device: &Device) -> HexPlane {
+        if let Err(problem) = self.check() {
+            panic!("the planes' resolution is {problem}");
+        }
         let planes = (0..self.multipliers.len())
-            .flat_map(|scale| (0..6).map(move |plane| (scale, plane)))
+            .flat_map(|scale| (0..PLANES_PER_SCALE).map(move |plane| (scale, plane)))
             .map(|(scale, plane)| {
                 let shape = self.plane_shape(scale, plane);
                 Param::from_tensor(if SPACE_TIME_PLANES.contains(&plane) {
@@ -74,7 +81,7 @@ impl HexPlaneConfig {
 /// ```
 #[derive(Module, Debug)]
 pub struct HexPlane {
-    /// Scale-major, six a scale in the order of [`PLANE_NAMES`].
+    /// Scale-major, six a scale in the order of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES).
     pub planes: Vec<Param<Tensor<3>>>,
     channels: usize,
 }
@@ -86,7 +93,7 @@ impl HexPlane {
     /// If there are no planes, or their number is no multiple of six.
     pub fn from_planes(planes: Vec<Tensor<3>>) -> Self {
         assert!(
-            !planes.is_empty() && planes.len().is_multiple_of(6),
+            !planes.is_empty() && planes.len().is_multiple_of(PLANES_PER_SCALE),
             "a hexplane has six planes a scale, not {}",
             planes.len()
         );
@@ -96,7 +103,7 @@ impl HexPlane {
 
     /// Number of scales.
     pub fn scales(&self) -> usize {
-        self.planes.len() / 6
+        self.planes.len() / PLANES_PER_SCALE
     }
 
     /// Length of a feature: channels times scales.
@@ -119,7 +126,7 @@ impl HexPlane {
 pub(crate) fn query_planes(points: Tensor<2>, planes: Vec<Tensor<3>>) -> Tensor<2> {
     assert_eq!(points.dims()[1], 4, "points must be [N, 4]: x, y, z, t");
     let mut features: Vec<Tensor<2>> = planes
-        .chunks_exact(6)
+        .chunks_exact(PLANES_PER_SCALE)
         .map(|scale| {
             let [xy, xz, xt, yz, yt, zt] = std::array::from_fn(|k| scale[k].clone().into_dispatch());
             let inputs = QueryInputs { points: points.clone().into_dispatch(), xy, xz, xt, yz, yt, zt };
