@@ -156,7 +156,9 @@ fn every_configuration_makes_a_file_that_decodes() {
         let scene = scene(&config, &device);
         let mut compression = Compression::new(&config, &device);
         compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps());
-        let encoded = encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device).unwrap();
+        let encoded =
+            encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
+                .unwrap();
         let decoded = decode(&encoded.bytes).unwrap();
         assert_eq!(decoded, encoded.decoded, "{overrides:?}");
         assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
@@ -187,7 +189,9 @@ fn frozen_planes_are_those_of_the_file() {
         scene.field.hexplane = freeze_planes(&scene, &compression, &config.compression, &device).unwrap();
         let frozen = scene.field.hexplane.to_arrays();
         assert_ne!(frozen, before, "{name}");
-        let file = encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device).unwrap();
+        let file =
+            encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
+                .unwrap();
         assert_eq!(file.decoded.hexplane, frozen, "{name}");
     }
 }
@@ -201,6 +205,8 @@ fn a_scene_without_gaussians_is_a_file_too() {
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
     let scene: DynamicScene = DynamicScene::from_arrays(&empty, &device).unwrap();
     let compression = Compression::new(&config, &device);
-    let encoded = encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device).unwrap();
+    let encoded =
+        encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
+            .unwrap();
     assert!(decode(&encoded.bytes).unwrap().gaussians.is_empty());
 }

@@ -18,11 +18,11 @@ use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
 use crate::compression::{TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
+use crate::dataset::{image_store, load_options};
 use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
 use crate::run::Checkpoint;
-use crate::dataset::{image_store, load_options};
 use crate::run::RunFolder;
 
 #[derive(Debug, Args)]

@@ -10,8 +10,8 @@ use crate::error::TrainError;
 use crate::optimization::adam::Adam;
 use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression};
 use crate::optimization::schedule::ExponentialDecay;
-use crate::stage::Stage;
 use crate::randomness::{Purpose, generator, seed_device};
+use crate::stage::Stage;
 
 /// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told the iterations
 /// done, and those that there are, after each.

@@ -14,9 +14,7 @@ mod rate;
 mod step_search;
 
 pub use code_scene::{CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
-pub use encoder::{
-    BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, freeze_planes,
-};
+pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, freeze_planes};
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
 
@@ -98,7 +96,9 @@ fn sh_config(config: &ShConfig, feature_size: usize) -> ShEntropyConfig {
     let step = config.step as f32;
     match config.model {
         ShModel::MixtureOfLogistics => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
-        ShModel::ChannelAutoregressive => ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step)),
+        ShModel::ChannelAutoregressive => {
+            ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step))
+        }
         ShModel::HexPlaneCoupled => {
             ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(feature_size).with_step(step))
         }

@@ -5,12 +5,12 @@ use std::fs;
 use light4gs_data::{DataError, Scene};
 
 use crate::config::Config;
+use crate::dataset::image_store;
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
 use crate::observers::metrics_log::read_metrics;
 use crate::report::{CodingReport, Report, SectionBytes, SummaryTile, write_report};
-use crate::dataset::image_store;
 use crate::run::RunFolder;
 
 /// Views a report shows.

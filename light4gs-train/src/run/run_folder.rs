@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 use light4gs_data::{DataError, write_atomically};
 use serde::{Deserialize, Serialize};
 
+use super::list_checkpoints;
 use crate::config::Config;
 use crate::error::TrainError;
-use super::list_checkpoints;
 
 /// Files of a run; `--overwrite` removes them.
 const FILES: [&str; 8] = [

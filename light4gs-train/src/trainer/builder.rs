@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use burn::tensor::Device;
 use light4gs_data::Scene;
 
+use super::Trainer;
 use super::profile::Profile;
 use super::views::ViewPools;
-use super::Trainer;
 use crate::compression::Compression;
 use crate::config::Config;
 use crate::dataset::{ImageSource, image_store};

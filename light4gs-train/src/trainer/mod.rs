@@ -29,8 +29,8 @@ pub use builder::TrainerBuilder;
 
 use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
 use crate::config::Config;
-use crate::density::{DensityStrategy, SignificanceScore};
 use crate::dataset::ImageSource;
+use crate::density::{DensityStrategy, SignificanceScore};
 use crate::error::TrainError;
 use crate::evaluation::metrics::{image_tensor, psnr};
 use crate::loss::Loss;

@@ -9,8 +9,8 @@ use crate::config::{Config, RateWeighting};
 use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
 use crate::optimization::parameters::plane_parameter;
-use crate::stage::Stage;
 use crate::randomness::{Purpose, generator, seed_device};
+use crate::stage::Stage;
 
 impl Trainer {
     /// The scene as it will roughly be decoded, once the rate has entered the training.

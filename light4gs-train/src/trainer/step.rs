@@ -5,8 +5,8 @@ use burn::tensor::Tensor;
 use light4gs_data::Frame;
 use light4gs_model::regularizer;
 
-use super::views::ViewPass;
 use super::Trainer;
+use super::views::ViewPass;
 use crate::density::{GaussianEditor, Moment, ViewStatistics};
 use crate::error::TrainError;
 use crate::observers::StepReport;
@@ -80,8 +80,12 @@ impl Trainer {
         }
         let scene = &mut self.state.scene;
         let weights = &self.config.train.regularizer;
-        let term =
-            regularizer::weighted_sum(&scene.field.hexplane, weights.plane_tv, weights.time_smoothness, weights.time_l1);
+        let term = regularizer::weighted_sum(
+            &scene.field.hexplane,
+            weights.plane_tv,
+            weights.time_smoothness,
+            weights.time_l1,
+        );
         let value = term.clone().inner();
         gradients.add_scene(scene, &mut term.backward());
         self.profile.lap("regularizers");
