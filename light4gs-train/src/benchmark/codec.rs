@@ -5,7 +5,8 @@ use std::time::Instant;
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::{
-    CompressionInput, HexPlaneArrays, OpenStream, SceneMeta, attributes, encode_compressed, encode_planes, encode_sh,
+    CompressionInput, HexPlaneArrays, OpenStream, Profile, SceneMeta, attributes, encode_compressed, encode_planes,
+    encode_sh,
 };
 use light4gs_data::PointCloud;
 use light4gs_model::DynamicScene;
@@ -52,7 +53,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
     let vary = |spread: f64, shape: [usize; 3]| Tensor::random(shape, Distribution::Normal(0.0, spread), device);
     let rest = scene.gaussians.sh_rest.dims();
     scene.gaussians.sh_rest = Param::from_tensor(vary(0.05, rest));
-    for plane in &mut scene.hexplane.planes {
+    for plane in &mut scene.field.hexplane.planes {
         *plane = Param::from_tensor(plane.val() + vary(0.05, plane.dims()));
     }
     scene
@@ -64,9 +65,10 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&config, &device);
-    compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+    compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
     let data = scene.to_arrays(SceneMeta::default());
-    let input: CompressionInput = compression_input(&mut compression, &scene, &data, &config.compression)?;
+    let input: CompressionInput =
+        compression_input(&mut compression, &scene, &data, &config.compression, Profile::Compact)?;
     let planes = input.planes.as_ref().expect("the compact profile codes planes");
     let encoded = encode_compressed(&data, &input)?;
     let stream = OpenStream::new(&encoded.bytes)?;

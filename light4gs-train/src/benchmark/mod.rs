@@ -309,7 +309,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     let loss_of = |scene_model: &DynamicScene, frame: usize| {
         let image = splatter.render(scene_model.at(0.3), &scene.camera_at(frame), None).image;
         let regularization = regularizer::weighted_sum(
-            &scene_model.hexplane,
+            &scene_model.field.hexplane,
             weights.plane_tv,
             weights.time_smoothness,
             weights.time_l1,

@@ -3,18 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_data::{ImageStore, Scene};
+use light4gs_data::Scene;
 
 use super::output::{say, say_json, tell};
+use super::progress::ProgressBars;
 use crate::compression::CodingRecord;
 use crate::config::{Config, DeviceName};
+use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::report::table::{Align, Table};
-use crate::trainer::run_folder::RunFolder;
-use crate::trainer::{Trainer, load_options};
+use crate::run::{RunFolder, RunRecord};
+use crate::trainer::{Trainer, TrainerBuilder};
 
 /// What a run prints.
 #[derive(Debug, Args)]
@@ -75,7 +77,7 @@ pub(super) fn train(
     Scene::open(scene, &load_options(&config))?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (folder, record, config) = RunFolder::open(folder.root())?;
-    let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
+    let trainer = trainer(&config, &folder, &record, output)?.build()?;
     finish(trainer, &folder, &config, output)
 }
 
@@ -108,10 +110,22 @@ pub(super) fn train_to_evaluation(
         )));
     }
     if !folder.stream().exists() {
-        run(&mut Trainer::resume(config.clone(), folder.clone(), &record, output.quiet)?, output)?;
+        run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
     evaluate_run(&folder, &config, &scene)
+}
+
+/// A trainer of a run's folder, with progress bars.
+fn trainer(
+    config: &Config,
+    folder: &RunFolder,
+    record: &RunRecord,
+    output: &RunOutput,
+) -> Result<TrainerBuilder, TrainError> {
+    let data = Scene::open(&record.scene, &load_options(config))?;
+    let bars = ProgressBars::new(output.quiet);
+    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars))
 }
 
 /// Trains to the end, and prints what the stages took if that is asked for.
@@ -152,7 +166,7 @@ impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let (folder, record, mut config) = RunFolder::open(&self.run)?;
         config.device = self.device.unwrap_or(config.device);
-        let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
+        let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
         finish(trainer, &folder, &config, &self.output)
     }
 }
@@ -202,7 +216,7 @@ impl Eval {
         config.data.background = decoded.data.meta.background;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
-        let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
+        let images = image_store(&config);
         let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)
     }

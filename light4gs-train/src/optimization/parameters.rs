@@ -3,7 +3,8 @@
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::Tensor;
-use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters, PLANE_NAMES};
+use light4gs_codec::plane_layout::plane_name;
+use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters};
 
 use crate::compression::Compression;
 
@@ -42,19 +43,44 @@ impl ParameterGroup {
     }
 }
 
-/// Names of the parameters that have a row for each Gaussian.
-pub const GAUSSIAN_PARAMETERS: [&str; 6] = [
-    "gaussians.means",
-    "gaussians.log_scales",
-    "gaussians.quats",
-    "gaussians.opacity_logits",
-    "gaussians.sh_dc",
-    "gaussians.sh_rest",
-];
+/// What every Gaussian has: the parameters with a row for each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GaussianAttribute {
+    /// Positions.
+    Means,
+    /// Logarithms of standard deviations.
+    LogScales,
+    /// Quaternions.
+    Quats,
+    /// Opacities before the sigmoid.
+    OpacityLogits,
+    /// Degree-0 spherical harmonics.
+    ShDc,
+    /// Higher spherical harmonics.
+    ShRest,
+}
+
+impl GaussianAttribute {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::Means, Self::LogScales, Self::Quats, Self::OpacityLogits, Self::ShDc, Self::ShRest];
+
+    /// The parameter's path in the scene.
+    pub fn path(self) -> &'static str {
+        match self {
+            Self::Means => "gaussians.means",
+            Self::LogScales => "gaussians.log_scales",
+            Self::Quats => "gaussians.quats",
+            Self::OpacityLogits => "gaussians.opacity_logits",
+            Self::ShDc => "gaussians.sh_dc",
+            Self::ShRest => "gaussians.sh_rest",
+        }
+    }
+}
 
 /// Name of a plane's parameter; planes are counted scale-major.
 pub fn plane_parameter(plane: usize) -> String {
-    format!("hexplane.{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
+    format!("hexplane.{}", plane_name(plane))
 }
 
 /// Something to do with every parameter, whatever its rank.
@@ -67,19 +93,19 @@ pub trait ParameterVisitor {
 pub fn visit_parameters(scene: &mut DynamicScene, visitor: &mut impl ParameterVisitor) {
     use ParameterGroup::*;
     let gaussians = &mut scene.gaussians;
-    visitor.visit(Means, GAUSSIAN_PARAMETERS[0], &mut gaussians.means);
-    visitor.visit(LogScales, GAUSSIAN_PARAMETERS[1], &mut gaussians.log_scales);
-    visitor.visit(Quats, GAUSSIAN_PARAMETERS[2], &mut gaussians.quats);
-    visitor.visit(Opacity, GAUSSIAN_PARAMETERS[3], &mut gaussians.opacity_logits);
-    visitor.visit(ShDc, GAUSSIAN_PARAMETERS[4], &mut gaussians.sh_dc);
-    visitor.visit(ShRest, GAUSSIAN_PARAMETERS[5], &mut gaussians.sh_rest);
-    for (i, plane) in scene.hexplane.planes.iter_mut().enumerate() {
+    visitor.visit(Means, GaussianAttribute::Means.path(), &mut gaussians.means);
+    visitor.visit(LogScales, GaussianAttribute::LogScales.path(), &mut gaussians.log_scales);
+    visitor.visit(Quats, GaussianAttribute::Quats.path(), &mut gaussians.quats);
+    visitor.visit(Opacity, GaussianAttribute::OpacityLogits.path(), &mut gaussians.opacity_logits);
+    visitor.visit(ShDc, GaussianAttribute::ShDc.path(), &mut gaussians.sh_dc);
+    visitor.visit(ShRest, GaussianAttribute::ShRest.path(), &mut gaussians.sh_rest);
+    for (i, plane) in scene.field.hexplane.planes.iter_mut().enumerate() {
         visitor.visit(Grid, &plane_parameter(i), plane);
     }
-    for (i, layer) in scene.deformation.trunk.iter_mut().enumerate() {
+    for (i, layer) in scene.field.deformation.trunk.iter_mut().enumerate() {
         visit_linear(visitor, &format!("deformation.trunk.{i}"), layer);
     }
-    let deformation = &mut scene.deformation;
+    let deformation = &mut scene.field.deformation;
     let heads: [(&str, &mut Option<DeformationHead>); 5] = [
         ("position", &mut deformation.position),
         ("scale", &mut deformation.scale),

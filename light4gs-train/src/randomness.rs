@@ -1,0 +1,61 @@
+//! Everything random in training, drawn from the seed and the position in the schedule, so that a resumed run draws
+//! the same and a checkpoint holds no generator.
+
+use burn::tensor::Device;
+use rand::seq::SliceRandom;
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::stage::Stage;
+
+/// What a random number is drawn for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Purpose {
+    /// The order in which frames are trained on.
+    FrameOrder,
+    /// Where the halves of a split Gaussian go.
+    Split,
+    /// The views that significance is measured on.
+    PruningViews,
+    /// Quantisation noise and the choice of planes and Gaussians for the rate.
+    Rate,
+}
+
+/// A generator for one purpose at one position, an iteration or a pass over the data.
+pub(crate) fn generator(seed: u64, purpose: Purpose, stage: Stage, position: usize) -> ChaCha8Rng {
+    let mut generator = ChaCha8Rng::seed_from_u64(seed);
+    let stage = if stage == Stage::Coarse { 0 } else { 1 };
+    generator.set_stream((purpose as u64) << 62 | stage << 61 | position as u64);
+    generator
+}
+
+/// Seeds the device's own generator, which fills random tensors, for one iteration.
+pub(crate) fn seed_device(device: &Device, seed: u64, stage: Stage, iteration: usize) {
+    device.seed(generator(seed, Purpose::Rate, stage, iteration).random());
+}
+
+/// Box-Muller, one of the pair.
+pub(crate) fn standard_normal(generator: &mut impl Rng) -> f32 {
+    let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
+    ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
+}
+
+/// Frames in an order that is shuffled anew each time all have been seen.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct FrameOrder {
+    pass: Option<(Stage, usize)>,
+    order: Vec<usize>,
+}
+
+impl FrameOrder {
+    /// The frame at a position of the sequence, of `count` frames.
+    pub(crate) fn at(&mut self, seed: u64, stage: Stage, position: usize, count: usize) -> usize {
+        let pass = (stage, position / count);
+        if self.pass != Some(pass) || self.order.len() != count {
+            self.order = (0..count).collect();
+            self.order.shuffle(&mut generator(seed, Purpose::FrameOrder, stage, pass.1));
+            self.pass = Some(pass);
+        }
+        self.order[position % count]
+    }
+}
