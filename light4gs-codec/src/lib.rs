@@ -60,7 +60,7 @@
 //! [`Limits`] before memory is taken, so hostile input gets a [`CodecError`], never a panic.
 //!
 //! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`,
-//! where the file functions (`read_file`, `write_file`, ...) are absent and work is done by one thread. Elsewhere
+//! where `read_file` and `read_info` are absent and work is done by one thread. Elsewhere
 //! planes are coded by the threads of rayon's current pool; the bytes do not depend on how many there are.
 
 #![forbid(unsafe_code)]
@@ -84,7 +84,7 @@ mod stream;
 pub use entropy::FrequencyTable;
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
-pub use file::{read_file, read_info, write_atomically, write_file};
+pub use file::{read_file, read_info};
 pub use limits::Limits;
 pub use network::{Network, weights as network_weights};
 pub use planes::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, section::PlaneBytes};

@@ -109,9 +109,6 @@ impl Network {
         at_most(section, format!("{name}, number of inputs"), self.inputs.len() as u64, limits.nodes)?;
         at_most(section, format!("{name}, number of nodes"), self.nodes.len() as u64, limits.nodes)?;
         at_most(section, format!("{name}, number of outputs"), self.outputs.len() as u64, limits.nodes)?;
-        if self.outputs.is_empty() {
-            return refuse("number of outputs".into(), "0".into(), "1 or more");
-        }
         if self.inputs.contains(&0) {
             return refuse("channels of an input".into(), "0".into(), "1 or more");
         }

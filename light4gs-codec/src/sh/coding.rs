@@ -165,12 +165,16 @@ pub(super) fn check_priors(
                 return Err(CodecError::invalid(SECTION, field, found, expected));
             }
         }
-        let outputs = network.channels()[network.outputs[0].0 as usize];
-        if !outputs.is_multiple_of(2) || network.outputs.len() != 1 {
-            let (found, expected) = (format!("{} of {outputs}", network.outputs.len()), "one, of scales and means");
-            return Err(CodecError::invalid(SECTION, format!("outputs of {name}"), found, expected));
-        }
-        decoded += outputs / 2;
+        let channels = network.channels();
+        let outputs: Vec<u64> = network.outputs.iter().map(|value| channels[value.0 as usize]).collect();
+        let own = match outputs[..] {
+            [own] if own.is_multiple_of(2) => own / 2,
+            _ => {
+                let (found, expected) = (format!("{outputs:?} channels"), "one, of as many scales as means");
+                return Err(CodecError::invalid(SECTION, format!("outputs of {name}"), found, expected));
+            }
+        };
+        decoded += own;
         weights = weights.saturating_add(network.weights());
     }
     at_most(SECTION, "number of weights", weights, limits.layer_weights)?;
