@@ -287,7 +287,7 @@ impl<F: DeformationField> Trainer<F> {
 
     fn save_checkpoint(&mut self) -> Result<(), TrainError> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let path = folder.checkpoints().join(Checkpoint::file_name(self.state.stage, self.state.iteration));
+        let path = folder.checkpoints().join(Checkpoint::<F>::file_name(self.state.stage, self.state.iteration));
         self.state.density = self.density.state();
         self.state.save(&path)?;
         let all = list_checkpoints(&folder.checkpoints());
