@@ -5,9 +5,9 @@
 use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::optim::{AdamConfig, GradientsParams};
-use burn::tensor::{Device, Tensor, TensorData, activation::tanh};
-use light4gs_data::{Frame, ImageStore, LoadOptions, Scene};
-use light4gs_examples::{Outcome, tiny_scene};
+use burn::tensor::{Device, Tensor, activation::tanh};
+use light4gs_data::{ImageStore, LoadOptions, Scene};
+use light4gs_examples::{Outcome, image_tensor, tiny_scene};
 use light4gs_model::{GaussianTensors, Gaussians, GaussiansConfig, HexPlane, HexPlaneConfig, Splatter};
 
 /// Gaussians, features over space and time, and one layer that turns a feature into a shift.
@@ -32,13 +32,6 @@ impl MovingGaussians {
     }
 }
 
-/// The image of a frame as a tensor `[H, W, 3]`.
-fn truth(store: &ImageStore, frame: &Frame, device: &Device) -> Result<Tensor<3>, light4gs_data::DataError> {
-    let image = store.get(frame)?.to_f32();
-    let shape = [image.height as usize, image.width as usize, 3];
-    Ok(Tensor::from_data(TensorData::new(image.pixels, shape), device))
-}
-
 fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let options = LoadOptions { random_points: 500, ..LoadOptions::default() };
@@ -60,7 +53,8 @@ fn main() -> Outcome {
     for iteration in 0..120 {
         let frame = &scene.train[iteration * 5 % scene.train.len()];
         let rendering = splatter.render(model.at(frame.time), &frame.camera, None);
-        let loss = (rendering.image - truth(&store, frame, &device)?).powi_scalar(2).mean();
+        let truth = image_tensor(&*store.get(frame)?, &device);
+        let loss = (rendering.image - truth).powi_scalar(2).mean();
         losses.push(loss.clone().into_scalar::<f32>());
         let gradients = GradientsParams::from_grads(loss.backward(), &model);
         model = optimizer.step(1e-2, model, gradients);
