@@ -12,9 +12,9 @@ use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Tensor};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
+use light4gs_train::Stage;
 use light4gs_train::dataset::load_options;
 use light4gs_train::density::{DensityStrategy, GaussianEditor, Moment, ViewStatistics};
-use light4gs_train::stage::Stage;
 use light4gs_train::trainer::Trainer;
 use rand::Rng;
 
@@ -42,8 +42,7 @@ impl DensityStrategy for Relocation {
         }
         let logits = gaussians.gaussians().opacity_logits.val().inner();
         let opacities: Vec<f32> = sigmoid(logits).into_data().iter::<f32>().collect();
-        let (opaque, faint): (Vec<usize>, Vec<usize>) =
-            (0..opacities.len()).partition(|&i| opacities[i] >= TOO_FAINT);
+        let (opaque, faint): (Vec<usize>, Vec<usize>) = (0..opacities.len()).partition(|&i| opacities[i] >= TOO_FAINT);
         if opaque.is_empty() || faint.is_empty() {
             return;
         }

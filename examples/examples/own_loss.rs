@@ -61,8 +61,7 @@ fn main() -> Outcome {
     println!("loss: {first:.3} in the first tenth of the run, {last:.3} in the last");
     assert!(last < 0.7 * first);
     // And it does what it is for: outlines are better than without it.
-    let (with, without) =
-        (outline_error(ours.scene(), &data, &device)?, outline_error(plain.scene(), &data, &device)?);
+    let (with, without) = (outline_error(ours.scene(), &data, &device)?, outline_error(plain.scene(), &data, &device)?);
     println!("error of the outline: {with:.4} with the loss, {without:.4} without");
     assert!(with < without);
 

@@ -7,9 +7,9 @@ use std::sync::{Arc, Mutex};
 
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
+use light4gs_train::Stage;
 use light4gs_train::dataset::load_options;
 use light4gs_train::density::{GaussianContributions, SignificanceScore};
-use light4gs_train::stage::Stage;
 use light4gs_train::trainer::Trainer;
 
 /// Mean blending weight over the pixels of a Gaussian: many faint pixels count for less than a few full ones. Keeps what it
