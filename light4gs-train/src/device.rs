@@ -3,71 +3,124 @@
 // Burn 0.22 deprecates its `ndarray` back end in favour of `flex`; we serve both.
 #![allow(deprecated)]
 
-use std::collections::HashMap;
-use std::sync::{LazyLock, Mutex};
+use burn::tensor::Device;
 
-use burn::tensor::{Device, DeviceKind, DeviceType};
-
-use crate::config::{Adapter, DeviceName};
+use crate::config::{DEVICES, DeviceName, UnknownDevice};
 use crate::error::TrainError;
+
+/// The back ends that this build contains, by name: those of [`DEVICES`] whose Cargo feature is on.
+pub fn built_in() -> Vec<&'static str> {
+    let is_built_in = |name: &&str| match *name {
+        "ndarray" => cfg!(feature = "ndarray"),
+        "flex" => cfg!(feature = "flex"),
+        "wgpu" => cfg!(feature = "wgpu"),
+        _ => false,
+    };
+    DEVICES.iter().copied().filter(is_built_in).collect()
+}
 
 /// The device that a name stands for, without autodiff: `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by
 /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (a software driver).
 ///
 /// # Errors
-/// [`TrainError::Input`] for any other name, and where there is no such adapter.
+/// [`TrainError::Input`] for any other name, and as [`open`].
 pub fn device_by_name(name: &str) -> Result<Device, TrainError> {
-    open(name.parse().map_err(|unknown: crate::config::UnknownDevice| TrainError::Input(unknown.to_string()))?)
+    open(name.parse().map_err(|unknown: UnknownDevice| TrainError::Input(unknown.to_string()))?)
 }
 
 /// The device that a name stands for, without autodiff.
 ///
 /// # Errors
-/// [`TrainError::Input`] where this machine has no such adapter.
+/// [`TrainError::Input`] where this build does not contain the back end, or this machine has no such adapter.
 pub fn open(name: DeviceName) -> Result<Device, TrainError> {
     match name {
+        #[cfg(feature = "ndarray")]
         DeviceName::NdArray => Ok(Device::ndarray()),
+        #[cfg(feature = "flex")]
         DeviceName::Flex => Ok(Device::flex()),
-        DeviceName::Wgpu(adapter) => open_adapter(name, adapter),
+        #[cfg(feature = "wgpu")]
+        DeviceName::Wgpu(adapter) => wgpu::open(name, adapter),
+        #[allow(unreachable_patterns)]
+        _ => Err(TrainError::Input(format!(
+            "this build has no back end `{}`; it has {}. Build with `--features {}`, or name another device",
+            name.back_end(),
+            built_in().join(", "),
+            name.back_end()
+        ))),
     }
 }
 
-/// Each adapter is opened once.
-static OPENED: LazyLock<Mutex<HashMap<DeviceName, Device>>> = LazyLock::new(Mutex::default);
+#[cfg(feature = "wgpu")]
+mod wgpu {
+    //! Graphics adapters.
 
-fn open_adapter(name: DeviceName, adapter: Adapter) -> Result<Device, TrainError> {
-    let mut opened = OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
-    if let Some(device) = opened.get(&name) {
-        return Ok(device.clone());
-    }
-    let missing = |problem: String| {
-        TrainError::Input(format!(
-            "there is no adapter for `{name}`: {problem}. Install a Vulkan driver (in software, on Debian or Ubuntu: \
-             apt-get install mesa-vulkan-drivers), or compute with `--device flex`"
-        ))
-    };
-    let of_kind =
-        |kind: DeviceKind| Device::wgpu_options().device_kind(kind).init().map_err(|error| missing(error.to_string()));
-    let device = match adapter {
-        Adapter::Strongest => of_kind(DeviceKind::DefaultDevice)?,
-        Adapter::Discrete => of_kind(DeviceKind::DiscreteGpu(0))?,
-        Adapter::Integrated => of_kind(DeviceKind::IntegratedGpu(0))?,
-        Adapter::Software => of_kind(DeviceKind::Cpu)?,
-        Adapter::Number(number) => {
-            let devices: Vec<Device> = Device::enumerate(DeviceType::Wgpu).into_iter().collect();
-            let found = devices.len();
-            let counted = || missing(format!("adapters are counted from 0, and {found} were found"));
-            devices.into_iter().nth(number).ok_or_else(counted)?
+    use std::collections::HashMap;
+    use std::sync::{LazyLock, Mutex};
+
+    use burn::tensor::{Device, DeviceKind, DeviceType};
+
+    use crate::config::{Adapter, DeviceName};
+    use crate::error::TrainError;
+
+    /// Each adapter is opened once.
+    static OPENED: LazyLock<Mutex<HashMap<DeviceName, Device>>> = LazyLock::new(Mutex::default);
+
+    pub(super) fn open(name: DeviceName, adapter: Adapter) -> Result<Device, TrainError> {
+        let mut opened = OPENED.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
+        if let Some(device) = opened.get(&name) {
+            return Ok(device.clone());
         }
-    };
-    opened.insert(name, device.clone());
-    Ok(device)
+        let missing = |problem: String| {
+            TrainError::Input(format!(
+                "there is no adapter for `{name}`: {problem}. Install a Vulkan driver (in software, on Debian or Ubuntu: \
+                 apt-get install mesa-vulkan-drivers), or compute with `--device flex`"
+            ))
+        };
+        let of_kind = |kind: DeviceKind| {
+            Device::wgpu_options().device_kind(kind).init().map_err(|error| missing(error.to_string()))
+        };
+        let device = match adapter {
+            Adapter::Strongest => of_kind(DeviceKind::DefaultDevice)?,
+            Adapter::Discrete => of_kind(DeviceKind::DiscreteGpu(0))?,
+            Adapter::Integrated => of_kind(DeviceKind::IntegratedGpu(0))?,
+            Adapter::Software => of_kind(DeviceKind::Cpu)?,
+            Adapter::Number(number) => {
+                let devices: Vec<Device> = Device::enumerate(DeviceType::Wgpu).into_iter().collect();
+                let found = devices.len();
+                let counted = || missing(format!("adapters are counted from 0, and {found} were found"));
+                devices.into_iter().nth(number).ok_or_else(counted)?
+            }
+        };
+        opened.insert(name, device.clone());
+        Ok(device)
+    }
+}
+
+/// Whether a device's work is done by the processor's own threads, as the caller's is.
+pub fn computes_on_processor(device: &Device) -> bool {
+    let device = device.clone().inner();
+    let mut processor = false;
+    #[cfg(feature = "ndarray")]
+    {
+        processor |= device == Device::ndarray();
+    }
+    #[cfg(feature = "flex")]
+    {
+        processor |= device == Device::flex();
+    }
+    processor
 }
 
 /// The name that a wgpu device's adapter has for itself; none for the processor's back ends.
 pub fn adapter_name(name: DeviceName, device: &Device) -> Option<String> {
-    let wgpu = matches!(name, DeviceName::Wgpu(_));
-    wgpu.then(|| device.clone().inner().identity()).flatten().map(|identity| identity.name)
+    match name {
+        #[cfg(feature = "wgpu")]
+        DeviceName::Wgpu(_) => device.clone().inner().identity().map(|identity| identity.name),
+        _ => {
+            let _ = device;
+            None
+        }
+    }
 }
 
 /// What reports say of a device: its name, and for wgpu the adapter's own, as in `wgpu (llvmpipe)`.
@@ -81,6 +134,8 @@ pub fn describe(name: DeviceName, device: &Device) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "wgpu")]
+    use crate::config::Adapter;
 
     #[test]
     fn unknown_names_are_wrong_input() {
@@ -90,11 +145,23 @@ mod tests {
     }
 
     #[test]
+    fn every_built_in_name_opens_or_says_why() {
+        for name in DEVICES {
+            match device_by_name(name) {
+                Ok(_) => assert!(built_in().contains(name), "{name}"),
+                Err(error) => assert!(error.to_string().contains(name), "{error}"),
+            }
+        }
+    }
+
+    #[cfg(feature = "wgpu")]
+    #[test]
     fn a_missing_adapter_is_an_error_with_a_remedy() {
         let text = device_by_name("wgpu:99").unwrap_err().to_string();
         assert!(text.contains("wgpu:99") && text.contains("mesa-vulkan-drivers"), "{text}");
     }
 
+    #[cfg(feature = "wgpu")]
     #[test]
     fn the_software_adapter_has_a_name() {
         let name = DeviceName::Wgpu(Adapter::Strongest);

@@ -1,15 +1,23 @@
 //! Training, evaluation and the command line of Light4GS.
 
 pub mod benchmark;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod compression;
 pub mod config;
+pub mod dataset;
 pub mod density;
 pub mod device;
 pub mod error;
 pub mod evaluation;
+pub mod loss;
 pub mod observers;
 pub mod optimization;
+mod randomness;
 pub mod report;
+pub mod run;
+mod stage;
 pub mod trainer;
 pub mod video;
+
+pub use stage::Stage;

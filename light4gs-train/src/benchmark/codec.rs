@@ -5,7 +5,8 @@ use std::time::Instant;
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::{
-    CompressionInput, HexPlaneArrays, OpenStream, SceneMeta, attributes, encode_compressed, encode_planes, encode_sh,
+    CompressionInput, HexPlaneArrays, OpenStream, Profile, SceneMeta, attributes, encode_compressed, encode_planes,
+    encode_sh,
 };
 use light4gs_data::PointCloud;
 use light4gs_model::DynamicScene;
@@ -63,10 +64,11 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = Device::flex();
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
-    let mut compression = Compression::new(&config, &device);
-    compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+    let mut compression = Compression::new(&config, scene.planes(), &device)?;
+    compression.start_from(scene.planes());
     let data = scene.to_arrays(SceneMeta::default());
-    let input: CompressionInput = compression_input(&mut compression, &scene, &data, &config.compression)?;
+    let input: CompressionInput =
+        compression_input(&mut compression, &scene, &data, &config.compression, Profile::Compact)?;
     let planes = input.planes.as_ref().expect("the compact profile codes planes");
     let encoded = encode_compressed(&data, &input)?;
     let stream = OpenStream::new(&encoded.bytes)?;

@@ -3,18 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_data::{ImageStore, Scene};
+use light4gs_data::Scene;
+use light4gs_model::HexPlaneField;
 
 use super::output::{say, say_json, tell};
+use super::progress::ProgressBars;
 use crate::compression::CodingRecord;
 use crate::config::{Config, DeviceName};
+use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::report::table::{Align, Table};
-use crate::trainer::run_folder::RunFolder;
-use crate::trainer::{Trainer, load_options};
+use crate::run::{RunFolder, RunRecord};
+use crate::trainer::{Trainer, TrainerBuilder};
 
 /// What a run prints.
 #[derive(Debug, Args)]
@@ -75,7 +78,7 @@ pub(super) fn train(
     Scene::open(scene, &load_options(&config))?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (folder, record, config) = RunFolder::open(folder.root())?;
-    let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
+    let trainer = trainer(&config, &folder, &record, output)?.build()?;
     finish(trainer, &folder, &config, output)
 }
 
@@ -108,10 +111,22 @@ pub(super) fn train_to_evaluation(
         )));
     }
     if !folder.stream().exists() {
-        run(&mut Trainer::resume(config.clone(), folder.clone(), &record, output.quiet)?, output)?;
+        run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
-    evaluate_run(&folder, &config, &scene)
+    evaluate_run::<HexPlaneField>(&folder, &config, &scene)
+}
+
+/// A trainer of a run's folder, with progress bars.
+fn trainer(
+    config: &Config,
+    folder: &RunFolder,
+    record: &RunRecord,
+    output: &RunOutput,
+) -> Result<TrainerBuilder, TrainError> {
+    let data = Scene::open(&record.scene, &load_options(config))?;
+    let bars = ProgressBars::new(output.quiet);
+    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars))
 }
 
 /// Trains to the end, and prints what the stages took if that is asked for.
@@ -129,7 +144,7 @@ fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
 
 fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &RunOutput) -> Result<(), TrainError> {
     run(&mut trainer, output)?;
-    let evaluation = evaluate_run(folder, config, trainer.data())?;
+    let evaluation = evaluate_run::<HexPlaneField>(folder, config, trainer.data())?;
     print_evaluation(&evaluation, output.json)?;
     if !output.json {
         say(format_args!("\nreport: {}", folder.path("report.html").display()))?;
@@ -152,7 +167,7 @@ impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let (folder, record, mut config) = RunFolder::open(&self.run)?;
         config.device = self.device.unwrap_or(config.device);
-        let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
+        let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
         finish(trainer, &folder, &config, &self.output)
     }
 }
@@ -187,7 +202,7 @@ impl Eval {
         config.device = self.device.unwrap_or(config.device);
         record.scene = self.scene.unwrap_or(record.scene);
         let scene = Scene::open(&record.scene, &load_options(&config))?;
-        print_evaluation(&evaluate_run(&folder, &config, &scene)?, self.json)
+        print_evaluation(&evaluate_run::<HexPlaneField>(&folder, &config, &scene)?, self.json)
     }
 
     fn eval_file(self) -> Result<(), TrainError> {
@@ -196,13 +211,13 @@ impl Eval {
         };
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;
-        let decoded = DecodedScene::open(&self.run, &device)?;
+        let decoded: DecodedScene = DecodedScene::open(&self.run, &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
-        let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
+        let images = image_store(&config);
         let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)
     }

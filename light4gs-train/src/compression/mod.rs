@@ -1,83 +1,115 @@
 //! What a scene is compressed with, and the rate that this puts into the loss (paper III-C to III-E).
 //!
-//! - here: the entropy models and the quantisation steps that are trained beside a scene
+//! - here: the entropy models and the quantization steps that are trained beside a scene
 //! - `rate`: noise in place of rounding, and the estimated size of the file
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: a scene and its models into the bytes of a file
-//! - `run_encoder`: what `train` and `encode` share
+//! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
 //! - `step_search`: how coarsely the other attributes may be quantised
 
+mod code_scene;
 mod encoder;
 mod fit;
 mod rate;
-mod run_encoder;
 mod step_search;
 
-pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, settled_planes};
+pub use code_scene::{CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
+pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, freeze_planes};
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
-pub use run_encoder::{CodingRecord, PlaneRecord, TrainedScene, WrittenScene, write_scene};
 
+use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_model::{
-    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts,
+    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlane,
     ShAutoregressiveConfig, ShBottleneckConfig, ShEntropyConfig, ShEntropyModel, ShHexPlaneCoupledConfig,
     ShMixtureConfig,
 };
 
-use crate::config::{CompressionConfig, Config, ContextConfig, ShConfig};
+use crate::config::{CompressionConfig, Config, ContextArchitecture, ContextConfig, ShConfig, ShModel};
+use crate::error::TrainError;
 
-/// Entropy models and quantisation steps of one scene.
-#[derive(Clone, Debug)]
+/// Entropy models and quantization steps of one scene.
+#[derive(Module, Debug)]
 pub struct Compression {
-    /// Of the hexplanes.
-    pub context: ContextModel,
-    /// Of the hexplanes.
-    pub quantization: AdaptiveQuantization,
+    /// Of the feature planes, if the deformation field has some.
+    pub planes: Option<PlaneModels>,
     /// Of the spherical harmonics beyond degree 0; the models are made for degree 3. Lower degrees are coded with the
     /// frequencies of their symbols, and have no part in the rate.
     pub sh: Option<ShEntropyModel>,
 }
 
+/// What feature planes are coded with.
+#[derive(Module, Debug)]
+pub struct PlaneModels {
+    /// What every value costs.
+    pub context: ContextModel,
+    /// How coarsely they are rounded.
+    pub quantization: AdaptiveQuantization,
+}
+
 impl Compression {
     /// Untrained models, if the run trains them: if there is a rate in its loss.
-    pub fn of_run(config: &Config, device: &Device) -> Option<Self> {
-        (config.compression.rate.lambda > 0.0).then(|| Self::new(config, device))
+    ///
+    /// # Errors
+    /// As [`Compression::new`].
+    pub fn of_run(config: &Config, planes: Option<&HexPlane>, device: &Device) -> Result<Option<Self>, TrainError> {
+        if config.compression.rate.lambda > 0.0 { Self::new(config, planes, device).map(Some) } else { Ok(None) }
     }
 
-    /// Untrained models for scenes of a configuration.
-    pub fn new(config: &Config, device: &Device) -> Self {
+    /// Untrained models for scenes of a configuration, whose deformation field has these planes.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] if the model of the spherical harmonics looks at planes and there are none.
+    pub fn new(config: &Config, planes: Option<&HexPlane>, device: &Device) -> Result<Self, TrainError> {
         let CompressionConfig { context, sh, .. } = &config.compression;
-        let planes = &config.model.hexplane;
-        let scales = planes.multipliers.len();
-        Self {
-            context: context_config(context, planes.channels).init(device),
-            quantization: quantization_config(config).init(device),
-            sh: (config.model.sh_degree == 3).then(|| sh_config(sh, planes.channels * scales).init(device)),
+        let feature_size = planes.map_or(0, HexPlane::feature_size);
+        if sh.model == ShModel::HexPlaneCoupled && feature_size == 0 {
+            return Err(TrainError::Input(format!(
+                "compression.sh.model = \"{}\" needs a deformation field with feature planes; choose another model",
+                sh.model
+            )));
+        }
+        let models = |planes: &HexPlane| PlaneModels {
+            context: context_config(context, planes.feature_size() / planes.scales()).init(device),
+            quantization: quantization_config(config, planes.scales()).init(device),
+        };
+        Ok(Self {
+            planes: planes.map(models),
+            sh: (config.model.sh_degree == 3).then(|| sh_config(sh, feature_size).init(device)),
+        })
+    }
+
+    /// Lets the context model begin with the statistics of planes.
+    pub fn start_from(&mut self, planes: Option<&HexPlane>) {
+        if let (Some(models), Some(planes)) = (&mut self.planes, planes) {
+            models.context.start_from(&planes.tensors(), &models.quantization.steps_without_gradient());
         }
     }
 
-    /// Keeps learned steps in the range that a configuration allows.
-    pub fn bound_steps(&mut self, config: &Config) {
-        if !config.compression.steps.refine {
-            self.quantization.no_finer_than(&quantization_config(config));
+    /// Keeps learned steps in the range that a configuration allows, for planes at so many scales.
+    pub fn bound_steps(&mut self, config: &Config, scales: usize) {
+        if let Some(models) = &mut self.planes
+            && !config.compression.steps.refine
+        {
+            models.quantization.no_finer_than(&quantization_config(config, scales));
         }
     }
 }
 
-fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
+fn quantization_config(config: &Config, scales: usize) -> AdaptiveQuantizationConfig {
     let steps = &config.compression.steps;
-    AdaptiveQuantizationConfig::new(config.model.hexplane.multipliers.len())
+    AdaptiveQuantizationConfig::new(scales)
         .with_space_only(steps.space_only)
         .with_space_time(steps.space_time)
         .with_per_scale(steps.per_scale)
 }
 
 fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig {
-    let sizes = match config.architecture.as_str() {
+    let sizes = match config.architecture {
         // The composition is what the switches say; the reference's centres and start belong to its sizes.
-        "reference" => ContextModelConfig::reference(channels),
-        _ => ContextModelConfig::compact(channels),
+        ContextArchitecture::Reference => ContextModelConfig::reference(channels),
+        ContextArchitecture::Compact => ContextModelConfig::compact(channels),
     };
     let parts = ContextParts::new()
         .with_hyperprior(config.hyperprior)
@@ -94,13 +126,15 @@ const SH_INITIAL_SCALE: f64 = 0.3;
 
 fn sh_config(config: &ShConfig, feature_size: usize) -> ShEntropyConfig {
     let step = config.step as f32;
-    match config.model.as_str() {
-        "mixture_of_logistics" => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
-        "channel_autoregressive" => ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step)),
-        "hexplane_coupled" => {
+    match config.model {
+        ShModel::MixtureOfLogistics => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
+        ShModel::ChannelAutoregressive => {
+            ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step))
+        }
+        ShModel::HexPlaneCoupled => {
             ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(feature_size).with_step(step))
         }
-        _ => {
+        ShModel::Factorized => {
             let bottleneck = ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE);
             ShEntropyConfig::Factorized(bottleneck)
         }

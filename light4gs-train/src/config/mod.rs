@@ -12,6 +12,7 @@
 //! fine_iterations = 2000
 //! ```
 
+mod choice;
 mod compression;
 mod data;
 mod device_name;
@@ -35,16 +36,18 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+pub use choice::UnknownChoice;
 pub use compression::{
-    AttributesConfig, CompressionConfig, ContextConfig, RateConfig, ShConfig, StepsConfig, WeightsConfig,
+    AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
+    ShConfig, ShModel, StepsConfig, WeightsConfig,
 };
 pub use data::DataConfig;
 pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin, Problem};
-pub use eval::EvalConfig;
+pub use eval::{EvalConfig, EvalSplit};
 pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use presets::preset_names;
-pub use prune::PruneConfig;
+pub use prune::{PruneConfig, PruneScore, PruneVolume};
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 
 /// The complete configuration of a run.

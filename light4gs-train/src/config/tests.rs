@@ -133,7 +133,7 @@ fn overrides_come_last() {
     assert_eq!(config.train.fine_iterations, 200);
     assert_eq!(config.device, DeviceName::Flex);
     assert_eq!(config.data.resolution, None);
-    assert_eq!(config.eval.splits, ["val"]);
+    assert_eq!(config.eval.splits, [EvalSplit::Val]);
     for (bad, part) in [
         ("train.fine_iteration=200", "the nearest known key is `train.fine_iterations`"),
         ("train.fine_iterations", "expected key=value"),
@@ -146,6 +146,23 @@ fn overrides_come_last() {
     ] {
         let text = problem_text(Config::load("dnerf", &[bad.to_owned()]));
         assert!(text.starts_with("override `") && text.contains(part), "{text}");
+    }
+}
+
+#[test]
+fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
+    for (bad, key, nearest) in [
+        ("compression.profile = 'papper'", "compression.profile", "paper"),
+        ("compression.rate.weighting = 'megabyte'", "compression.rate.weighting", "megabytes"),
+        ("compression.context.architecture = 'compcat'", "compression.context.architecture", "compact"),
+        ("compression.sh.model = 'factorised'", "compression.sh.model", "factorized"),
+        ("train.prune.score = 'wieght'", "train.prune.score", "weight"),
+        ("train.prune.volume = 'unclampd'", "train.prune.volume", "unclamped"),
+        ("eval.splits = ['tset']", "eval.splits", "test"),
+        ("device = 'flax'", "device", "flex"),
+    ] {
+        let text = problem_text(Config::from_toml(bad, "text"));
+        assert!(text.contains(&format!("`{key}`")) && text.contains(&format!("nearest is `{nearest}`")), "{text}");
     }
 }
 
@@ -179,7 +196,7 @@ fn plane_sizes_must_be_multiples_of_four() {
 #[test]
 fn all_ranges_are_reported_at_once() {
     let bad = "[train]\nbatch_size = 0\nlambda_dssim = 1.5\n[train.learning_rate]\nopacity = 0\n\
-               means_init = nan\n[train.densify]\nfrom = 9\nuntil = 8\n[eval]\nsplits = ['tset']\n";
+               means_init = nan\n[train.densify]\nfrom = 9\nuntil = 8\n";
     let Err(ConfigError::Invalid { problems }) = Config::from_toml(bad, "text") else { panic!("must be refused") };
     let keys: Vec<&str> = problems.iter().map(|problem| problem.key.as_str()).collect();
     let expected = [
@@ -188,7 +205,6 @@ fn all_ranges_are_reported_at_once() {
         "train.learning_rate.means_init",
         "train.learning_rate.opacity",
         "train.densify.from",
-        "eval.splits",
     ];
     assert_eq!(keys, expected);
 }

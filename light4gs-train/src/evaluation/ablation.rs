@@ -7,7 +7,8 @@ use crate::error::TrainError;
 use crate::evaluation::Evaluation;
 
 /// A table of runs. Each variant is laid over the same configuration.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum AblationTable {
     /// Parts of the context model (paper, table on MHCM).
     Context,

@@ -2,25 +2,30 @@
 
 use std::fs;
 
-use light4gs_data::{DataError, ImageStore, Scene};
+use light4gs_data::{DataError, Scene};
+use light4gs_model::DeformationField;
 
 use crate::config::Config;
+use crate::dataset::image_store;
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
 use crate::observers::metrics_log::read_metrics;
 use crate::report::{CodingReport, Report, SectionBytes, SummaryTile, write_report};
-use crate::trainer::load_options;
-use crate::trainer::run_folder::RunFolder;
+use crate::run::RunFolder;
 
 /// Views a report shows.
 const REPORT_VIEWS: usize = 6;
 
 /// Measures the run's file on its own dataset and writes everything that depends on it.
-pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Result<Evaluation, TrainError> {
+pub fn evaluate_run<F: DeformationField>(
+    folder: &RunFolder,
+    config: &Config,
+    scene: &Scene,
+) -> Result<Evaluation, TrainError> {
     let device = device::open(config.device)?;
-    let decoded = DecodedScene::open(&folder.stream(), &device)?;
-    let images = ImageStore::new(&load_options(config), (config.data.memory_limit_mib << 20) as usize);
+    let decoded = DecodedScene::<F>::open(&folder.stream(), &device)?;
+    let images = image_store(config);
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
     evaluation.training_seconds = metrics.last().map(|record| record.seconds);

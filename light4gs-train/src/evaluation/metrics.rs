@@ -1,4 +1,4 @@
-//! Differentiable picture losses and the metrics made of them. Pictures are `[H, W, 3]` in [0, 1].
+//! Measures of how alike two images are, all differentiable. Images are `[H, W, 3]` in [0, 1].
 
 use burn::tensor::module::conv2d;
 use burn::tensor::ops::ConvOptions;
@@ -22,7 +22,7 @@ pub fn l2(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
     (image - truth).powi_scalar(2).mean()
 }
 
-/// Peak signal-to-noise ratio in dB over the whole picture, for a peak of 1.
+/// Peak signal-to-noise ratio in dB over the whole image, for a peak of 1.
 pub fn psnr(image: Tensor<3>, truth: Tensor<3>) -> f64 {
     let mse: f32 = l2(image, truth).into_scalar();
     -10.0 * f64::from(mse).log10()
@@ -32,8 +32,8 @@ fn gaussian(device: &Device, shape: [usize; 4]) -> Tensor<4> {
     let center = (WINDOW / 2) as f32;
     let weights: Vec<f32> = (0..WINDOW).map(|i| (-(i as f32 - center).powi(2) / (2.0 * SIGMA * SIGMA)).exp()).collect();
     let sum: f32 = weights.iter().sum();
-    let normalised = weights.iter().map(|w| w / sum).collect::<Vec<_>>();
-    Tensor::from_data(TensorData::new(normalised, shape), device)
+    let normalized = weights.iter().map(|w| w / sum).collect::<Vec<_>>();
+    Tensor::from_data(TensorData::new(normalized, shape), device)
 }
 
 /// Structural similarity (Wang et al. 2004) with an 11×11 Gaussian window of sigma 1.5 and zero padding, averaged over
@@ -61,17 +61,8 @@ pub fn ssim(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
     (numerator / denominator).mean()
 }
 
-/// The training loss on pictures: `(1 - lambda) · L1 + lambda · (1 - SSIM)`, `[1]`.
-pub fn photometric(image: Tensor<3>, truth: Tensor<3>, lambda_dssim: f32) -> Tensor<1> {
-    if lambda_dssim == 0.0 {
-        return l1(image, truth);
-    }
-    let similarity = ssim(image.clone(), truth.clone());
-    l1(image, truth) * (1.0 - lambda_dssim) + (similarity.neg() + 1.0) * lambda_dssim
-}
-
 /// An 8-bit image as a tensor `[H, W, 3]` in [0, 1].
-pub(crate) fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
+pub fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
     let values: Vec<f32> = image.pixels.iter().map(|byte| f32::from(*byte) / 255.0).collect();
     Tensor::from_data(TensorData::new(values, [image.height as usize, image.width as usize, 3]), device)
 }

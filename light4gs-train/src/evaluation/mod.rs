@@ -9,12 +9,13 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 use light4gs_codec::{SceneData, StreamInfo};
-use light4gs_data::{Frame, ImageStore, RgbImage8, RgbImage32, Scene, Split};
-use light4gs_model::{DynamicScene, Splatter};
+use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
+use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::Serialize;
 
 use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
+use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::evaluation::metrics::image_tensor;
 use crate::evaluation::metrics::{psnr, ssim};
@@ -98,9 +99,9 @@ pub struct RenderedView {
 }
 
 /// A decoded file, ready to render.
-pub struct DecodedScene {
+pub struct DecodedScene<F: DeformationField = HexPlaneField> {
     /// The model on the device.
-    pub model: DynamicScene,
+    pub model: DynamicScene<F>,
     /// What the file says of itself.
     pub data: SceneData,
     /// Sections and sizes.
@@ -110,7 +111,7 @@ pub struct DecodedScene {
     device: Device,
 }
 
-impl DecodedScene {
+impl<F: DeformationField> DecodedScene<F> {
     /// Reads a file onto a device.
     pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
@@ -158,14 +159,14 @@ impl DecodedScene {
     pub fn evaluate(
         &self,
         scene: &Scene,
-        images: &ImageStore,
+        images: &dyn ImageSource,
         eval: &EvalConfig,
         device_name: &str,
     ) -> Result<(Evaluation, Vec<RenderedView>), TrainError> {
         let mut splits = Vec::new();
         let mut rendered = Vec::new();
         for name in &eval.splits {
-            let split: Split = name.parse()?;
+            let split = Split::from(*name);
             let frames = scene.frames(split);
             if frames.is_empty() {
                 continue;
@@ -173,7 +174,7 @@ impl DecodedScene {
             let mut views = Vec::with_capacity(frames.len());
             for frame in frames {
                 let render = self.render(frame);
-                let truth = images.get(frame)?;
+                let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
                 let psnr = psnr(image.clone(), truth_tensor.clone());
@@ -184,7 +185,7 @@ impl DecodedScene {
                 rendered.push(RenderedView { split, name, time, psnr, truth, render });
             }
             let mean = |value: fn(&ViewScore) -> f64| views.iter().map(value).sum::<f64>() / views.len() as f64;
-            splits.push(SplitScore { split: name.clone(), psnr: mean(|v| v.psnr), ssim: mean(|v| v.ssim), views });
+            splits.push(SplitScore { split: name.to_string(), psnr: mean(|v| v.psnr), ssim: mean(|v| v.ssim), views });
         }
         let frames = if scene.test.is_empty() { &scene.train } else { &scene.test };
         let camera = frames[0].camera;

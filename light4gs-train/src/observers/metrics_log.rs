@@ -12,7 +12,9 @@ use light4gs_data::DataError;
 use light4gs_data::write_atomically;
 use serde::{Deserialize, Serialize};
 
-use crate::trainer::Stage;
+use super::Observer;
+use crate::error::TrainError;
+use crate::stage::Stage;
 
 /// One line of `metrics.jsonl`. What was not measured is absent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -78,6 +80,12 @@ impl MetricsRecord {
 pub struct MetricsLog {
     path: PathBuf,
     file: File,
+}
+
+impl Observer for MetricsLog {
+    fn on_log(&mut self, record: &MetricsRecord) -> Result<(), TrainError> {
+        Ok(self.append(record)?)
+    }
 }
 
 impl MetricsLog {

@@ -13,6 +13,11 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use light4gs_data::DataError;
 
+use super::Observer;
+use super::metrics_log::MetricsRecord;
+use crate::config::TrainConfig;
+use crate::error::TrainError;
+
 /// Writes one event file.
 #[derive(Debug)]
 pub struct TensorBoard {
@@ -58,6 +63,38 @@ impl TensorBoard {
 
     fn flush(&mut self) -> Result<(), DataError> {
         self.out.flush().map_err(failed("write", &self.path))
+    }
+}
+
+/// The metrics of a run as an event file. Steps are iterations over both stages.
+#[derive(Debug)]
+pub struct TensorBoardLog {
+    events: TensorBoard,
+    train: TrainConfig,
+}
+
+impl TensorBoardLog {
+    /// As [`TensorBoard::create`], for a run of this configuration.
+    ///
+    /// # Errors
+    /// [`DataError::Io`] naming the file.
+    pub fn create(folder: &Path, resume_step: Option<u64>, train: &TrainConfig) -> Result<Self, DataError> {
+        Ok(Self { events: TensorBoard::create(folder, resume_step)?, train: train.clone() })
+    }
+}
+
+impl Observer for TensorBoardLog {
+    fn on_log(&mut self, record: &MetricsRecord) -> Result<(), TrainError> {
+        let step = self.train.global_step(record.stage, record.iteration) as u64;
+        let mut scalars = vec![("gaussians", record.gaussians as f32)];
+        let optional = [
+            ("loss", record.loss),
+            ("psnr/train", record.psnr),
+            ("psnr/test", record.test_psnr),
+            ("iterations_per_second", record.iterations_per_second),
+        ];
+        scalars.extend(optional.into_iter().filter_map(|(name, value)| Some((name, value? as f32))));
+        Ok(self.events.scalars(step, &scalars)?)
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::config::Config;
 use crate::optimization::parameters::ParameterGroup;
 use crate::optimization::schedule::ExponentialDecay;
-use crate::trainer::Stage;
+use crate::stage::Stage;
 
 /// Learning rates of one iteration, by parameter group.
 #[derive(Clone, Copy, Debug)]
@@ -26,11 +26,7 @@ impl GroupRates {
     pub fn new(config: &Config, stage: Stage, iteration: usize, extent: f32) -> Self {
         let Config { train, compression, .. } = config;
         let rates = &train.learning_rate;
-        let length = match stage {
-            Stage::Coarse => train.coarse_iterations,
-            Stage::Fine => train.fine_iterations,
-        };
-        let steps = rates.schedule_steps.unwrap_or(length);
+        let steps = rates.schedule_steps.unwrap_or(train.iterations(stage));
         let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);

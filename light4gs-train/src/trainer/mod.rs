@@ -1,136 +1,140 @@
 //! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
 //!
-//! - here: stages, steps, checkpoints, what is logged
-//! - `density`: how many Gaussians there are
-//! - `rate`: what a small file asks of a step
-//! - `views`: what the pictures ask of it
+//! - here: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
+//! - `builder`: what a trainer is made of
+//! - `step`: one iteration
+//! - `views`: the views of an iteration, each with a tape of its own
+//! - `rate`: quantization noise, and the rate in the loss
+//! - `pruning`: pruning by significance
+//!
+//! What a researcher may want to replace are traits: [`Loss`](crate::loss::Loss),
+//! [`DensityStrategy`](crate::density::DensityStrategy), [`SignificanceScore`](crate::density::SignificanceScore),
+//! [`Observer`](crate::observers::Observer) and [`ImageSource`](crate::dataset::ImageSource).
 
-pub mod checkpoint;
-mod density;
+mod builder;
 pub mod profile;
-pub(crate) mod randomness;
+mod pruning;
 mod rate;
-pub mod run_folder;
-mod stage;
+mod step;
 mod views;
-
-pub use stage::Stage;
 
 use std::time::Instant;
 
-use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
-use indicatif::{ProgressBar, ProgressStyle};
-use light4gs_codec::SceneMeta;
-use light4gs_data::{Frame, ImageStore, LoadOptions, Resolution, Scene, Split};
-use light4gs_model::{Splatter, regularizer};
+use burn::module::Module;
+use burn::tensor::Device;
+use light4gs_data::{Scene, Split};
+use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneField, Splatter};
 
-use crate::compression::{Compression, TrainedScene, write_scene};
-use crate::config::{Config, TrainConfig};
-use crate::density::densification::DensityStatistics;
-use crate::device;
+pub use builder::TrainerBuilder;
+
+use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
+use crate::config::Config;
+use crate::dataset::ImageSource;
+use crate::density::{DensityStrategy, SignificanceScore};
 use crate::error::TrainError;
 use crate::evaluation::metrics::{image_tensor, psnr};
-use crate::observers::metrics_log::{MetricsLog, MetricsRecord};
-use crate::observers::tensorboard::TensorBoard;
+use crate::loss::Loss;
+use crate::observers::metrics_log::MetricsRecord;
+use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
-use crate::optimization::gradients::GradientSums;
-use crate::optimization::learning_rates::GroupRates;
-use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
-use crate::trainer::checkpoint::Checkpoint;
-use crate::trainer::profile::Profile;
-use crate::trainer::randomness::FrameOrder;
-use crate::trainer::run_folder::{RunFolder, RunRecord};
-use views::{ViewPass, ViewPools};
-
-/// How a dataset is opened for a configuration.
-pub fn load_options(config: &Config) -> LoadOptions {
-    LoadOptions {
-        resolution: config.data.resolution.map_or(Resolution::Native, Resolution::MaxSide),
-        background: config.data.background,
-        seed: config.seed,
-        random_points: config.data.initial_points,
-        random_half_size: config.data.initial_box,
-        ..LoadOptions::default()
-    }
-}
+use crate::randomness::FrameOrder;
+use crate::run::{Checkpoint, RunFolder, list_checkpoints};
+use crate::stage::Stage;
+use profile::Profile;
+use views::ViewPools;
 
 /// A run in progress.
-pub struct Trainer {
+///
+/// Without a run folder everything stays in memory: there are no checkpoints and no logs then. Ten iterations with a loss
+/// of one's own, on images in memory:
+///
+/// ```
+/// use std::path::Path;
+///
+/// use light4gs_data::{Camera, Frame, PointCloud, RgbImage8, Scene, SplitFrames};
+/// use light4gs_train::config::{Config, DeviceName};
+/// use light4gs_train::loss::LossInput;
+/// use light4gs_train::dataset::MemoryImages;
+/// use light4gs_train::trainer::Trainer;
+///
+/// // Four views of an orange ball's silhouette, at four times.
+/// let image = |_| {
+///     let inside = |i: i32| (i % 32 - 16).pow(2) + (i / 32 - 16).pow(2) < 64;
+///     let pixels = (0..32 * 32).flat_map(|i| if inside(i) { [255, 128, 0] } else { [255; 3] }).collect();
+///     RgbImage8 { width: 32, height: 32, pixels }
+/// };
+/// let frames: Vec<Frame> = (0..4)
+///     .map(|k| {
+///         let (sin, cos) = (k as f32 * 1.57).sin_cos();
+///         let eye = [4.0 * cos, 4.0 * sin, 0.5].into();
+///         let camera = Camera::look_at(eye, [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 32, 32);
+///         Frame::without_image(format!("view-{k}"), camera, k as f32 / 3.0)
+///     })
+///     .collect();
+/// let images: MemoryImages = frames.iter().map(|frame| (frame.name.clone(), image(frame))).collect();
+/// let frames = SplitFrames { test: frames.clone(), train: frames, ..SplitFrames::default() };
+/// let data = Scene::new("memory", Path::new("ball"), frames, PointCloud::random(200, 0.8, 0), [1.0; 3])?;
+///
+/// let mut config = Config::from_preset("dnerf-small")?;
+/// config.device = DeviceName::Flex;
+/// config.train.coarse_iterations = 5;
+/// config.train.fine_iterations = 5;
+/// config.train.prune.fraction = 0.0;
+/// let mut trainer = Trainer::builder(config, data)
+///     .images(images)
+///     // The square root of the squared difference, smoothed: less strict than L2, more than L1.
+///     .loss(|view: LossInput| ((view.image - view.truth).powi_scalar(2) + 1e-4).sqrt().mean())
+///     .build()?;
+/// let mut losses = Vec::new();
+/// while let Some(step) = trainer.step()? {
+///     losses.push(step.loss);
+/// }
+/// assert_eq!(losses.len(), 10);
+/// # Ok::<(), light4gs_train::error::TrainError>(())
+/// ```
+pub struct Trainer<F: DeformationField = HexPlaneField> {
     config: Config,
     device: Device,
     data: Scene,
-    images: ImageStore,
-    folder: RunFolder,
-    state: Checkpoint,
-    metrics: MetricsLog,
-    events: TensorBoard,
+    images: Box<dyn ImageSource>,
+    folder: Option<RunFolder>,
+    state: Checkpoint<F>,
+    loss: Box<dyn Loss>,
+    density: Box<dyn DensityStrategy>,
+    significance: Box<dyn SignificanceScore>,
+    observers: Vec<Box<dyn Observer>>,
     order: FrameOrder,
-    quiet: bool,
     profile: Profile,
     view_pools: ViewPools,
+    lap: Option<Lap>,
+}
+
+/// Since when the speed is measured; there is none before a stage has begun.
+#[derive(Clone, Copy)]
+struct Lap {
+    begin: Instant,
+    iteration: usize,
 }
 
 impl Trainer {
-    /// Begins a run in a fresh folder.
-    pub fn start(config: Config, folder: RunFolder, record: &RunRecord, quiet: bool) -> Result<Self, TrainError> {
-        let device = device::open(config.device)?.autodiff();
-        device.seed(config.seed);
-        let data = Scene::open(&record.scene, &load_options(&config))?;
-        let scene = config.model.build().init(&data.points, &device);
-        let state = Checkpoint {
-            statistics: DensityStatistics::new(scene.gaussians.len(), &device.clone().inner()),
-            compression: Compression::of_run(&config, &device),
-            scene,
-            adam: Adam::default(),
-            stage: Stage::Coarse,
-            iteration: 0,
-            seconds: 0.0,
-        };
-        Self::assemble(config, device, data, folder, state, quiet)
+    /// What a run of `config` on `data` is made of. The parts that `config` names are the defaults.
+    pub fn builder(config: Config, data: Scene) -> TrainerBuilder {
+        let field = config.model.field();
+        Self::builder_with_field(config, data, field)
+    }
+}
+
+impl<F: DeformationField> Trainer<F> {
+    /// The same with a deformation field of one's own: `field` takes the place of `model.hexplane` and
+    /// `model.deformation` in the configuration.
+    pub fn builder_with_field(config: Config, data: Scene, field: F::Config) -> TrainerBuilder<F> {
+        TrainerBuilder::new(config, data, field)
     }
 
-    /// Continues a run from its newest checkpoint, or from the beginning if it has none.
-    pub fn resume(config: Config, folder: RunFolder, record: &RunRecord, quiet: bool) -> Result<Self, TrainError> {
-        let Some(path) = folder.last_checkpoint() else {
-            let mut trainer = Self::start(config, folder, record, quiet)?;
-            trainer.metrics.truncate_after(Stage::Coarse, 0)?;
-            return Ok(trainer);
-        };
-        let device = device::open(config.device)?.autodiff();
-        let data = Scene::open(&record.scene, &load_options(&config))?;
-        let state = Checkpoint::load(&path, &config, &device)?;
-        let (stage, iteration) = (state.stage, state.iteration);
-        let mut trainer = Self::assemble(config, device, data, folder, state, quiet)?;
-        trainer.metrics.truncate_after(stage, iteration)?;
-        Ok(trainer)
-    }
-
-    fn assemble(
-        config: Config,
-        device: Device,
-        data: Scene,
-        folder: RunFolder,
-        state: Checkpoint,
-        quiet: bool,
-    ) -> Result<Self, TrainError> {
-        let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
-        images.prefetch(&data.train);
-        let metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
-        let step = global_step(&config.train, state.stage, state.iteration) as u64;
-        let events = TensorBoard::create(&folder.path("events"), (step > 0).then_some(step + 1))?;
-        let order = FrameOrder::default();
-        let profile = Profile::off();
-        // A graphics card is kept busy by one view at a time.
-        let side_by_side = config.device.computes_on_processor();
-        let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
-        Ok(Self { config, device, data, images, folder, state, metrics, events, order, quiet, profile, view_pools })
-    }
-
-    /// From now on measures the stages of every step.
+    /// From now on measures the parts of every iteration. The run gets slower, since each part is waited for.
     pub fn measure_stages(&mut self) {
         self.profile = Profile::on(&self.device);
-        // Stages can only be measured one after the other.
+        // Parts can only be measured one after the other.
         self.view_pools = ViewPools::none();
     }
 
@@ -144,279 +148,195 @@ impl Trainer {
         &self.data
     }
 
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The model as trained so far, on the run's device.
+    pub fn scene(&self) -> &DynamicScene<F> {
+        &self.state.scene
+    }
+
+    /// Entropy models and quantization steps, where the run trains them.
+    pub fn compression(&self) -> Option<&Compression> {
+        self.state.compression.as_ref()
+    }
+
+    /// Stage of the next iteration, or of the last one if training is over, and iterations done in it.
+    pub fn position(&self) -> (Stage, usize) {
+        (self.state.stage, self.state.iteration)
+    }
+
     /// Seconds of training so far, over all sessions.
     pub fn seconds(&self) -> f64 {
         self.state.seconds
     }
 
-    /// Trains to the end and writes `scene.l4gs`; returns its size in bytes.
-    pub fn run(&mut self) -> Result<u64, TrainError> {
-        if self.state.stage == Stage::Coarse {
-            self.run_stage(Stage::Coarse, self.config.train.coarse_iterations)?;
-            self.begin_fine_stage();
+    /// Trains to the end. With a run folder, also writes `scene.l4gs` and how it was coded; returns the file's size in
+    /// bytes then.
+    ///
+    /// # Errors
+    /// As [`Trainer::step`] and [`Trainer::encode`].
+    pub fn run(&mut self) -> Result<Option<u64>, TrainError> {
+        while self.step()?.is_some() {}
+        let Some(folder) = self.folder.clone() else { return Ok(None) };
+        let coded = self.encode()?;
+        folder.write("scene.l4gs", &coded.bytes)?;
+        if let Some((record, bit_maps)) = &coded.coding {
+            folder.write_json("coding.json", record)?;
+            folder.write_json("bit_maps.json", bit_maps)?;
         }
-        self.run_stage(Stage::Fine, self.config.train.fine_iterations)?;
+        Ok(Some(coded.bytes.len() as u64))
+    }
+
+    /// The scene as it is now as the bytes of a `.l4gs` file, in the profile of the configuration. Entropy models are fitted
+    /// first if the run trains none.
+    ///
+    /// # Errors
+    /// What the codec refuses, such as values that are not finite; an image that cannot be read.
+    pub fn encode(&mut self) -> Result<CodedScene, TrainError> {
         let trained = TrainedScene {
             scene: &self.state.scene,
             compression: self.state.compression.as_ref(),
             config: &self.config,
             data: &self.data,
-            images: &self.images,
+            images: &*self.images,
             device: &self.device,
         };
-        let written = write_scene(&trained, &self.folder.stream(), self.quiet)?;
-        if let Some((record, bit_maps)) = &written.coding {
-            self.folder.write_json("coding.json", record)?;
-            self.folder.write_json("bit_maps.json", bit_maps)?;
-        }
-        Ok(written.bytes)
+        let observers = &mut self.observers;
+        code_scene(&trained, &mut |done, iterations| observers.iter_mut().try_for_each(|o| o.on_fit(done, iterations)))
     }
 
-    /// The fine stage starts with a new optimiser and new statistics.
+    /// One iteration: forward and backward through a batch of views, the optimizer's step, then cloning, splitting and
+    /// pruning where they are due. Metrics, checkpoints and the change of stages happen here too. Returns what happened;
+    /// nothing once training is over.
+    ///
+    /// # Errors
+    /// [`TrainError::NotFinite`] if the loss is not finite; an image that cannot be read; a log or a checkpoint that cannot be
+    /// written; an observer's own.
+    pub fn step(&mut self) -> Result<Option<StepReport>, TrainError> {
+        let Some(iterations) = self.begin_iteration()? else { return Ok(None) };
+        let stage = self.state.stage;
+        let iteration = self.state.iteration + 1;
+        let begin = Instant::now();
+        let mut report = self.optimize(stage, iteration)?;
+        self.control_density(stage, iteration);
+        self.state.iteration = iteration;
+        self.state.seconds += begin.elapsed().as_secs_f64();
+        report.gaussians = self.state.scene.gaussians.len();
+        report.seconds = self.state.seconds;
+        let scene = Snapshot { scene: &self.state.scene, stage };
+        self.observers.iter_mut().try_for_each(|observer| observer.on_step(&report, &scene))?;
+
+        let is_last = iteration == iterations;
+        if iteration.is_multiple_of(self.config.train.log_interval) || is_last {
+            self.log(&report, is_last)?;
+        }
+        let interval = self.config.train.checkpoint_interval;
+        if (interval > 0 && iteration.is_multiple_of(interval)) || is_last {
+            self.save_checkpoint()?;
+        }
+        if is_last {
+            self.lap = None;
+            self.observers.iter_mut().try_for_each(|observer| observer.on_stage_end(stage))?;
+        }
+        Ok(Some(report))
+    }
+
+    /// The length of the current stage, after changing to the next one where one is over. None at the end of training.
+    fn begin_iteration(&mut self) -> Result<Option<usize>, TrainError> {
+        if self.state.stage == Stage::Coarse && self.state.iteration >= self.config.train.coarse_iterations {
+            self.begin_fine_stage();
+        }
+        let (stage, done) = (self.state.stage, self.state.iteration);
+        let iterations = self.config.train.iterations(stage);
+        if done >= iterations {
+            return Ok(None);
+        }
+        if self.lap.is_none() {
+            self.observers.iter_mut().try_for_each(|observer| observer.on_stage(stage, done, iterations))?;
+            self.restart_lap();
+        }
+        Ok(Some(iterations))
+    }
+
+    /// The fine stage starts with a new optimizer and new statistics.
     fn begin_fine_stage(&mut self) {
         self.state.stage = Stage::Fine;
         self.state.iteration = 0;
         self.state.adam = Adam::default();
-        self.reset_statistics();
+        self.density.begin_stage(self.state.scene.gaussians.len(), &self.device.clone().inner());
     }
 
-    fn reset_statistics(&mut self) {
-        self.state.statistics = DensityStatistics::new(self.state.scene.gaussians.len(), &self.device.clone().inner());
+    fn restart_lap(&mut self) {
+        self.lap = Some(Lap { begin: Instant::now(), iteration: self.state.iteration });
     }
 
-    fn run_stage(&mut self, stage: Stage, iterations: usize) -> Result<(), TrainError> {
-        let bar = if self.quiet { ProgressBar::hidden() } else { ProgressBar::new(iterations as u64) };
-        let style = "{prefix:>6} {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}  {msg}";
-        bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
-        bar.set_prefix(stage.name());
-        bar.set_position(self.state.iteration as u64);
-        bar.reset_eta();
-        let mut lap = (Instant::now(), self.state.iteration);
-        while self.state.iteration < iterations {
-            let iteration = self.state.iteration + 1;
-            let begin = Instant::now();
-            let picture = self.step(stage, iteration)?;
-            self.control_density(stage, iteration);
-            if stage == Stage::Fine && self.config.train.prune.is_due(iteration) {
-                self.prune_insignificant(iteration);
-            }
-            self.profile.lap("density control");
-            self.state.iteration = iteration;
-            self.state.seconds += begin.elapsed().as_secs_f64();
-            bar.inc(1);
-
-            if iteration.is_multiple_of(self.config.train.log_interval) || iteration == iterations {
-                let rate = (iteration - lap.1) as f64 / lap.0.elapsed().as_secs_f64();
-                lap = (Instant::now(), iteration);
-                let psnr = psnr(picture.image, picture.truth);
-                let count = self.state.scene.gaussians.len();
-                bar.set_message(format!("{psnr:.2} dB  {count} Gaussians"));
-                let mut record = MetricsRecord::new(stage, iteration, self.state.seconds, count);
-                record.loss = Some(f64::from(picture.loss));
-                record.psnr = Some(psnr);
-                record.iterations_per_second = Some(rate);
-                record.test_psnr = self.test_psnr(stage, iteration, iterations)?;
-                self.log(&record)?;
-            }
-            let interval = self.config.train.checkpoint_interval;
-            if (interval > 0 && iteration.is_multiple_of(interval)) || iteration == iterations {
-                self.save_checkpoint()?;
-                lap = (Instant::now(), iteration);
-            }
-        }
-        bar.finish();
-        Ok(())
-    }
-
-    fn log(&mut self, record: &MetricsRecord) -> Result<(), TrainError> {
-        self.metrics.append(record)?;
-        let step = global_step(&self.config.train, record.stage, record.iteration) as u64;
-        let mut scalars = vec![("gaussians", record.gaussians as f32)];
-        let optional = [
-            ("loss", record.loss),
-            ("psnr/train", record.psnr),
-            ("psnr/test", record.test_psnr),
-            ("iterations_per_second", record.iterations_per_second),
-        ];
-        scalars.extend(optional.into_iter().filter_map(|(name, value)| Some((name, value? as f32))));
-        Ok(self.events.scalars(step, &scalars)?)
+    fn log(&mut self, report: &StepReport, is_last: bool) -> Result<(), TrainError> {
+        let StepReport { stage, iteration, .. } = *report;
+        let rate = self.lap.map(|lap| (iteration - lap.iteration) as f64 / lap.begin.elapsed().as_secs_f64());
+        self.restart_lap();
+        let mut record = MetricsRecord::new(stage, iteration, report.seconds, report.gaussians);
+        record.loss = Some(f64::from(report.loss));
+        record.psnr = Some(psnr(report.image.clone(), report.truth.clone()));
+        record.iterations_per_second = rate;
+        record.test_psnr = self.test_psnr(stage, iteration, is_last)?;
+        self.observers.iter_mut().try_for_each(|observer| observer.on_log(&record))
     }
 
     fn save_checkpoint(&mut self) -> Result<(), TrainError> {
-        let name = Checkpoint::file_name(self.state.stage, self.state.iteration);
-        let folder = self.folder.checkpoints();
-        self.state.save(&folder.join(name))?;
-        let all = checkpoint::list(&folder);
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let path = folder.checkpoints().join(Checkpoint::<F>::file_name(self.state.stage, self.state.iteration));
+        self.state.density = self.density.state();
+        self.state.save(&path)?;
+        let all = list_checkpoints(&folder.checkpoints());
         for old in &all[..all.len().saturating_sub(self.config.train.keep_checkpoints.max(1))] {
             // A checkpoint too many does no harm.
             let _ = std::fs::remove_file(old);
         }
-        Ok(())
-    }
-
-    /// Forward, backward, and one optimiser step.
-    fn step(&mut self, stage: Stage, iteration: usize) -> Result<StepPicture, TrainError> {
-        self.profile.begin_step();
-        let batch = self.config.train.batch_size.max(1);
-        let count = self.data.train.len();
-        let frames: Vec<usize> =
-            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, count)).collect();
-        let noisy = self.quantization_noise(stage, iteration)?;
-        self.profile.lap("quantisation noise");
-        let frames: Vec<&Frame> = frames.into_iter().map(|frame| &self.data.train[frame]).collect();
-        let config = &self.config.train;
-        let pass = ViewPass {
-            stage,
-            splatter: self.splatter(stage, iteration),
-            images: &self.images,
-            device: &self.device,
-            squared: config.l2_until > 0 && (stage == Stage::Coarse || iteration <= config.l2_until),
-            lambda_dssim: config.lambda_dssim,
-            weight: 1.0 / batch as f32,
-        };
-        let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
-        let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
-        let mut gradients = GradientSums::default();
-        for view in &mut views {
-            gradients.add(std::mem::take(&mut view.gradients));
-        }
-        let rate = noisy.as_ref().and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
-        let regularizers = self.add_regularizers(stage, iteration, &mut gradients);
-        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
-        let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one picture");
-        // What a step reads back from the device: this number.
-        let loss: f32 = loss.into_scalar();
-        if !loss.is_finite() {
-            let checkpoint = self.folder.last_checkpoint().map_or("none".into(), |path| path.display().to_string());
-            return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss, checkpoint });
-        }
-        let last = views.last().expect("a batch has at least one picture");
-        let picture = StepPicture { loss, image: last.image.clone(), truth: last.truth.clone() };
-
-        if iteration <= self.config.train.densify.until {
-            for view in views {
-                if let Some(gradient) = view.screen_gradient {
-                    // The loss is a mean over the batch; thresholds are meant for one picture.
-                    self.state.statistics.add(gradient * batch as f32, view.radii);
-                }
-            }
-        }
-        self.profile.lap("density statistics");
-        let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
-        let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
-        visit_parameters(&mut self.state.scene, &mut step);
-        if let Some(compression) = &mut self.state.compression {
-            visit_compression(compression, &mut step);
-            if noisy.is_some_and(|noisy| noisy.learns_steps()) {
-                compression.bound_steps(&self.config);
-            }
-        }
-        self.profile.lap("Adam");
-        Ok(picture)
-    }
-
-    /// Adds the gradients of the regularisers, and returns their value, `[1]`.
-    fn add_regularizers(&mut self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Option<Tensor<1>> {
-        if stage == Stage::Coarse || self.planes_are_settled(stage, iteration) {
-            return None;
-        }
-        let scene = &mut self.state.scene;
-        let weights = &self.config.train.regularizer;
-        let term = regularizer::weighted_sum(
-            &scene.field.hexplane,
-            weights.plane_tv,
-            weights.time_smoothness,
-            weights.time_l1,
-        );
-        let value = term.clone().inner();
-        gradients.add_scene(scene, &mut term.backward());
-        self.profile.lap("regularisers");
-        Some(value)
+        self.restart_lap();
+        self.observers.iter_mut().try_for_each(|observer| observer.on_checkpoint(&path))
     }
 
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
-        let step = global_step(&self.config.train, stage, iteration);
+        let step = self.config.train.global_step(stage, iteration);
         let degree = (step / self.config.train.sh_degree_interval.max(1)).min(usize::from(self.config.model.sh_degree));
-        Splatter::new(self.config.data.background, degree)
+        Splatter::new(self.data.background, degree)
     }
 
     /// PSNR of a few test views by the model in memory, when it is due.
-    fn test_psnr(&self, stage: Stage, iteration: usize, last: usize) -> Result<Option<f64>, TrainError> {
+    fn test_psnr(&self, stage: Stage, iteration: usize, is_last: bool) -> Result<Option<f64>, TrainError> {
         let eval = &self.config.eval;
         let frames = self.data.frames(Split::Test);
-        let due = eval.interval > 0 && (iteration.is_multiple_of(eval.interval) || iteration == last);
+        let due = eval.interval > 0 && (iteration.is_multiple_of(eval.interval) || is_last);
         if !due || eval.views == 0 || frames.is_empty() {
             return Ok(None);
         }
         let splatter = self.splatter(stage, iteration);
         let stride = frames.len().div_ceil(eval.views);
-        let scene = self.state.scene.valid();
+        let scene = Snapshot { scene: &self.state.scene, stage };
         let mut values = Vec::new();
         for frame in frames.iter().step_by(stride) {
-            let gaussians = match stage {
-                Stage::Coarse => scene.gaussians.tensors(),
-                Stage::Fine => scene.at(frame.time),
-            };
-            let image = splatter.render(gaussians, &frame.camera, None).image.clamp(0.0, 1.0);
-            values.push(psnr(image, image_tensor(&*self.images.get(frame)?, &self.device.clone().inner())));
+            let image = splatter.render(scene.gaussians_at(frame.time), &frame.camera, None).image.clamp(0.0, 1.0);
+            values.push(psnr(image, image_tensor(&*self.images.image(frame)?, &self.device.clone().inner())));
         }
         Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
     }
 }
 
-/// Iterations done over both stages.
-fn global_step(config: &TrainConfig, stage: Stage, iteration: usize) -> usize {
-    match stage {
-        Stage::Coarse => iteration,
-        Stage::Fine => config.coarse_iterations + iteration,
-    }
+/// The model between two iterations.
+struct Snapshot<'a, F: DeformationField> {
+    scene: &'a DynamicScene<F>,
+    stage: Stage,
 }
 
-/// The last picture of a batch, off the tape.
-struct StepPicture {
-    loss: f32,
-    image: Tensor<3>,
-    truth: Tensor<3>,
-}
-
-struct AdamVisitor<'a> {
-    adam: &'a mut Adam,
-    gradients: &'a mut GradientSums,
-    rates: GroupRates,
-}
-
-impl ParameterVisitor for AdamVisitor<'_> {
-    fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        if let Some(gradient) = self.gradients.remove(name) {
-            let gradient = gradient.reshape(parameter.val().dims());
-            self.adam.step(name, parameter, gradient, self.rates.of(group));
+impl<F: DeformationField> SceneInTraining for Snapshot<'_, F> {
+    fn gaussians_at(&self, time: f32) -> GaussianTensors {
+        let scene = self.scene.valid();
+        match self.stage {
+            Stage::Coarse => scene.gaussians.tensors(),
+            Stage::Fine => scene.at(time),
         }
-    }
-}
-
-/// What the file says about the scene it was made from.
-pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
-    let positions = &data.points.positions;
-    let bound = |pick: fn(f32, f32) -> f32, start: f32| {
-        std::array::from_fn(|axis| positions.iter().map(|p| p[axis]).fold(start, pick))
-    };
-    let bounds =
-        if positions.is_empty() { [[0.0; 3]; 2] } else { [bound(f32::min, f32::MAX), bound(f32::max, f32::MIN)] };
-    let camera = data.train[0].camera;
-    let mut times: Vec<f32> = data.train.iter().map(|frame| frame.time).collect();
-    times.sort_by(f32::total_cmp);
-    times.dedup();
-    SceneMeta {
-        name: data.name.clone(),
-        frame_count: times.len() as u32,
-        // Times are a share of the whole; nobody says how long it lasts.
-        fps: 0.0,
-        bounds,
-        background: data.background,
-        config_digest: config.digest(),
-        width: camera.width,
-        height: camera.height,
-        fov_x: camera.fov().0,
-        ..SceneMeta::default()
     }
 }

@@ -1,29 +1,30 @@
 //! The views of a training step. Each has a tape of its own, so that they can be rendered and differentiated side by side.
 
 use burn::module::Module;
-use burn::tensor::{Device, Int, Tensor};
-use light4gs_data::{Frame, ImageStore};
-use light4gs_model::{DynamicScene, Splatter};
+use burn::tensor::{Device, Tensor};
+use light4gs_data::Frame;
+use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use super::profile::Profile;
+use crate::dataset::ImageSource;
+use crate::density::ViewStatistics;
 use crate::error::TrainError;
 use crate::evaluation::metrics::image_tensor;
-use crate::evaluation::metrics::{l2, photometric};
+use crate::loss::{Loss, LossInput};
 use crate::optimization::gradients::GradientSums;
-use crate::trainer::Stage;
-use crate::trainer::profile::Profile;
+use crate::stage::Stage;
 
 /// What the views of a step have in common.
 pub(super) struct ViewPass<'a> {
     pub(super) stage: Stage,
+    pub(super) iteration: usize,
     pub(super) splatter: Splatter,
-    pub(super) images: &'a ImageStore,
+    pub(super) images: &'a dyn ImageSource,
     pub(super) device: &'a Device,
-    /// Whether the loss is squared.
-    pub(super) squared: bool,
-    pub(super) lambda_dssim: f32,
-    /// Of a view in the loss.
-    pub(super) weight: f32,
+    pub(super) loss: &'a dyn Loss,
+    /// Views an iteration. The loss is their mean.
+    pub(super) batch: usize,
 }
 
 /// What a view adds to a step. All tensors are off the tape.
@@ -32,10 +33,8 @@ pub(super) struct View {
     pub(super) loss: Tensor<1>,
     /// Of that part by the scene's parameters.
     pub(super) gradients: GradientSums,
-    /// `[N, 2]`: of that part by the Gaussians' places in the picture.
-    pub(super) screen_gradient: Option<Tensor<2>>,
-    /// `[N]` in pixels.
-    pub(super) radii: Tensor<1, Int>,
+    /// What it says about the Gaussians.
+    pub(super) statistics: ViewStatistics,
     /// `[H, W, 3]`
     pub(super) image: Tensor<3>,
     /// `[H, W, 3]`
@@ -68,9 +67,9 @@ impl ViewPools {
 
 impl ViewPass<'_> {
     /// Renders and differentiates every frame. The outcome, in the order of the frames, does not depend on the pools.
-    pub(super) fn run<'f>(
+    pub(super) fn run<'f, F: DeformationField>(
         &self,
-        scene: &DynamicScene,
+        scene: &DynamicScene<F>,
         frames: &[&'f Frame],
         pools: &ViewPools,
         profile: &Profile,
@@ -97,11 +96,20 @@ impl ViewPass<'_> {
         })
     }
 
-    fn views(&self, tasks: Vec<(DynamicScene, &Frame)>, profile: &Profile) -> Result<Vec<View>, TrainError> {
+    fn views<F: DeformationField>(
+        &self,
+        tasks: Vec<(DynamicScene<F>, &Frame)>,
+        profile: &Profile,
+    ) -> Result<Vec<View>, TrainError> {
         tasks.into_iter().map(|(scene, frame)| self.view(scene, frame, profile)).collect()
     }
 
-    fn view(&self, mut scene: DynamicScene, frame: &Frame, profile: &Profile) -> Result<View, TrainError> {
+    fn view<F: DeformationField>(
+        &self,
+        scene: DynamicScene<F>,
+        frame: &Frame,
+        profile: &Profile,
+    ) -> Result<View, TrainError> {
         let gaussians = match self.stage {
             Stage::Coarse => scene.gaussians.tensors(),
             Stage::Fine => scene.at(frame.time),
@@ -110,26 +118,33 @@ impl ViewPass<'_> {
         let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
         let rendering = self.splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
         profile.lap("splatting");
-        let truth = image_tensor(&*self.images.get(frame)?, self.device);
-        profile.lap("picture from disk");
+        let truth = image_tensor(&*self.images.image(frame)?, self.device);
+        profile.lap("training image");
         let image = rendering.image;
-        let loss = if self.squared {
-            l2(image.clone(), truth.clone())
-        } else {
-            photometric(image.clone(), truth.clone(), self.lambda_dssim)
-        };
-        let loss = loss * self.weight;
+        let loss = self.loss.loss(LossInput {
+            image: image.clone(),
+            alpha: rendering.alpha,
+            depth: rendering.depth,
+            truth: truth.clone(),
+            frame,
+            stage: self.stage,
+            iteration: self.iteration,
+        });
+        let loss = loss * (1.0 / self.batch as f32);
         profile.lap("loss");
         let value = loss.clone().inner();
         let mut tape = loss.backward();
         let mut gradients = GradientSums::default();
-        gradients.add_scene(&mut scene, &mut tape);
+        gradients.add_module(&scene, &mut tape);
         profile.lap("backward");
         Ok(View {
             loss: value,
             gradients,
-            screen_gradient: offsets.grad_remove(&mut tape),
-            radii: rendering.radii,
+            // The loss is a mean over the batch; thresholds are meant for one view.
+            statistics: ViewStatistics {
+                screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),
+                radii: rendering.radii,
+            },
             image: image.inner(),
             truth: truth.inner(),
         })

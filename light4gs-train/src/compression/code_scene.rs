@@ -1,21 +1,19 @@
-//! What `train` and `encode` share: models if there are none yet, training pictures for the step search, the file, and
-//! the record of what was expected and what came out.
+//! From a trained scene to a file: models if there are none yet, training images for the step search, the bytes, and the
+//! record of what was expected and what came out.
 
-use std::path::Path;
 use std::time::Instant;
 
 use burn::tensor::Device;
-use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_codec::plane_layout::plane_name;
-use light4gs_codec::{PlaneBytes, SceneData, write_atomically};
-use light4gs_data::{DataError, Frame, ImageStore, Scene};
-use light4gs_model::{DynamicScene, Splatter};
+use light4gs_codec::{PlaneBytes, Profile, SceneData};
+use light4gs_data::{Frame, Scene};
+use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::{Deserialize, Serialize};
 
 use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit};
-use crate::config::Config;
+use crate::config::{Config, FileProfile};
+use crate::dataset::{ImageSource, scene_meta};
 use crate::error::TrainError;
-use crate::trainer::scene_meta;
 
 /// Training views that the step search looks at.
 const SEARCH_VIEWS: usize = 8;
@@ -24,7 +22,7 @@ const SEARCH_VIEWS: usize = 8;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CodingRecord {
     /// Profile of the file.
-    pub profile: String,
+    pub profile: FileProfile,
     /// Seconds of fitting models to a scene that was trained without them.
     pub fit_seconds: Option<f64>,
     /// Seconds of encoding, checking included.
@@ -52,91 +50,82 @@ pub struct PlaneRecord {
     pub value_bytes: u64,
 }
 
-/// A scene as trained, and where its pictures are.
-pub struct TrainedScene<'a> {
+/// A scene as trained, and where its images are.
+pub struct TrainedScene<'a, F: DeformationField = HexPlaneField> {
     /// The model.
-    pub scene: &'a DynamicScene,
+    pub scene: &'a DynamicScene<F>,
     /// Its entropy models, if it was trained with them.
     pub compression: Option<&'a Compression>,
     /// The run's.
     pub config: &'a Config,
     /// The dataset.
     pub data: &'a Scene,
-    /// Its pictures.
-    pub images: &'a ImageStore,
+    /// Its images.
+    pub images: &'a dyn ImageSource,
     /// With autodiff.
     pub device: &'a Device,
 }
 
-/// A file on disk.
+/// A file in memory.
 #[derive(Clone, Debug)]
-pub struct WrittenScene {
-    /// Its size.
-    pub bytes: u64,
+pub struct CodedScene {
+    /// The file.
+    pub bytes: Vec<u8>,
     /// How it was coded, and where its planes' bits are; not in the `float32` profile.
     pub coding: Option<(CodingRecord, Vec<BitMap>)>,
 }
 
-/// Encodes a trained scene in the profile of its configuration and writes the file, whole or not at all.
-pub fn write_scene(trained: &TrainedScene, path: &Path, quiet: bool) -> Result<WrittenScene, TrainError> {
+/// Encodes a trained scene in the profile of its configuration. Where the scene was trained without entropy models they are
+/// fitted first; `progress` is told the iterations done, and those that there are.
+///
+/// # Errors
+/// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
+pub fn code_scene<F: DeformationField>(
+    trained: &TrainedScene<F>,
+    progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
+) -> Result<CodedScene, TrainError> {
     let TrainedScene { scene, config, data, device, .. } = trained;
     let meta = scene_meta(config, data);
     let settings = &config.compression;
-    if settings.profile == "float32" {
-        let bytes = light4gs_codec::write_file(path, &scene.to_arrays(meta))?;
-        return Ok(WrittenScene { bytes, coding: None });
-    }
+    let Some(profile) = settings.profile.coded() else {
+        return Ok(CodedScene { bytes: light4gs_codec::encode(&scene.to_arrays(meta))?, coding: None });
+    };
     let (compression, fit_seconds) = match trained.compression {
         Some(compression) => (compression.clone(), None),
         None => {
             let begin = Instant::now();
-            let compression = fit_with_bar(scene, config, device, quiet);
+            let compression = fit(scene, config, device, progress)?;
             (compression, Some(begin.elapsed().as_secs_f64()))
         }
     };
     let begin = Instant::now();
     let views = search_views(data);
     let inner = (*device).clone().inner();
-    let render = |data: &SceneData| render_views(data, &views, &inner);
-    let pictures = if settings.attributes.search_tolerance > 0.0 && settings.profile == "compact" {
+    let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
+    let pictures = if settings.attributes.search_tolerance > 0.0 && profile == Profile::Compact {
         let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images)?;
         Some(Pictures { render: &render, error })
     } else {
         None
     };
-    let encoded = encode(scene, &compression, meta, settings, pictures, device)?;
-    write_atomically(path, &encoded.bytes).map_err(|source| DataError::Io {
-        action: "write",
-        path: path.to_owned(),
-        source,
-    })?;
+    let encoded = encode(scene, &compression, meta, settings, profile, pictures, device)?;
     let sizes = &encoded.coded.report;
     let hexplane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
     let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
     let record = CodingRecord {
-        profile: settings.profile.clone(),
+        profile: settings.profile,
         fit_seconds,
         encode_seconds: begin.elapsed().as_secs_f64(),
         estimated_bits: encoded.coded.estimate,
         coded_bits: BitEstimate { hexplanes: 8.0 * hexplane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
         planes: plane_records(&encoded, &compression),
     };
-    let bytes = encoded.bytes.len() as u64;
-    Ok(WrittenScene { bytes, coding: Some((record, encoded.coded.bit_maps)) })
-}
-
-fn fit_with_bar(scene: &DynamicScene, config: &Config, device: &Device, quiet: bool) -> Compression {
-    let iterations = config.compression.context.fit_iterations as u64;
-    let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(iterations) };
-    let style = "   fit {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}";
-    bar.set_style(ProgressStyle::with_template(style).expect("a valid template"));
-    let compression = fit(scene, config, device, |iteration| bar.set_position(iteration as u64));
-    bar.finish();
-    compression
+    Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
 }
 
 fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {
-    let steps = compression.quantization.steps_without_gradient().values();
+    let Some(models) = &compression.planes else { return Vec::new() };
+    let steps = models.quantization.steps_without_gradient().values();
     let record = |bytes: &PlaneBytes| PlaneRecord {
         name: plane_name(bytes.plane),
         step: steps[bytes.plane],
@@ -153,8 +142,8 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
 }
 
 /// Pixel values of all views, clamped to [0, 1].
-fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
-    let scene: DynamicScene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
+fn render_views<F: DeformationField>(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
+    let scene = DynamicScene::<F>::from_arrays(data, device).expect("arrays that came from a model make one");
     let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
     let picture = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;
@@ -163,11 +152,11 @@ fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32>
     views.iter().flat_map(picture).collect()
 }
 
-fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &ImageStore) -> Result<f64, TrainError> {
+fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &dyn ImageSource) -> Result<f64, TrainError> {
     let mut sum = 0.0;
     let mut rest = pixels;
     for frame in views {
-        let truth = images.get(frame)?;
+        let truth = images.image(frame)?;
         let (own, others) = rest.split_at(truth.pixels.len());
         let errors = own.iter().zip(&truth.pixels).map(|(value, byte)| f64::from(*value) - f64::from(*byte) / 255.0);
         sum += errors.map(|error| error.powi(2)).sum::<f64>();

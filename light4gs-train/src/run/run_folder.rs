@@ -2,15 +2,15 @@
 //! `eval.json`, `renders/`, `report.html`.
 
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use light4gs_codec::write_atomically;
-use light4gs_data::DataError;
+use light4gs_data::{DataError, write_atomically};
 use serde::{Deserialize, Serialize};
 
+use super::list_checkpoints;
 use crate::config::Config;
 use crate::error::TrainError;
-use crate::trainer::checkpoint;
 
 /// Files of a run; `--overwrite` removes them.
 const FILES: [&str; 8] = [
@@ -122,14 +122,14 @@ impl RunFolder {
         for (from, to) in checkpoint.into_iter().chain([(log, self.path("metrics.jsonl"))]) {
             // Whole or not at all: half a checkpoint would stop the run from being resumed.
             let bytes = fs::read(&from).map_err(io("read", &from))?;
-            write_atomically(&to, &bytes).map_err(io("write", &to))?;
+            write_atomically(&to, |file| file.write_all(&bytes))?;
         }
         Ok(())
     }
 
     /// The newest checkpoint.
     pub fn last_checkpoint(&self) -> Option<PathBuf> {
-        checkpoint::list(&self.checkpoints()).pop()
+        list_checkpoints(&self.checkpoints()).pop()
     }
 
     /// The compressed scene.
@@ -140,7 +140,7 @@ impl RunFolder {
     /// Writes a file whole or not at all.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
         let path = self.path(name);
-        write_atomically(&path, bytes).map_err(io("write", &path)).map_err(Into::into)
+        Ok(write_atomically(&path, |file| file.write_all(bytes))?)
     }
 
     /// Reads a JSON file of the run; nothing if it is not there.
