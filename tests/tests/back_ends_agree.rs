@@ -7,7 +7,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 use light4gs_data::Camera;
-use light4gs_model::Splatter;
+use light4gs_model::{ActivatedGaussians, Splatter};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run_weighed};
 use light4gs_tests::random::Random;
