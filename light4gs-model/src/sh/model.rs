@@ -10,7 +10,6 @@ use super::bottleneck::{ShBottleneck, ShBottleneckConfig};
 use super::entropy::{ShEntropy, ShKnown, ShTables};
 use super::hexplane_coupled::{ShHexPlaneCoupled, ShHexPlaneCoupledConfig};
 use super::mixture::{ShMixture, ShMixtureConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
 
 /// Which entropy model, with its configuration.
 #[derive(Config, Debug)]
@@ -85,15 +84,6 @@ impl ShEntropyModel {
             Self::Autoregressive(_) | Self::HexPlaneCoupled(_) => None,
         }
     }
-
-    /// The model's layers as the stream stores them; none if it travels as tables.
-    pub fn layers(&self) -> Vec<Layer<'_>> {
-        match self {
-            Self::Factorized(_) | Self::Mixture(_) => Vec::new(),
-            Self::Autoregressive(model) => model.layers(),
-            Self::HexPlaneCoupled(model) => model.layers(),
-        }
-    }
 }
 
 impl ShEntropy for ShEntropyModel {
@@ -111,16 +101,5 @@ impl ShEntropy for ShEntropyModel {
 
     fn priors(&self) -> Vec<ShPrior> {
         self.model().priors()
-    }
-}
-
-impl NamedParameters for ShEntropyModel {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        match self {
-            Self::Factorized(model) => model.visit_parameters(visitor),
-            Self::Mixture(model) => model.visit_parameters(visitor),
-            Self::Autoregressive(model) => model.visit_parameters(visitor),
-            Self::HexPlaneCoupled(model) => model.visit_parameters(visitor),
-        }
     }
 }

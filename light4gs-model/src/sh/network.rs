@@ -7,10 +7,6 @@ use light4gs_codec::Network;
 use light4gs_codec::network::Value;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, visit_layer};
-
-/// Names of the two layers in the stream.
-pub(crate) type Names = [&'static str; 2];
 
 /// Features `[I, 1, N]` to scales and means `[2 C, 1, N]`: linear, rectifier, linear. Gaussians are the columns of a plane with one row.
 #[derive(Module, Debug)]
@@ -41,15 +37,5 @@ impl ShNetwork {
         let hidden = network.layer(features, first.to_layer());
         let rectified = network.leaky_relu(hidden, LEAKY_SLOPE as f32);
         network.layer(rectified, last.to_layer())
-    }
-
-    pub(crate) fn layers(&self, names: Names) -> impl Iterator<Item = Layer<'_>> {
-        names.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
-    }
-
-    pub(crate) fn visit_layers(&mut self, names: Names, visitor: &mut impl NamedParameterVisitor) {
-        for (name, layer) in names.into_iter().zip(&mut self.layers) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
     }
 }
