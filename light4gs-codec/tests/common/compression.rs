@@ -327,6 +327,10 @@ pub fn scene(count: usize, sh_degree: u8, channels: u32, resolution: [u32; 4], m
         .map(|_| 0.02 * laplace_symbol(&mut random, 0.6) as f32 + 0.004 * random.uniform())
         .collect();
     scene.hexplane = hexplane(channels, resolution, multipliers);
+    scene.motion = match channels * multipliers.len() as u32 {
+        0 => Default::default(),
+        features => super::motion(features),
+    };
     for (index, plane) in scene.hexplane.planes.iter_mut().enumerate() {
         let center = if SPACE_TIME_PLANES.contains(&(index % 6)) { 1.0 } else { 0.0 };
         plane.values.fill_with(|| center + 0.1 * random.normal());
