@@ -60,6 +60,10 @@ impl ShEntropy for ShBottleneck {
     fn quantize(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
         (values.detach() / self.step).round() * self.step
     }
+
+    fn tables(&self) -> Option<&dyn ShTables> {
+        Some(self)
+    }
 }
 
 impl ShTables for ShBottleneck {

@@ -17,7 +17,7 @@ pub struct ShNetwork {
 
 impl ShNetwork {
     /// The last layer starts at scale `scale` and mean 0, with a tenth of PyTorch's weights.
-    pub(crate) fn new(inputs: usize, hidden: usize, channels: usize, scale: f32, device: &Device) -> Self {
+    pub fn new(inputs: usize, hidden: usize, channels: usize, scale: f32, device: &Device) -> Self {
         let [first, mut last] = [(inputs, hidden), (hidden, 2 * channels)]
             .map(|(inputs, outputs)| PlaneConvConfig::new(inputs, outputs, 1).init(device));
         let bias = [vec![scale; channels], vec![0.0; channels]].concat();
@@ -26,13 +26,14 @@ impl ShNetwork {
         Self { layers: [first, last] }
     }
 
-    pub(crate) fn forward(&self, features: Tensor<3>) -> Tensor<3> {
+    /// `[2 C, 1, N]` from `features [I, 1, N]`.
+    pub fn forward(&self, features: Tensor<3>) -> Tensor<3> {
         let [first, last] = &self.layers;
         last.forward(leaky_relu(first.forward(features), LEAKY_SLOPE))
     }
 
     /// [`Self::forward`] for the codec's exact executor.
-    pub(crate) fn describe(&self, network: &mut Network, features: Value) -> Value {
+    pub fn describe(&self, network: &mut Network, features: Value) -> Value {
         let [first, last] = &self.layers;
         let hidden = network.layer(features, first.to_layer());
         let rectified = network.leaky_relu(hidden, LEAKY_SLOPE as f32);
