@@ -7,10 +7,12 @@ mod common;
 
 use std::time::{Duration, Instant};
 
-use common::compression::{ALL_PARTS, Random, compact_shape, condition, distribution, input, plane_coding, scene, step};
+use common::compression::{
+    ALL_PARTS, Random, compact_shape, condition, distribution, input, plane_coding, scene, step,
+};
 use light4gs_codec::{
-    CodecError, CompressionInput, Condition, ContextModelArrays, LatentArrays, Limits, Network, PlanePrior, PlaneSource,
-    Profile, decode, decode_with_limits, encode_compressed, info,
+    CodecError, CompressionInput, Condition, ContextModelArrays, LatentArrays, Limits, Network, PlanePrior,
+    PlaneSource, Profile, decode, decode_with_limits, encode_compressed, info,
     network::{Layer, LayerKind, Node, Operation, Value},
 };
 use proptest::prelude::*;
@@ -180,7 +182,8 @@ fn bombs_are_refused_before_they_go_off() {
 
     // Wide layers: the file would be small, since weights of zero take next to no bytes.
     let (mut network, [value]) = Network::new([M]);
-    let wide = |inputs: u32, outputs: u32| Layer::linear(vec![0.0; (inputs * outputs) as usize], vec![0.0; outputs as usize]);
+    let wide =
+        |inputs: u32, outputs: u32| Layer::linear(vec![0.0; (inputs * outputs) as usize], vec![0.0; outputs as usize]);
     let value = network.node(Operation::Resize, &[value]);
     let value = network.layer(value, wide(M, 1400));
     let value = network.layer(value, wide(1400, 1400));
