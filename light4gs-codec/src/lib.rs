@@ -84,6 +84,7 @@ pub mod network_weights;
 mod open_stream;
 mod parallel;
 mod parts;
+pub mod plane_layout;
 mod planes;
 mod query;
 mod reader;

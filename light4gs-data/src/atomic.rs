@@ -1,46 +1,92 @@
-//! Files that are either complete or absent: write beside, then rename.
+//! Files that are either complete or absent: write beside, flush to the disk, then rename.
 
 use crate::error::DataError;
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// A name in the same folder as `path` that no other call of this process uses.
+/// A name in the folder of `path` that no other call of this process uses.
+///
+/// It does not contain the name of `path`, so that a name of the longest legal length still works.
 pub(crate) fn sibling(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let count = COUNTER.fetch_add(1, Ordering::Relaxed);
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    path.with_file_name(format!(".{name}.{}-{count}.part", std::process::id()))
+    path.with_file_name(format!(".light4gs-{}-{count}.part", std::process::id()))
 }
 
-/// Writes a file through `fill` into a temporary sibling and renames it to `path` at the end.
+/// Writes a file so that a reader sees the old content or the new, never a part.
 ///
-/// An existing file at `path` is replaced in one step; on any error it stays as it was and the
+/// `fill` writes the content to a temporary file in the same folder, which must exist. The content is flushed to
+/// the disk (fsync), the file takes the name `path`, and on Unix the folder is flushed as well, so that the name
+/// outlives a power cut. An existing file at `path` is replaced in one step. On any error it stays as it was, and the
 /// temporary file is removed.
 ///
+/// ```
+/// use std::io::Write;
+///
+/// let path = std::env::temp_dir().join(format!("light4gs-example-{}.json", std::process::id()));
+/// light4gs_data::write_atomically(&path, |file| file.write_all(b"{}"))?;
+/// assert_eq!(std::fs::read(&path).unwrap(), b"{}");
+/// # std::fs::remove_file(&path).unwrap();
+/// # Ok::<(), light4gs_data::DataError>(())
+/// ```
+///
 /// # Errors
-/// [`DataError::Io`] naming `path`, when `fill` fails or the file cannot be created, flushed or renamed.
+/// [`DataError::Io`] naming `path`, when `fill` fails, or the file cannot be created, flushed or renamed.
 pub fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), DataError> {
-    let part = sibling(path);
-    let written = File::create(&part).and_then(|file| {
-        let mut writer = BufWriter::new(file);
-        fill(&mut writer)?;
-        writer.flush()
-    });
-    written.and_then(|()| fs::rename(&part, path)).map_err(|source| {
+    let failed = DataError::io("write", path);
+    let (part, file) = match create_sibling(path) {
+        Ok(created) => created,
+        Err(source) => return Err(failed(source)),
+    };
+    let written = fill_and_flush(file, fill).and_then(|()| fs::rename(&part, path));
+    if let Err(source) = written {
         // The first error is the one to report; a leftover is all that could go wrong here.
         let _ = fs::remove_file(&part);
-        DataError::Io { action: "write", path: path.to_path_buf(), source }
-    })
+        return Err(failed(source));
+    }
+    flush_folder(path).map_err(failed)
+}
+
+/// A new, empty file beside `path`. A name that is taken (a leftover of a process of the same number) is passed over.
+fn create_sibling(path: &Path) -> io::Result<(PathBuf, File)> {
+    loop {
+        let part = sibling(path);
+        match File::create_new(&part) {
+            Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            created => return created.map(|file| (part, file)),
+        }
+    }
+}
+
+fn fill_and_flush(file: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let mut writer = BufWriter::new(file);
+    fill(&mut writer)?;
+    writer.into_inner()?.sync_all()
+}
+
+/// Flushes the entry of a file that has just been renamed. The file is there and complete, so a system that cannot
+/// flush a folder, or a folder that may be written but not read, is no error; a disk that fails is.
+fn flush_folder(path: &Path) -> io::Result<()> {
+    if !cfg!(unix) {
+        return Ok(());
+    }
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let harmless = [io::ErrorKind::Unsupported, io::ErrorKind::InvalidInput, io::ErrorKind::PermissionDenied];
+    match File::open(folder).and_then(|folder| folder.sync_all()) {
+        Err(error) if !harmless.contains(&error.kind()) => Err(error),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Write;
 
     #[test]
     fn a_failed_write_leaves_the_old_file_and_no_rest() {
@@ -54,5 +100,29 @@ mod tests {
         assert!(failed.unwrap_err().to_string().contains("disk on fire"));
         assert_eq!(fs::read(&path).unwrap(), b"old");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn errors_name_the_file_and_leave_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let nowhere = folder.path().join("missing/a.bin");
+        let message = write_atomically(&nowhere, |_| Ok(())).unwrap_err().to_string();
+        assert!(message.contains("cannot write") && message.contains("a.bin"), "{message}");
+        let taken = folder.path().join("a folder");
+        fs::create_dir(&taken).unwrap();
+        let message = write_atomically(&taken, |_| Ok(())).unwrap_err().to_string();
+        assert!(message.contains("a folder"), "{message}");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn the_longest_name_and_the_usual_permissions() {
+        let folder = tempfile::tempdir().unwrap();
+        let long = folder.path().join("n".repeat(255));
+        write_atomically(&long, |out| out.write_all(b"x")).unwrap();
+        let plain = folder.path().join("plain");
+        fs::write(&plain, b"x").unwrap();
+        let permissions = |path: &Path| fs::metadata(path).unwrap().permissions();
+        assert_eq!(permissions(&long), permissions(&plain));
     }
 }

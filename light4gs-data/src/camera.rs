@@ -8,7 +8,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 /// An OpenCV pinhole camera: +x right, +y down, +z forward; `x_cam = rotation * x_world + translation`.
 ///
 /// Pixel `(i, j)` sees `u = fx * x / z + cx - 0.5`, compared with the integer `i` (and `v` likewise
-/// with `j`): the centre of the picture is at `cx = width / 2`.
+/// with `j`): the centre of the image is at `cx = width / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// World to camera rotation `[3, 3]` (orthonormal, determinant 1).
@@ -19,13 +19,13 @@ pub struct Camera {
     pub fx: f32,
     /// Vertical focal length, pixels.
     pub fy: f32,
-    /// Horizontal principal point, pixels from the picture's left edge.
+    /// Horizontal principal point, pixels from the image's left edge.
     pub cx: f32,
-    /// Vertical principal point, pixels from the picture's upper edge.
+    /// Vertical principal point, pixels from the image's upper edge.
     pub cy: f32,
-    /// Picture width, pixels.
+    /// Image width, pixels.
     pub width: u32,
-    /// Picture height, pixels.
+    /// Image height, pixels.
     pub height: u32,
 }
 
@@ -65,9 +65,9 @@ pub enum PoseError {
         /// The angle that was given, radians.
         fov_x: f32,
     },
-    /// The picture has no pixels.
-    #[error("the picture is {width} x {height} pixels, expected at least 1 x 1")]
-    EmptyPicture {
+    /// The image has no pixels.
+    #[error("the image is {width} x {height} pixels, expected at least 1 x 1")]
+    EmptyImage {
         /// Width, pixels.
         width: u32,
         /// Height, pixels.
@@ -88,7 +88,7 @@ impl Camera {
     ///
     /// # Errors
     /// [`PoseError`] when an entry is not finite, the matrix is not a rigid motion, the field of
-    /// view is not in (0, pi), or the picture is empty.
+    /// view is not in (0, pi), or the image is empty.
     pub fn from_camera_to_world_opengl(
         c2w: &[[f32; 4]; 4],
         fov_x: f32,
@@ -110,7 +110,7 @@ impl Camera {
             return Err(PoseError::FieldOfView { fov_x });
         }
         if width == 0 || height == 0 {
-            return Err(PoseError::EmptyPicture { width, height });
+            return Err(PoseError::EmptyImage { width, height });
         }
         let column = |j: usize| DVec3::new(f64::from(c2w[0][j]), f64::from(c2w[1][j]), f64::from(c2w[2][j]));
         let opengl = DMat3::from_cols(column(0), column(1), column(2));
@@ -126,7 +126,7 @@ impl Camera {
         Ok(Self::centred(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height))
     }
 
-    /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the picture.
+    /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the image.
     ///
     /// `fov_x` is the full horizontal field of view in radians; pixels are square. If `eye` equals
     /// `target` the camera looks along +y; if `up` is parallel to the view, another axis stands in.
@@ -160,7 +160,7 @@ impl Camera {
         }
     }
 
-    /// The same view for a picture of another size: focal lengths and principal point scale along.
+    /// The same view for an image of another size: focal lengths and principal point scale along.
     pub fn resized(&self, width: u32, height: u32) -> Self {
         let sx = f64::from(width) / f64::from(self.width.max(1));
         let sy = f64::from(height) / f64::from(self.height.max(1));

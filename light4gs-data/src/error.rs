@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-/// Why a dataset, a picture or a point cloud could not be read or written.
+/// Why a dataset, an image or a point cloud could not be read or written.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum DataError {
@@ -38,10 +38,10 @@ pub enum DataError {
         /// What the user can do about it.
         remedy: String,
     },
-    /// A picture is missing, damaged, or of another size than the rest.
-    #[error("picture {}: {problem}; {remedy}", path.display())]
-    Picture {
-        /// The picture's file.
+    /// An image is missing, damaged, or of another size than the rest.
+    #[error("image {}: {problem}; {remedy}", path.display())]
+    Image {
+        /// The image's file.
         path: PathBuf,
         /// What was found and what was expected.
         problem: String,
@@ -60,7 +60,7 @@ pub enum DataError {
     },
     /// A folder holds none of the known dataset layouts.
     #[error("{}: no known dataset layout: {problem}; {remedy}", path.display())]
-    UnknownFormat {
+    UnknownLayout {
         /// The folder.
         path: PathBuf,
         /// What was looked for.
@@ -86,28 +86,23 @@ pub enum DataError {
 
 impl DataError {
     /// A function for `map_err` that adds what was attempted, and on which file.
-    pub(crate) fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
+    pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { action, path, source }
     }
 
     /// A bad field of a text file.
-    pub(crate) fn field(
-        path: &Path,
-        field: impl Into<String>,
-        problem: impl Into<String>,
-        remedy: impl Into<String>,
-    ) -> Self {
+    pub fn field(path: &Path, field: impl Into<String>, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Field { path: path.to_path_buf(), field: field.into(), problem: problem.into(), remedy: remedy.into() }
     }
 
-    /// A bad picture.
-    pub(crate) fn picture(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Picture { path: path.to_path_buf(), problem: problem.into(), remedy: remedy.into() }
+    /// A bad image.
+    pub fn image(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Image { path: path.to_path_buf(), problem: problem.into(), remedy: remedy.into() }
     }
 
     /// A bad PLY file.
-    pub(crate) fn ply(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+    pub fn ply(path: &Path, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
         Self::Ply { path: path.to_path_buf(), problem: problem.into(), remedy: remedy.into() }
     }
 }

@@ -1,36 +1,37 @@
 //! Cameras, frames, point clouds and dataset readers.
 //!
-//! [`Scene::open`] turns a folder into cameras with times, a point cloud and an extent;
-//! [`ImageStore`] decodes the pictures lazily, within a memory bound;
+//! [`Scene::open`] turns a folder into cameras with times, a point cloud and an extent; a [`DatasetLayout`] says how
+//! a folder is read, and [`Layouts`] lists those that are known;
+//! [`ImageStore`] decodes the images lazily, within a memory bound;
 //! [`write_synthetic`] makes a small moving scene to try things on.
 //! Nothing here depends on Burn, and no user input makes this crate panic.
 //!
 //! Conventions: cameras are OpenCV pinholes
-//! (+x right, +y down, +z forward), time is in `[0, 1]`, pictures are `[H, W, 3]`, row-major,
+//! (+x right, +y down, +z forward), time is in `[0, 1]`, images are `[H, W, 3]`, row-major,
 //! already composited on the background, in the byte values of the file (no gamma handling).
 
-pub mod atomic;
-pub mod camera;
-pub mod composite;
-pub mod dnerf;
-pub mod error;
-pub mod frame;
-pub mod gaussian_ply;
-mod json;
-pub mod loader;
-pub mod neighbors;
-pub mod orbit;
+mod atomic;
+mod camera;
+mod error;
+mod frame;
+mod images;
+mod layouts;
+mod options;
+mod orbit;
 pub mod ply;
-pub mod point_cloud;
-pub mod scene;
-pub mod synthetic;
+mod points;
+mod scene;
+mod synthetic;
 
+pub use atomic::write_atomically;
 pub use camera::{Camera, PoseError};
 pub use error::DataError;
-pub use frame::{Frame, RgbImage8, RgbImage32};
-pub use gaussian_ply::GaussianPly;
-pub use loader::ImageStore;
+pub use frame::Frame;
+pub use images::{ImageStore, RgbImage8, RgbImage32, composite, composite_resized, image_size};
+pub use layouts::{DNerf, DatasetLayout, Layouts};
+pub use options::{LoadOptions, Resolution};
 pub use orbit::orbit_path;
-pub use point_cloud::PointCloud;
-pub use scene::{Format, LoadOptions, Resolution, Scene, Split};
+pub use ply::GaussianPly;
+pub use points::{PointCloud, SH_C0, SMALLEST_MEAN_SQUARED_DISTANCE, mean_squared_distance_to_3_nearest};
+pub use scene::{Scene, Split, SplitFrames};
 pub use synthetic::{SyntheticOptions, write_synthetic};

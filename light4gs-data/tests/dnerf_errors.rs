@@ -6,7 +6,7 @@ use std::fs;
 use std::path::Path;
 use tempfile::TempDir;
 
-fn picture(path: &Path, width: u32, height: u32) {
+fn image(path: &Path, width: u32, height: u32) {
     let pixels = (0..width * height * 3).map(|i| (i * 37 % 251) as u8).collect();
     let image = RgbImage8 { width, height, pixels };
     image.save_png(path).unwrap();
@@ -32,7 +32,7 @@ fn scene() -> TempDir {
     for (split, count) in [("train", 5), ("test", 2), ("val", 2)] {
         fs::create_dir(folder.path().join(split)).unwrap();
         for i in 0..count {
-            picture(&folder.path().join(format!("{split}/r_{i:03}.png")), 32, 24);
+            image(&folder.path().join(format!("{split}/r_{i:03}.png")), 32, 24);
         }
         write(folder.path(), split, &transforms(split, count));
     }
@@ -172,7 +172,7 @@ fn splits() {
 }
 
 #[test]
-fn pictures() {
+fn images() {
     let named = ["r_004.png", "frames[4].file_path"];
     let folder = scene();
     fs::remove_file(folder.path().join("train/r_004.png")).unwrap();
@@ -192,7 +192,7 @@ fn pictures() {
     fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
     let truncated = store.get(&scene.train[2]).unwrap_err().to_string();
     assert!(truncated.contains("r_002.png") && truncated.contains("truncated"), "{truncated}");
-    picture(path, 31, 24);
+    image(path, 31, 24);
     let other = store.get(&scene.train[2]).unwrap_err().to_string();
     assert!(other.contains("31 x 24 pixels, expected 32 x 24"), "{other}");
     fs::write(&scene.train[0].path, &bytes[..10]).unwrap();

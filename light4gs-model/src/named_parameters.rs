@@ -3,7 +3,7 @@
 use burn::module::Param;
 use burn::tensor::Tensor;
 
-use crate::plane_conv::{PlaneConv, PlaneDeconv};
+use crate::entropy::convolution::{PlaneConv, PlaneDeconv};
 
 /// Something to do with every parameter of a module, whatever its rank.
 pub trait NamedParameterVisitor {

@@ -3,8 +3,8 @@
 use burn::backend::Dispatch;
 use light4gs_data::Camera;
 
-use crate::gaussians::GaussianTensors;
 use crate::ops::significance::SignificanceOps;
+use crate::scene::gaussians::GaussianTensors;
 use crate::splatter::Splatter;
 
 /// Share of the Gaussians whose volume lies below the reference volume of [`VolumeWeight`].

@@ -6,8 +6,8 @@ use burn::tensor::{Bool, Int, Tensor, s};
 use light4gs_data::Camera;
 
 use crate::cpu::project::View;
-use crate::gaussians::GaussianTensors;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
+use crate::scene::gaussians::GaussianTensors;
 
 /// Logarithms of scales are cut here before the exponential.
 const MAX_LOG_SCALE: f32 = 40.0;

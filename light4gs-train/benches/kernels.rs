@@ -6,8 +6,7 @@ use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_ma
 use light4gs_model::ops::adam::{AdamStep, adam_step};
 use light4gs_model::{HexPlaneConfig, Splatter};
 use light4gs_train::benchmark::BenchScene;
-use light4gs_train::config::DEVICES;
-use light4gs_train::device::device_by_name;
+use light4gs_train::device::{built_in, device_by_name};
 
 const GAUSSIANS: usize = 20_000;
 const SIZE: u32 = 400;
@@ -22,7 +21,7 @@ fn splatting(criterion: &mut Criterion) {
     let scene = BenchScene::generate(GAUSSIANS, SIZE);
     let mut group = criterion.benchmark_group("splat 20k @ 400²");
     group.sample_size(10);
-    for name in DEVICES {
+    for name in built_in() {
         let device = device_by_name(name).expect("a built-in device");
         let splatter = Splatter::new([1.0; 3], 3);
         let still = scene.gaussians(&device);
@@ -41,7 +40,7 @@ fn splatting(criterion: &mut Criterion) {
 fn hexplane(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("hexplane 20k points, 32 channels, 64³·24, scales 1 and 2");
     group.sample_size(10);
-    for name in DEVICES {
+    for name in built_in() {
         let device = device_by_name(name).expect("a built-in device").autodiff();
         let planes = HexPlaneConfig::new().with_resolution([64, 64, 64, 24]).init(&device);
         let points = Tensor::<2>::random([GAUSSIANS, 4], Distribution::Uniform(-1.0, 1.0), &device).require_grad();
@@ -61,7 +60,7 @@ fn hexplane(criterion: &mut Criterion) {
 fn adam(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("Adam, a million values");
     let step = AdamStep { learning_rate: 1e-3, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 10 };
-    for name in DEVICES {
+    for name in built_in() {
         let device = device_by_name(name).expect("a built-in device");
         let random = || Tensor::<1>::random([1_000_000], Distribution::Default, &device);
         let gradient = random();

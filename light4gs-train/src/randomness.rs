@@ -6,7 +6,7 @@ use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::metrics_log::Stage;
+use crate::stage::Stage;
 
 /// What a random number is drawn for.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ pub(crate) fn seed_device(device: &Device, seed: u64, stage: Stage, iteration: u
 }
 
 /// Box-Muller, one of the pair.
-pub(crate) fn standard_normal(generator: &mut ChaCha8Rng) -> f32 {
+pub(crate) fn standard_normal(generator: &mut impl Rng) -> f32 {
     let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
     ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, RgbaImage};
-use light4gs_data::atomic::write_atomically;
+use light4gs_data::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
 
 /// How often a GIF plays.
@@ -102,7 +102,7 @@ pub fn write_png_sequence<E: From<DataError>>(
 
 /// A frame must have as many bytes as its size says, and the size of those before it.
 fn check(path: &Path, frame: &RgbImage8, size: &mut Option<(u32, u32)>) -> Result<(), DataError> {
-    let wrong = |problem: String| DataError::Picture {
+    let wrong = |problem: String| DataError::Image {
         path: path.to_path_buf(),
         problem,
         remedy: "render all frames with one camera size".to_owned(),

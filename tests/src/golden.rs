@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_train::config::DEVICES;
-use light4gs_train::device::device_by_name;
+use light4gs_train::device::{built_in, device_by_name};
 use safetensors::{Dtype, SafeTensors};
 
 /// The folder: `LIGHT4GS_GOLDEN`, or the copy in `tests/golden`.
@@ -102,7 +101,7 @@ impl Golden {
 /// # Panics
 /// If there is no graphics adapter, not even one in software: a back end that cannot be tested fails its tests.
 pub fn devices() -> Vec<(&'static str, Device)> {
-    DEVICES.iter().map(|name| (*name, device_by_name(name).unwrap_or_else(|error| panic!("{error}")))).collect()
+    built_in().into_iter().map(|name| (name, device_by_name(name).unwrap_or_else(|error| panic!("{error}")))).collect()
 }
 
 /// The back ends among [`devices`] that compute on the processor.

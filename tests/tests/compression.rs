@@ -2,18 +2,23 @@
 //! scenes into files and back.
 
 use burn::tensor::{Device, Distribution, Tensor};
-use light4gs_codec::{PlaneCoding, SceneMeta, decode, plane_distributions};
+use light4gs_codec::{PlaneCoding, Profile, SceneMeta, decode, plane_distributions};
 use light4gs_data::PointCloud;
 use light4gs_model::{
     ContextModel, ContextModelConfig, ContextParts, DynamicScene, HexPlaneConfig, Latent, PlaneSteps,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
-use light4gs_train::compression::{Compression, encode, settled_planes};
+use light4gs_train::compression::{Compression, encode, freeze_planes};
 use light4gs_train::config::Config;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const CHANNELS: usize = 4;
+
+/// The profile of a configuration that codes something.
+fn profile(config: &Config) -> Profile {
+    config.compression.profile.coded().unwrap()
+}
 
 /// The whole model, and each with a part less.
 fn compositions() -> Vec<ContextModelConfig> {
@@ -150,8 +155,10 @@ fn every_configuration_makes_a_file_that_decodes() {
         let config = config(overrides);
         let scene = scene(&config, &device);
         let mut compression = Compression::new(&config, &device);
-        compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps());
-        let encoded = encode(&scene, &compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+        compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps());
+        let encoded =
+            encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
+                .unwrap();
         let decoded = decode(&encoded.bytes).unwrap();
         assert_eq!(decoded, encoded.decoded, "{overrides:?}");
         assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
@@ -166,24 +173,26 @@ fn every_configuration_makes_a_file_that_decodes() {
 
 /// Once settled, planes are what the file has, bit for bit: what learns around them learns around the right thing.
 #[test]
-fn settled_planes_are_those_of_the_file() {
+fn frozen_planes_are_those_of_the_file() {
     for (name, device) in devices() {
         let device = device.autodiff();
         let config = config(&["model.hexplane.resolution=[16,16,16,8]", "compression.steps.space_time=0.01"]);
         let mut scene = scene(&config, &device);
-        for plane in &mut scene.hexplane.planes {
+        for plane in &mut scene.field.hexplane.planes {
             let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.05), &device);
             *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
         }
         let mut compression = Compression::new(&config, &device);
         let steps = compression.quantization.steps();
-        compression.context = shaken(compression.context, &scene.hexplane.tensors(), &steps);
-        let before = scene.hexplane.to_arrays();
-        scene.hexplane = settled_planes(&scene, &compression, &config.compression, &device).unwrap();
-        let settled = scene.hexplane.to_arrays();
-        assert_ne!(settled, before, "{name}");
-        let file = encode(&scene, &compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
-        assert_eq!(file.decoded.hexplane, settled, "{name}");
+        compression.context = shaken(compression.context, &scene.field.hexplane.tensors(), &steps);
+        let before = scene.field.hexplane.to_arrays();
+        scene.field.hexplane = freeze_planes(&scene, &compression, &config.compression, &device).unwrap();
+        let frozen = scene.field.hexplane.to_arrays();
+        assert_ne!(frozen, before, "{name}");
+        let file =
+            encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
+                .unwrap();
+        assert_eq!(file.decoded.hexplane, frozen, "{name}");
     }
 }
 
@@ -194,8 +203,10 @@ fn a_scene_without_gaussians_is_a_file_too() {
     let full = scene(&config, &device).to_arrays(SceneMeta::default());
     let mut empty = full;
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
-    let scene = DynamicScene::from_arrays(&empty, &device).unwrap();
+    let scene: DynamicScene = DynamicScene::from_arrays(&empty, &device).unwrap();
     let compression = Compression::new(&config, &device);
-    let encoded = encode(&scene, &compression, SceneMeta::default(), &config.compression, None, &device).unwrap();
+    let encoded =
+        encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
+            .unwrap();
     assert!(decode(&encoded.bytes).unwrap().gaussians.is_empty());
 }

@@ -4,9 +4,10 @@
 use burn::module::Param;
 use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::{Device, Distribution, Tensor};
+use light4gs_codec::plane_layout::coding_order;
 use light4gs_model::{
     AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlaneConfig, Latent,
-    NamedParameterVisitor, NamedParameters, PlaneSteps, coding_order,
+    NamedParameterVisitor, NamedParameters, PlaneSteps,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 

@@ -5,10 +5,11 @@
 //! as one more [`PriorPart`], and the rest is the model itself in its reference configuration.
 
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::coding_order;
 use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
     CenteredPlanes, ContextModel, ContextModelConfig, InterPlane, InterScale, KernelShape, Latent, Passes, PlaneSteps,
-    Prior, PriorPart, anchor_mask, checkerboard_kernel, coding_order, demultiplex, multiplex, upsample,
+    Prior, PriorPart, anchor_mask, checkerboard_kernel, demultiplex, multiplex, upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::named::{compare_gradients, load};

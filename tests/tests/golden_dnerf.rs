@@ -1,8 +1,8 @@
 //! The D-NeRF reader against the golden vectors `c12_dnerf_*` and their dataset `case12_data_*/dnerf`,
 //! and the distances that give the initial scales against `c11_densify_*`.
 
-use light4gs_data::composite::composite;
-use light4gs_data::neighbors::mean_squared_distance_to_3_nearest;
+use light4gs_data::composite;
+use light4gs_data::mean_squared_distance_to_3_nearest;
 use light4gs_data::{Camera, Frame, ImageStore, LoadOptions, Scene, Split, orbit_path};
 use safetensors::SafeTensors;
 use std::path::PathBuf;

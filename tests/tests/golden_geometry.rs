@@ -4,8 +4,8 @@ use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, s};
 use light4gs_model::{
-    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, Pca,
-    SceneFrame, contract,
+    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, HexPlaneField,
+    Pca, SceneCoordinates, contract,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 
@@ -52,7 +52,7 @@ fn scene_frame() {
     let golden = Golden::open("c01_contract_pca");
     for (name, device) in devices() {
         let device = device.autodiff();
-        let frame = SceneFrame::new(&pca_of(&golden), &device);
+        let frame = SceneCoordinates::new(&pca_of(&golden), &device);
         let points = golden.tensor::<2>("pca.points", &device).require_grad();
         let standardised = values_of(&frame.standardize(points.clone()));
         assert_close(&format!("{name} standardised"), &standardised, &golden.values("pca.standardised"), 1e-5);
@@ -117,7 +117,7 @@ fn hexplane_query_in_the_scene_frame() {
         let hexplane = hexplane_of(&golden, "", &device);
         let xyz = golden.tensor::<2>("ref.xyz", &device).require_grad();
         let time = golden.tensor::<2>("ref.t", &device) * 2.0 - 1.0;
-        let points = Tensor::cat(vec![SceneFrame::new(&pca, &device).normalize(xyz.clone()), time], 1);
+        let points = Tensor::cat(vec![SceneCoordinates::new(&pca, &device).normalize(xyz.clone()), time], 1);
         let out = hexplane.query(points);
         assert_close_relative(&format!("{name} paper.out"), &values_of(&out), &golden.values("paper.out"), 1e-5);
         let grads = (out * golden.tensor("ref.w", &device)).sum().backward();
@@ -178,10 +178,10 @@ fn deformation() {
                 assert_close_relative(&format!("{name} {key}"), found, &golden.values(&key), 1e-5);
             };
             check("hidden", &values_of(&network.hidden(features.clone())));
-            let deltas = network.forward(features.clone());
+            let offsets = network.forward(features.clone());
             let mut loss = Tensor::<1>::zeros([1], &device);
             let outputs =
-                [("dx", deltas.position), ("ds", deltas.scale), ("dr", deltas.rotation), ("do", deltas.opacity)];
+                [("dx", offsets.position), ("ds", offsets.scale), ("dr", offsets.rotation), ("do", offsets.opacity)];
             for (key, output) in outputs {
                 assert_eq!(output.is_some(), golden.has(&format!("{prefix}.out.{key}")), "{prefix} {key}");
                 if let Some(output) = output {
@@ -189,7 +189,7 @@ fn deformation() {
                     loss = loss + (output * golden.tensor(&format!("{prefix}.w.{key}"), &device)).sum();
                 }
             }
-            if let Some(output) = deltas.sh {
+            if let Some(output) = offsets.sh {
                 check("out.dshs", &values_of(&output));
                 let weights = golden.tensor::<2>(&format!("{prefix}.w.dshs"), &device).reshape(output.dims());
                 loss = loss + (output * weights).sum();
@@ -238,14 +238,13 @@ fn deformed_gaussians() {
         let GoldenNetwork { network, layers } = network_of(&golden, "depth1", &device);
         let scene = DynamicScene {
             gaussians,
-            frame: SceneFrame::new(&identity, &device),
-            hexplane: hexplane_of(&golden, "full.", &device),
-            deformation: network,
+            coordinates: SceneCoordinates::new(&identity, &device),
+            field: HexPlaneField { hexplane: hexplane_of(&golden, "full.", &device), deformation: network },
             differentiate_points: false,
         };
         let rest = scene.gaussians.tensors();
         let points = reference_query_points(&golden, rest.means.clone().detach(), &device);
-        let moved = scene.deform(rest.clone(), scene.hexplane.query(points));
+        let moved = rest.clone().offset_by(scene.field.deformation.forward(scene.field.hexplane.query(points)));
 
         let check = |key: &str, found: &[f32]| {
             let key = format!("full.{key}");
@@ -278,7 +277,7 @@ fn deformed_gaussians() {
         check("grad.opacity", &gradient(&rest.opacity_logits));
         let (dc, other) = (rest.sh_dc.grad(&grads).unwrap(), rest.sh_rest.grad(&grads).unwrap());
         check("grad.shs", &values_of(&Tensor::cat(vec![dc, other], 1)));
-        for (i, plane) in scene.hexplane.planes.iter().enumerate() {
+        for (i, plane) in scene.field.hexplane.planes.iter().enumerate() {
             let key = format!("grad.scale{}.plane{}", i / 6, i % 6);
             check(&key, &values_of(&plane.val().grad(&grads).unwrap()));
         }

@@ -5,12 +5,14 @@ use burn::tensor::{Device, Int, Tensor, TensorData, s};
 use light4gs_data::PointCloud;
 use light4gs_model::{GaussianTensors, Gaussians, GaussiansConfig, HexPlane, regularizer};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
-use light4gs_train::densification::{
-    DensifyMasks, DensityStatistics, SizeLimit, densify, largest_scales, prune, reset_opacity, survivors,
+use light4gs_train::density::clone_and_split::{
+    DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors,
 };
-use light4gs_train::loss::{l1, l2, photometric, psnr, ssim};
-use light4gs_train::optimizer::{Adam, AdamState};
-use light4gs_train::schedule::ExponentialDecay;
+use light4gs_train::density::{DensityStatistics, GaussianEditor};
+use light4gs_train::evaluation::metrics::{l1, l2, psnr, ssim};
+use light4gs_train::loss::photometric;
+use light4gs_train::optimization::adam::{Adam, AdamState};
+use light4gs_train::optimization::schedule::ExponentialDecay;
 
 /// One picture `[H, W, 3]` of a batch `[B, 3, H, W]`.
 fn picture(batch: &Tensor<4>, index: usize) -> Tensor<3> {
@@ -269,7 +271,7 @@ fn adam_after_an_opacity_reset() {
             sh_rest: zeros(45).reshape([count, 15, 3]),
         });
         let steps_before = adam.states[opacity.name].time;
-        reset_opacity(&mut gaussians, &mut adam);
+        reset_opacity(&mut GaussianEditor::new(&mut gaussians, &mut adam));
         let expected = golden.values("surgery.opacity_after_reset");
         let found = values_of(&gaussians.opacity_logits.val());
         assert_close(&format!("{name} surgery.opacity_after_reset"), &found, &expected, 1e-6);
@@ -366,7 +368,7 @@ fn densification() {
         let state = AdamState { second: first.clone(), first, time: 9 };
         adam.states.insert("gaussians.means".to_owned(), state);
 
-        let rows = densify(&mut gaussians, &mut adam, &masks, &normals);
+        let rows = densify(&mut GaussianEditor::new(&mut gaussians, &mut adam), &masks, &normals);
         assert_eq!(rows, sources, "{name} source_index");
         let check = |key: &str, found: Vec<f32>| {
             let key = format!("after_densify.{key}");
@@ -421,7 +423,7 @@ fn pruning() {
 
             let means = values_of(&gaussians.means.val());
             let mut adam = numbered_moments(&gaussians, &inner);
-            prune(&mut gaussians, &mut adam, &keep);
+            GaussianEditor::new(&mut gaussians, &mut adam).keep(&keep);
             assert_eq!(gaussians.len() as i64, golden.integers(&format!("{case}.n_after"))[0], "{name} {case}");
             let left: Vec<usize> = (0..keep.len()).filter(|i| keep[*i]).collect();
             let expected: Vec<f32> = left.iter().flat_map(|i| means[3 * i..3 * i + 3].to_vec()).collect();
@@ -440,7 +442,7 @@ fn opacity_reset() {
         let device = device.autodiff();
         let mut gaussians = gaussians_of(&golden, "after_densify", &device);
         let mut adam = numbered_moments(&gaussians, &device.clone().inner());
-        reset_opacity(&mut gaussians, &mut adam);
+        reset_opacity(&mut GaussianEditor::new(&mut gaussians, &mut adam));
         let found = values_of(&gaussians.opacity_logits.val());
         assert_close(&format!("{name} reset_opacity.logit"), &found, &golden.values("reset_opacity.logit"), 1e-5);
     }

@@ -3,7 +3,8 @@
 use burn::tensor::Tensor;
 use light4gs_data::{Camera, PointCloud};
 use light4gs_model::{
-    DeformationConfig, DynamicSceneConfig, GaussianTensors, GaussiansConfig, HexPlaneConfig, Splatter,
+    DeformationConfig, DynamicSceneConfig, GaussianTensors, GaussiansConfig, HexPlaneConfig, HexPlaneField,
+    HexPlaneFieldConfig, Splatter,
 };
 use light4gs_tests::golden::{cpu_devices, devices, values_of};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run};
@@ -393,11 +394,9 @@ fn finite_raw_attributes_have_finite_gradients() {
 /// A file may legally hold no Gaussians: it renders as background at every time.
 #[test]
 fn a_scene_without_gaussians_renders_the_background() {
-    let config = DynamicSceneConfig::new(
-        GaussiansConfig::new(),
-        HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]),
-        DeformationConfig::new(0).with_width(8),
-    );
+    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
+    let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(8));
+    let config = DynamicSceneConfig::<HexPlaneField>::new(GaussiansConfig::new(), field);
     for (name, device) in devices() {
         let scene = config.init(&PointCloud::default(), &device);
         let camera = random_camera(20, 12, &mut Random::new(8));

@@ -1,6 +1,6 @@
 //! The text in front of a PLY file's data.
 
-use super::{Encoding, Property, Scalar};
+use super::property::{Encoding, Property, Scalar};
 use crate::error::DataError;
 use std::io::{BufRead, Read};
 use std::path::Path;

@@ -9,10 +9,10 @@ mod render;
 mod shapes;
 mod world;
 
-use crate::atomic::sibling;
+use crate::atomic::{sibling, write_atomically};
 use crate::camera::Camera;
 use crate::error::DataError;
-use crate::frame::save_png;
+use crate::images::save_png;
 use crate::orbit::orbit_path;
 use glam::Vec3;
 use image::ExtendedColorType;
@@ -21,6 +21,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 use world::World;
 
@@ -34,7 +35,7 @@ const ELEVATIONS: [f32; 2] = [30.0, 50.0];
 /// What [`write_synthetic`] makes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntheticOptions {
-    /// Width and height of the pictures, pixels; 8 to 4096.
+    /// Width and height of the images, pixels; 8 to 4096.
     pub resolution: u32,
     /// Number of training frames; 2 to 10000.
     pub train_frames: usize,
@@ -71,7 +72,7 @@ impl SyntheticOptions {
 }
 
 /// Writes the procedural scene as a new D-NeRF folder: `transforms_{train,test,val}.json` and
-/// RGBA pictures `train/r_000.png`...; the folder is complete or absent, never half-written.
+/// RGBA images `train/r_000.png`...; the folder is complete or absent, never half-written.
 ///
 /// The same options give the same files.
 ///
@@ -163,11 +164,11 @@ fn unseen_time(i: usize, count: usize, train_frames: usize) -> f32 {
 }
 
 fn write_split(folder: &Path, split: &str, views: &[(Camera, f32)], world: &World) -> Result<(), DataError> {
-    let pictures = folder.join(split);
-    fs::create_dir_all(&pictures).map_err(DataError::io("create", &pictures))?;
+    let images = folder.join(split);
+    fs::create_dir_all(&images).map_err(DataError::io("create", &images))?;
     views.par_iter().enumerate().try_for_each(|(i, (camera, time))| {
         let rgba = render::render(world, camera, *time);
-        let path = pictures.join(format!("r_{i:03}.png"));
+        let path = images.join(format!("r_{i:03}.png"));
         save_png(&path, &rgba, camera.width, camera.height, ExtendedColorType::Rgba8)
     })?;
     let frames: Vec<serde_json::Value> = views
@@ -183,14 +184,15 @@ fn write_split(folder: &Path, split: &str, views: &[(Camera, f32)], world: &Worl
         .collect();
     let document = serde_json::json!({ "camera_angle_x": FOV_X, "frames": frames });
     let path = folder.join(format!("transforms_{split}.json"));
-    fs::write(&path, format!("{document:#}\n")).map_err(DataError::io("write", &path))
+    write_atomically(&path, |out| writeln!(out, "{document:#}"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::loader::ImageStore;
-    use crate::scene::{LoadOptions, Scene};
+    use crate::images::ImageStore;
+    use crate::options::LoadOptions;
+    use crate::scene::Scene;
     use std::path::PathBuf;
 
     fn small(seed: u64) -> SyntheticOptions {

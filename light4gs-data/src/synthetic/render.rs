@@ -1,4 +1,4 @@
-//! Ray casting: one supersampled RGBA picture of the procedural scene.
+//! Ray casting: one supersampled RGBA image of the procedural scene.
 
 use super::shapes::sphere;
 use super::world::{Hit, World};

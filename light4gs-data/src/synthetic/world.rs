@@ -9,7 +9,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// Height of the ground disc, world units.
 const GROUND: f32 = -0.6;
 
-/// A smooth pattern between two colours; wavelengths are a tenth of a picture or so.
+/// A smooth pattern between two colours; wavelengths are a tenth of an image or so.
 #[derive(Clone, Copy, Debug)]
 struct Texture {
     colors: [Vec3; 2],

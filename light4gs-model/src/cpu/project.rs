@@ -4,7 +4,7 @@
 use glam::{Mat3, Vec2, Vec3};
 use light4gs_data::Camera;
 
-use crate::spherical_harmonics::{basis, basis_gradient, coefficient_count};
+use crate::scene::spherical_harmonics::{basis, basis_gradient, coefficient_count};
 
 /// Gaussians nearer than this along the view axis are not drawn.
 const NEAR: f32 = 0.2;

@@ -157,7 +157,7 @@ impl HexPlaneKernels for CubeBackend {
 mod tests {
     use burn::tensor::{Device, Tensor};
 
-    use crate::hexplane::HexPlaneConfig;
+    use crate::scene::hexplane::HexPlaneConfig;
 
     /// Far more points in one cell than a loop of Mesa's software driver takes.
     #[test]
@@ -173,7 +173,7 @@ mod tests {
                 .map(|plane| Tensor::from_data(plane.val().into_data(), &device).require_grad());
             let planes: Vec<Tensor<3>> = planes.collect();
             let points = Tensor::<2>::full([POINTS, 4], 0.1, &device);
-            let features = crate::hexplane::query_planes(points, planes.clone());
+            let features = crate::scene::hexplane::query_planes(points, planes.clone());
             let gradients = features.sum().backward();
             let all = planes.iter().map(|plane| plane.grad(&gradients).expect("planes have gradients"));
             let sums = all.map(|gradient| gradient.sum().into_scalar::<f32>());

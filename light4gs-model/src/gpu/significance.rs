@@ -60,7 +60,7 @@ mod tests {
     use glam::Vec3;
     use light4gs_data::Camera;
 
-    use crate::gaussians::GaussianTensors;
+    use crate::scene::gaussians::GaussianTensors;
     use crate::significance::{Significance, SignificanceScore};
     use crate::splatter::Splatter;
 

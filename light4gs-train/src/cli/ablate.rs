@@ -1,13 +1,16 @@
 //! `ablate`.
 
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
+use light4gs_data::write_atomically;
 
 use super::output::{say, say_json};
 use super::train::{RunOutput, train_to_evaluation};
-use crate::ablation::{AblationRow, AblationTable, to_markdown};
+use crate::config::DeviceName;
 use crate::error::TrainError;
+use crate::evaluation::ablation::{AblationRow, AblationTable, to_markdown};
 
 #[derive(Debug, Args)]
 pub(super) struct Ablate {
@@ -28,7 +31,7 @@ pub(super) struct Ablate {
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     #[command(flatten)]
     output: RunOutput,
 }
@@ -58,8 +61,7 @@ impl Ablate {
             rows.push(AblationRow::new(variant.name, &evaluation));
             // After every run, so that an interrupted table shows what there is.
             let path = self.out.join("table.md");
-            light4gs_codec::write_atomically(&path, to_markdown(&rows).as_bytes())
-                .map_err(|source| light4gs_data::DataError::Io { action: "write", path: path.clone(), source })?;
+            write_atomically(&path, |file| file.write_all(to_markdown(&rows).as_bytes()))?;
         }
         if self.output.json {
             say_json(&rows)?;

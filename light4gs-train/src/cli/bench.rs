@@ -1,20 +1,21 @@
-//! `bench`: the tables of `crate::benchmark` and `crate::codec_benchmark`.
+//! `bench`: the tables of `crate::benchmark` and `crate::benchmark::codec`.
 
 use std::path::PathBuf;
 
 use clap::Args;
 
 use super::output::{say, say_json};
+use crate::benchmark::codec::{codec_benchmark, codec_table};
 use crate::benchmark::{BenchScene, benchmark, table};
-use crate::codec_benchmark::{codec_benchmark, codec_table};
-use crate::device::device_by_name;
+use crate::config::DeviceName;
+use crate::device;
 use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Bench {
     /// Back ends, separated by commas.
     #[arg(long, value_delimiter = ',', default_value = "ndarray,flex")]
-    device: Vec<String>,
+    device: Vec<DeviceName>,
     /// A scene file instead of generated ones (layout: docs/benchmarks.md).
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
     scene: Vec<PathBuf>,
@@ -65,8 +66,8 @@ impl Bench {
             );
         }
         let mut results = Vec::new();
-        for name in &self.device {
-            let device = device_by_name(name)?;
+        for name in self.device {
+            let device = device::open(name)?;
             results.push(benchmark(name, &device, &scenes, self.repeats as usize)?);
         }
         if self.json {

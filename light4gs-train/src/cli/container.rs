@@ -1,26 +1,29 @@
 //! `encode`, `decode`, `info`.
 
 use std::collections::BTreeMap;
+use std::io::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info, write_atomically};
-use light4gs_data::{DataError, ImageStore, Scene};
+use light4gs_codec::plane_layout::plane_name;
+use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info};
+use light4gs_data::{Scene, write_atomically};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
 use super::check_output;
 use super::output::{say, say_json};
+use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
-use crate::checkpoint::Checkpoint;
-use crate::compression::{TrainedScene, plane_name, write_scene};
-use crate::config::Config;
-use crate::device::device_by_name;
+use crate::compression::{TrainedScene, code_scene};
+use crate::config::{Config, DeviceName};
+use crate::dataset::{image_store, load_options};
+use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
-use crate::run_folder::RunFolder;
-use crate::trainer::load_options;
+use crate::run::Checkpoint;
+use crate::run::RunFolder;
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {
@@ -38,7 +41,7 @@ pub(super) struct Encode {
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     /// Print what was written as JSON.
     #[arg(long)]
     json: bool,
@@ -54,7 +57,7 @@ impl Encode {
                 "{run} has no checkpoint yet; train it with `light4gs resume {run}`"
             )));
         };
-        let device = device_by_name(self.device.as_deref().unwrap_or(&config.device))?.autodiff();
+        let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
         let checkpoint = Checkpoint::load(&path, &config, &device)?;
         let data = Scene::open(&record.scene, &load_options(&config))?;
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
@@ -63,7 +66,7 @@ impl Encode {
         }
         let (old, new) = (&config.compression, &changed.compression);
         let same_models = old.context == new.context && old.steps == new.steps && old.sh == new.sh;
-        let images = ImageStore::new(&load_options(&config), (config.data.memory_limit_mib << 20) as usize);
+        let images = image_store(&config);
         let trained = TrainedScene {
             scene: &checkpoint.scene,
             compression: checkpoint.compression.as_ref().filter(|_| same_models),
@@ -72,9 +75,14 @@ impl Encode {
             images: &images,
             device: &device,
         };
-        let written = write_scene(&trained, &self.out, self.json)?;
+        let mut bar = FitBar::new(self.json);
+        let coded = code_scene(&trained, &mut |done, iterations| {
+            bar.show(done, iterations);
+            Ok(())
+        })?;
+        write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
         print_info(&read_info(&self.out)?, self.json)?;
-        if let Some((record, _)) = written.coding.filter(|_| !self.json) {
+        if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
             }
@@ -164,11 +172,7 @@ impl Decode {
             (name, TensorView::new(Dtype::F32, shape.clone(), bytes).expect("shapes match their values"))
         });
         let bytes = safetensors::serialize(views, None).map_err(|error| TrainError::Input(error.to_string()))?;
-        write_atomically(&self.out, &bytes).map_err(|source| DataError::Io {
-            action: "write",
-            path: self.out.clone(),
-            source,
-        })?;
+        write_atomically(&self.out, |file| file.write_all(&bytes))?;
         say(format_args!("wrote {} ({} tensors, {} bytes)", self.out.display(), tensors.len(), bytes.len()))
     }
 }
@@ -193,7 +197,7 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
     add("frame.std".into(), vec![3], &data.frame.std);
     for (i, plane) in data.hexplane.planes.iter().enumerate() {
         let shape = vec![data.hexplane.channels as usize, plane.height as usize, plane.width as usize];
-        add(format!("hexplane.{}.{}", i / 6, light4gs_model::PLANE_NAMES[i % 6]), shape, &plane.values);
+        add(format!("hexplane.{}", plane_name(i)), shape, &plane.values);
     }
     for layer in &data.deformation.layers {
         let shape = vec![layer.outputs as usize, layer.inputs as usize];

@@ -6,7 +6,8 @@ use clap::Args;
 use light4gs_data::{DataError, GaussianPly};
 
 use super::output::say;
-use crate::device::device_by_name;
+use crate::config::DeviceName;
+use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::DecodedScene;
 
@@ -21,13 +22,13 @@ pub(super) struct Export {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     frames: Option<u32>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
-    #[arg(long, default_value = "ndarray")]
-    device: String,
+    #[arg(long, default_value_t)]
+    device: DeviceName,
 }
 
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let decoded = DecodedScene::open(&self.file, &device_by_name(&self.device)?)?;
+        let decoded = DecodedScene::open(&self.file, &device::open(self.device)?)?;
         std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
             action: "create",
             path: self.out.clone(),

@@ -4,7 +4,9 @@ mod ablate;
 mod bench;
 mod container;
 mod export;
+mod gpu_errors;
 mod output;
+mod progress;
 mod quickstart;
 mod render;
 mod synth;
@@ -14,7 +16,6 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use light4gs_model::GpuError;
 
 use crate::error::TrainError;
 
@@ -93,24 +94,13 @@ impl Cli {
 pub fn main() -> ExitCode {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
-    match catching_gpu_errors(|| Cli::parse().run()) {
+    match gpu_errors::catch(|| Cli::parse().run()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::tell(format_args!("error: {error}"));
             ExitCode::from(if error.is_internal() { 1 } else { 2 })
         }
     }
-}
-
-/// Errors of GPU operations arrive as panics, since Burn's operations return no results: makes ordinary errors of them.
-fn catching_gpu_errors(run: impl FnOnce() -> Result<(), TrainError>) -> Result<(), TrainError> {
-    let report = std::panic::take_hook();
-    std::panic::set_hook(Box::new(move |panic| {
-        if !panic.payload().is::<GpuError>() {
-            report(panic);
-        }
-    }));
-    GpuError::catch(run)?
 }
 
 /// Refuses an output path whose folder does not exist, before any work is done.

@@ -6,7 +6,7 @@ use clap::Args;
 use light4gs_data::{SyntheticOptions, write_synthetic};
 
 use super::train::{RunOutput, train};
-use crate::config::Config;
+use crate::config::{Config, DeviceName};
 use crate::error::TrainError;
 
 #[derive(Debug, Args)]
@@ -15,8 +15,8 @@ pub(super) struct Quickstart {
     #[arg(long, default_value = "runs/quickstart")]
     out: PathBuf,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
-    #[arg(long, default_value = "flex")]
-    device: String,
+    #[arg(long, default_value_t = DeviceName::Flex)]
+    device: DeviceName,
     /// Replace a run that is there already.
     #[arg(long)]
     overwrite: bool,

@@ -7,7 +7,8 @@ use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
 
 use super::check_output;
 use super::output::say;
-use crate::device::device_by_name;
+use crate::config::DeviceName;
+use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::DecodedScene;
 use crate::video::{Looping, write_gif, write_png_sequence};
@@ -57,8 +58,8 @@ pub(super) struct Render {
     #[arg(long, default_value_t = 20.0)]
     fps: f32,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
-    #[arg(long, default_value = "ndarray")]
-    device: String,
+    #[arg(long, default_value_t)]
+    device: DeviceName,
 }
 
 impl Render {
@@ -70,7 +71,7 @@ impl Render {
             return Err(TrainError::Input("--radius must be positive and --elevation finite".into()));
         }
         check_output(&self.out)?;
-        let decoded = DecodedScene::open(&self.file, &device_by_name(&self.device)?)?;
+        let decoded = DecodedScene::open(&self.file, &device::open(self.device)?)?;
         let frames = self.camera_frames(&decoded)?;
         let pictures = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
         if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
@@ -110,7 +111,7 @@ impl Render {
                 Path::Fixed => (first, time),
                 Path::Frozen => (camera, self.time),
             };
-            Frame::without_picture(format!("{k:04}"), camera, time)
+            Frame::without_image(format!("{k:04}"), camera, time)
         };
         Ok(path.into_iter().enumerate().map(frame).collect())
     }

@@ -3,18 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_data::{ImageStore, Scene};
+use light4gs_data::Scene;
 
 use super::output::{say, say_json, tell};
+use super::progress::ProgressBars;
 use crate::compression::CodingRecord;
-use crate::config::Config;
-use crate::device::{describe, device_by_name};
+use crate::config::{Config, DeviceName};
+use crate::dataset::{image_store, load_options};
+use crate::device::{self, describe};
 use crate::error::TrainError;
+use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::{DecodedScene, Evaluation};
-use crate::finish::evaluate_run;
-use crate::run_folder::RunFolder;
-use crate::table::{Align, Table};
-use crate::trainer::{Trainer, load_options};
+use crate::report::table::{Align, Table};
+use crate::run::{RunFolder, RunRecord};
+use crate::trainer::{Trainer, TrainerBuilder};
 
 /// What a run prints.
 #[derive(Debug, Args)]
@@ -45,7 +47,7 @@ pub(super) struct Train {
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     /// Replace a run that is there already.
     #[arg(long)]
     overwrite: bool,
@@ -70,12 +72,12 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
-    device_by_name(&config.device)?;
+    device::open(config.device)?;
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
     Scene::open(scene, &load_options(&config))?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (folder, record, config) = RunFolder::open(folder.root())?;
-    let trainer = Trainer::start(config.clone(), folder.clone(), &record, output.quiet)?;
+    let trainer = trainer(&config, &folder, &record, output)?.build()?;
     finish(trainer, &folder, &config, output)
 }
 
@@ -91,7 +93,7 @@ pub(super) fn train_to_evaluation(
     like: Option<&Path>,
     output: &RunOutput,
 ) -> Result<Evaluation, TrainError> {
-    device_by_name(&config.device)?;
+    device::open(config.device)?;
     let fresh = !out.join("run.json").exists();
     if fresh {
         Scene::open(scene, &load_options(&config))?;
@@ -108,10 +110,22 @@ pub(super) fn train_to_evaluation(
         )));
     }
     if !folder.stream().exists() {
-        run(&mut Trainer::resume(config.clone(), folder.clone(), &record, output.quiet)?, output)?;
+        run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
     evaluate_run(&folder, &config, &scene)
+}
+
+/// A trainer of a run's folder, with progress bars.
+fn trainer(
+    config: &Config,
+    folder: &RunFolder,
+    record: &RunRecord,
+    output: &RunOutput,
+) -> Result<TrainerBuilder, TrainError> {
+    let data = Scene::open(&record.scene, &load_options(config))?;
+    let bars = ProgressBars::new(output.quiet);
+    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars))
 }
 
 /// Trains to the end, and prints what the stages took if that is asked for.
@@ -143,7 +157,7 @@ pub(super) struct Resume {
     run: PathBuf,
     /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     #[command(flatten)]
     output: RunOutput,
 }
@@ -152,7 +166,7 @@ impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let (folder, record, mut config) = RunFolder::open(&self.run)?;
         config.device = self.device.unwrap_or(config.device);
-        let trainer = Trainer::resume(config.clone(), folder.clone(), &record, self.output.quiet)?;
+        let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
         finish(trainer, &folder, &config, &self.output)
     }
 }
@@ -166,7 +180,7 @@ pub(super) struct Eval {
     scene: Option<PathBuf>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
-    device: Option<String>,
+    device: Option<DeviceName>,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -194,16 +208,16 @@ impl Eval {
         let Some(scene) = self.scene else {
             return Err(TrainError::Input("a .l4gs file holds no pictures; name the dataset with --scene DIR".into()));
         };
-        let name = self.device.unwrap_or_else(|| "ndarray".into());
-        let device = device_by_name(&name)?;
+        let name = self.device.unwrap_or_default();
+        let device = device::open(name)?;
         let decoded = DecodedScene::open(&self.run, &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
-        let images = ImageStore::new(&options, (config.data.memory_limit_mib << 20) as usize);
-        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(&name, &device))?;
+        let images = image_store(&config);
+        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)
     }
 }

@@ -4,11 +4,12 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
+use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, encode_compressed, sh_rest_coefficients,
 };
-use light4gs_model::{DynamicScene, HexPlane, Latent, PLANE_NAMES, ShEntropy, counted_sh_coding};
+use light4gs_model::{DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::known;
@@ -51,11 +52,6 @@ pub struct BitMap {
     pub bits: Vec<f32>,
 }
 
-/// How a plane is called in records: its scale and its axes.
-pub fn plane_name(plane: usize) -> String {
-    format!("{}.{}", plane / PLANE_NAMES.len(), PLANE_NAMES[plane % PLANE_NAMES.len()])
-}
-
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BitEstimate {
@@ -74,20 +70,21 @@ pub struct Pictures<'a> {
     pub error: f64,
 }
 
-/// Encodes a scene in one of the coded profiles, `compact` or `paper`. Everything that is coded is decoded again and
+/// Encodes a scene in a profile. Everything that is coded is decoded again and
 /// compared before this returns.
 pub fn encode(
     scene: &DynamicScene,
     compression: &Compression,
     meta: SceneMeta,
     config: &CompressionConfig,
+    profile: Profile,
     pictures: Option<Pictures>,
     device: &Device,
 ) -> Result<EncodedScene, TrainError> {
     let (scene, device) = (&scene.valid(), &device.clone().inner());
     let compression = &mut compression.valid();
     let data = scene.to_arrays(meta);
-    let mut input = compression_input(compression, scene, &data, config)?;
+    let mut input = compression_input(compression, scene, &data, config, profile)?;
     if let (Some(pictures), Profile::Compact) = (pictures, input.profile)
         && config.attributes.search_tolerance > 0.0
     {
@@ -101,8 +98,8 @@ pub fn encode(
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
-/// Rounds in which [`settled_planes`] looks for planes that stay as they are. The last round's are near enough if none do.
-const SETTLING_ROUNDS: usize = 8;
+/// Rounds in which [`freeze_planes`] looks for planes that stay as they are. The last round's are near enough if none do.
+const FREEZING_ROUNDS: usize = 8;
 
 /// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
 /// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn.
@@ -110,7 +107,7 @@ const SETTLING_ROUNDS: usize = 8;
 ///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
-pub fn settled_planes(
+pub fn freeze_planes(
     scene: &DynamicScene,
     compression: &Compression,
     config: &CompressionConfig,
@@ -119,13 +116,13 @@ pub fn settled_planes(
     let mut scene = scene.valid();
     let compression = &mut compression.valid();
     let mut data = scene.to_arrays(SceneMeta::default());
-    for _ in 0..SETTLING_ROUNDS {
-        let input = compression_input(compression, &scene, &data, config)?;
-        let decoded = encode_compressed(&data, &CompressionInput { profile: Profile::Compact, ..input })?.decoded;
+    for _ in 0..FREEZING_ROUNDS {
+        let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
+        let decoded = encode_compressed(&data, &input)?.decoded;
         if decoded.hexplane == data.hexplane {
             break;
         }
-        scene.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
+        scene.field.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
         data.hexplane = decoded.hexplane;
     }
     Ok(HexPlane::from_arrays(&data.hexplane, device)?)
@@ -138,10 +135,11 @@ pub fn compression_input(
     scene: &DynamicScene,
     data: &SceneData,
     config: &CompressionConfig,
+    profile: Profile,
 ) -> Result<CompressionInput, TrainError> {
     compression.context.update_quantiles();
     Ok(CompressionInput {
-        profile: if config.profile == "paper" { Profile::Paper } else { Profile::Compact },
+        profile,
         planes: Some(compression.plane_coding(scene)?),
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
         attributes: attribute_steps(&config.attributes),
@@ -168,7 +166,7 @@ impl Compression {
     /// What the codec needs to code the planes.
     fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
         let steps = self.quantization.steps_without_gradient();
-        let symbols = self.context.hyper_symbols(&scene.hexplane.tensors(), &steps);
+        let symbols = self.context.hyper_symbols(&scene.field.hexplane.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(PlaneCoding {
             model: self.context.to_arrays()?,
@@ -186,8 +184,8 @@ impl Compression {
 
     /// Bits that the models give for a decoded scene; `device` is the models' own.
     pub fn estimate(&self, decoded: &SceneData, coding: &ShCoding, device: &Device) -> Result<BitEstimate, TrainError> {
-        let scene = DynamicScene::from_arrays(decoded, device)?;
-        let planes = scene.hexplane.tensors();
+        let scene: DynamicScene = DynamicScene::from_arrays(decoded, device)?;
+        let planes = scene.field.hexplane.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
         let steps = self.quantization.steps_without_gradient();
         let rates = self.context.rate(&planes, &steps, &all, Latent::Rounded);

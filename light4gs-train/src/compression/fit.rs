@@ -6,14 +6,24 @@ use light4gs_model::DynamicScene;
 
 use super::Compression;
 use crate::config::Config;
-use crate::metrics_log::Stage;
-use crate::optimizer::Adam;
-use crate::parameters::{ParameterGroup, ParameterVisitor, visit_compression};
+use crate::error::TrainError;
+use crate::optimization::adam::Adam;
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression};
+use crate::optimization::schedule::ExponentialDecay;
 use crate::randomness::{Purpose, generator, seed_device};
-use crate::schedule::ExponentialDecay;
+use crate::stage::Stage;
 
-/// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told after each.
-pub fn fit(scene: &DynamicScene, config: &Config, device: &Device, mut progress: impl FnMut(usize)) -> Compression {
+/// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told the iterations
+/// done, and those that there are, after each.
+///
+/// # Errors
+/// What `progress` returns.
+pub fn fit(
+    scene: &DynamicScene,
+    config: &Config,
+    device: &Device,
+    progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
+) -> Result<Compression, TrainError> {
     seed_device(device, config.seed, Stage::Fine, 0);
     let mut compression = Compression::new(config, device);
     let settings = &config.compression;
@@ -21,7 +31,7 @@ pub fn fit(scene: &DynamicScene, config: &Config, device: &Device, mut progress:
     let decay = |first: f64, last: f64| ExponentialDecay::new(first, last, iterations);
     let context = decay(settings.context.learning_rate_init, settings.context.learning_rate_final);
     let sh = decay(settings.sh.learning_rate_init, settings.sh.learning_rate_final);
-    compression.context.start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+    compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
     let mut adam = Adam::default();
     for iteration in 1..=iterations {
         seed_device(device, config.seed, Stage::Fine, iteration);
@@ -36,9 +46,9 @@ pub fn fit(scene: &DynamicScene, config: &Config, device: &Device, mut progress:
             sh: sh.at(iteration as f64),
         };
         visit_compression(&mut compression, &mut step);
-        progress(iteration);
+        progress(iteration, iterations)?;
     }
-    compression
+    Ok(compression)
 }
 
 struct FitStep<'a> {

@@ -4,21 +4,19 @@
 //! - `rate`: noise in place of rounding, and the estimated size of the file
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: a scene and its models into the bytes of a file
-//! - `run_encoder`: what `train` and `encode` share
+//! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
 //! - `step_search`: how coarsely the other attributes may be quantised
 
+mod code_scene;
 mod encoder;
 mod fit;
 mod rate;
-mod run_encoder;
 mod step_search;
 
-pub use encoder::{
-    BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, plane_name, settled_planes,
-};
+pub use code_scene::{CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
+pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, freeze_planes};
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
-pub use run_encoder::{CodingRecord, PlaneRecord, TrainedScene, WrittenScene, write_scene};
 
 use burn::tensor::Device;
 use light4gs_model::{
@@ -27,7 +25,7 @@ use light4gs_model::{
     ShMixtureConfig,
 };
 
-use crate::config::{CompressionConfig, Config, ContextConfig, ShConfig};
+use crate::config::{CompressionConfig, Config, ContextArchitecture, ContextConfig, ShConfig, ShModel};
 
 /// Entropy models and quantisation steps of one scene.
 #[derive(Clone, Debug)]
@@ -76,10 +74,10 @@ fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
 }
 
 fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig {
-    let sizes = match config.architecture.as_str() {
+    let sizes = match config.architecture {
         // The composition is what the switches say; the reference's centres and start belong to its sizes.
-        "reference" => ContextModelConfig::reference(channels),
-        _ => ContextModelConfig::compact(channels),
+        ContextArchitecture::Reference => ContextModelConfig::reference(channels),
+        ContextArchitecture::Compact => ContextModelConfig::compact(channels),
     };
     let parts = ContextParts::new()
         .with_hyperprior(config.hyperprior)
@@ -96,13 +94,15 @@ const SH_INITIAL_SCALE: f64 = 0.3;
 
 fn sh_config(config: &ShConfig, feature_size: usize) -> ShEntropyConfig {
     let step = config.step as f32;
-    match config.model.as_str() {
-        "mixture_of_logistics" => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
-        "channel_autoregressive" => ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step)),
-        "hexplane_coupled" => {
+    match config.model {
+        ShModel::MixtureOfLogistics => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
+        ShModel::ChannelAutoregressive => {
+            ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step))
+        }
+        ShModel::HexPlaneCoupled => {
             ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(feature_size).with_step(step))
         }
-        _ => {
+        ShModel::Factorized => {
             let bottleneck = ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE);
             ShEntropyConfig::Factorized(bottleneck)
         }

@@ -14,7 +14,7 @@ pub struct NoisyScene {
     /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the
     /// scene's, since noise only adds to them; by the steps see [`NoisyScene::step_gradients`].
     pub scene: DynamicScene,
-    /// Of the planes; they begin a tape of their own where they are learned. None if the planes are settled: as the file
+    /// Of the planes; they begin a tape of their own where they are learned. None if the planes are frozen: as the file
     /// will have them, without noise, without gradient and without a part in the rate.
     pub steps: Option<PlaneSteps>,
 }
@@ -22,7 +22,7 @@ pub struct NoisyScene {
 /// Estimated bits of a file's planes and spherical harmonics.
 #[derive(Clone, Debug)]
 pub struct Rate {
-    /// `[1]`: of all planes, hyperpriors included; 0 for settled planes.
+    /// `[1]`: of all planes, hyperpriors included; 0 for frozen planes.
     pub planes: Tensor<1>,
     /// Values of all planes.
     pub plane_symbols: usize,
@@ -58,19 +58,19 @@ impl Compression {
     pub fn noisy(&self, scene: &DynamicScene, learn_steps: bool, with_sh: bool) -> NoisyScene {
         let steps = self.quantization.steps_without_gradient();
         let noisy = steps.add_noise(
-            &scene.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect::<Vec<_>>(),
+            &scene.field.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect::<Vec<_>>(),
         );
         let mut scene = scene.clone();
-        for (parameter, plane) in scene.hexplane.planes.iter_mut().zip(noisy) {
+        for (parameter, plane) in scene.field.hexplane.planes.iter_mut().zip(noisy) {
             replace(parameter, plane);
         }
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: Some(steps.leaves(learn_steps)) }
     }
 
-    /// The same for a scene whose planes are settled.
-    pub fn noisy_beside_settled_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
+    /// The same for a scene whose planes are frozen.
+    pub fn noisy_beside_frozen_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
         let mut scene = scene.clone();
-        for plane in &mut scene.hexplane.planes {
+        for plane in &mut scene.field.hexplane.planes {
             *plane = plane.clone().set_require_grad(false);
         }
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
@@ -91,7 +91,7 @@ impl Compression {
     /// the rate of everything.
     pub fn rate(&self, noisy: &NoisyScene, fraction: f64, with_sh: bool, generator: &mut impl Rng) -> Rate {
         let scene = &noisy.scene;
-        let planes = &scene.hexplane.tensors();
+        let planes = &scene.field.hexplane.tensors();
         let sh_rest = scene.gaussians.sh_rest.val();
         let plane_bits = noisy.steps.as_ref().map(|steps| {
             let chosen = sample(generator, planes.len(), fraction);
@@ -129,7 +129,7 @@ impl NoisyScene {
     /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
     /// That is without the part they play through the noise.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
-        let planes = 0..self.scene.hexplane.planes.len();
+        let planes = 0..self.scene.field.hexplane.planes.len();
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
     }
 }
@@ -146,7 +146,7 @@ pub(super) fn known(scene: &DynamicScene, planes: &[Tensor<3>], rows: Option<Ten
         sh_dc = sh_dc.select(0, rows.clone());
         means = means.select(0, rows);
     }
-    ShKnown { sh_dc, positions: scene.frame.normalize(means), planes: planes.to_vec() }
+    ShKnown { sh_dc, positions: scene.coordinates.normalize(means), planes: planes.to_vec() }
 }
 
 /// A random share of `0..count` without repetition, at least one, in rising order.

@@ -1,13 +1,16 @@
 //! `[compression]`: how small, and how (paper III-C to III-E).
 
+use light4gs_codec::Profile;
 use serde::{Deserialize, Serialize};
+
+use super::choice::choice;
 
 /// What the file looks like, and what is trained for its sake.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct CompressionConfig {
-    /// How the file is written: `compact`, `paper` or `float32`.
-    pub profile: String,
+    /// How the file is written.
+    pub profile: FileProfile,
     /// The rate in the loss.
     pub rate: RateConfig,
     /// The context model of the hexplanes (MHCM).
@@ -22,9 +25,28 @@ pub struct CompressionConfig {
     pub weights: WeightsConfig,
 }
 
-/// What `compression.profile` may be: everything coded; planes and spherical harmonics coded and the rest as float32,
-/// as the paper does; nothing coded.
-pub(super) const PROFILES: &[&str] = &["compact", "paper", "float32"];
+choice! {
+    /// What is entropy coded in a file.
+    pub enum FileProfile: "profile" {
+        /// Everything.
+        Compact = "compact",
+        /// Planes and spherical harmonics; the rest is float32, as in the paper.
+        Paper = "paper",
+        /// Nothing.
+        Float32 = "float32",
+    }
+}
+
+impl FileProfile {
+    /// The codec's name for it; none where nothing is entropy coded.
+    pub fn coded(self) -> Option<Profile> {
+        match self {
+            Self::Compact => Some(Profile::Compact),
+            Self::Paper => Some(Profile::Paper),
+            Self::Float32 => None,
+        }
+    }
+}
 
 /// The rate term of the loss.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,8 +54,8 @@ pub(super) const PROFILES: &[&str] = &["compact", "paper", "float32"];
 pub struct RateConfig {
     /// Weight of the rate; 0 = no rate in the loss.
     pub lambda: f64,
-    /// What lambda weighs: `megabytes` or `per_symbol`.
-    pub weighting: String,
+    /// What lambda weighs.
+    pub weighting: RateWeighting,
     /// The rate is taken in every so many iterations.
     pub interval: usize,
     /// Share of the planes, and of the Gaussians, on which it is estimated.
@@ -41,21 +63,27 @@ pub struct RateConfig {
     /// Iteration of the fine stage from which planes carry noise and the rate counts. Spherical harmonics join once
     /// densification is over.
     pub from: usize,
-    /// Iteration of the fine stage after which the planes are settled: they take the values that the file will have, and
+    /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have, and
     /// the rest of the scene goes on learning around them. 0 = never.
     pub planes_until: usize,
 }
 
-/// What `compression.rate.weighting` may be: megabytes in the file, or the paper's sum of the bits per plane symbol and
-/// the bits per spherical-harmonics symbol.
-pub(super) const WEIGHTINGS: &[&str] = &["megabytes", "per_symbol"];
+choice! {
+    /// What `compression.rate.lambda` weighs.
+    pub enum RateWeighting: "weighting" {
+        /// Megabytes (10^6 bytes) in the file.
+        Megabytes = "megabytes",
+        /// The paper's sum of the bits per plane symbol and the bits per spherical-harmonics symbol.
+        PerSymbol = "per_symbol",
+    }
+}
 
 /// Parts and sizes of the context model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ContextConfig {
-    /// Sizes of its networks: `compact` or `reference`.
-    pub architecture: String,
+    /// Sizes of its networks.
+    pub architecture: ContextArchitecture,
     /// Whether the lowest scale's space-time planes send a hyperprior.
     pub hyperprior: bool,
     /// Whether the second half of the lowest scale's positions sees the first.
@@ -74,8 +102,15 @@ pub struct ContextConfig {
     pub fit_iterations: usize,
 }
 
-/// What `compression.context.architecture` may be: small networks for small scenes, or the public code's sizes.
-pub(super) const ARCHITECTURES: &[&str] = &["compact", "reference"];
+choice! {
+    /// Sizes of the context model's networks.
+    pub enum ContextArchitecture: "architecture" {
+        /// Small networks, for small scenes.
+        Compact = "compact",
+        /// The public code's sizes.
+        Reference = "reference",
+    }
+}
 
 /// Quantisation steps of the planes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -101,8 +136,8 @@ pub struct StepsConfig {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct ShConfig {
-    /// `factorized`, `mixture_of_logistics`, `channel_autoregressive` or `hexplane_coupled`.
-    pub model: String,
+    /// Which model.
+    pub model: ShModel,
     /// Quantisation step.
     pub step: f64,
     /// Learning rate of the model at the first step.
@@ -111,9 +146,19 @@ pub struct ShConfig {
     pub learning_rate_final: f64,
 }
 
-/// What `compression.sh.model` may be.
-pub(super) const SH_MODELS: &[&str] =
-    &["factorized", "mixture_of_logistics", "channel_autoregressive", "hexplane_coupled"];
+choice! {
+    /// The entropy models of the spherical harmonics.
+    pub enum ShModel: "model" {
+        /// One learned density a channel: the paper's.
+        Factorized = "factorized",
+        /// A mixture of logistics a channel.
+        MixtureOfLogistics = "mixture_of_logistics",
+        /// Every degree is predicted from those below it.
+        ChannelAutoregressive = "channel_autoregressive",
+        /// The parameters follow from the hexplane features at the Gaussian's position.
+        HexPlaneCoupled = "hexplane_coupled",
+    }
+}
 
 /// Quantisation of what every Gaussian has besides spherical harmonics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -146,7 +191,7 @@ pub struct WeightsConfig {
 impl Default for CompressionConfig {
     fn default() -> Self {
         Self {
-            profile: "compact".to_owned(),
+            profile: FileProfile::Compact,
             rate: RateConfig::default(),
             context: ContextConfig::default(),
             steps: StepsConfig::default(),
@@ -161,7 +206,7 @@ impl Default for RateConfig {
     fn default() -> Self {
         Self {
             lambda: 0.0,
-            weighting: "megabytes".to_owned(),
+            weighting: RateWeighting::Megabytes,
             interval: 3,
             fraction: 0.125,
             from: 1000,
@@ -173,7 +218,7 @@ impl Default for RateConfig {
 impl Default for ContextConfig {
     fn default() -> Self {
         Self {
-            architecture: "compact".to_owned(),
+            architecture: ContextArchitecture::Compact,
             hyperprior: true,
             checkerboard: true,
             inter_plane: true,
@@ -202,7 +247,7 @@ impl Default for StepsConfig {
 
 impl Default for ShConfig {
     fn default() -> Self {
-        Self { model: "factorized".to_owned(), step: 0.02, learning_rate_init: 5e-3, learning_rate_final: 5e-4 }
+        Self { model: ShModel::Factorized, step: 0.02, learning_rate_init: 5e-3, learning_rate_final: 5e-4 }
     }
 }
 

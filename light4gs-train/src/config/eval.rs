@@ -1,13 +1,16 @@
 //! `[eval]`: how it is measured.
 
+use light4gs_data::Split;
 use serde::{Deserialize, Serialize};
+
+use super::choice::choice;
 
 /// Views and repetitions of an evaluation.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct EvalConfig {
-    /// Splits that are measured: `test`, `val`, `train`. One that the dataset lacks is passed over.
-    pub splits: Vec<String>,
+    /// Splits that are measured. One that the dataset lacks is passed over.
+    pub splits: Vec<EvalSplit>,
     /// Whether every rendered view is saved as a PNG.
     pub save_renders: bool,
     /// Frames rendered before the clock starts.
@@ -20,10 +23,32 @@ pub struct EvalConfig {
     pub views: usize,
 }
 
+choice! {
+    /// A split whose images can be compared with.
+    pub enum EvalSplit: "split" {
+        /// Frames that are never trained.
+        Test = "test",
+        /// More of them.
+        Val = "val",
+        /// Frames that are trained.
+        Train = "train",
+    }
+}
+
+impl From<EvalSplit> for Split {
+    fn from(split: EvalSplit) -> Self {
+        match split {
+            EvalSplit::Test => Self::Test,
+            EvalSplit::Val => Self::Val,
+            EvalSplit::Train => Self::Train,
+        }
+    }
+}
+
 impl Default for EvalConfig {
     fn default() -> Self {
         Self {
-            splits: vec!["test".to_owned(), "val".to_owned()],
+            splits: vec![EvalSplit::Test, EvalSplit::Val],
             save_renders: true,
             fps_warmup: 5,
             fps_frames: 50,

@@ -12,8 +12,10 @@
 //! fine_iterations = 2000
 //! ```
 
+mod choice;
 mod compression;
 mod data;
+mod device_name;
 mod error;
 mod eval;
 mod layers;
@@ -34,28 +36,28 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+pub use choice::UnknownChoice;
 pub use compression::{
-    AttributesConfig, CompressionConfig, ContextConfig, RateConfig, ShConfig, StepsConfig, WeightsConfig,
+    AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
+    ShConfig, ShModel, StepsConfig, WeightsConfig,
 };
 pub use data::DataConfig;
+pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin, Problem};
-pub use eval::EvalConfig;
+pub use eval::{EvalConfig, EvalSplit};
 pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use presets::preset_names;
-pub use prune::PruneConfig;
+pub use prune::{PruneConfig, PruneScore, PruneVolume};
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 
-/// The back ends that `device` may name; `wgpu` may be followed by an adapter, as in `wgpu:0` or `wgpu:cpu`.
-pub const DEVICES: &[&str] = &["ndarray", "flex", "wgpu"];
-
 /// The complete configuration of a run.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Config {
     /// Seed of everything random in a run.
     pub seed: u64,
-    /// Back end that computes, one of [`DEVICES`], for `wgpu` with the adapter if wanted.
-    pub device: String,
+    /// Back end that computes, for `wgpu` with the adapter if wanted.
+    pub device: DeviceName,
     /// What is trained on.
     pub data: DataConfig,
     /// What is trained.
@@ -66,20 +68,6 @@ pub struct Config {
     pub compression: CompressionConfig,
     /// How it is measured.
     pub eval: EvalConfig,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            seed: 0,
-            device: "ndarray".to_owned(),
-            data: DataConfig::default(),
-            model: ModelConfig::default(),
-            train: TrainConfig::default(),
-            compression: CompressionConfig::default(),
-            eval: EvalConfig::default(),
-        }
-    }
 }
 
 impl Config {

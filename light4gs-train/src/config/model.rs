@@ -94,7 +94,7 @@ impl ModelConfig {
             .with_opacity(network.opacity)
             .with_sh(network.sh);
         let gaussians = model::GaussiansConfig::new().with_sh_degree(usize::from(self.sh_degree));
-        model::DynamicSceneConfig::new(gaussians, hexplane, deformation)
+        model::DynamicSceneConfig::new(gaussians, model::HexPlaneFieldConfig::new(hexplane, deformation))
             .with_differentiate_points(network.differentiate_points)
     }
 }

@@ -4,7 +4,7 @@ macro_rules! presets {
     ($($name:literal),* $(,)?) => {
         /// Name and text of every preset, sorted by name.
         pub(super) const PRESETS: &[(&str, &str)] =
-            &[$(($name, include_str!(concat!("../../../configs/", $name, ".toml")))),*];
+            &[$(($name, include_str!(concat!("../../configs/", $name, ".toml")))),*];
     };
 }
 

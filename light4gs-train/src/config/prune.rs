@@ -1,7 +1,8 @@
 //! `[train.prune]`: significance pruning (STP, paper III-B).
 
-use light4gs_model::{SignificanceScore, VolumeWeight};
 use serde::{Deserialize, Serialize};
+
+use super::choice::choice;
 
 /// When and how the least significant Gaussians are dropped.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -11,10 +12,10 @@ pub struct PruneConfig {
     pub fraction: f64,
     /// Iterations of the fine stage after which a pass takes place.
     pub iterations: Vec<usize>,
-    /// What a pixel adds to the score of a Gaussian that it blends: `transmittance`, `weight`, `opacity` or `count`.
-    pub score: String,
-    /// The factor of a Gaussian's volume: `none`, `clamped` or `unclamped`.
-    pub volume: String,
+    /// What a pixel adds to the score of a Gaussian that it blends.
+    pub score: PruneScore,
+    /// The factor of a Gaussian's volume.
+    pub volume: PruneVolume,
     /// Exponent of the volume's factor.
     pub volume_exponent: f64,
     /// Whether only one random camera a time is looked through, for data with many cameras; else every training view.
@@ -26,41 +27,41 @@ impl Default for PruneConfig {
         Self {
             fraction: 0.0,
             iterations: vec![15_001, 20_000],
-            score: "transmittance".to_owned(),
-            volume: "clamped".to_owned(),
+            score: PruneScore::Transmittance,
+            volume: PruneVolume::Clamped,
             volume_exponent: 0.1,
             one_camera_per_time: false,
         }
     }
 }
 
-/// What `score` may be: transmittance times opacity (the paper's), transmittance times alpha, the opacity alone, or
-/// one (a pixel count).
-pub(super) const SCORES: &[&str] = &["transmittance", "weight", "opacity", "count"];
-/// What `volume` may be: no factor, the paper's, or the public code's.
-pub(super) const VOLUMES: &[&str] = &["none", "clamped", "unclamped"];
+choice! {
+    /// What a pixel adds to the significance of a Gaussian that it blends.
+    pub enum PruneScore: "score" {
+        /// Transmittance before the Gaussian times its opacity: the paper's.
+        Transmittance = "transmittance",
+        /// The blending weight, transmittance times alpha.
+        Weight = "weight",
+        /// The opacity alone, as the first public code of LightGaussian does.
+        Opacity = "opacity",
+        /// One a pixel.
+        Count = "count",
+    }
+}
+
+choice! {
+    /// The factor of a Gaussian's volume in its significance.
+    pub enum PruneVolume: "volume" {
+        /// None.
+        None = "none",
+        /// Relative to the volume that 90 % stay below, at most 1: the paper's.
+        Clamped = "clamped",
+        /// Relative to the volume that 10 % stay below, without a bound: the public code's.
+        Unclamped = "unclamped",
+    }
+}
 
 impl PruneConfig {
-    /// The score that [`Self::score`] names.
-    pub fn score(&self) -> SignificanceScore {
-        match self.score.as_str() {
-            "weight" => SignificanceScore::BlendingWeight,
-            "opacity" => SignificanceScore::Opacity,
-            "count" => SignificanceScore::PixelCount,
-            _ => SignificanceScore::TransmittanceOpacity,
-        }
-    }
-
-    /// The volume factor that [`Self::volume`] names.
-    pub fn volume_weight(&self) -> VolumeWeight {
-        let exponent = self.volume_exponent;
-        match self.volume.as_str() {
-            "none" => VolumeWeight::None,
-            "unclamped" => VolumeWeight::Unclamped { exponent },
-            _ => VolumeWeight::Clamped { exponent },
-        }
-    }
-
     /// Whether a pass takes place after an iteration of the fine stage.
     pub fn is_due(&self, iteration: usize) -> bool {
         self.fraction > 0.0 && self.iterations.contains(&iteration)

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{PruneConfig, optional};
+use crate::stage::Stage;
 
 /// Stages, loss and bookkeeping of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -35,6 +36,24 @@ pub struct TrainConfig {
     pub prune: PruneConfig,
     /// Weights of the space-time regularisers, used in the fine stage.
     pub regularizer: RegularizerConfig,
+}
+
+impl TrainConfig {
+    /// Iterations done over both stages, after `iteration` of a stage.
+    pub fn global_step(&self, stage: Stage, iteration: usize) -> usize {
+        match stage {
+            Stage::Coarse => iteration,
+            Stage::Fine => self.coarse_iterations + iteration,
+        }
+    }
+
+    /// Iterations of a stage.
+    pub fn iterations(&self, stage: Stage) -> usize {
+        match stage {
+            Stage::Coarse => self.coarse_iterations,
+            Stage::Fine => self.fine_iterations,
+        }
+    }
 }
 
 /// Learning rates; those with `init` and `final` decay exponentially.

@@ -1,15 +1,12 @@
 //! Ranges: what the types alone let through.
 
-use super::compression::{ARCHITECTURES, PROFILES, SH_MODELS, WEIGHTINGS};
-use super::prune::{SCORES, VOLUMES};
-use super::{
-    CompressionConfig, Config, ConfigError, DEVICES, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig,
-    LearningRates, ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
-};
-use crate::device::is_device_name;
+use light4gs_codec::plane_layout::check_resolution;
 
-/// Planes are halved twice by the context model and predicted scale by scale.
-const PLANE_MULTIPLE: usize = 4;
+use super::{
+    CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates,
+    ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
+};
+
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
 const MAX_PLANE_RESOLUTION: usize = 4096;
 const MAX_CHANNELS: usize = 1024;
@@ -17,15 +14,10 @@ const MAX_WIDTH: usize = 4096;
 const MAX_DEPTH: usize = 64;
 const MAX_GAUSSIANS: usize = 50_000_000;
 const MAX_PICTURE_WIDTH: u32 = 16_384;
-const SPLITS: &[&str] = &["train", "test", "val"];
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check::default();
     check.that("seed", i64::try_from(config.seed).is_ok(), || format!("must be at most {} (TOML's limit)", i64::MAX));
-    check.that("device", is_device_name(&config.device), || {
-        let names = DEVICES.join(", ");
-        format!("is \"{}\"; it must be one of {names}, or wgpu with an adapter such as wgpu:0", config.device)
-    });
     data(&mut check, &config.data);
     model(&mut check, &config.model);
     train(&mut check, &config.train);
@@ -57,15 +49,9 @@ fn model(check: &mut Check, model: &ModelConfig) {
 
 fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     check.range("model.hexplane.channels", planes.channels, 1, MAX_CHANNELS);
-    // A whole multiple of a legal size is legal as well: the base resolution settles it for every scale.
-    let legal = |size: usize| size >= PLANE_MULTIPLE && size.is_multiple_of(PLANE_MULTIPLE);
+    let illegal = check_resolution(planes.resolution).err();
+    check.that("model.hexplane.resolution", illegal.is_none(), || format!("is {}", illegal.expect("it is illegal")));
     for (axis, size) in ["x", "y", "z", "t"].into_iter().zip(planes.resolution) {
-        check.that("model.hexplane.resolution", legal(size), || {
-            format!(
-                "is {size} along {axis}; it must be a multiple of {PLANE_MULTIPLE}, the nearest is {}",
-                nearest(size)
-            )
-        });
         for &multiplier in if axis == "t" { &[1][..] } else { &planes.multipliers[..] } {
             let scaled = size.saturating_mul(multiplier);
             check.that("model.hexplane.resolution", scaled <= MAX_PLANE_RESOLUTION, || {
@@ -78,18 +64,6 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     check.that("model.hexplane.multipliers", ascending && multipliers.first().is_some_and(|first| *first > 0), || {
         format!("is {multipliers:?}; it must hold at least one number, all above 0, each above the one before")
     });
-}
-
-/// The legal plane sizes next to `size`.
-fn nearest(size: usize) -> String {
-    let below = size / PLANE_MULTIPLE * PLANE_MULTIPLE;
-    let above = below.saturating_add(PLANE_MULTIPLE);
-    match size - below {
-        _ if below == 0 => above.to_string(),
-        1 => below.to_string(),
-        2 => format!("{below} or {above}"),
-        _ => above.to_string(),
-    }
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {
@@ -181,8 +155,6 @@ fn prune(check: &mut Check, prune: &PruneConfig, train: &TrainConfig) {
             });
         }
     }
-    check.one_of("train.prune.score", &prune.score, SCORES);
-    check.one_of("train.prune.volume", &prune.volume, VOLUMES);
     check.positive("train.prune.volume_exponent", prune.volume_exponent);
 }
 
@@ -197,12 +169,10 @@ fn regularizer(check: &mut Check, weights: &RegularizerConfig) {
 }
 
 fn compression(check: &mut Check, compression: &CompressionConfig) {
-    let CompressionConfig { profile, rate, context, steps, sh, attributes, weights } = compression;
-    check.one_of("compression.profile", profile, PROFILES);
+    let CompressionConfig { profile: _, rate, context, steps, sh, attributes, weights } = compression;
     check.that("compression.rate.lambda", rate.lambda.is_finite() && rate.lambda >= 0.0, || {
         format!("is {}; it must be finite and at least 0", rate.lambda)
     });
-    check.one_of("compression.rate.weighting", &rate.weighting, WEIGHTINGS);
     check.range("compression.rate.interval", rate.interval, 1, 1000);
     check.that("compression.rate.fraction", rate.fraction > 0.0 && rate.fraction <= 1.0, || {
         format!("is {}; it must be above 0 and at most 1", rate.fraction)
@@ -212,7 +182,6 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.that("compression.rate.planes_until", rate.planes_until == 0 || rate.planes_until > rate.from, || {
         format!("is {}; it must be 0 (never) or above compression.rate.from, {}", rate.planes_until, rate.from)
     });
-    check.one_of("compression.context.architecture", &context.architecture, ARCHITECTURES);
     check.that(
         "compression.context.high_scale_hyperprior",
         !context.high_scale_hyperprior || (context.hyperprior && context.inter_scale),
@@ -220,7 +189,6 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     );
     check.range("compression.context.fit_iterations", context.fit_iterations, 1, 1_000_000);
     check.toml_integer("compression.steps.adaptive_from", steps.adaptive_from);
-    check.one_of("compression.sh.model", &sh.model, SH_MODELS);
     for (name, value) in [
         ("context.learning_rate_init", context.learning_rate_init),
         ("context.learning_rate_final", context.learning_rate_final),
@@ -247,9 +215,6 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
 }
 
 fn eval(check: &mut Check, eval: &EvalConfig) {
-    for split in &eval.splits {
-        check.one_of("eval.splits", split, SPLITS);
-    }
     check.toml_integer("eval.fps_warmup", eval.fps_warmup);
     check.range("eval.fps_frames", eval.fps_frames, 1, 1_000_000);
     check.toml_integer("eval.interval", eval.interval);
@@ -286,9 +251,5 @@ impl Check {
 
     fn share(&mut self, key: &str, value: f32) {
         self.that(key, (0.0..=1.0).contains(&value), || format!("is {value}; it must lie in 0 to 1"));
-    }
-
-    fn one_of(&mut self, key: &str, value: &str, known: &[&str]) {
-        self.that(key, known.contains(&value), || format!("is \"{value}\"; it must be one of {}", known.join(", ")));
     }
 }

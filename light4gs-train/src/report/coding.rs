@@ -74,7 +74,7 @@ fn maps(html: &mut String, path: &Path, bit_maps: &[BitMap]) -> Result<(), DataE
     for map in bit_maps {
         let pixels = map.bits.iter().flat_map(|bits| inferno(bits / most)).collect();
         let picture = RgbImage8 { width: map.width, height: map.height, pixels };
-        let data = data_uri(&picture).map_err(|error| DataError::Picture {
+        let data = data_uri(&picture).map_err(|error| DataError::Image {
             path: path.to_path_buf(),
             problem: format!("bit map of plane {}: {error}", map.name),
             remedy: "this is a fault of the program: please report it".to_owned(),

@@ -1,6 +1,7 @@
 //! The run's curves over its iterations, both stages on one axis.
 
-use crate::metrics_log::{MetricsRecord, Stage};
+use crate::observers::metrics_log::MetricsRecord;
+use crate::stage::Stage;
 
 use super::chart::{Chart, Mark, Series};
 

@@ -35,7 +35,7 @@ pub(super) fn section(path: &Path, views: &[ViewPictures]) -> Result<String, Dat
 }
 
 fn figure(html: &mut String, path: &Path, view: &ViewPictures) -> Result<(), DataError> {
-    let wrong = |problem: String| DataError::Picture {
+    let wrong = |problem: String| DataError::Image {
         path: path.to_path_buf(),
         problem: format!("view {}: {problem}", view.name),
         remedy: "this is a fault of the program: please report it".to_owned(),

@@ -1,6 +1,6 @@
 use super::*;
 use crate::compression::{BitEstimate, PlaneRecord};
-use crate::metrics_log::Stage;
+use crate::stage::Stage;
 
 fn picture(width: u32, height: u32, shift: u8) -> RgbImage8 {
     let at = |x: u32, y: u32| [(x * 2) as u8, (y * 2) as u8, 128].map(|v: u8| v.saturating_add(shift));
@@ -60,7 +60,7 @@ fn bit_map() -> BitMap {
 fn coding_record() -> CodingRecord {
     let plane = PlaneRecord { name: "0.xy".into(), step: 0.05, symbols: 512, hyperprior_bytes: 3, value_bytes: 64 };
     CodingRecord {
-        profile: "compact".into(),
+        profile: crate::config::FileProfile::Compact,
         fit_seconds: None,
         encode_seconds: 0.5,
         estimated_bits: BitEstimate { hexplanes: 530.0, sh: 1010.0 },

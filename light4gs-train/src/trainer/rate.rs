@@ -1,16 +1,16 @@
-//! Quantisation noise and the rate in a training step (paper III-C to III-E, IV-B).
+//! Quantization noise and the rate in a training step (paper III-C to III-E, IV-B).
 
 use burn::tensor::Tensor;
 use light4gs_model::DynamicScene;
 
 use super::Trainer;
-use crate::compression::{Compression, NoisyScene, settled_planes};
-use crate::config::Config;
+use crate::compression::{Compression, NoisyScene, freeze_planes};
+use crate::config::{Config, RateWeighting};
 use crate::error::TrainError;
-use crate::gradients::GradientSums;
-use crate::metrics_log::Stage;
-use crate::parameters::plane_parameter;
+use crate::optimization::gradients::GradientSums;
+use crate::optimization::parameters::plane_parameter;
 use crate::randomness::{Purpose, generator, seed_device};
+use crate::stage::Stage;
 
 impl Trainer {
     /// The scene as it will roughly be decoded, once the rate has entered the training.
@@ -25,34 +25,34 @@ impl Trainer {
             return Ok(None);
         }
         let with_sh = self.sh_counts(iteration);
-        let settled = self.planes_are_settled(stage, iteration);
+        let frozen = self.planes_are_frozen(stage, iteration);
         let Some(compression) = self.state.compression.as_mut() else { return Ok(None) };
         let scene = &mut self.state.scene;
         if iteration == from {
             compression
                 .context
-                .start_from(&scene.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+                .start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
         }
-        if settled && iteration == config.rate.planes_until + 1 {
-            scene.hexplane = settled_planes(scene, compression, config, &self.device)?;
+        if frozen && iteration == config.rate.planes_until + 1 {
+            scene.field.hexplane = freeze_planes(scene, compression, config, &self.device)?;
         }
         seed_device(&self.device, *seed, stage, iteration);
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
-        Ok(Some(match settled {
-            true => compression.noisy_beside_settled_planes(scene, with_sh),
+        Ok(Some(match frozen {
+            true => compression.noisy_beside_frozen_planes(scene, with_sh),
             false => compression.noisy(scene, learn_steps, with_sh),
         }))
     }
 
     /// Whether the planes have the values that the file will have: nothing changes them, nor what codes them, any more.
-    pub(super) fn planes_are_settled(&self, stage: Stage, iteration: usize) -> bool {
+    pub(super) fn planes_are_frozen(&self, stage: Stage, iteration: usize) -> bool {
         let until = self.config.compression.rate.planes_until;
         stage == Stage::Fine && until > 0 && iteration > until && self.state.compression.is_some()
     }
 
     /// Whether spherical harmonics have a part in the rate: once Gaussians neither come nor split any more.
     fn sh_counts(&self, iteration: usize) -> bool {
-        iteration > self.config.train.densify.until
+        self.density.is_over(Stage::Fine, iteration.saturating_sub(1))
     }
 
     /// Adds what the rate asks for, in the iterations in which it is due, and what the noise asks of the steps. Returns the
@@ -67,14 +67,14 @@ impl Trainer {
         let with_sh = self.sh_counts(iteration);
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
-        let mut steps = vec![None; noisy.scene.hexplane.planes.len()];
+        let mut steps = vec![None; noisy.scene.field.hexplane.planes.len()];
         if iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
             let rate = compression.rate(noisy, config.fraction, with_sh, &mut generator);
-            let term = match config.weighting.as_str() {
-                "per_symbol" => rate.bits_per_symbol() * config.lambda,
+            let term = match config.weighting {
+                RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
                 // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
-                _ => rate.megabytes() * (config.lambda * config.interval as f64),
+                RateWeighting::Megabytes => rate.megabytes() * (config.lambda * config.interval as f64),
             };
             value = Some(term.clone().inner());
             let mut tape = term.backward();
@@ -103,7 +103,7 @@ fn steps_term(
         return None;
     }
     let steps = compression.quantization.steps();
-    let planes = scene.hexplane.planes.iter().zip(&noisy.scene.hexplane.planes).zip(direct).enumerate();
+    let planes = scene.field.hexplane.planes.iter().zip(&noisy.scene.field.hexplane.planes).zip(direct).enumerate();
     let terms = planes.map(|(i, ((plane, noisy), direct))| {
         let step = steps.of(i);
         let through_noise = gradients.get(&plane_parameter(i)).map(|gradient| {
@@ -148,7 +148,7 @@ mod tests {
         let log_steps = "quantization.log_steps";
 
         let leaves = noisy.steps.clone().unwrap();
-        let mut tape = loss(&noisy.scene.hexplane.tensors(), &|i| leaves.of(i)).backward();
+        let mut tape = loss(&noisy.scene.field.hexplane.tensors(), &|i| leaves.of(i)).backward();
         let direct = noisy.step_gradients(&tape);
         let mut apart = GradientSums::default();
         apart.add_scene(&mut noisy.scene, &mut tape);
@@ -156,7 +156,7 @@ mod tests {
         apart.add_compression(&mut compression, &mut term.backward());
 
         let steps = compression.quantization.steps();
-        let pairs = scene.hexplane.tensors().into_iter().zip(noisy.scene.hexplane.tensors()).enumerate();
+        let pairs = scene.field.hexplane.tensors().into_iter().zip(noisy.scene.field.hexplane.tensors()).enumerate();
         let planes: Vec<_> = pairs
             .map(|(i, (plane, noisy))| {
                 let step = steps.broadcast(i);

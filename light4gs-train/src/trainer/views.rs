@@ -1,29 +1,30 @@
 //! The views of a training step. Each has a tape of its own, so that they can be rendered and differentiated side by side.
 
 use burn::module::Module;
-use burn::tensor::{Device, Int, Tensor};
-use light4gs_data::{Frame, ImageStore};
+use burn::tensor::{Device, Tensor};
+use light4gs_data::Frame;
 use light4gs_model::{DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use super::image_tensor;
+use super::profile::Profile;
+use crate::dataset::ImageSource;
+use crate::density::ViewStatistics;
 use crate::error::TrainError;
-use crate::gradients::GradientSums;
-use crate::loss::{l2, photometric};
-use crate::metrics_log::Stage;
-use crate::profile::Profile;
+use crate::evaluation::metrics::image_tensor;
+use crate::loss::{Loss, LossInput};
+use crate::optimization::gradients::GradientSums;
+use crate::stage::Stage;
 
 /// What the views of a step have in common.
 pub(super) struct ViewPass<'a> {
     pub(super) stage: Stage,
+    pub(super) iteration: usize,
     pub(super) splatter: Splatter,
-    pub(super) images: &'a ImageStore,
+    pub(super) images: &'a dyn ImageSource,
     pub(super) device: &'a Device,
-    /// Whether the loss is squared.
-    pub(super) squared: bool,
-    pub(super) lambda_dssim: f32,
-    /// Of a view in the loss.
-    pub(super) weight: f32,
+    pub(super) loss: &'a dyn Loss,
+    /// Views an iteration. The loss is their mean.
+    pub(super) batch: usize,
 }
 
 /// What a view adds to a step. All tensors are off the tape.
@@ -32,10 +33,8 @@ pub(super) struct View {
     pub(super) loss: Tensor<1>,
     /// Of that part by the scene's parameters.
     pub(super) gradients: GradientSums,
-    /// `[N, 2]`: of that part by the Gaussians' places in the picture.
-    pub(super) screen_gradient: Option<Tensor<2>>,
-    /// `[N]` in pixels.
-    pub(super) radii: Tensor<1, Int>,
+    /// What it says about the Gaussians.
+    pub(super) statistics: ViewStatistics,
     /// `[H, W, 3]`
     pub(super) image: Tensor<3>,
     /// `[H, W, 3]`
@@ -110,15 +109,19 @@ impl ViewPass<'_> {
         let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
         let rendering = self.splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
         profile.lap("splatting");
-        let truth = image_tensor(&*self.images.get(frame)?, self.device);
-        profile.lap("picture from disk");
+        let truth = image_tensor(&*self.images.image(frame)?, self.device);
+        profile.lap("training image");
         let image = rendering.image;
-        let loss = if self.squared {
-            l2(image.clone(), truth.clone())
-        } else {
-            photometric(image.clone(), truth.clone(), self.lambda_dssim)
-        };
-        let loss = loss * self.weight;
+        let loss = self.loss.loss(LossInput {
+            image: image.clone(),
+            alpha: rendering.alpha,
+            depth: rendering.depth,
+            truth: truth.clone(),
+            frame,
+            stage: self.stage,
+            iteration: self.iteration,
+        });
+        let loss = loss * (1.0 / self.batch as f32);
         profile.lap("loss");
         let value = loss.clone().inner();
         let mut tape = loss.backward();
@@ -128,8 +131,11 @@ impl ViewPass<'_> {
         Ok(View {
             loss: value,
             gradients,
-            screen_gradient: offsets.grad_remove(&mut tape),
-            radii: rendering.radii,
+            // The loss is a mean over the batch; thresholds are meant for one view.
+            statistics: ViewStatistics {
+                screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),
+                radii: rendering.radii,
+            },
             image: image.inner(),
             truth: truth.inner(),
         })

@@ -1,0 +1,47 @@
+//! Runs every example. `cargo test -p light4gs-examples` builds them beside the tests, and they are found there.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// The names of the examples: the files in `examples/`.
+fn names() -> Vec<String> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let mut names: Vec<String> = files
+        .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
+        .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
+        .collect();
+    names.sort();
+    names
+}
+
+/// `target/PROFILE/examples`: this program is in `target/PROFILE/deps`.
+fn folder_of_programs() -> PathBuf {
+    std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples")
+}
+
+#[test]
+fn every_example_succeeds() {
+    let mut failures = Vec::new();
+    for name in names() {
+        let program = folder_of_programs().join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+        assert!(program.is_file(), "{} is missing: cargo test -p light4gs-examples builds it", program.display());
+        let output = Command::new(&program).output().unwrap();
+        let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
+        println!("{name}: {}\n{text}", output.status);
+        if !output.status.success() {
+            failures.push(format!("{name} ({}):\n{text}", output.status));
+        }
+    }
+    assert!(failures.is_empty(), "{}", failures.join("\n"));
+}
+
+/// The index of the examples names each of them, and only those.
+#[test]
+fn the_index_is_complete() {
+    let index = include_str!("../README.md");
+    for name in names() {
+        assert!(index.contains(&format!("(examples/{name}.rs)")), "examples/README.md does not name {name}");
+    }
+    assert_eq!(index.matches("(examples/").count(), names().len());
+}

@@ -1,0 +1,379 @@
+//! Images in memory: decoded when needed, composited, resized, kept within a bound.
+
+use super::composite::composite_resized;
+use super::rgb::RgbImage8;
+use crate::error::DataError;
+use crate::frame::Frame;
+use crate::options::LoadOptions;
+use image::ImageReader;
+use rayon::prelude::*;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// Decoding a single image may take at most this much memory.
+const MAX_DECODED_BYTES: u64 = 1 << 30;
+
+/// An image file at a size.
+type Key = (PathBuf, u32, u32);
+
+/// A thread-safe store of the images of frames: `[H, W, 3]` bytes, on the background, at the size
+/// of the frame's camera.
+///
+/// Images are decoded on demand and the least recently used are dropped when the bound is
+/// reached. Clones share one store. An image is decoded once even if several threads ask for it.
+#[derive(Clone)]
+pub struct ImageStore {
+    inner: Arc<Inner>,
+}
+
+struct Inner {
+    background: [f32; 3],
+    limit: usize,
+    state: Mutex<State>,
+    decoded: Condvar,
+}
+
+#[derive(Default)]
+struct State {
+    /// The image and when it was last asked for.
+    kept: HashMap<Key, (Arc<RgbImage8>, u64)>,
+    /// When, to which: the first is the least recently used.
+    by_age: BTreeMap<u64, Key>,
+    bytes: usize,
+    clock: u64,
+    /// Images that some thread is decoding right now.
+    decoding: HashSet<Key>,
+}
+
+impl fmt::Debug for ImageStore {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("ImageStore")
+            .field("limit", &self.inner.limit)
+            .field("bytes", &self.bytes())
+            .field("images", &self.len())
+            .finish()
+    }
+}
+
+impl ImageStore {
+    /// An empty store that composites on the background of `options` and keeps at most
+    /// `memory_limit_bytes` of images. (Images that callers still hold are not counted.)
+    pub fn new(options: &LoadOptions, memory_limit_bytes: usize) -> Self {
+        Self {
+            inner: Arc::new(Inner {
+                background: options.background,
+                limit: memory_limit_bytes,
+                state: Mutex::default(),
+                decoded: Condvar::new(),
+            }),
+        }
+    }
+
+    /// The image of a frame, decoded now if it is not kept.
+    ///
+    /// # Errors
+    /// [`DataError::Image`] when the frame has no image, or it is missing, damaged, or of
+    /// another size than its split's first one.
+    pub fn get(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
+        let key = key(frame);
+        let mut state = self.inner.lock();
+        loop {
+            if let Some(image) = state.touch(&key) {
+                return Ok(image);
+            }
+            if !state.decoding.contains(&key) {
+                break;
+            }
+            // The other thread is running, not queued, so this ends.
+            state = self.inner.decoded.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        state.decoding.insert(key.clone());
+        drop(state);
+        self.inner.decode_claimed(frame, key)
+    }
+
+    /// The images of several frames, in their order, decoded in parallel.
+    ///
+    /// # Errors
+    /// As [`Self::get`], for the first frame that has one.
+    pub fn get_many(&self, frames: &[Frame]) -> Result<Vec<Arc<RgbImage8>>, DataError> {
+        frames.par_iter().map(|frame| self.get(frame)).collect()
+    }
+
+    /// Starts to decode images in the background, in order, as many as fit in the bound together;
+    /// returns at once. What fails here is reported by the [`Self::get`] of that frame.
+    pub fn prefetch(&self, frames: &[Frame]) {
+        let mut bytes = 0usize;
+        for frame in frames {
+            bytes = bytes.saturating_add(bytes_of(frame));
+            if bytes > self.inner.limit {
+                break;
+            }
+            if self.inner.lock().touch(&key(frame)).is_some() {
+                continue;
+            }
+            let inner = Arc::clone(&self.inner);
+            let frame = frame.clone();
+            rayon::spawn(move || {
+                let key = key(&frame);
+                let mut state = inner.lock();
+                if state.kept.contains_key(&key) || !state.decoding.insert(key.clone()) {
+                    return;
+                }
+                drop(state);
+                // Said by `get`, to the caller who wants the image.
+                let _ = inner.decode_claimed(&frame, key);
+            });
+        }
+    }
+
+    /// Bytes of the images kept now.
+    pub fn bytes(&self) -> usize {
+        self.inner.lock().bytes
+    }
+
+    /// Number of images kept now.
+    pub fn len(&self) -> usize {
+        self.inner.lock().kept.len()
+    }
+
+    /// Whether no image is kept now.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+fn key(frame: &Frame) -> Key {
+    (frame.path.clone(), frame.camera.width, frame.camera.height)
+}
+
+/// Bytes of a frame's image in the store.
+fn bytes_of(frame: &Frame) -> usize {
+    (frame.camera.width as usize).saturating_mul(frame.camera.height as usize).saturating_mul(3)
+}
+
+impl Inner {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Decodes an image that this thread has marked in `decoding`, and keeps it if it fits.
+    fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Arc<RgbImage8>, DataError> {
+        /// Takes the mark back, also if a decoder panics: others would wait for ever.
+        struct Claim<'a>(&'a Inner, Key);
+        impl Drop for Claim<'_> {
+            fn drop(&mut self) {
+                self.0.lock().decoding.remove(&self.1);
+                self.0.decoded.notify_all();
+            }
+        }
+        let claim = Claim(self, key);
+        let image = Arc::new(decode(frame, self.background)?);
+        self.lock().keep(claim.1.clone(), &image, self.limit);
+        Ok(image)
+    }
+}
+
+impl State {
+    fn touch(&mut self, key: &Key) -> Option<Arc<RgbImage8>> {
+        self.clock += 1;
+        let (image, used) = self.kept.get_mut(key)?;
+        self.by_age.remove(used);
+        *used = self.clock;
+        let image = Arc::clone(image);
+        self.by_age.insert(self.clock, key.clone());
+        Some(image)
+    }
+
+    fn keep(&mut self, key: Key, image: &Arc<RgbImage8>, limit: usize) {
+        let size = image.pixels.len();
+        if size > limit || self.kept.contains_key(&key) {
+            return;
+        }
+        while self.bytes + size > limit {
+            let Some((_, oldest)) = self.by_age.pop_first() else {
+                break;
+            };
+            if let Some((dropped, _)) = self.kept.remove(&oldest) {
+                self.bytes -= dropped.pixels.len();
+            }
+        }
+        self.clock += 1;
+        self.bytes += size;
+        self.by_age.insert(self.clock, key.clone());
+        self.kept.insert(key, (Arc::clone(image), self.clock));
+    }
+}
+
+/// Opens an image file far enough to know its format.
+fn open(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>, DataError> {
+    ImageReader::open(path)
+        .and_then(ImageReader::with_guessed_format)
+        .map_err(|e| DataError::image(path, format!("cannot be read: {e}"), "restore the file or remove its frame"))
+}
+
+/// Size (width, height) of an image, from its header alone.
+///
+/// # Errors
+/// [`DataError::Image`] when the file is missing or its header is damaged.
+pub fn image_size(path: &Path) -> Result<(u32, u32), DataError> {
+    open(path)?.into_dimensions().map_err(|e| {
+        DataError::image(
+            path,
+            format!("its header cannot be read ({e}), expected a PNG or JPEG image"),
+            "restore the file or remove its frame",
+        )
+    })
+}
+
+/// Decodes, composites and resizes the image of a frame.
+fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, DataError> {
+    let path = &frame.path;
+    if !frame.has_image() {
+        return Err(DataError::image(
+            Path::new(&frame.name),
+            "this frame has no image, it belongs to a camera path",
+            "use a frame of the train, test or val split",
+        ));
+    }
+    let mut reader = open(path)?;
+    let mut limits = image::Limits::default();
+    limits.max_alloc = Some(MAX_DECODED_BYTES);
+    reader.limits(limits);
+    let image = reader.decode().map_err(|e| {
+        DataError::image(
+            path,
+            format!("cannot be decoded ({e}): it is truncated or damaged"),
+            "restore the file or remove its frame",
+        )
+    })?;
+    let found = (image.width(), image.height());
+    let expected = (frame.source_width, frame.source_height);
+    if found != expected {
+        return Err(DataError::image(
+            path,
+            format!(
+                "it is {} x {} pixels, expected {} x {} as the first image of its split",
+                found.0, found.1, expected.0, expected.1
+            ),
+            "make all images of a split the same size",
+        ));
+    }
+    let rgba = image.into_rgba8();
+    let target = (frame.camera.width, frame.camera.height);
+    composite_resized(rgba.as_raw(), found, target, background)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use glam::Vec3;
+
+    /// `count` grey 8×8 images; image `i` has value `i`.
+    fn frames(folder: &Path, count: u8) -> Vec<Frame> {
+        (0..count)
+            .map(|i| {
+                let path = folder.join(format!("{i}.png"));
+                let image = RgbImage8 { width: 8, height: 8, pixels: vec![i; 192] };
+                image.save_png(&path).unwrap();
+                Frame {
+                    name: i.to_string(),
+                    camera: Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 8, 8),
+                    time: 0.0,
+                    path,
+                    source_width: 8,
+                    source_height: 8,
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_bound_holds_and_the_least_recently_used_goes_first() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames = frames(folder.path(), 5);
+        let store = ImageStore::new(&LoadOptions::default(), 3 * 192 + 100);
+        for frame in &frames[..3] {
+            store.get(frame).unwrap();
+        }
+        assert_eq!((store.len(), store.bytes()), (3, 576));
+        let first = store.get(&frames[0]).unwrap();
+        store.get(&frames[3]).unwrap();
+        assert_eq!((store.len(), store.bytes()), (3, 576));
+        // 1 went, 0 stayed: without files, only what is kept can be had.
+        for i in 0..5 {
+            std::fs::remove_file(&frames[i].path).unwrap();
+        }
+        assert!(Arc::ptr_eq(&first, &store.get(&frames[0]).unwrap()));
+        assert!(store.get(&frames[1]).is_err());
+        assert_eq!(store.get(&frames[2]).unwrap().pixels[0], 2);
+        assert_eq!(store.get(&frames[3]).unwrap().pixels[0], 3);
+    }
+
+    #[test]
+    fn a_store_too_small_for_one_picture_still_works() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames = frames(folder.path(), 2);
+        let store = ImageStore::new(&LoadOptions::default(), 10);
+        assert_eq!(store.get(&frames[1]).unwrap().pixels[0], 1);
+        store.prefetch(&frames);
+        assert!(store.is_empty() && store.bytes() == 0);
+    }
+
+    #[test]
+    fn prefetch_and_many_threads_agree() {
+        let folder = tempfile::tempdir().unwrap();
+        let frames = frames(folder.path(), 40);
+        let store = ImageStore::new(&LoadOptions::default(), 20 * 192);
+        store.prefetch(&frames);
+        let many: Vec<Frame> = (0..400).map(|i| frames[i * 7 % 40].clone()).collect();
+        let images = store.get_many(&many).unwrap();
+        for (frame, image) in many.iter().zip(images) {
+            assert_eq!(frame.name, image.pixels[0].to_string());
+        }
+        assert!(store.bytes() <= 20 * 192 && store.bytes() == store.len() * 192);
+        // Everything fits: a prefetch ends with all of them there.
+        let store = ImageStore::new(&LoadOptions::default(), 40 * 192);
+        store.prefetch(&frames);
+        for _ in 0..1000 {
+            if store.len() == 40 {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        assert_eq!(store.len(), 40);
+    }
+
+    #[test]
+    fn bad_images_are_errors_and_do_not_block_later_ones() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut frames = frames(folder.path(), 4);
+        let store = ImageStore::new(&LoadOptions::default(), 1 << 20);
+        let bytes = std::fs::read(&frames[0].path).unwrap();
+        std::fs::write(&frames[0].path, &bytes[..bytes.len() / 2]).unwrap();
+        frames[1].source_width = 9;
+        std::fs::remove_file(&frames[2].path).unwrap();
+        store.prefetch(&frames);
+        let message = |i: usize| store.get(&frames[i]).unwrap_err().to_string();
+        assert!(message(0).contains("truncated") && message(0).contains("0.png"), "{}", message(0));
+        assert!(message(1).contains("8 x 8 pixels, expected 9 x 8"), "{}", message(1));
+        assert!(message(2).contains("2.png"), "{}", message(2));
+        assert_eq!(store.get(&frames[3]).unwrap().pixels[0], 3);
+        let video = Frame::without_image("v_000", frames[3].camera, 0.0);
+        assert!(store.get(&video).unwrap_err().to_string().contains("no image"));
+    }
+
+    #[test]
+    fn images_come_at_the_size_of_the_camera() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut frames = frames(folder.path(), 3);
+        frames[2].camera = frames[2].camera.resized(4, 2);
+        let store = ImageStore::new(&LoadOptions::default(), 1 << 20);
+        let image = store.get(&frames[2]).unwrap();
+        assert_eq!((image.width, image.height), (4, 2));
+        assert_eq!(image.pixels, [2; 24]);
+    }
+}

@@ -1,0 +1,230 @@
+//! The D-NeRF layout: Blender transforms with a time for each frame.
+//!
+//! `transforms_{train,test,val}.json` hold `camera_angle_x` (radians) and `frames`, each with
+//! `file_path` (with or without extension), `time` and `transform_matrix` (camera to world, OpenGL
+//! axes). Times are divided by the largest of train and test; a later `val` time counts as 1. `val`
+//! may be absent. A `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise
+//! they are random.
+
+use super::json;
+use super::layout::DatasetLayout;
+use crate::camera::{Camera, PoseError};
+use crate::error::DataError;
+use crate::frame::Frame;
+use crate::images::image_size;
+use crate::options::LoadOptions;
+use crate::orbit::orbit_path;
+use crate::points::PointCloud;
+use crate::scene::{Scene, SplitFrames};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+
+/// Frames, distance to the origin (world units) and elevation (degrees) of the video path.
+const VIDEO_PATH: (usize, f32, f32) = (160, 4.0, 30.0);
+
+/// The layout `dnerf`: Blender transforms with a time for each frame, one file a split.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DNerf;
+
+impl DatasetLayout for DNerf {
+    fn name(&self) -> &'static str {
+        "dnerf"
+    }
+
+    fn signature(&self) -> &'static str {
+        "transforms_train.json"
+    }
+
+    fn detect(&self, root: &Path) -> bool {
+        root.join(self.signature()).is_file()
+    }
+
+    fn open(&self, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
+        let file = |split: &str| root.join(format!("transforms_{split}.json"));
+        let train = read_split(root, file("train"))?;
+        let test = read_split(root, file("test"))?;
+        let val = if file("val").is_file() { Some(read_split(root, file("val"))?) } else { None };
+        let timed = train.frames.iter().chain(&test.frames);
+        let last = timed.fold(0.0f64, |last, frame| last.max(frame.time));
+        let train = frames(&train, last, options)?;
+        let test = frames(&test, last, options)?;
+        let val = val.map_or(Ok(Vec::new()), |val| frames(&val, last, options))?;
+        let video = video_path(&train[0].camera);
+        let splits = SplitFrames { train, test, val, video };
+        Scene::new(self.name(), root, splits, points(root, options)?, options.background)
+    }
+}
+
+/// A camera that circles the scene once while time runs from 0 to 1.
+fn video_path(intrinsics: &Camera) -> Vec<Frame> {
+    let (count, radius, elevation) = VIDEO_PATH;
+    let cameras = orbit_path(count, radius, elevation, intrinsics).into_iter().enumerate();
+    cameras.map(|(i, (camera, time))| Frame::without_image(format!("v_{i:03}"), camera, time)).collect()
+}
+
+/// One entry of `frames`, with the time as in the file.
+struct RawFrame {
+    pose: [[f32; 4]; 4],
+    time: f64,
+    image: PathBuf,
+}
+
+/// One transforms file.
+struct RawSplit {
+    path: PathBuf,
+    fov_x: f32,
+    frames: Vec<RawFrame>,
+}
+
+/// The point cloud of the folder, or a random one.
+fn points(root: &Path, options: &LoadOptions) -> Result<PointCloud, DataError> {
+    let found = ["points3d.ply", "fused.ply"].iter().map(|name| root.join(name)).find(|path| path.is_file());
+    match found {
+        Some(path) => PointCloud::read_ply(&path),
+        None => Ok(PointCloud::random(options.random_points, options.random_half_size, options.seed)),
+    }
+}
+
+fn read_split(root: &Path, path: PathBuf) -> Result<RawSplit, DataError> {
+    let document = json::read(&path)?;
+    let fov_x = json::finite(
+        &path,
+        "camera_angle_x",
+        document.get("camera_angle_x"),
+        "the horizontal field of view in radians, between 0 and pi",
+        "add the field to the file",
+    )?;
+    if !(fov_x > 0.0 && fov_x < std::f64::consts::PI) {
+        return Err(DataError::field(
+            &path,
+            "camera_angle_x",
+            format!("{fov_x}, expected the horizontal field of view in radians, between 0 and pi"),
+            "convert degrees to radians, or export the file again",
+        ));
+    }
+    let entries =
+        document.get("frames").and_then(Value::as_array).filter(|entries| !entries.is_empty()).ok_or_else(|| {
+            let found = json::describe(document.get("frames"));
+            DataError::field(
+                &path,
+                "frames",
+                format!("{found}, expected a list of at least one frame"),
+                "every split needs a frame; only transforms_val.json may be left out altogether",
+            )
+        })?;
+    let frames =
+        entries.iter().enumerate().map(|(i, entry)| read_frame(root, &path, i, entry)).collect::<Result<_, _>>()?;
+    Ok(RawSplit { path, fov_x: fov_x as f32, frames })
+}
+
+fn read_frame(root: &Path, path: &Path, i: usize, entry: &Value) -> Result<RawFrame, DataError> {
+    let field = format!("frames[{i}].time");
+    let expected = "a finite number of at least 0";
+    let remedy = "give every frame its time (a static scene has 0 everywhere)";
+    let time = json::finite(path, &field, entry.get("time"), expected, remedy)?;
+    if time < 0.0 {
+        let problem = format!("{time}, expected {expected}");
+        return Err(DataError::field(path, field, problem, "shift the times so that the first is 0"));
+    }
+    Ok(RawFrame {
+        pose: read_pose(path, i, entry.get("transform_matrix"))?,
+        time,
+        image: find_image(root, path, i, entry.get("file_path"))?,
+    })
+}
+
+fn read_pose(path: &Path, i: usize, value: Option<&Value>) -> Result<[[f32; 4]; 4], DataError> {
+    let field = format!("frames[{i}].transform_matrix");
+    let remedy = "export the pose again as a 4x4 camera-to-world matrix";
+    let wrong_shape =
+        |what: String| DataError::field(path, field.clone(), format!("{what}, expected 4 rows of 4 numbers"), remedy);
+    let rows = value
+        .and_then(Value::as_array)
+        .filter(|rows| rows.len() == 4)
+        .ok_or_else(|| wrong_shape(json::describe(value)))?;
+    let mut pose = [[0.0f32; 4]; 4];
+    for (r, row) in rows.iter().enumerate() {
+        let row = row
+            .as_array()
+            .filter(|row| row.len() == 4)
+            .ok_or_else(|| wrong_shape(format!("row {r} is {}", json::describe(Some(row)))))?;
+        for (c, value) in row.iter().enumerate() {
+            let entry = format!("{field}[{r}][{c}]");
+            pose[r][c] = json::finite(path, &entry, Some(value), "a finite number", remedy)? as f32;
+        }
+    }
+    Ok(pose)
+}
+
+/// The image of a frame: `file_path` itself, or with an extension added.
+fn find_image(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Result<PathBuf, DataError> {
+    let name = value.and_then(Value::as_str).filter(|name| !name.is_empty()).ok_or_else(|| {
+        let found = json::describe(value);
+        DataError::field(
+            path,
+            format!("frames[{i}].file_path"),
+            format!("{found}, expected the image's path, relative to the folder"),
+            "add the field to the frame",
+        )
+    })?;
+    let base = root.join(name.trim_start_matches("./"));
+    let known = ["png", "jpg", "jpeg", "PNG", "JPG", "JPEG"];
+    let has_extension = base.extension().is_some_and(|extension| known.iter().any(|known| extension == *known));
+    let with_extension = |extension: &str| {
+        let mut name = base.clone().into_os_string();
+        name.push(".");
+        name.push(extension);
+        PathBuf::from(name)
+    };
+    let as_given = has_extension.then(|| base.clone());
+    as_given
+        .into_iter()
+        .chain(known.iter().map(|extension| with_extension(extension)))
+        .find(|candidate| candidate.is_file())
+        .ok_or_else(|| {
+            let tried = if has_extension { base.clone() } else { with_extension("png") };
+            DataError::image(
+                &tried,
+                format!("missing, but {} names it in frames[{i}].file_path", path.display()),
+                "copy the image there or remove the frame",
+            )
+        })
+}
+
+/// Frames with cameras at the wanted size and times in `[0, 1]`; `last` is the time that becomes 1.
+fn frames(split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
+    let Some(first) = split.frames.first() else {
+        return Ok(Vec::new());
+    };
+    // One header speaks for the split; the loader checks each image against it.
+    let source = image_size(&first.image)?;
+    let (width, height) = options.resolution.apply(source);
+    let to_frame = |(i, raw): (usize, &RawFrame)| {
+        let camera = Camera::from_camera_to_world_opengl(&raw.pose, split.fov_x, source.0, source.1)
+            .map_err(|error| pose_error(&split.path, i, error))?;
+        let time = if last > 0.0 { (raw.time / last).min(1.0) } else { 0.0 };
+        let name = raw.image.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
+        Ok(Frame {
+            name,
+            camera: camera.resized(width, height),
+            time: time as f32,
+            path: raw.image.clone(),
+            source_width: source.0,
+            source_height: source.1,
+        })
+    };
+    split.frames.iter().enumerate().map(to_frame).collect()
+}
+
+fn pose_error(path: &Path, i: usize, error: PoseError) -> DataError {
+    let (field, remedy) = match error {
+        PoseError::FieldOfView { .. } => {
+            ("camera_angle_x".to_string(), "give the angle in radians, large enough for a 32-bit number")
+        }
+        _ => (
+            format!("frames[{i}].transform_matrix"),
+            "export the pose again as a 4x4 camera-to-world matrix without scaling or mirroring",
+        ),
+    };
+    DataError::field(path, field, error.to_string(), remedy)
+}

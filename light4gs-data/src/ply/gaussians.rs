@@ -1,0 +1,239 @@
+//! The PLY layout of the original 3D Gaussian Splatting, which viewers and editors read.
+//!
+//! `x y z nx ny nz f_dc_0..2 f_rest_0..44 opacity scale_0..2 rot_0..3`, where `f_rest` runs over the
+//! channels outside and the coefficients inside: coefficient `k` of channel `c` is `f_rest_{c*15+k}`.
+
+use super::property::{Encoding, Property, Scalar};
+use super::table::{self, VertexTable};
+use crate::error::DataError;
+use std::path::Path;
+
+/// Coefficients a channel above degree 0, for SH degree 3.
+const REST: usize = 15;
+
+/// Static Gaussians as plain arrays; every list has the same length `N`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GaussianPly {
+    /// `[N, 3]`, world units.
+    pub means: Vec<[f32; 3]>,
+    /// `[N, 3]`, degree-0 harmonic of red, green, blue.
+    pub sh_dc: Vec<[f32; 3]>,
+    /// `[N, 15, 3]`, harmonics of degree 1 to 3, coefficient outside, channel inside.
+    pub sh_rest: Vec<[[f32; 3]; REST]>,
+    /// `[N]`, logits.
+    pub opacity_logits: Vec<f32>,
+    /// `[N, 3]`, natural logarithm of world units.
+    pub log_scales: Vec<[f32; 3]>,
+    /// `[N, 4]`, `(w, x, y, z)`, not necessarily normalised.
+    pub quats: Vec<[f32; 4]>,
+}
+
+impl GaussianPly {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.means.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
+    }
+
+    /// Reads a file of any SH degree from 0 to 3; missing higher coefficients are 0.
+    ///
+    /// # Errors
+    /// [`DataError::Io`] when it cannot be read; [`DataError::Ply`] when it is damaged, a property is
+    /// missing, a value is not finite, or the number of `f_rest_*` is not 0, 9, 24 or 45.
+    pub fn read(path: &Path) -> Result<Self, DataError> {
+        let table = table::read(path)?;
+        let rest = table.properties().iter().filter(|p| p.name.starts_with("f_rest_")).count();
+        if ![0, 9, 24, 45].contains(&rest) {
+            return Err(DataError::ply(
+                path,
+                format!("it has {rest} f_rest properties, expected 0, 9, 24 or 45 (SH degree 0 to 3)"),
+                "export it again with a whole SH degree",
+            ));
+        }
+        let per_channel = rest / 3;
+        let gaussians = Self {
+            means: columns(&table, ["x", "y", "z"])?,
+            sh_dc: columns(&table, ["f_dc_0", "f_dc_1", "f_dc_2"])?,
+            sh_rest: rest_columns(&table, per_channel)?,
+            opacity_logits: table.column("opacity")?,
+            log_scales: columns(&table, ["scale_0", "scale_1", "scale_2"])?,
+            quats: columns(&table, ["rot_0", "rot_1", "rot_2", "rot_3"])?,
+        };
+        match gaussians.first_non_finite() {
+            Some(i) => Err(DataError::ply(
+                path,
+                format!("Gaussian {i} has a value that is NaN or infinite"),
+                "remove such Gaussians",
+            )),
+            None => Ok(gaussians),
+        }
+    }
+
+    /// Writes the layout above, binary little endian, SH degree 3, normals 0; the file is complete
+    /// or absent, never half-written.
+    ///
+    /// # Errors
+    /// [`DataError::Io`] when it cannot be written; [`DataError::Ply`] when the lists differ in length.
+    pub fn write(&self, path: &Path) -> Result<(), DataError> {
+        let lengths =
+            [self.sh_dc.len(), self.sh_rest.len(), self.opacity_logits.len(), self.log_scales.len(), self.quats.len()];
+        if lengths.iter().any(|&length| length != self.len()) {
+            return Err(DataError::ply(
+                path,
+                format!("{} means, but the other lists have {lengths:?} entries", self.len()),
+                "pass lists of one length",
+            ));
+        }
+        let properties: Vec<Property> = names().into_iter().map(|name| Property::new(name, Scalar::F32)).collect();
+        table::write(path, Encoding::BinaryLittleEndian, &properties, self.len(), |i, row| {
+            row.extend(self.means[i]);
+            row.extend([0.0; 3]);
+            row.extend(self.sh_dc[i]);
+            for channel in 0..3 {
+                row.extend(self.sh_rest[i].iter().map(|coefficient| coefficient[channel]));
+            }
+            row.push(self.opacity_logits[i]);
+            row.extend(self.log_scales[i]);
+            row.extend(self.quats[i]);
+        })
+    }
+
+    fn first_non_finite(&self) -> Option<usize> {
+        (0..self.len()).find(|&i| {
+            let finite = |values: &[f32]| values.iter().all(|v| v.is_finite());
+            !(finite(&self.means[i])
+                && finite(&self.sh_dc[i])
+                && self.sh_rest[i].iter().all(|c| finite(c))
+                && self.opacity_logits[i].is_finite()
+                && finite(&self.log_scales[i])
+                && finite(&self.quats[i]))
+        })
+    }
+}
+
+/// The 62 property names, in the order of the layout.
+fn names() -> Vec<String> {
+    let plain = ["x", "y", "z", "nx", "ny", "nz"].map(String::from);
+    let numbered = |stem: &'static str, count: usize| (0..count).map(move |i| format!("{stem}_{i}"));
+    plain
+        .into_iter()
+        .chain(numbered("f_dc", 3))
+        .chain(numbered("f_rest", 3 * REST))
+        .chain(["opacity".to_string()])
+        .chain(numbered("scale", 3))
+        .chain(numbered("rot", 4))
+        .collect()
+}
+
+/// Several columns as one array a vertex.
+fn columns<const C: usize>(table: &VertexTable, names: [&str; C]) -> Result<Vec<[f32; C]>, DataError> {
+    let mut rows = vec![[0.0; C]; table.rows()];
+    for (c, name) in names.into_iter().enumerate() {
+        for (row, value) in rows.iter_mut().zip(table.column(name)?) {
+            row[c] = value;
+        }
+    }
+    Ok(rows)
+}
+
+/// `f_rest_{channel * per_channel + k}` as `[N, 15, 3]`.
+fn rest_columns(table: &VertexTable, per_channel: usize) -> Result<Vec<[[f32; 3]; REST]>, DataError> {
+    let mut rows = vec![[[0.0; 3]; REST]; table.rows()];
+    for channel in 0..3 {
+        for k in 0..per_channel {
+            let name = format!("f_rest_{}", channel * per_channel + k);
+            for (row, value) in rows.iter_mut().zip(table.column(&name)?) {
+                row[k][channel] = value;
+            }
+        }
+    }
+    Ok(rows)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn example(count: usize) -> GaussianPly {
+        let value = |i: usize, k: usize| (i * 100 + k) as f32 * 0.25;
+        GaussianPly {
+            means: (0..count).map(|i| [0, 1, 2].map(|k| value(i, k))).collect(),
+            sh_dc: (0..count).map(|i| [3, 4, 5].map(|k| value(i, k))).collect(),
+            sh_rest: (0..count)
+                .map(|i| std::array::from_fn(|k| std::array::from_fn(|c| value(i, 10 + k * 3 + c))))
+                .collect(),
+            opacity_logits: (0..count).map(|i| value(i, 60)).collect(),
+            log_scales: (0..count).map(|i| [61, 62, 63].map(|k| value(i, k))).collect(),
+            quats: (0..count).map(|i| [64, 65, 66, 67].map(|k| value(i, k))).collect(),
+        }
+    }
+
+    #[test]
+    fn round_trip() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        for count in [0, 1, 37] {
+            let gaussians = example(count);
+            gaussians.write(&path).unwrap();
+            assert_eq!(GaussianPly::read(&path).unwrap(), gaussians);
+        }
+    }
+
+    #[test]
+    fn the_layout_is_the_original_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        example(1).write(&path).unwrap();
+        let table = table::read(&path).unwrap();
+        assert_eq!(table.properties().len(), 62);
+        // Coefficient 2 of blue: channel-major.
+        assert_eq!(table.column("f_rest_32").unwrap(), [example(1).sh_rest[0][2][2]]);
+        assert_eq!(table.properties()[54].name, "opacity");
+    }
+
+    #[test]
+    fn lower_degrees_are_padded_with_zeros() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        for (degree, rest) in [(0usize, 0usize), (1, 9), (2, 24)] {
+            let properties: Vec<Property> = names()
+                .into_iter()
+                .filter(|name| name.strip_prefix("f_rest_").is_none_or(|n| n.parse::<usize>().unwrap() < rest))
+                .map(|name| Property::new(name, Scalar::F32))
+                .collect();
+            table::write(&path, Encoding::Ascii, &properties, 1, |_, row| {
+                row.extend((0..properties.len()).map(|k| k as f32));
+            })
+            .unwrap();
+            let read = GaussianPly::read(&path).unwrap();
+            let used = (degree + 1) * (degree + 1) - 1;
+            for (k, coefficient) in read.sh_rest[0].iter().enumerate() {
+                for (c, &value) in coefficient.iter().enumerate() {
+                    let expected = if k < used { (9 + c * used + k) as f32 } else { 0.0 };
+                    assert_eq!(value, expected, "degree {degree} k {k} c {c}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn bad_files_are_errors() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        let mut gaussians = example(3);
+        gaussians.quats[1][2] = f32::INFINITY;
+        gaussians.write(&path).unwrap();
+        assert!(GaussianPly::read(&path).unwrap_err().to_string().contains("Gaussian 1"));
+        gaussians.quats.pop();
+        assert!(gaussians.write(&path).is_err());
+        let text = fs::read(&path).unwrap();
+        let text = String::from_utf8_lossy(&text).replace("property float f_rest_44\n", "");
+        fs::write(&path, text).unwrap();
+        assert!(GaussianPly::read(&path).unwrap_err().to_string().contains("44 f_rest"));
+    }
+}

@@ -1,0 +1,13 @@
+//! PLY: point clouds and Gaussians in files that other programs read.
+//!
+//! Only scalar properties of the `vertex` element are read (ASCII or binary little endian); what
+//! follows it, such as faces, is ignored.
+
+mod gaussians;
+mod header;
+mod property;
+mod table;
+
+pub use gaussians::GaussianPly;
+pub use property::{Encoding, Property, Scalar};
+pub use table::{VertexTable, read, write};

@@ -1,0 +1,7 @@
+//! Coloured points, and their nearest neighbours.
+
+mod cloud;
+mod neighbors;
+
+pub use cloud::{PointCloud, SH_C0};
+pub use neighbors::{SMALLEST_MEAN_SQUARED_DISTANCE, mean_squared_distance_to_3_nearest};

@@ -1,0 +1,106 @@
+//! The checkerboard context (He et al. 2021; paper III-C).
+//!
+//! ```text
+//!     . # . #      # anchors: row + column odd. Coded first, all at once, without this context.
+//!     # . # .      . the others: coded second, all at once, each in sight of the decoded anchors around it.
+//!     . # . #
+//! ```
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor, s};
+
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
+
+const KERNEL: usize = 5;
+
+/// Configuration of a [`Checkerboard`].
+#[derive(Config, Debug)]
+pub struct CheckerboardConfig {
+    /// Channels of a plane, M.
+    pub channels: usize,
+    /// Groups of the convolution.
+    #[config(default = 1)]
+    pub groups: usize,
+}
+
+impl CheckerboardConfig {
+    /// PyTorch's default initialisation; masked taps are zero.
+    pub fn init(&self, device: &Device) -> Checkerboard {
+        let conv = PlaneConvConfig::new(self.channels, 2 * self.channels, KERNEL)
+            .with_groups(self.groups)
+            .with_checkerboard(true);
+        Checkerboard { conv: conv.init(device) }
+    }
+}
+
+/// The context of non-anchors from the anchors around them.
+#[derive(Module, Debug)]
+pub struct Checkerboard {
+    /// 5×5 `[M, H, W]` to `[2 M, H, W]`, only taps with row + column odd: those that reach anchors from a non-anchor.
+    pub conv: PlaneConv,
+}
+
+const NAME: &str = "context_prediction";
+
+impl NamedParameters for Checkerboard {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
+    }
+}
+
+impl Checkerboard {
+    /// The convolution as the stream stores it.
+    pub fn layer(&self) -> Layer<'_> {
+        Layer::conv(NAME, &self.conv)
+    }
+
+    /// The context `[2 M, H, W]` of a plane `[M, H, W]` in original units, of which only the anchors are looked at. Zero at the
+    /// anchors themselves, so that one evaluation of what follows serves both passes.
+    ///
+    /// ```
+    /// use burn::tensor::{Device, Tensor};
+    /// use light4gs_model::CheckerboardConfig;
+    ///
+    /// let device = Device::flex();
+    /// let context = CheckerboardConfig::new(4).init(&device).context(Tensor::ones([4, 8, 8], &device));
+    /// assert_eq!(context.dims(), [8, 8, 8]);
+    /// ```
+    pub fn context(&self, plane: Tensor<3>) -> Tensor<3> {
+        let [_, height, width] = plane.dims();
+        let anchors = anchor_mask([height, width], &plane.device());
+        let others = (anchors.clone() - 1.0).neg();
+        self.conv.forward(plane * anchors) * others
+    }
+}
+
+/// `[1, H, W]`: 1 at the anchors, where row + column is odd, else 0.
+pub fn anchor_mask([height, width]: [usize; 2], device: &Device) -> Tensor<3> {
+    let mask: Vec<f32> = (0..height * width).map(|i| ((i / width + i % width) % 2) as f32).collect();
+    Tensor::<1>::from_floats(mask.as_slice(), device).reshape([1, height, width])
+}
+
+/// Anchors and the others of `[C, H, W]` (H and W even), each `[2 C, H / 2, W / 2]`: first the even rows' values, then the odd
+/// rows'.
+pub fn demultiplex(plane: Tensor<3>) -> [Tensor<3>; 2] {
+    let [channels, height, width] = plane.dims();
+    let split: Tensor<5> = plane.reshape([channels, height / 2, 2, width / 2, 2]);
+    let phase = |row: usize, column: usize| {
+        let values = split.clone().slice(s![.., .., row..row + 1, .., column..column + 1]);
+        values.reshape([channels, height / 2, width / 2])
+    };
+    [[phase(0, 1), phase(1, 0)], [phase(0, 0), phase(1, 1)]].map(|halves| Tensor::cat(halves.into(), 0))
+}
+
+/// The inverse of [`demultiplex`].
+pub fn multiplex(anchors: Tensor<3>, others: Tensor<3>) -> Tensor<3> {
+    let [doubled, height, width] = anchors.dims();
+    let channels = doubled / 2;
+    let phase = |values: &Tensor<3>, half: usize| {
+        values.clone().narrow(0, half * channels, channels).reshape([channels, height, 1, width, 1])
+    };
+    let even: Tensor<5> = Tensor::cat(vec![phase(&others, 0), phase(&anchors, 0)], 4);
+    let odd = Tensor::cat(vec![phase(&anchors, 1), phase(&others, 1)], 4);
+    Tensor::cat(vec![even, odd], 2).reshape([channels, 2 * height, 2 * width])
+}

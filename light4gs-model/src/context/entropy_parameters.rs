@@ -1,0 +1,117 @@
+//! From what the parts know of a plane to the Gaussian of each value.
+
+use burn::config::Config;
+use burn::module::{Module, Param};
+use burn::tensor::activation::leaky_relu;
+use burn::tensor::{Device, Tensor};
+
+use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
+
+/// How the last layer starts.
+#[derive(Config, Debug, PartialEq)]
+pub enum Start {
+    /// PyTorch's default: scales near 0, where every symbol costs the most and teaches the least.
+    PyTorch,
+    /// Scales near 1, means near 0, with a tenth of PyTorch's weights.
+    Unit,
+}
+
+/// Configuration of [`EntropyParameters`].
+#[derive(Config, Debug)]
+pub struct EntropyParametersConfig {
+    /// Channels of a plane, M.
+    pub channels: usize,
+    /// Widths of the two hidden layers, C and D.
+    pub hidden: [usize; 2],
+    /// How the last layer starts.
+    #[config(default = "Start::Unit")]
+    pub start: Start,
+}
+
+impl EntropyParametersConfig {
+    /// PyTorch's default initialisation but for the last layer; see [`Start`].
+    pub fn init(&self, device: &Device) -> EntropyParameters {
+        let Self { channels, hidden: [first, second], .. } = *self;
+        let mut parameters = EntropyParameters {
+            layers: [(4 * channels, first), (first, second), (second, 2 * channels)]
+                .map(|(inputs, outputs)| PlaneConvConfig::new(inputs, outputs, 1).init(device)),
+        };
+        if self.start == Start::Unit {
+            parameters.start_from(&vec![0.0; channels], &vec![1.0; channels]);
+        }
+        parameters
+    }
+}
+
+/// A network at every place: parameters `[2 M]` and context `[2 M]` to scales `[M]` and means `[M]`.
+#[derive(Module, Debug)]
+pub struct EntropyParameters {
+    /// 1×1 convolutions 4 M to C to D to 2 M, rectifiers between them.
+    pub layers: [PlaneConv; 3],
+}
+
+/// The Gaussian of each value of a plane, in units of its step.
+#[derive(Clone, Debug)]
+pub struct PlaneGaussians {
+    /// `[M, H, W]`.
+    pub means: Tensor<3>,
+    /// `[M, H, W]`, raw: what is below [`SCALE_BOUND`](crate::entropy::gaussian_conditional::SCALE_BOUND) counts as that.
+    pub scales: Tensor<3>,
+}
+
+const NAMES: [&str; 3] = ["entropy_parameters.0", "entropy_parameters.2", "entropy_parameters.4"];
+
+impl NamedParameters for EntropyParameters {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        for (name, layer) in NAMES.into_iter().zip(&mut self.layers) {
+            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
+        }
+    }
+}
+
+impl EntropyParameters {
+    /// The layers as the stream stores them.
+    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
+        NAMES.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
+    }
+
+    /// Gaussians of a plane of this size (height, width) from `parameters` and `context [2 M, H, W]`; what is absent
+    /// counts as zeros.
+    pub fn forward(
+        &self,
+        parameters: Option<Tensor<3>>,
+        context: Option<Tensor<3>>,
+        [height, width]: [usize; 2],
+    ) -> PlaneGaussians {
+        let [first, rest @ ..] = &self.layers;
+        let [outputs, inputs, ..] = first.weight.dims();
+        let weight = first.weight.val().reshape([outputs, inputs]);
+        let half = inputs / 2;
+        let bias = first.bias.val().unsqueeze_dim::<2>(1);
+        // Zeros are not multiplied.
+        let hidden = [(0, parameters), (half, context)]
+            .into_iter()
+            .filter_map(|(start, input)| {
+                let input = input?.reshape([half, height * width]);
+                Some(weight.clone().narrow(1, start, half).matmul(input))
+            })
+            .reduce(|sum, product| sum + product)
+            .map_or_else(|| bias.clone().expand([outputs, height * width]), |product| product + bias.clone());
+        let hidden = hidden.reshape([outputs, height, width]);
+        let output = rest.iter().fold(hidden, |hidden, layer| layer.forward(leaky_relu(hidden, LEAKY_SLOPE)));
+        let [doubled, ..] = output.dims();
+        let channels = doubled / 2;
+        PlaneGaussians { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
+    }
+
+    /// Makes the network say about this mean and scale (in steps) for each channel, whatever it sees: the last layer's biases
+    /// become these, its weights a tenth of themselves times the channel's scale. To be called once. So a weight moves an output by
+    /// about as many standard deviations in a channel that spans hundreds of symbols as in one that spans two.
+    pub fn start_from(&mut self, means: &[f32], scales: &[f32]) {
+        let [.., last] = &mut self.layers;
+        let device = last.bias.val().device();
+        last.weight = Param::from_tensor(last.weight.val().set_require_grad(false) * 0.1);
+        last.bias = Param::from_tensor(Tensor::from_floats([scales, means].concat().as_slice(), &device));
+    }
+}

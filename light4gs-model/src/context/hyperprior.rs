@@ -1,0 +1,114 @@
+//! The hyperprior: a small latent that is transmitted and describes a plane (Ballé et al. 2018; DESIGN section 6).
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::activation::leaky_relu;
+use burn::tensor::{Device, Tensor};
+
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
+use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
+use crate::entropy::gaussian_conditional::bits;
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, Prefixed, visit_layer};
+
+/// Configuration of a [`Hyperprior`].
+#[derive(Config, Debug)]
+pub struct HyperpriorConfig {
+    /// Channels of a plane, M.
+    pub channels: usize,
+    /// Channels of the latent, N.
+    pub hyper_channels: usize,
+    /// Channels between the layers of the synthesis, A and B.
+    pub synthesis_channels: [usize; 2],
+}
+
+impl HyperpriorConfig {
+    /// PyTorch's default initialisation; the bottleneck as CompressAI.
+    pub fn init(&self, device: &Device) -> Hyperprior {
+        let Self { channels, hyper_channels: hyper, synthesis_channels: [first, second] } = *self;
+        Hyperprior {
+            analysis: [
+                PlaneConvConfig::new(channels, hyper, 3).init(device),
+                PlaneConvConfig::new(hyper, hyper, 5).with_stride(2).init(device),
+                PlaneConvConfig::new(hyper, hyper, 5).with_stride(2).init(device),
+            ],
+            bottleneck: EntropyBottleneckConfig::new(hyper).init(device),
+            synthesis_up: [
+                PlaneDeconvConfig::new(hyper, first).init(device),
+                PlaneDeconvConfig::new(first, second).init(device),
+            ],
+            synthesis_out: PlaneConvConfig::new(second, 2 * channels, 3).init(device),
+        }
+    }
+}
+
+/// Plane in steps `[M, H, W]`, to a latent `[N, H / 4, W / 4]`, to Gaussian parameters `[2 M, H, W]`.
+#[derive(Module, Debug)]
+pub struct Hyperprior {
+    /// `h_a`: convolutions with strides 1, 2, 2, rectifiers between them. Only the encoder has them.
+    pub analysis: [PlaneConv; 3],
+    /// The latent's entropy model.
+    pub bottleneck: EntropyBottleneck,
+    /// `h_s`: two transposed convolutions, each with a rectifier.
+    pub synthesis_up: [PlaneDeconv; 2],
+    /// `h_s`: the last convolution.
+    pub synthesis_out: PlaneConv,
+}
+
+const ANALYSIS: [&str; 3] = ["h_a.0", "h_a.2", "h_a.4"];
+const SYNTHESIS_UP: [&str; 2] = ["h_s.0", "h_s.2"];
+const SYNTHESIS_OUT: &str = "h_s.4";
+
+impl NamedParameters for Hyperprior {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        for (name, layer) in ANALYSIS.into_iter().zip(&mut self.analysis) {
+            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
+        }
+        for (name, layer) in SYNTHESIS_UP.into_iter().zip(&mut self.synthesis_up) {
+            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
+        }
+        visit_layer(SYNTHESIS_OUT, &mut self.synthesis_out.weight, &mut self.synthesis_out.bias, visitor);
+        self.bottleneck.visit_parameters(&mut Prefixed { prefix: "entropy_bottleneck", visitor });
+    }
+}
+
+impl Hyperprior {
+    /// The layers as the stream stores them, and `h_a`, which it does not.
+    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
+        let analysis = ANALYSIS.into_iter().zip(&self.analysis);
+        let analysis = analysis.map(|(name, layer)| Layer { encoder_only: true, ..Layer::conv(name, layer) });
+        let up = SYNTHESIS_UP.into_iter().zip(&self.synthesis_up).map(|(name, layer)| Layer::deconv(name, layer));
+        analysis.chain(up).chain([Layer::conv(SYNTHESIS_OUT, &self.synthesis_out)])
+    }
+
+    /// The latent `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
+    pub fn analyze(&self, plane: Tensor<3>) -> Tensor<3> {
+        let [first, second, third] = &self.analysis;
+        let hidden = leaky_relu(first.forward(plane), LEAKY_SLOPE);
+        third.forward(leaky_relu(second.forward(hidden), LEAKY_SLOPE))
+    }
+
+    /// Parameters `[2 M, H, W]` from a received latent `[N, H / 4, W / 4]`.
+    pub fn synthesize(&self, latent: Tensor<3>) -> Tensor<3> {
+        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| leaky_relu(layer.forward(hidden), LEAKY_SLOPE));
+        self.synthesis_out.forward(up)
+    }
+
+    /// Symbols `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
+    pub fn symbols(&self, plane: Tensor<3>) -> Tensor<3> {
+        self.bottleneck.symbols(self.analyze(plane))
+    }
+}
+
+impl PriorPart for Hyperprior {
+    /// Applies to every plane.
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior> {
+        let (received, likelihood) = self.bottleneck.forward(self.analyze(planes.in_steps(plane)), latent);
+        Some(Prior {
+            parameters: Some(self.synthesize(received)),
+            context: None,
+            passes: Passes::AnchorsFirst,
+            hyper_bits: Some(bits(likelihood).sum()),
+        })
+    }
+}

@@ -1,0 +1,101 @@
+//! The inter-plane context: what a space-only plane can learn from its axes' space-time planes (paper III-C).
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::position_of;
+
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
+
+/// Configuration of an [`InterPlane`].
+#[derive(Config, Debug)]
+pub struct InterPlaneConfig {
+    /// Channels of a plane, M.
+    pub channels: usize,
+    /// Side of the convolution's kernel.
+    #[config(default = 5)]
+    pub kernel: usize,
+    /// Groups of the convolution.
+    #[config(default = 1)]
+    pub groups: usize,
+}
+
+impl InterPlaneConfig {
+    /// PyTorch's default initialisation.
+    pub fn init(&self, device: &Device) -> InterPlane {
+        let conv = PlaneConvConfig::new(2 * self.channels, 2 * self.channels, self.kernel).with_groups(self.groups);
+        InterPlane { conv: conv.init(device) }
+    }
+}
+
+/// Parameters of the plane over (a, b) from the planes over (a, t) and (b, t).
+///
+/// Each is averaged over time, which leaves a vector along a and one along b; spread over the plane and put side by side
+/// they are the context `[2 M, H, W]` of a convolution. (The reference averages over space; see DESIGN section 3.)
+#[derive(Module, Debug)]
+pub struct InterPlane {
+    /// `[2 M, H, W]` to `[2 M, H, W]`.
+    pub conv: PlaneConv,
+}
+
+const NAME: &str = "inter_plane";
+
+impl NamedParameters for InterPlane {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
+    }
+}
+
+impl InterPlane {
+    /// The convolution as the stream stores it.
+    pub fn layer(&self) -> Layer<'_> {
+        Layer::conv(NAME, &self.conv)
+    }
+
+    /// Positions of the space-time planes over the two axes of the plane at `position`; none if that holds time itself.
+    pub fn sources(position: usize) -> Option<[usize; 2]> {
+        const XT: usize = 2;
+        const YT: usize = 4;
+        const ZT: usize = 5;
+        match position {
+            0 => Some([XT, YT]),
+            1 => Some([XT, ZT]),
+            3 => Some([YT, ZT]),
+            _ => None,
+        }
+    }
+
+    /// The context `[2 M, B, A]` of the plane over (a, b) from `over_a [M, T, A]` and `over_b [M, T, B]`.
+    ///
+    /// ```
+    /// use burn::tensor::{Device, Tensor};
+    /// use light4gs_model::InterPlane;
+    ///
+    /// let device = Device::flex();
+    /// let [xt, yt] = [8, 12].map(|length| Tensor::zeros([16, 4, length], &device));
+    /// assert_eq!(InterPlane::context(xt, yt).dims(), [32, 12, 8]);
+    /// ```
+    pub fn context(over_a: Tensor<3>, over_b: Tensor<3>) -> Tensor<3> {
+        let ([channels, _, a], [_, _, b]) = (over_a.dims(), over_b.dims());
+        let along_a = over_a.mean_dim(1).expand([channels, b, a]);
+        let along_b = over_b.mean_dim(1).reshape([channels, b, 1]).expand([channels, b, a]);
+        Tensor::cat(vec![along_a, along_b], 0)
+    }
+
+    /// Parameters `[2 M, B, A]` from `over_a [M, T, A]` and `over_b [M, T, B]`.
+    pub fn forward(&self, over_a: Tensor<3>, over_b: Tensor<3>) -> Tensor<3> {
+        self.conv.forward(Self::context(over_a, over_b))
+    }
+}
+
+impl PriorPart for InterPlane {
+    /// Applies to space-only planes.
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
+        let [over_a, over_b] = Self::sources(position_of(plane))?.map(|position| planes.in_same_scale(plane, position));
+        let parameters = Some(self.forward(over_a, over_b));
+        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+    }
+}

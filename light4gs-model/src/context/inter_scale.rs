@@ -1,0 +1,133 @@
+//! The inter-scale context: a plane one scale below predicts the plane above (paper III-C).
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+
+use super::hyperprior::Hyperprior;
+use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
+
+/// Configuration of an [`InterScale`].
+#[derive(Config, Debug)]
+pub struct InterScaleConfig {
+    /// Channels of a plane, M.
+    pub channels: usize,
+    /// Side of the convolution's kernel.
+    #[config(default = 5)]
+    pub kernel: usize,
+    /// Groups of the convolution.
+    #[config(default = 1)]
+    pub groups: usize,
+}
+
+impl InterScaleConfig {
+    /// PyTorch's default initialisation.
+    pub fn init(&self, device: &Device) -> InterScale {
+        let conv = PlaneConvConfig::new(self.channels, 2 * self.channels, self.kernel).with_groups(self.groups);
+        InterScale { conv: conv.init(device) }
+    }
+}
+
+/// Parameters of a plane from the decoded plane over the same axes one scale below, upsampled to its size.
+#[derive(Module, Debug)]
+pub struct InterScale {
+    /// `[M, H, W]` to `[2 M, H, W]`.
+    pub conv: PlaneConv,
+}
+
+const NAME: &str = "inter_scale";
+
+impl NamedParameters for InterScale {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
+    }
+}
+
+impl InterScale {
+    /// The convolution as the stream stores it.
+    pub fn layer(&self) -> Layer<'_> {
+        Layer::conv(NAME, &self.conv)
+    }
+
+    /// Parameters `[2 M, H, W]` from the plane `[M, h, w]` below.
+    pub fn forward(&self, lower: Tensor<3>, size: [usize; 2]) -> Tensor<3> {
+        self.conv.forward(upsample(lower, size))
+    }
+
+    fn contribution(&self, planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
+        let lower = planes.one_scale_below(plane)?;
+        let [_, height, width] = planes.planes[plane].dims();
+        Some(self.forward(lower, [height, width]))
+    }
+}
+
+impl PriorPart for InterScale {
+    /// Applies above the lowest scale: no latent, one pass.
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
+        let parameters = Some(self.contribution(planes, plane)?);
+        Some(Prior { parameters, context: None, passes: Passes::One, hyper_bits: None })
+    }
+}
+
+/// What the reference does above the lowest scale: a hyperprior for the parameters, the inter-scale context beside it.
+#[derive(Clone, Debug)]
+pub struct HighScaleHyperprior<'a> {
+    /// Gives the parameters and costs bits.
+    pub hyperprior: &'a Hyperprior,
+    /// Gives the context.
+    pub inter_scale: &'a InterScale,
+}
+
+impl PriorPart for HighScaleHyperprior<'_> {
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior> {
+        let context = self.inter_scale.contribution(planes, plane)?;
+        let hyperprior = self.hyperprior.prior(planes, plane, latent)?;
+        Some(Prior { context: Some(context), passes: Passes::One, ..hyperprior })
+    }
+}
+
+/// Bilinear with corners aligned: `[C, h, w]` to `[C, H, W]`.
+///
+/// As two products with interpolation matrices, whose gradient every back end has.
+///
+/// ```
+/// use burn::tensor::{Device, Tensor};
+/// use light4gs_model::upsample;
+///
+/// let plane = Tensor::<3>::from_floats([[[0.0, 3.0]]], &Device::flex());
+/// let up = upsample(plane, [1, 4]).into_data().to_vec::<f32>().unwrap();
+/// assert!(up.iter().zip([0.0, 1.0, 2.0, 3.0]).all(|(found, expected)| (found - expected).abs() < 1e-6));
+/// ```
+pub fn upsample(plane: Tensor<3>, [height, width]: [usize; 2]) -> Tensor<3> {
+    let [channels, low_height, low_width] = plane.dims();
+    let device = plane.device();
+    let plane = if low_width == width {
+        plane
+    } else {
+        let across = interpolation(low_width, width, &device).transpose();
+        let wide = plane.reshape([channels * low_height, low_width]).matmul(across);
+        wide.reshape([channels, low_height, width])
+    };
+    if low_height == height {
+        return plane;
+    }
+    let down = interpolation(low_height, height, &device).unsqueeze::<3>().expand([channels, height, low_height]);
+    down.matmul(plane)
+}
+
+/// `[to, from]`: the weights of the two neighbours of each place.
+fn interpolation(from: usize, to: usize, device: &Device) -> Tensor<2> {
+    let mut weights = vec![0.0f32; to * from];
+    let last = (from - 1) as f64;
+    for (i, row) in weights.chunks_exact_mut(from).enumerate() {
+        let place = if to > 1 { i as f64 * last / (to - 1) as f64 } else { 0.0 };
+        let low = (place as usize).min(from.saturating_sub(2));
+        let share = (place - low as f64) as f32;
+        row[low] += 1.0 - share;
+        row[(low + 1).min(from - 1)] += share;
+    }
+    Tensor::<1>::from_floats(weights.as_slice(), device).reshape([to, from])
+}

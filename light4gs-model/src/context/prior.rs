@@ -1,0 +1,80 @@
+//! What a part of the context model contributes to a plane, and what it may look at.
+
+use burn::tensor::Tensor;
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, scale_of};
+
+use crate::entropy::bottleneck::Latent;
+use crate::entropy::quantization_steps::PlaneSteps;
+
+/// All planes `[M, H, W]` of a hexplane, scale-major, minus their groups' centres, with their steps.
+///
+/// For the planes that are coded before, these are the decoded ones, or the noisy ones that stand for them in training. Only a
+/// hyperprior looks at the plane that is being coded: it is transmitted.
+#[derive(Clone, Debug)]
+pub struct CenteredPlanes {
+    /// `[M, H, W]`, original units minus the centre.
+    pub planes: Vec<Tensor<3>>,
+    /// One for each plane.
+    pub steps: PlaneSteps,
+}
+
+impl CenteredPlanes {
+    /// A plane in units of its step, `[M, H, W]`.
+    pub fn in_steps(&self, plane: usize) -> Tensor<3> {
+        self.planes[plane].clone() / self.steps.broadcast(plane)
+    }
+
+    /// The plane over the same axes one scale below; none for the lowest scale.
+    pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
+        Some(self.planes[plane.checked_sub(PLANES_PER_SCALE)?].clone())
+    }
+
+    /// The plane at a position of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES) in the same scale as `plane`.
+    pub fn in_same_scale(&self, plane: usize, position: usize) -> Tensor<3> {
+        self.planes[scale_of(plane) * PLANES_PER_SCALE + position].clone()
+    }
+}
+
+/// In which order the values of a plane are coded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Passes {
+    /// All at once.
+    One,
+    /// The checkerboard's anchors, then the others in sight of them, if the model has a checkerboard.
+    AnchorsFirst,
+}
+
+/// Where the Gaussian parameters of a plane come from. Absent tensors count as zeros.
+#[derive(Clone, Debug)]
+pub struct Prior {
+    /// `[2 M, H, W]`.
+    pub parameters: Option<Tensor<3>>,
+    /// `[2 M, H, W]`, in the place of the checkerboard's context; only with [`Passes::One`].
+    pub context: Option<Tensor<3>>,
+    /// How the values are coded.
+    pub passes: Passes,
+    /// `[1]`: what is transmitted beside the values.
+    pub hyper_bits: Option<Tensor<1>>,
+}
+
+impl Prior {
+    /// Nothing is known but the network's biases.
+    pub fn constant() -> Self {
+        Self { parameters: None, context: None, passes: Passes::AnchorsFirst, hyper_bits: None }
+    }
+}
+
+/// A part of the context model.
+///
+/// A model is a list of parts. For each plane the first part that has something to say gives its prior, so an ablation is a
+/// shorter list, and a new part is one more entry.
+pub trait PriorPart {
+    /// The prior of a plane, or nothing where this part does not apply.
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior>;
+}
+
+impl<P: PriorPart> PriorPart for &P {
+    fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior> {
+        (**self).prior(planes, plane, latent)
+    }
+}

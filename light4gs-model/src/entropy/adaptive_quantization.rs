@@ -1,0 +1,105 @@
+//! Adaptive quantisation: learned steps (paper III-D; DESIGN section 6).
+
+use burn::config::Config;
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, is_space_time, scale_of};
+
+use super::quantization_steps::PlaneSteps;
+use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
+
+/// Configuration of an [`AdaptiveQuantization`].
+#[derive(Config, Debug)]
+pub struct AdaptiveQuantizationConfig {
+    /// Scales of the hexplane.
+    pub scales: usize,
+    /// Initial step of the space-only planes.
+    #[config(default = 0.1)]
+    pub space_only: f64,
+    /// Initial step of the space-time planes.
+    #[config(default = 0.1)]
+    pub space_time: f64,
+    /// Whether each scale has its own pair of steps.
+    #[config(default = false)]
+    pub per_scale: bool,
+}
+
+impl AdaptiveQuantizationConfig {
+    /// Steps at their initial values.
+    ///
+    /// # Panics
+    /// If a step is not positive and finite.
+    pub fn init(&self, device: &Device) -> AdaptiveQuantization {
+        AdaptiveQuantization { log_steps: Param::from_tensor(self.log_steps(device)), scales: self.scales }
+    }
+
+    /// Logarithms of the initial steps, in the order of [`AdaptiveQuantization::log_steps`].
+    fn log_steps(&self, device: &Device) -> Tensor<1> {
+        let pair = [self.space_only, self.space_time];
+        assert!(pair.iter().all(|step| *step > 0.0 && step.is_finite()), "steps must be positive, not {pair:?}");
+        let groups = if self.per_scale { self.scales } else { 1 };
+        Tensor::<1>::from_floats(pair.map(|step| step.ln() as f32), device).repeat_dim(0, groups)
+    }
+}
+
+/// A learned step for the space-only planes and one for the space-time planes, optionally for each scale.
+///
+/// The parameter is the logarithm, so a step is always positive and an optimiser's step changes it by a ratio: a step
+/// of 0.001 is learned as easily as one of 1.
+///
+/// ```
+/// use burn::tensor::Device;
+/// use light4gs_model::AdaptiveQuantizationConfig;
+///
+/// let quantization = AdaptiveQuantizationConfig::new(2).with_space_time(0.05).init(&Device::flex());
+/// let steps = quantization.steps().values();
+/// assert_eq!(steps.len(), 12);
+/// assert!((steps[0] - 0.1).abs() < 1e-6 && (steps[2] - 0.05).abs() < 1e-6);
+/// ```
+#[derive(Module, Debug)]
+pub struct AdaptiveQuantization {
+    /// `[2]` or `[2 · scales]`: space-only, space-time.
+    pub log_steps: Param<Tensor<1>>,
+    scales: usize,
+}
+
+impl NamedParameters for AdaptiveQuantization {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        visitor.visit("log_steps", &mut self.log_steps);
+    }
+}
+
+impl AdaptiveQuantization {
+    /// The step of every plane, with its gradient.
+    pub fn steps(&self) -> PlaneSteps {
+        self.steps_of(self.log_steps.val())
+    }
+
+    /// The step of every plane, off the tape from the beginning: operations on the tape that no backward pass ever comes
+    /// to would stay there for good, and every later pass would look through them.
+    pub fn steps_without_gradient(&self) -> PlaneSteps {
+        self.steps_of(self.log_steps.val().set_require_grad(false))
+    }
+
+    /// Brings steps that have become finer than the initial ones of `config` back to those.
+    ///
+    /// # Panics
+    /// If `config` is not the one that this was made with.
+    pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
+        let log_steps = self.log_steps.val().inner();
+        let initial = config.log_steps(&log_steps.device());
+        let value = Tensor::from_inner(log_steps.max_pair(initial));
+        let learns = self.log_steps.is_require_grad();
+        self.log_steps = Param::initialized(self.log_steps.id, value.set_require_grad(learns));
+    }
+
+    fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {
+        let steps = log_steps.exp();
+        let groups = steps.dims()[0] / 2;
+        let of_plane = |plane: usize| {
+            let group = 2 * (scale_of(plane) % groups) + usize::from(is_space_time(plane));
+            steps.clone().narrow(0, group, 1)
+        };
+        PlaneSteps::new((0..self.scales * PLANES_PER_SCALE).map(of_plane).collect())
+    }
+}

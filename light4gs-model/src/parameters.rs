@@ -1,0 +1,132 @@
+//! Every float parameter of a Burn module with its dotted path: for optimizers, checkpoints, learning-rate groups and tests.
+//!
+//! Burn's [`ModuleVisitor`] and [`ModuleMapper`] walk a module and say where they are; this puts the path together. A path
+//! is made of the names of fields and the indices of lists, as in `gaussians.means` or `field.hexplane.planes.3`. Options
+//! and enums add nothing to it.
+//!
+//! **Order.** Parameters come depth first, fields in the order of their declaration, lists by index. It is the same for
+//! every module of one structure.
+//!
+//! ```
+//! use burn::module::Param;
+//! use burn::tensor::{Device, Tensor};
+//! use light4gs_model::HexPlaneConfig;
+//! use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
+//!
+//! #[derive(Default)]
+//! struct Count(Vec<(String, usize)>);
+//!
+//! impl ParameterVisitor for Count {
+//!     fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>) {
+//!         self.0.push((path.to_owned(), parameter.val().shape().num_elements()));
+//!     }
+//! }
+//!
+//! let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]).init(&Device::flex());
+//! let mut count = Count::default();
+//! visit_parameters(&hexplane, &mut count);
+//! assert_eq!(count.0[2], ("planes.2".to_owned(), 4 * 4 * 8));
+//! ```
+
+use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
+use burn::tensor::Tensor;
+
+/// Something to do with every float parameter, whatever its rank: a closure could not be generic.
+pub trait ParameterVisitor {
+    /// Called once a parameter.
+    fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>);
+}
+
+/// Something that replaces every float parameter, whatever its rank.
+pub trait ParameterMapper {
+    /// Called once a parameter; what it returns takes the parameter's place. Keep the identity where an optimizer or a
+    /// tape knows it: `Param::initialized(parameter.id, value)`.
+    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>>;
+}
+
+/// Shows every float parameter to the visitor.
+pub fn visit_parameters<M: Module>(module: &M, visitor: &mut impl ParameterVisitor) {
+    module.visit(&mut WithPath { path: Path::default(), inner: visitor });
+}
+
+/// The module with every float parameter replaced by what the mapper makes of it.
+pub fn map_parameters<M: Module>(module: M, mapper: &mut impl ParameterMapper) -> M {
+    module.map(&mut WithPath { path: Path::default(), inner: mapper })
+}
+
+/// [`map_parameters`] where the module cannot be given away. The mapper gets the only handle to each tensor, so that what
+/// it does can be done in place.
+pub fn update_parameters<M: Module>(module: &mut M, mapper: &mut impl ParameterMapper) {
+    let empty = map_parameters(module.clone(), &mut Emptied);
+    let full = std::mem::replace(module, empty);
+    *module = map_parameters(full, mapper);
+}
+
+struct Emptied;
+
+impl ParameterMapper for Emptied {
+    fn map<const D: usize>(&mut self, _: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let device = parameter.lazy_device();
+        Param::initialized(parameter.id, Tensor::empty([0; D], &device))
+    }
+}
+
+/// Where in a module a walk is.
+#[derive(Default)]
+struct Path {
+    /// The path so far: `names` joined by dots.
+    joined: String,
+    /// Lengths of `joined` before each name was added.
+    lengths: Vec<usize>,
+}
+
+impl Path {
+    fn enter(&mut self, name: &str, container: &str) {
+        self.lengths.push(self.joined.len());
+        if container.starts_with("Enum") {
+            return;
+        }
+        if !self.joined.is_empty() {
+            self.joined.push('.');
+        }
+        self.joined.push_str(name);
+    }
+
+    fn exit(&mut self) {
+        let length = self.lengths.pop().expect("a module is left as often as it is entered");
+        self.joined.truncate(length);
+    }
+}
+
+struct WithPath<'a, T> {
+    path: Path,
+    inner: &'a mut T,
+}
+
+impl<T: ParameterVisitor> ModuleVisitor for WithPath<'_, T> {
+    fn visit_float<const D: usize>(&mut self, parameter: &Param<Tensor<D>>) {
+        self.inner.visit(&self.path.joined, parameter);
+    }
+
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _: &str, _: &str) {
+        self.path.exit();
+    }
+}
+
+impl<T: ParameterMapper> ModuleMapper for WithPath<'_, T> {
+    fn map_float<const D: usize>(&mut self, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        self.inner.map(&self.path.joined, parameter)
+    }
+
+    fn enter_module(&mut self, name: &str, container: &str) {
+        self.path.enter(name, container);
+    }
+
+    fn exit_module(&mut self, _: &str, _: &str) {
+        self.path.exit();
+    }
+}

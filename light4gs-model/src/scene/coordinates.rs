@@ -1,0 +1,105 @@
+//! The scene's own coordinates: principal axes of the initial cloud, standardised and contracted (paper III-A).
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData};
+use nalgebra::{Matrix3, SymmetricEigen, Vector3};
+
+use super::contraction::contract;
+
+/// Principal component analysis of a point cloud.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pca {
+    /// Mean of the points, world units.
+    pub mean: [f32; 3],
+    /// Unit axes, by falling variance; the component of largest magnitude of each is positive.
+    pub axes: [[f32; 3]; 3],
+    /// Standard deviation along each axis, world units.
+    pub std: [f32; 3],
+}
+
+/// Spread below this share of the largest one counts as this share, so that flat clouds can be standardised.
+const MIN_RELATIVE_STD: f64 = 1e-4;
+
+impl Pca {
+    /// Analyses points with the unbiased covariance (N - 1). Fewer than two points, or points that all coincide, give
+    /// the identity around their mean.
+    pub fn fit(points: &[[f32; 3]]) -> Self {
+        let count = points.len() as f64;
+        let vector = |p: &[f32; 3]| Vector3::new(f64::from(p[0]), f64::from(p[1]), f64::from(p[2]));
+        let mean = points.iter().map(vector).sum::<Vector3<f64>>() / count.max(1.0);
+        let covariance = points.iter().map(|p| vector(p) - mean).map(|d| d * d.transpose()).sum::<Matrix3<f64>>()
+            / (count - 1.0).max(1.0);
+        let mean = [mean.x as f32, mean.y as f32, mean.z as f32];
+        let eigen = SymmetricEigen::new(covariance);
+        let mut order = [0, 1, 2];
+        order.sort_by(|&i, &j| eigen.eigenvalues[j].total_cmp(&eigen.eigenvalues[i]));
+        let largest = eigen.eigenvalues[order[0]].max(0.0).sqrt();
+        if !(largest.is_finite() && largest > 0.0) {
+            return Self { mean, axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] };
+        }
+        let axes = order.map(|i| {
+            let axis = eigen.eigenvectors.column(i);
+            let sign = axis[axis.iamax()].signum();
+            [(axis[0] * sign) as f32, (axis[1] * sign) as f32, (axis[2] * sign) as f32]
+        });
+        let std = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt().max(MIN_RELATIVE_STD * largest) as f32);
+        Self { mean, axes, std }
+    }
+}
+
+/// Maps world points to the hexplane's coordinates. Fixed once made: none of its tensors is trained.
+///
+/// ```
+/// use burn::tensor::{Device, Tensor};
+/// use light4gs_model::{Pca, SceneCoordinates};
+///
+/// let device = Device::flex();
+/// let cloud = [[0.0, 0.0, 0.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.5]];
+/// let frame = SceneCoordinates::new(&Pca::fit(&cloud), &device);
+/// let coordinates = frame.normalize(Tensor::from_floats(cloud, &device));
+/// assert_eq!(coordinates.dims(), [4, 3]);
+/// assert!(coordinates.abs().max().into_scalar::<f32>() <= 1.0);
+/// ```
+#[derive(Module, Debug)]
+pub struct SceneCoordinates {
+    /// `[1, 3]`
+    mean: Param<Tensor<2>>,
+    /// `[3, 3]`: column j is axis j.
+    axes: Param<Tensor<2>>,
+    /// `[1, 3]`
+    std: Param<Tensor<2>>,
+}
+
+impl SceneCoordinates {
+    /// The frame of an analysed cloud.
+    pub fn new(pca: &Pca, device: &Device) -> Self {
+        let columns: Vec<f32> = (0..9).map(|k| pca.axes[k % 3][k / 3]).collect();
+        let constant = |values: Vec<f32>, rows: usize| {
+            let tensor = Tensor::<2>::from_data(TensorData::new(values, [rows, 3]), device);
+            Param::from_tensor(tensor).set_require_grad(false)
+        };
+        Self { mean: constant(pca.mean.to_vec(), 1), axes: constant(columns, 3), std: constant(pca.std.to_vec(), 1) }
+    }
+
+    /// Standardised coordinates along the principal axes: `[N, 3]` to `[N, 3]`.
+    pub fn standardize(&self, points: Tensor<2>) -> Tensor<2> {
+        (points - self.mean.val()).matmul(self.axes.val() / self.std.val())
+    }
+
+    /// Coordinates in [-1, 1]: standardised, contracted into the ball of radius 2, halved. `[N, 3]` to `[N, 3]`.
+    pub fn normalize(&self, points: Tensor<2>) -> Tensor<2> {
+        contract(self.standardize(points)) * 0.5
+    }
+
+    /// The analysis that the frame was made from.
+    pub fn pca(&self) -> Pca {
+        let values = |tensor: Tensor<2>| tensor.into_data().iter::<f32>().collect::<Vec<_>>();
+        let triple = |v: Vec<f32>| [v[0], v[1], v[2]];
+        let axes = values(self.axes.val());
+        Pca {
+            mean: triple(values(self.mean.val())),
+            axes: std::array::from_fn(|j| [axes[j], axes[3 + j], axes[6 + j]]),
+            std: triple(values(self.std.val())),
+        }
+    }
+}

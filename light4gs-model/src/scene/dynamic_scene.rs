@@ -1,0 +1,96 @@
+//! The whole model: Gaussians, their coordinates, and the field that moves them.
+
+use burn::module::Module;
+use burn::tensor::Device;
+use light4gs_data::PointCloud;
+
+use super::coordinates::{Pca, SceneCoordinates};
+use super::field::DeformationField;
+use super::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
+use super::hexplane::HexPlane;
+use super::hexplane_field::HexPlaneField;
+
+/// Configuration of a [`DynamicScene`].
+#[derive(Clone, Debug)]
+pub struct DynamicSceneConfig<F: DeformationField = HexPlaneField> {
+    /// The Gaussians.
+    pub gaussians: GaussiansConfig,
+    /// What moves them.
+    pub field: F::Config,
+    /// Whether the field's gradient reaches the positions (the reference detaches them).
+    pub differentiate_points: bool,
+}
+
+impl<F: DeformationField> DynamicSceneConfig<F> {
+    /// With gradients to the positions.
+    pub fn new(gaussians: GaussiansConfig, field: F::Config) -> Self {
+        Self { gaussians, field, differentiate_points: true }
+    }
+
+    /// Whether the field's gradient reaches the positions.
+    pub fn with_differentiate_points(mut self, differentiate_points: bool) -> Self {
+        self.differentiate_points = differentiate_points;
+        self
+    }
+
+    /// A model over a cloud, whose principal axes become those of the scene's coordinates.
+    pub fn init(&self, cloud: &PointCloud, device: &Device) -> DynamicScene<F> {
+        DynamicScene {
+            gaussians: self.gaussians.init(cloud, device),
+            coordinates: SceneCoordinates::new(&Pca::fit(&cloud.positions), device),
+            field: F::init(&self.field, device),
+            differentiate_points: self.differentiate_points,
+        }
+    }
+}
+
+/// Deformable Gaussians.
+///
+/// ```
+/// use burn::tensor::Device;
+/// use light4gs_data::PointCloud;
+/// use light4gs_model::*;
+///
+/// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]], colors: vec![[0.5; 3]; 3] };
+/// let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
+/// let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(16));
+/// let config = DynamicSceneConfig::<HexPlaneField>::new(GaussiansConfig::new(), field);
+/// let scene = config.init(&cloud, &Device::flex());
+/// assert_eq!(scene.at(0.25).means.dims(), [3, 3]);
+/// ```
+#[derive(Module, Debug)]
+pub struct DynamicScene<F: Module = HexPlaneField> {
+    /// At rest.
+    pub gaussians: Gaussians,
+    /// From world coordinates to the field's.
+    pub coordinates: SceneCoordinates,
+    /// What moves the Gaussians.
+    pub field: F,
+    /// Whether the field's gradient reaches the positions.
+    pub differentiate_points: bool,
+}
+
+impl<F: DeformationField> DynamicScene<F> {
+    /// Raw attributes at a time in [0, 1].
+    pub fn at(&self, time: f32) -> GaussianTensors {
+        let rest = self.gaussians.tensors();
+        if self.gaussians.is_empty() {
+            // Dense layers of some back ends refuse a batch of none.
+            return rest;
+        }
+        let means = rest.means.clone();
+        let means = if self.differentiate_points { means } else { means.detach() };
+        let offsets = self.field.offsets(self.coordinates.normalize(means), time);
+        rest.offset_by(offsets)
+    }
+
+    /// The field's planes, if it has some.
+    pub fn planes(&self) -> Option<&HexPlane> {
+        self.field.planes()
+    }
+
+    /// The field's planes, if it has some, to replace them.
+    pub fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+        self.field.planes_mut()
+    }
+}

@@ -1,0 +1,84 @@
+//! The paper's motion: a feature of the multiscale hexplane, and a small network that turns it into changes (III-A).
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::NetworkArrays;
+
+use super::arrays::ModelError;
+use super::deformation::{Deformation, DeformationConfig};
+use super::field::{DeformationField, Offsets};
+use super::hexplane::{HexPlane, HexPlaneConfig};
+
+/// Configuration of a [`HexPlaneField`].
+#[derive(Config, Debug)]
+pub struct HexPlaneFieldConfig {
+    /// The planes.
+    pub hexplane: HexPlaneConfig,
+    /// The network; its `feature_size` is set from the planes.
+    pub deformation: DeformationConfig,
+}
+
+/// Features over space and time, and what they change.
+///
+/// ```
+/// use burn::tensor::{Device, Tensor};
+/// use light4gs_model::*;
+///
+/// let device = Device::flex();
+/// let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
+/// let config = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(16));
+/// let field = HexPlaneField::init(&config, &device);
+/// let offsets = field.offsets(Tensor::zeros([5, 3], &device), 0.25);
+/// assert_eq!(offsets.position.unwrap().dims(), [5, 3]);
+/// ```
+#[derive(Module, Debug)]
+pub struct HexPlaneField {
+    /// Features over space and time.
+    pub hexplane: HexPlane,
+    /// From features to changes.
+    pub deformation: Deformation,
+}
+
+impl HexPlaneField {
+    /// Hexplane coordinates `[N, 4]` of `points [N, 3]` in [-1, 1] at a time in [0, 1].
+    pub fn query_points(points: Tensor<2>, time: f32) -> Tensor<2> {
+        let [count, _] = points.dims();
+        let time = Tensor::full([count, 1], 2.0 * time - 1.0, &points.device());
+        Tensor::cat(vec![points, time], 1)
+    }
+}
+
+impl DeformationField for HexPlaneField {
+    type Config = HexPlaneFieldConfig;
+
+    const KIND: &'static str = "hexplane";
+
+    fn init(config: &HexPlaneFieldConfig, device: &Device) -> Self {
+        let hexplane = config.hexplane.init(device);
+        let deformation = DeformationConfig { feature_size: hexplane.feature_size(), ..config.deformation.clone() };
+        Self { hexplane, deformation: deformation.init(device) }
+    }
+
+    fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
+        self.deformation.forward(self.hexplane.query(Self::query_points(points, time)))
+    }
+
+    fn planes(&self) -> Option<&HexPlane> {
+        Some(&self.hexplane)
+    }
+
+    fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+        Some(&mut self.hexplane)
+    }
+
+    fn to_arrays(&self) -> NetworkArrays {
+        self.deformation.to_arrays()
+    }
+
+    fn from_arrays(arrays: &NetworkArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+        let hexplane = planes.ok_or_else(|| ModelError::Planes("none, but a hexplane field needs some".into()))?;
+        let deformation = Deformation::from_arrays(arrays, hexplane.feature_size(), device)?;
+        Ok(Self { hexplane, deformation })
+    }
+}

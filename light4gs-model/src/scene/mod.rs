@@ -1,0 +1,27 @@
+//! The scene (paper III-A): Gaussians at rest, and the field that moves them.
+//!
+//! World points become the field's coordinates ([`SceneCoordinates`], [`contract`]); a multiscale [`HexPlane`] gives a
+//! feature for a point and a time; [`Deformation`] turns the feature into changes of the Gaussians' attributes;
+//! [`DynamicScene`] is all of it together. [`regularizer`] keeps the planes smooth.
+
+mod arrays;
+pub(crate) mod contraction;
+pub(crate) mod coordinates;
+pub(crate) mod deformation;
+pub(crate) mod dynamic_scene;
+pub(crate) mod field;
+pub(crate) mod gaussians;
+pub(crate) mod hexplane;
+pub(crate) mod hexplane_field;
+pub mod regularizer;
+pub mod spherical_harmonics;
+
+pub use arrays::ModelError;
+pub use contraction::contract;
+pub use coordinates::{Pca, SceneCoordinates};
+pub use deformation::{Deformation, DeformationConfig, DeformationHead};
+pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
+pub use field::{DeformationField, Offsets};
+pub use gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
+pub use hexplane::{HexPlane, HexPlaneConfig};
+pub use hexplane_field::{HexPlaneField, HexPlaneFieldConfig};

@@ -1,0 +1,101 @@
+//! Channel-wise autoregressive entropy model of the spherical harmonics: degree by degree (paper III-D, an alternative).
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+
+use super::entropy::{ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
+use super::network::{Names, ShNetwork};
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
+
+/// First channel and number of channels of the degrees 1, 2 and 3.
+const DEGREES: [(usize, usize); 3] = [(0, 9), (9, 15), (24, 21)];
+const NAMES: [Names; 3] = [["sh_ar.0.0", "sh_ar.0.2"], ["sh_ar.1.0", "sh_ar.1.2"], ["sh_ar.2.0", "sh_ar.2.2"]];
+const DC: usize = 3;
+
+/// Configuration of a [`ShAutoregressive`].
+#[derive(Config, Debug)]
+pub struct ShAutoregressiveConfig {
+    /// Distance between the values of neighbouring symbols.
+    #[config(default = 0.02)]
+    pub step: f32,
+    /// Width of the hidden layers.
+    #[config(default = 32)]
+    pub hidden: usize,
+    /// Standard deviations at the start, in steps.
+    #[config(default = 4.0)]
+    pub initial_scale: f32,
+}
+
+impl ShAutoregressiveConfig {
+    /// Random weights; the last layers start at the initial scale and mean 0.
+    pub fn init(&self, device: &Device) -> ShAutoregressive {
+        let network = |(known, channels)| ShNetwork::new(DC + known, self.hidden, channels, self.initial_scale, device);
+        ShAutoregressive { degrees: DEGREES.map(network), step: self.step }
+    }
+}
+
+/// A network for each degree: from the colour and all lower degrees of the same Gaussian to the Gaussian of each of the
+/// degree's channels.
+#[derive(Module, Debug)]
+pub struct ShAutoregressive {
+    /// `sh_ar.{degree - 1}`.
+    pub degrees: [ShNetwork; 3],
+    step: f32,
+}
+
+impl ShAutoregressive {
+    /// The layers as the stream stores them.
+    pub fn layers(&self) -> Vec<Layer<'_>> {
+        self.degrees.iter().zip(NAMES).flat_map(|(network, names)| network.layers(names)).collect()
+    }
+
+    /// Scales and means `[2 C, 1, N]` of a degree's channels, from `dc [3, N]` and the lower degrees in `values [45, N]`.
+    fn output(&self, degree: usize, dc: &Tensor<2>, values: &Tensor<2>) -> Tensor<3> {
+        let (lower, _) = DEGREES[degree];
+        let features = match lower {
+            0 => dc.clone(),
+            _ => Tensor::cat(vec![dc.clone(), values.clone().narrow(0, 0, lower)], 0),
+        };
+        self.degrees[degree].forward(features.unsqueeze_dim(1))
+    }
+}
+
+fn dc_of(known: &ShKnown) -> Tensor<2> {
+    known.sh_dc.clone().squeeze_dim::<2>(1).transpose()
+}
+
+impl ShEntropy for ShAutoregressive {
+    fn step(&self) -> f32 {
+        self.step
+    }
+
+    fn bits(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
+        let (dc, values) = (dc_of(known), channels_first(values));
+        let degrees = DEGREES.iter().enumerate().map(|(degree, (start, channels))| {
+            let own = values.clone().narrow(0, *start, *channels);
+            gaussian_bits(own, self.output(degree, &dc, &values), self.step)
+        });
+        channels_last(Tensor::cat(degrees.collect(), 0))
+    }
+
+    fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
+        let (dc, values) = (dc_of(known), channels_first(values.detach()));
+        let mut decoded: Vec<Tensor<2>> = Vec::new();
+        for (degree, (start, channels)) in DEGREES.into_iter().enumerate() {
+            // A network looks only at what lies before its own channels.
+            let lower = if degree == 0 { values.clone() } else { Tensor::cat(decoded.clone(), 0) };
+            let own = values.clone().narrow(0, start, channels);
+            decoded.push(round_around(own, self.output(degree, &dc, &lower).detach(), self.step));
+        }
+        channels_last(Tensor::cat(decoded, 0))
+    }
+}
+
+impl NamedParameters for ShAutoregressive {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        for (network, names) in self.degrees.iter_mut().zip(NAMES) {
+            network.visit_layers(names, visitor);
+        }
+    }
+}

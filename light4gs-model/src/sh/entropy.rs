@@ -1,0 +1,84 @@
+//! What an entropy model of the spherical harmonics is, and what a decoder knows before it asks one.
+
+use std::ops::RangeInclusive;
+
+use burn::tensor::{Device, Distribution, Tensor};
+
+use crate::entropy::gaussian_conditional::{bits, gaussian_likelihood};
+
+/// Channels of the higher spherical harmonics.
+pub const SH_CHANNELS: usize = 45;
+
+/// What a decoder knows of the Gaussians before it decodes their spherical harmonics.
+#[derive(Clone, Debug)]
+pub struct ShKnown {
+    /// Degree-0 spherical harmonics, `[N, 1, 3]`.
+    pub sh_dc: Tensor<3>,
+    /// Positions in the scene's frame, `[N, 3]` in [-1, 1].
+    pub positions: Tensor<2>,
+    /// All planes of the hexplane `[M, H, W]`, scale-major.
+    pub planes: Vec<Tensor<3>>,
+}
+
+impl ShKnown {
+    /// For models whose densities depend on nothing (see [`ShTables`]): no Gaussian, no plane.
+    pub fn nothing(device: &Device) -> Self {
+        Self { sh_dc: Tensor::zeros([0, 1, 3], device), positions: Tensor::zeros([0, 3], device), planes: Vec::new() }
+    }
+}
+
+/// An entropy model of `sh_rest`.
+pub trait ShEntropy {
+    /// Distance between the values of neighbouring symbols.
+    fn step(&self) -> f32;
+
+    /// Bits of each value, `[N, 15, 3]`, of `values [N, 15, 3]`: noisy in training, quantised in an evaluation.
+    /// Differentiable in the values, in what is known and in the weights.
+    fn bits(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
+
+    /// Values with uniform noise of the step's width, which stands for rounding in training.
+    fn add_noise(&self, values: Tensor<3>) -> Tensor<3> {
+        let half = f64::from(self.step()) / 2.0;
+        let noise = Tensor::random(values.dims(), Distribution::Uniform(-half, half), &values.device());
+        values + noise
+    }
+
+    /// `values` as a decoder gets them. Without gradient.
+    fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
+}
+
+/// An entropy model whose densities do not depend on anything: a frequency table for each channel.
+pub trait ShTables {
+    /// For each of the 45 channels the probabilities of these symbols (`value / step`), in float64 on the host.
+    fn pmf(&self, symbols: RangeInclusive<i32>) -> Vec<Vec<f64>>;
+}
+
+/// `[45, N]` from `[N, 15, 3]`.
+pub(crate) fn channels_first(values: Tensor<3>) -> Tensor<2> {
+    let count = values.dims()[0];
+    values.reshape([count, SH_CHANNELS]).transpose()
+}
+
+/// `[N, 15, 3]` from `[45, N]`.
+pub(crate) fn channels_last(values: Tensor<2>) -> Tensor<3> {
+    let count = values.dims()[1];
+    values.transpose().reshape([count, SH_CHANNELS / 3, 3])
+}
+
+/// Bits `[C, N]` of `values [C, N]`, given the output `[2 C, 1, N]` of a network: first scales, then means, in steps.
+pub(crate) fn gaussian_bits(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
+    let [scales, means] = scales_and_means(output);
+    bits(gaussian_likelihood(values / step, means, scales))
+}
+
+/// `values [C, N]` rounded around the means of a network's output `[2 C, 1, N]`.
+pub(crate) fn round_around(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
+    let [_, means] = scales_and_means(output);
+    ((values / step - means.clone()).round() + means) * step
+}
+
+fn scales_and_means(output: Tensor<3>) -> [Tensor<2>; 2] {
+    let output: Tensor<2> = output.squeeze_dim(1);
+    let channels = output.dims()[0] / 2;
+    [output.clone().narrow(0, 0, channels), output.narrow(0, channels, channels)]
+}

@@ -1,0 +1,93 @@
+//! Entropy model of the spherical harmonics that asks the hexplanes (paper III-D, an alternative).
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::PLANES_PER_SCALE;
+
+use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
+use super::network::{Names, ShNetwork};
+use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
+use crate::scene::hexplane::query_planes;
+
+const NAMES: Names = ["sh_hex.0", "sh_hex.2"];
+
+/// Configuration of a [`ShHexPlaneCoupled`].
+#[derive(Config, Debug)]
+pub struct ShHexPlaneCoupledConfig {
+    /// Channels of a plane times scales: the length of a hexplane's feature.
+    pub feature_size: usize,
+    /// Distance between the values of neighbouring symbols.
+    #[config(default = 0.02)]
+    pub step: f32,
+    /// Width of the hidden layer.
+    #[config(default = 32)]
+    pub hidden: usize,
+    /// Standard deviations at the start, in steps.
+    #[config(default = 4.0)]
+    pub initial_scale: f32,
+}
+
+impl ShHexPlaneCoupledConfig {
+    /// Random weights; the last layer starts at the initial scale and mean 0.
+    pub fn init(&self, device: &Device) -> ShHexPlaneCoupled {
+        let network = ShNetwork::new(self.feature_size, self.hidden, SH_CHANNELS, self.initial_scale, device);
+        ShHexPlaneCoupled { network, step: self.step }
+    }
+}
+
+/// A network from the space-only planes' feature at a Gaussian's position to the Gaussian of each of its channels.
+#[derive(Module, Debug)]
+pub struct ShHexPlaneCoupled {
+    /// `sh_hex`.
+    pub network: ShNetwork,
+    step: f32,
+}
+
+impl ShHexPlaneCoupled {
+    /// The layers as the stream stores them.
+    pub fn layers(&self) -> Vec<Layer<'_>> {
+        self.network.layers(NAMES).collect()
+    }
+
+    /// Scales and means `[90, 1, N]`.
+    fn output(&self, known: &ShKnown) -> Tensor<3> {
+        self.network.forward(space_feature(&known.planes, known.positions.clone()).transpose().unsqueeze_dim(1))
+    }
+}
+
+/// `[N, M · scales]` at positions `[N, 3]`: the product of the three space-only planes' bilinear samples, the scales side
+/// by side. The hexplane's query, with ones for the planes that hold time.
+pub fn space_feature(planes: &[Tensor<3>], positions: Tensor<2>) -> Tensor<2> {
+    const MOMENTS: usize = 2;
+    let device = positions.device();
+    let [count, _] = positions.dims();
+    let points = Tensor::cat(vec![positions, Tensor::zeros([count, 1], &device)], 1);
+    let planes = planes.chunks_exact(PLANES_PER_SCALE).flat_map(|scale| {
+        let [xy, xz, _, yz, ..] = scale else { unreachable!("chunks of six") };
+        let ([channels, y, x], [_, z, _]) = (xy.dims(), xz.dims());
+        let [xt, yt, zt] = [x, y, z].map(|length| Tensor::ones([channels, MOMENTS, length], &device));
+        [xy.clone(), xz.clone(), xt, yz.clone(), yt, zt]
+    });
+    query_planes(points, planes.collect())
+}
+
+impl ShEntropy for ShHexPlaneCoupled {
+    fn step(&self) -> f32 {
+        self.step
+    }
+
+    fn bits(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
+        channels_last(gaussian_bits(channels_first(values), self.output(known), self.step))
+    }
+
+    fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
+        channels_last(round_around(channels_first(values.detach()), self.output(known).detach(), self.step))
+    }
+}
+
+impl NamedParameters for ShHexPlaneCoupled {
+    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
+        self.network.visit_layers(NAMES, visitor);
+    }
+}

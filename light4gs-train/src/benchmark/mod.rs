@@ -1,0 +1,428 @@
+//! Timing of every stage of a training step, on scenes that anybody can make again.
+
+pub mod codec;
+
+use std::path::Path;
+use std::time::Instant;
+
+use burn::module::Param;
+use burn::tensor::{Device, Distribution, Tensor, TensorData};
+use glam::{Mat3, Quat, Vec3};
+use light4gs_data::{Camera, DataError, PointCloud};
+use light4gs_model::{
+    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter,
+    regularizer,
+};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use safetensors::{Dtype, SafeTensors};
+use serde::Serialize;
+
+use crate::compression::Compression;
+use crate::config::{Config, DeviceName};
+use crate::device::adapter_name;
+use crate::error::TrainError;
+use crate::evaluation::metrics::l1;
+use crate::optimization::adam::Adam;
+use crate::optimization::gradients::GradientSums;
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
+use crate::report::table::{Align, Table};
+
+/// Untimed repetitions before the timed ones.
+const WARM_UP: usize = 2;
+/// Side of the calibration product's matrices.
+const CALIBRATION: usize = 1024;
+
+/// Gaussians and a camera to time with.
+#[derive(Clone, Debug)]
+pub struct BenchScene {
+    /// Name in the table.
+    pub name: String,
+    camera: Camera,
+    background: [f32; 3],
+    means: Vec<f32>,
+    log_scales: Vec<f32>,
+    quats: Vec<f32>,
+    opacity_logits: Vec<f32>,
+    /// `[N, 16, 3]`
+    sh: Vec<f32>,
+}
+
+impl BenchScene {
+    /// A seeded cloud of `count` Gaussians in the unit ball before a camera with a square picture.
+    pub fn generate(count: usize, size: u32) -> Self {
+        let mut rng = ChaCha8Rng::seed_from_u64(count as u64);
+        let mut symmetric = |half: f32| rng.random_range(-half..half);
+        let mut scene = Self {
+            name: format!("{}k @ {size}²", count as f32 / 1000.0),
+            camera: Camera::look_at(Vec3::new(0.0, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.69, size, size),
+            background: [1.0; 3],
+            means: Vec::new(),
+            log_scales: Vec::new(),
+            quats: Vec::new(),
+            opacity_logits: Vec::new(),
+            sh: Vec::new(),
+        };
+        // Total projected area stays the same as the count grows, as in trained scenes.
+        let typical = -3.0 - 0.5 * (count as f32 / 5000.0).ln();
+        for _ in 0..count {
+            scene.means.extend((0..3).map(|_| symmetric(1.2)));
+            scene.log_scales.extend((0..3).map(|_| typical + symmetric(0.7)));
+            scene.quats.extend((0..4).map(|k| symmetric(1.0) + if k == 0 { 1.5 } else { 0.0 }));
+            scene.opacity_logits.push(symmetric(3.0));
+            scene.sh.extend((0..48).map(|k| symmetric(if k < 3 { 1.5 } else { 0.2 })));
+        }
+        scene
+    }
+
+    /// Reads a scene file: `means`, `log_scales`, `quats_wxyz`, `raw_opacities`, `sh_coeffs`, `background`,
+    /// `image_wh`, `K`, `viewmat` (see `docs/benchmarks.md`).
+    pub fn open(path: &Path) -> Result<Self, TrainError> {
+        let bytes =
+            std::fs::read(path).map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
+        let field = |field: &str, problem: String| DataError::Field {
+            path: path.to_owned(),
+            field: field.to_owned(),
+            problem,
+            remedy: "see docs/benchmarks.md for the layout".into(),
+        };
+        let file = SafeTensors::deserialize(&bytes).map_err(|error| field("header", error.to_string()))?;
+        let values = |name: &str, expected: Option<usize>| -> Result<Vec<f32>, DataError> {
+            let view = file.tensor(name).map_err(|error| field(name, error.to_string()))?;
+            let data = view.data();
+            let values: Vec<f32> = match view.dtype() {
+                Dtype::F32 => data.as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect(),
+                Dtype::I32 => data.as_chunks().0.iter().map(|b| i32::from_le_bytes(*b) as f32).collect(),
+                Dtype::I64 => data.as_chunks().0.iter().map(|b| i64::from_le_bytes(*b) as f32).collect(),
+                other => return Err(field(name, format!("type {other:?}, expected float32 or integers"))),
+            };
+            match expected {
+                Some(expected) if expected != values.len() => {
+                    Err(field(name, format!("{} values, expected {expected}", values.len())))
+                }
+                _ => Ok(values),
+            }
+        };
+        let opacity_logits = values("raw_opacities", None)?;
+        let count = opacity_logits.len();
+        if count == 0 {
+            return Err(field("raw_opacities", "no Gaussians, expected at least one".into()).into());
+        }
+        let size = values("image_wh", Some(2))?;
+        if !size.iter().all(|side| (1.0..=16_384.0).contains(side)) {
+            return Err(field("image_wh", format!("{size:?}, expected sides between 1 and 16384")).into());
+        }
+        let k = values("K", Some(9))?;
+        let m = values("viewmat", Some(16))?;
+        let background = values("background", Some(3))?;
+        Ok(Self {
+            name: path.file_stem().unwrap_or_default().to_string_lossy().into_owned(),
+            camera: Camera {
+                rotation: Mat3::from_cols_array(&[m[0], m[4], m[8], m[1], m[5], m[9], m[2], m[6], m[10]]),
+                translation: Vec3::new(m[3], m[7], m[11]),
+                fx: k[0],
+                fy: k[4],
+                cx: k[2],
+                cy: k[5],
+                width: size[0] as u32,
+                height: size[1] as u32,
+            },
+            background: [background[0], background[1], background[2]],
+            means: values("means", Some(3 * count))?,
+            log_scales: values("log_scales", Some(3 * count))?,
+            quats: values("quats_wxyz", Some(4 * count))?,
+            sh: values("sh_coeffs", Some(48 * count))?,
+            opacity_logits,
+        })
+    }
+
+    fn count(&self) -> usize {
+        self.opacity_logits.len()
+    }
+
+    /// Where it is seen from.
+    pub fn camera(&self) -> &Camera {
+        &self.camera
+    }
+
+    /// The Gaussians on a device.
+    pub fn gaussians(&self, device: &Device) -> Gaussians {
+        let count = self.count();
+        let matrix = |values: &[f32], columns: usize| {
+            Tensor::<2>::from_data(TensorData::new(values.to_vec(), [count, columns]), device)
+        };
+        let sh = |range: std::ops::Range<usize>| {
+            let values: Vec<f32> = self.sh.chunks_exact(48).flat_map(|row| row[range.clone()].to_vec()).collect();
+            Tensor::<3>::from_data(TensorData::new(values, [count, range.len() / 3, 3]), device)
+        };
+        Gaussians::from_tensors(GaussianTensors {
+            means: matrix(&self.means, 3),
+            log_scales: matrix(&self.log_scales, 3),
+            quats: matrix(&self.quats, 4),
+            opacity_logits: matrix(&self.opacity_logits, 1),
+            sh_dc: sh(0..3),
+            sh_rest: sh(3..48),
+        })
+    }
+
+    /// A dynamic scene over these Gaussians, with the planes and the network of a preset.
+    fn dynamic(&self, config: &DynamicSceneConfig, device: &Device) -> DynamicScene {
+        let positions = self.means.as_chunks::<3>().0.to_vec();
+        let colors = vec![[0.5; 3]; positions.len()];
+        let mut scene = config.init(&PointCloud { positions, colors }, device);
+        scene.gaussians = self.gaussians(device);
+        scene
+    }
+
+    /// The camera turned a little about the vertical, so that a series of frames is not one frame.
+    fn camera_at(&self, frame: usize) -> Camera {
+        let turn = Mat3::from_quat(Quat::from_rotation_z(0.02 * frame as f32));
+        Camera { rotation: self.camera.rotation * turn, ..self.camera }
+    }
+}
+
+/// Median milliseconds of one stage.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageTime {
+    /// What was timed.
+    pub stage: &'static str,
+    /// Median over the repetitions.
+    pub milliseconds: f64,
+}
+
+/// All stages on one scene.
+#[derive(Clone, Debug, Serialize)]
+pub struct SceneTimes {
+    /// Name of the scene.
+    pub scene: String,
+    /// In the order of a training step.
+    pub stages: Vec<StageTime>,
+}
+
+/// All scenes on one device.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeviceTimes {
+    /// Name of the back end.
+    pub device: String,
+    /// What its graphics adapter calls itself, if it has one.
+    pub adapter: Option<String>,
+    /// Median of a 1024×1024 float32 product, to set machines side by side.
+    pub calibration_ms: f64,
+    /// One entry a scene.
+    pub scenes: Vec<SceneTimes>,
+}
+
+/// Median wall time of `run` in milliseconds; `prepare` is not timed.
+fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T, mut run: impl FnMut(T) -> R) -> f64 {
+    let mut times = Vec::with_capacity(repeats);
+    for repetition in 0..WARM_UP + repeats {
+        let input = prepare();
+        // A device that cannot wait has nothing to wait for.
+        let _ = device.sync();
+        let begin = Instant::now();
+        let output = run(input);
+        let _ = device.sync();
+        if repetition >= WARM_UP {
+            times.push(begin.elapsed().as_secs_f64() * 1e3);
+        }
+        drop(output);
+    }
+    times.sort_by(f64::total_cmp);
+    times[times.len() / 2]
+}
+
+/// Times every stage on every scene.
+pub fn benchmark(
+    name: DeviceName,
+    device: &Device,
+    scenes: &[BenchScene],
+    repeats: usize,
+) -> Result<DeviceTimes, TrainError> {
+    let autodiff = device.clone().autodiff();
+    let matrix = || Tensor::<2>::random([CALIBRATION, CALIBRATION], Distribution::Default, device);
+    let (a, b) = (matrix(), matrix());
+    let calibration_ms = median(device, repeats, || (a.clone(), b.clone()), |(a, b)| a.matmul(b));
+    let small = Config::from_preset("dnerf-small")?;
+    let scenes = scenes
+        .iter()
+        .map(|scene| SceneTimes {
+            scene: scene.name.clone(),
+            stages: stages(scene, device, &autodiff, &small, repeats),
+        })
+        .collect();
+    Ok(DeviceTimes { device: name.to_string(), adapter: adapter_name(name, device), calibration_ms, scenes })
+}
+
+fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config, repeats: usize) -> Vec<StageTime> {
+    let mut out = Vec::new();
+    let mut add = |stage: &'static str, milliseconds: f64| out.push(StageTime { stage, milliseconds });
+    let splatter = Splatter::new(scene.background, 3);
+    let [height, width] = [scene.camera.height as usize, scene.camera.width as usize];
+
+    let still = scene.gaussians(device);
+    add(
+        "project",
+        median(
+            device,
+            repeats,
+            || still.tensors(),
+            |g| {
+                // A picture of one pixel: everything but the blending.
+                let camera = Camera { width: 1, height: 1, ..scene.camera };
+                splatter.render(g, &camera, None)
+            },
+        ),
+    );
+    let forward = median(device, repeats, || still.tensors(), |g| splatter.render(g, &scene.camera, None).image);
+    add("splat forward", forward);
+
+    let trained = scene.gaussians(autodiff);
+    let weights = Tensor::<3>::random([height, width, 3], Distribution::Default, autodiff);
+    let weighted = |g: GaussianTensors| (splatter.render(g, &scene.camera, None).image * weights.clone()).sum();
+    add("splat backward", median(device, repeats, || weighted(trained.tensors()), |loss| loss.backward()));
+    add("splat forward + backward", median(device, repeats, || trained.tensors(), |g| weighted(g).backward()));
+
+    let count = scene.count();
+    let planes = HexPlaneConfig::new().with_resolution([64, 64, 64, 24]).init(autodiff);
+    let points = Tensor::<2>::random([count, 4], Distribution::Uniform(-1.0, 1.0), autodiff).require_grad();
+    let upstream = Tensor::<2>::random([count, planes.feature_size()], Distribution::Default, autodiff);
+    add("hexplane forward", median(device, repeats, || points.clone(), |points| planes.query(points)));
+    let query = |points: Tensor<2>| (planes.query(points) * upstream.clone()).sum();
+    add("hexplane backward", median(device, repeats, || query(points.clone()), |loss| loss.backward()));
+    let both = median(device, repeats, || points.clone(), |points| query(points).backward());
+    add("hexplane forward + backward", both);
+
+    let network = DeformationConfig::new(64).init(autodiff);
+    let features = Tensor::<2>::random([count, 64], Distribution::Default, autodiff).require_grad();
+    let deform = |features: Tensor<2>| {
+        let deltas = network.forward(features);
+        let parts = [deltas.position, deltas.scale, deltas.rotation];
+        parts.into_iter().flatten().map(|t| t.sum()).reduce(|a, b| a + b).expect("three heads")
+    };
+    add("deformation forward", median(device, repeats, || features.clone(), &deform));
+    add("deformation backward", median(device, repeats, || deform(features.clone()), |loss| loss.backward()));
+
+    let config = small.model.build();
+    let mut dynamic = scene.dynamic(&config, autodiff);
+    let truth = Tensor::<3>::zeros([height, width, 3], autodiff);
+    let weights = small.train.regularizer.clone();
+    let loss_of = |scene_model: &DynamicScene, frame: usize| {
+        let image = splatter.render(scene_model.at(0.3), &scene.camera_at(frame), None).image;
+        let regularization = regularizer::weighted_sum(
+            &scene_model.field.hexplane,
+            weights.plane_tv,
+            weights.time_smoothness,
+            weights.time_l1,
+        );
+        l1(image, truth.clone()) + regularization
+    };
+    let mut adam = Adam::default();
+    // Rates so small that the scene stays what it is while it is timed.
+    let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
+        visit_parameters(dynamic, &mut TinySteps { adam: &mut adam, gradients: &mut gradients });
+    };
+    let mut times = [Vec::new(), Vec::new()];
+    for repetition in 0..WARM_UP + repeats {
+        let begin = Instant::now();
+        let mut tape = loss_of(&dynamic, repetition).backward();
+        let mut gradients = GradientSums::default();
+        gradients.add_scene(&mut dynamic, &mut tape);
+        let _ = device.sync();
+        let middle = Instant::now();
+        update(&mut dynamic, gradients);
+        let _ = device.sync();
+        if repetition >= WARM_UP {
+            times[0].push(middle.elapsed().as_secs_f64() * 1e3);
+            times[1].push(begin.elapsed().as_secs_f64() * 1e3);
+        }
+    }
+    let [adam_ms, step_ms] = times.map(|mut t| {
+        t.sort_by(f64::total_cmp);
+        t[t.len() / 2]
+    });
+    add("Adam step", adam_ms);
+    add("training step", step_ms);
+
+    let compression = Compression::new(small, autodiff);
+    let fraction = small.compression.rate.fraction;
+    let lambda = 0.05;
+    for (stage, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {
+        let mut random = ChaCha8Rng::seed_from_u64(1);
+        let step = median(
+            autodiff,
+            repeats,
+            || (),
+            |()| {
+                let mut noisy = compression.noisy(&dynamic, true, true);
+                let mut sums = GradientSums::default();
+                let image = splatter.render(noisy.scene.at(0.3), &scene.camera, None).image;
+                sums.add_scene(&mut noisy.scene, &mut l1(image, truth.clone()).backward());
+                if with_rate {
+                    let rate = compression.rate(&noisy, fraction, true, &mut random);
+                    sums.add_scene(&mut noisy.scene, &mut (rate.megabytes() * lambda).backward());
+                }
+                update(&mut dynamic, sums);
+            },
+        );
+        add(stage, step);
+    }
+
+    let decoded = scene.dynamic(&config, device);
+    let mut frame = 0;
+    add(
+        "render",
+        median(
+            device,
+            repeats,
+            || (),
+            |()| {
+                frame += 1;
+                splatter.render(decoded.at(0.3), &scene.camera_at(frame), None).image
+            },
+        ),
+    );
+    out
+}
+
+struct TinySteps<'a> {
+    adam: &'a mut Adam,
+    gradients: &'a mut GradientSums,
+}
+
+impl ParameterVisitor for TinySteps<'_> {
+    fn visit<const D: usize>(&mut self, _: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
+        if let Some(gradient) = self.gradients.remove(name) {
+            let gradient = gradient.reshape(parameter.val().dims());
+            self.adam.step(name, parameter, gradient, 1e-12);
+        }
+    }
+}
+
+/// One table: a row a stage, a column a device and scene.
+pub fn table(results: &[DeviceTimes]) -> String {
+    let mut columns = vec![("ms (median)".to_owned(), Align::Left)];
+    for device in results {
+        columns.extend(device.scenes.iter().map(|s| (format!("{} {}", device.device, s.scene), Align::Right)));
+    }
+    let mut table = Table::new(columns);
+    let Some(first) = results.first().and_then(|device| device.scenes.first()) else { return String::new() };
+    let cells = |row: &str, value: &dyn Fn(&DeviceTimes, &SceneTimes) -> f64| {
+        let times = results.iter().flat_map(|device| device.scenes.iter().map(move |scene| (device, scene)));
+        std::iter::once(row.to_owned())
+            .chain(times.map(|(device, scene)| format!("{:.2}", value(device, scene))))
+            .collect::<Vec<_>>()
+    };
+    for (i, stage) in first.stages.iter().enumerate() {
+        table.row(cells(stage.stage, &|_, scene| scene.stages[i].milliseconds));
+    }
+    let stage_of = |name: &'static str| {
+        move |_: &DeviceTimes, scene: &SceneTimes| {
+            1e3 / scene.stages.iter().find(|s| s.stage == name).map_or(f64::NAN, |s| s.milliseconds)
+        }
+    };
+    table.row(cells("training it/s", &stage_of("training step")));
+    table.row(cells("render FPS", &stage_of("render")));
+    table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
+    let adapters = results.iter().filter_map(|device| Some((&device.device, device.adapter.as_ref()?)));
+    adapters.fold(table.to_string(), |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
+}

@@ -1,0 +1,84 @@
+//! Progress bars, as an observer of the trainer.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+use crate::Stage;
+use crate::error::TrainError;
+use crate::observers::metrics_log::MetricsRecord;
+use crate::observers::{Observer, SceneInTraining, StepReport};
+
+/// A bar for each stage, and one for the fitting of entropy models.
+pub(super) struct ProgressBars {
+    hidden: bool,
+    stage: ProgressBar,
+    fit: FitBar,
+}
+
+impl ProgressBars {
+    /// `quiet` shows nothing.
+    pub(super) fn new(quiet: bool) -> Self {
+        Self { hidden: quiet, stage: ProgressBar::hidden(), fit: FitBar::new(quiet) }
+    }
+}
+
+impl Observer for ProgressBars {
+    fn on_stage(&mut self, stage: Stage, done: usize, iterations: usize) -> Result<(), TrainError> {
+        let template = "{prefix:>6} {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}  {msg}";
+        self.stage = bar(self.hidden, iterations, template);
+        self.stage.set_prefix(stage.name());
+        self.stage.set_position(done as u64);
+        self.stage.reset_eta();
+        Ok(())
+    }
+
+    fn on_step(&mut self, _: &StepReport, _: &dyn SceneInTraining) -> Result<(), TrainError> {
+        self.stage.inc(1);
+        Ok(())
+    }
+
+    fn on_log(&mut self, record: &MetricsRecord) -> Result<(), TrainError> {
+        if let Some(psnr) = record.psnr {
+            self.stage.set_message(format!("{psnr:.2} dB  {} Gaussians", record.gaussians));
+        }
+        Ok(())
+    }
+
+    fn on_stage_end(&mut self, _: Stage) -> Result<(), TrainError> {
+        self.stage.finish();
+        Ok(())
+    }
+
+    fn on_fit(&mut self, done: usize, iterations: usize) -> Result<(), TrainError> {
+        self.fit.show(done, iterations);
+        Ok(())
+    }
+}
+
+/// The bar of the fitting of entropy models, made when that begins.
+pub(super) struct FitBar {
+    hidden: bool,
+    bar: Option<ProgressBar>,
+}
+
+impl FitBar {
+    /// `quiet` shows nothing.
+    pub(super) fn new(quiet: bool) -> Self {
+        Self { hidden: quiet, bar: None }
+    }
+
+    /// So many of the iterations are done.
+    pub(super) fn show(&mut self, done: usize, iterations: usize) {
+        let template = "   fit {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}";
+        let bar = self.bar.get_or_insert_with(|| bar(self.hidden, iterations, template));
+        bar.set_position(done as u64);
+        if done == iterations {
+            bar.finish();
+        }
+    }
+}
+
+fn bar(hidden: bool, length: usize, template: &str) -> ProgressBar {
+    let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(length as u64) };
+    bar.set_style(ProgressStyle::with_template(template).expect("a valid template"));
+    bar
+}

@@ -1,0 +1,165 @@
+//! From a trained scene to a file: models if there are none yet, training images for the step search, the bytes, and the
+//! record of what was expected and what came out.
+
+use std::time::Instant;
+
+use burn::tensor::Device;
+use light4gs_codec::plane_layout::plane_name;
+use light4gs_codec::{PlaneBytes, Profile, SceneData};
+use light4gs_data::{Frame, Scene};
+use light4gs_model::{DynamicScene, Splatter};
+use serde::{Deserialize, Serialize};
+
+use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit};
+use crate::config::{Config, FileProfile};
+use crate::dataset::{ImageSource, scene_meta};
+use crate::error::TrainError;
+
+/// Training views that the step search looks at.
+const SEARCH_VIEWS: usize = 8;
+
+/// How a file was coded: what the models expected of it and what it took, `coding.json` in a run's folder.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CodingRecord {
+    /// Profile of the file.
+    pub profile: FileProfile,
+    /// Seconds of fitting models to a scene that was trained without them.
+    pub fit_seconds: Option<f64>,
+    /// Seconds of encoding, checking included.
+    pub encode_seconds: f64,
+    /// Bits that the models of the training give.
+    pub estimated_bits: BitEstimate,
+    /// Bits in the file, models and tables aside.
+    pub coded_bits: BitEstimate,
+    /// Of every plane.
+    pub planes: Vec<PlaneRecord>,
+}
+
+/// How a plane was coded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlaneRecord {
+    /// Scale and axes, as in `0.xy`.
+    pub name: String,
+    /// Quantisation step.
+    pub step: f32,
+    /// Values.
+    pub symbols: usize,
+    /// Bytes of the hyperprior.
+    pub hyperprior_bytes: u64,
+    /// Bytes of the values.
+    pub value_bytes: u64,
+}
+
+/// A scene as trained, and where its images are.
+pub struct TrainedScene<'a> {
+    /// The model.
+    pub scene: &'a DynamicScene,
+    /// Its entropy models, if it was trained with them.
+    pub compression: Option<&'a Compression>,
+    /// The run's.
+    pub config: &'a Config,
+    /// The dataset.
+    pub data: &'a Scene,
+    /// Its images.
+    pub images: &'a dyn ImageSource,
+    /// With autodiff.
+    pub device: &'a Device,
+}
+
+/// A file in memory.
+#[derive(Clone, Debug)]
+pub struct CodedScene {
+    /// The file.
+    pub bytes: Vec<u8>,
+    /// How it was coded, and where its planes' bits are; not in the `float32` profile.
+    pub coding: Option<(CodingRecord, Vec<BitMap>)>,
+}
+
+/// Encodes a trained scene in the profile of its configuration. Where the scene was trained without entropy models they are
+/// fitted first; `progress` is told the iterations done, and those that there are.
+///
+/// # Errors
+/// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
+pub fn code_scene(
+    trained: &TrainedScene,
+    progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
+) -> Result<CodedScene, TrainError> {
+    let TrainedScene { scene, config, data, device, .. } = trained;
+    let meta = scene_meta(config, data);
+    let settings = &config.compression;
+    let Some(profile) = settings.profile.coded() else {
+        return Ok(CodedScene { bytes: light4gs_codec::encode(&scene.to_arrays(meta))?, coding: None });
+    };
+    let (compression, fit_seconds) = match trained.compression {
+        Some(compression) => (compression.clone(), None),
+        None => {
+            let begin = Instant::now();
+            let compression = fit(scene, config, device, progress)?;
+            (compression, Some(begin.elapsed().as_secs_f64()))
+        }
+    };
+    let begin = Instant::now();
+    let views = search_views(data);
+    let inner = (*device).clone().inner();
+    let render = |data: &SceneData| render_views(data, &views, &inner);
+    let pictures = if settings.attributes.search_tolerance > 0.0 && profile == Profile::Compact {
+        let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images)?;
+        Some(Pictures { render: &render, error })
+    } else {
+        None
+    };
+    let encoded = encode(scene, &compression, meta, settings, profile, pictures, device)?;
+    let sizes = &encoded.coded.report;
+    let hexplane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
+    let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
+    let record = CodingRecord {
+        profile: settings.profile,
+        fit_seconds,
+        encode_seconds: begin.elapsed().as_secs_f64(),
+        estimated_bits: encoded.coded.estimate,
+        coded_bits: BitEstimate { hexplanes: 8.0 * hexplane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
+        planes: plane_records(&encoded, &compression),
+    };
+    Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
+}
+
+fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {
+    let steps = compression.quantization.steps_without_gradient().values();
+    let record = |bytes: &PlaneBytes| PlaneRecord {
+        name: plane_name(bytes.plane),
+        step: steps[bytes.plane],
+        symbols: encoded.decoded.hexplane.planes[bytes.plane].values.len(),
+        hyperprior_bytes: bytes.hyperprior,
+        value_bytes: bytes.anchors + bytes.others,
+    };
+    encoded.coded.report.planes.iter().map(record).collect()
+}
+
+fn search_views(data: &Scene) -> Vec<&Frame> {
+    let stride = data.train.len().div_ceil(SEARCH_VIEWS).max(1);
+    data.train.iter().step_by(stride).collect()
+}
+
+/// Pixel values of all views, clamped to [0, 1].
+fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
+    let scene: DynamicScene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
+    let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
+    let picture = |frame: &&Frame| {
+        let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;
+        image.clamp(0.0, 1.0).into_data().iter::<f32>().collect::<Vec<_>>()
+    };
+    views.iter().flat_map(picture).collect()
+}
+
+fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &dyn ImageSource) -> Result<f64, TrainError> {
+    let mut sum = 0.0;
+    let mut rest = pixels;
+    for frame in views {
+        let truth = images.image(frame)?;
+        let (own, others) = rest.split_at(truth.pixels.len());
+        let errors = own.iter().zip(&truth.pixels).map(|(value, byte)| f64::from(*value) - f64::from(*byte) / 255.0);
+        sum += errors.map(|error| error.powi(2)).sum::<f64>();
+        rest = others;
+    }
+    Ok(sum / pixels.len().max(1) as f64)
+}

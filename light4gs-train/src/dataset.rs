@@ -1,0 +1,97 @@
+//! Where a run's frames and images come from.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use light4gs_codec::SceneMeta;
+use light4gs_data::{DataError, Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene};
+
+use crate::config::Config;
+
+/// Gives the images of frames. Asked by several threads at once.
+pub trait ImageSource: Send + Sync {
+    /// The image of a frame, of the size of the frame's camera.
+    ///
+    /// # Errors
+    /// Where the frame has no image, or it cannot be read.
+    fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError>;
+
+    /// These frames will be asked for; a source may begin to read them.
+    fn prefetch(&self, frames: &[Frame]) {
+        let _ = frames;
+    }
+}
+
+impl ImageSource for ImageStore {
+    fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
+        self.get(frame)
+    }
+
+    fn prefetch(&self, frames: &[Frame]) {
+        ImageStore::prefetch(self, frames);
+    }
+}
+
+/// Images in memory, by the name of their frame.
+#[derive(Clone, Debug, Default)]
+pub struct MemoryImages(HashMap<String, Arc<RgbImage8>>);
+
+impl FromIterator<(String, RgbImage8)> for MemoryImages {
+    fn from_iter<I: IntoIterator<Item = (String, RgbImage8)>>(images: I) -> Self {
+        Self(images.into_iter().map(|(name, image)| (name, Arc::new(image))).collect())
+    }
+}
+
+impl ImageSource for MemoryImages {
+    fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
+        self.0.get(&frame.name).cloned().ok_or_else(|| DataError::Image {
+            path: frame.name.clone().into(),
+            problem: "no image of this name is in memory".into(),
+            remedy: "give one for every frame that is trained on".into(),
+        })
+    }
+}
+
+/// How a dataset is opened for a configuration.
+pub fn load_options(config: &Config) -> LoadOptions {
+    LoadOptions {
+        resolution: config.data.resolution.map_or(Resolution::Native, Resolution::MaxSide),
+        background: config.data.background,
+        seed: config.seed,
+        random_points: config.data.initial_points,
+        random_half_size: config.data.initial_box,
+        ..LoadOptions::default()
+    }
+}
+
+/// A store of images from disk, with the memory limit of a configuration.
+pub fn image_store(config: &Config) -> ImageStore {
+    ImageStore::new(&load_options(config), (config.data.memory_limit_mib << 20) as usize)
+}
+
+/// What the file says about the scene it was made from.
+pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
+    let positions = &data.points.positions;
+    let bound = |pick: fn(f32, f32) -> f32, start: f32| {
+        std::array::from_fn(|axis| positions.iter().map(|p| p[axis]).fold(start, pick))
+    };
+    let bounds =
+        if positions.is_empty() { [[0.0; 3]; 2] } else { [bound(f32::min, f32::MAX), bound(f32::max, f32::MIN)] };
+    let camera = data.train[0].camera;
+    let mut times: Vec<f32> = data.train.iter().map(|frame| frame.time).collect();
+    times.sort_by(f32::total_cmp);
+    times.dedup();
+    SceneMeta {
+        name: data.name.clone(),
+        frame_count: times.len() as u32,
+        // Times are a share of the whole; nobody says how long it lasts.
+        fps: 0.0,
+        bounds,
+        background: data.background,
+        config_digest: config.digest(),
+        width: camera.width,
+        height: camera.height,
+        fov_x: camera.fov().0,
+        ..SceneMeta::default()
+    }
+}

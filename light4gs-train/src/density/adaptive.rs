@@ -1,0 +1,146 @@
+//! Adaptive density control (3DGS, Kerbl et al. 2023, section 5.2), with the thresholds of 4DGS that change over the fine
+//! stage.
+
+use std::collections::BTreeMap;
+
+use burn::tensor::{Device, Tensor};
+
+use super::clone_and_split::{DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors};
+use super::{DensityStatistics, DensityStrategy, GaussianEditor, Moment, ViewStatistics};
+use crate::config::DensifyConfig;
+use crate::randomness::standard_normal;
+use crate::stage::Stage;
+
+/// Gaussians larger than this on the screen, in pixels, are dropped once opacities have been reset.
+const MAX_SCREEN_RADIUS: f32 = 20.0;
+/// Gaussians larger than this share of the scene's extent are dropped once opacities have been reset.
+const MAX_EXTENT_SHARE: f32 = 0.1;
+
+/// Clones small Gaussians and splits large ones where the screen-space gradient is large, prunes transparent and
+/// oversized ones, resets opacities. The default.
+#[derive(Debug)]
+pub struct AdaptiveDensityControl {
+    config: DensifyConfig,
+    /// Empty before the first stage.
+    statistics: Option<DensityStatistics>,
+}
+
+impl AdaptiveDensityControl {
+    /// With the thresholds and intervals of a configuration.
+    pub fn new(config: DensifyConfig) -> Self {
+        Self { config, statistics: None }
+    }
+
+    /// The smallest gradient that densifies, and the smallest opacity that survives.
+    fn thresholds(&self, moment: &Moment) -> (f32, f32) {
+        let config = &self.config;
+        let progress = moment.iteration as f32 / config.until.max(1) as f32;
+        let between = |from: f32, to: f32| from + (to - from) * progress;
+        match moment.stage {
+            Stage::Coarse => (config.grad_threshold_coarse, config.opacity_threshold),
+            Stage::Fine => (
+                between(config.grad_threshold_fine_init, config.grad_threshold_fine_final),
+                between(config.opacity_threshold_fine_init, config.opacity_threshold_fine_final),
+            ),
+        }
+    }
+
+    fn prune(&mut self, gaussians: &mut GaussianEditor, min_opacity: f32, moment: &Moment) {
+        let Some(statistics) = &self.statistics else { return };
+        let interval = self.config.opacity_reset_interval;
+        let size_limit = (interval > 0 && moment.iteration > interval)
+            .then_some(SizeLimit { max_radius: MAX_SCREEN_RADIUS, max_scale: MAX_EXTENT_SHARE * moment.extent });
+        let keep = survivors(gaussians.gaussians(), min_opacity, size_limit, &statistics.largest_radius);
+        // Never everything: an empty scene has no gradient to come back from.
+        if keep.contains(&true) && keep.contains(&false) {
+            gaussians.keep(&keep);
+            self.rows_kept(&keep);
+        }
+    }
+
+    fn clone_and_split(&mut self, gaussians: &mut GaussianEditor, threshold: f32, moment: &Moment) {
+        let Some(statistics) = &self.statistics else { return };
+        let masks = DensifyMasks::new(
+            &statistics.mean_gradients(),
+            &largest_scales(gaussians.gaussians()),
+            threshold,
+            self.config.percent_dense * moment.extent,
+        );
+        let mut generator = moment.generator();
+        let normals: Vec<f32> = (0..masks.normals_needed()).map(|_| standard_normal(&mut generator)).collect();
+        densify(gaussians, &masks, &normals);
+        let device = gaussians.gaussians().means.device().inner();
+        self.begin_stage(gaussians.len(), &device);
+    }
+}
+
+impl DensityStrategy for AdaptiveDensityControl {
+    fn begin_stage(&mut self, count: usize, device: &Device) {
+        self.statistics = Some(DensityStatistics::new(count, device));
+    }
+
+    fn after_backward(&mut self, views: &[ViewStatistics], moment: &Moment) {
+        if self.is_over(moment.stage, moment.iteration.saturating_sub(1)) {
+            return;
+        }
+        let Some(statistics) = &mut self.statistics else { return };
+        for view in views {
+            if let Some(gradient) = &view.screen_gradient {
+                statistics.add(gradient.clone(), view.radii.clone());
+            }
+        }
+    }
+
+    fn after_step(&mut self, gaussians: &mut GaussianEditor, moment: &Moment) {
+        let DensifyConfig { from, until, interval, prune_from, prune_interval, .. } = self.config;
+        let iteration = moment.iteration;
+        if iteration > until {
+            return;
+        }
+        let (threshold, min_opacity) = self.thresholds(moment);
+        let due = |from: usize, interval: usize| interval > 0 && iteration > from && iteration.is_multiple_of(interval);
+        if due(prune_from, prune_interval) && gaussians.len() > self.config.prune_above {
+            self.prune(gaussians, min_opacity, moment);
+        }
+        if due(from, interval) && gaussians.len() < self.config.max_gaussians {
+            self.clone_and_split(gaussians, threshold, moment);
+        }
+        if due(0, self.config.opacity_reset_interval) && iteration < until {
+            reset_opacity(gaussians);
+        }
+    }
+
+    fn rows_kept(&mut self, keep: &[bool]) {
+        if let Some(statistics) = &mut self.statistics {
+            statistics.keep(keep);
+        }
+    }
+
+    fn is_over(&self, _: Stage, iteration: usize) -> bool {
+        iteration >= self.config.until
+    }
+
+    fn state(&self) -> BTreeMap<String, Tensor<1>> {
+        let Some(DensityStatistics { gradient_sum, views, largest_radius }) = &self.statistics else {
+            return BTreeMap::new();
+        };
+        let named = [("gradient_sum", gradient_sum), ("views", views), ("largest_radius", largest_radius)];
+        named.into_iter().map(|(name, tensor)| (name.to_owned(), tensor.clone())).collect()
+    }
+
+    fn restore(&mut self, mut state: BTreeMap<String, Tensor<1>>, count: usize) -> Result<(), String> {
+        let mut take = |name: &str| {
+            let tensor = state.remove(name).ok_or_else(|| format!("density statistic `{name}`: nothing found"))?;
+            match tensor.dims() {
+                [found] if found == count => Ok(tensor),
+                [found] => Err(format!("density statistic `{name}`: expected {count} values, found {found}")),
+            }
+        };
+        self.statistics = Some(DensityStatistics {
+            gradient_sum: take("gradient_sum")?,
+            views: take("views")?,
+            largest_radius: take("largest_radius")?,
+        });
+        Ok(())
+    }
+}

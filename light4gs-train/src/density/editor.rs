@@ -1,0 +1,100 @@
+//! Changes to the set of Gaussians, with the optimizer's moments in step.
+
+use burn::module::Param;
+use burn::tensor::{Int, Tensor, TensorData};
+use light4gs_model::{GaussianTensors, Gaussians};
+
+use crate::optimization::adam::Adam;
+use crate::optimization::parameters::GaussianAttribute;
+
+/// The Gaussians of a run while their number changes: every edit moves the optimizer's rows along.
+#[derive(Debug)]
+pub struct GaussianEditor<'a> {
+    gaussians: &'a mut Gaussians,
+    adam: &'a mut Adam,
+}
+
+impl<'a> GaussianEditor<'a> {
+    /// Of Gaussians and the optimizer that trains them.
+    pub fn new(gaussians: &'a mut Gaussians, adam: &'a mut Adam) -> Self {
+        Self { gaussians, adam }
+    }
+
+    /// The Gaussians as they are now.
+    pub fn gaussians(&self) -> &Gaussians {
+        self.gaussians
+    }
+
+    /// Their number `N`.
+    pub fn len(&self) -> usize {
+        self.gaussians.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Makes row `k` of the result a copy of row `rows[k]`. Moments are copied along for the first `first_new` rows; the
+    /// rows after them are new Gaussians, which begin without moments.
+    ///
+    /// # Panics
+    /// If a row is not below [`len`](Self::len).
+    pub fn select_rows(&mut self, rows: &[usize], first_new: usize) {
+        let count = self.len();
+        assert!(rows.iter().all(|row| *row < count), "a row beyond the {count} that there are");
+        let device = self.gaussians.means.device().inner();
+        let indices: Vec<i64> = rows.iter().map(|row| *row as i64).collect();
+        let rows = Tensor::<1, Int>::from_data(TensorData::new(indices, [rows.len()]), &device);
+        let fresh: Vec<f32> = (0..rows.dims()[0]).map(|k| if k < first_new { 0.0 } else { 1.0 }).collect();
+        let fresh = Tensor::<1>::from_data(TensorData::new(fresh, rows.dims()), &device);
+        for attribute in GaussianAttribute::ALL {
+            self.adam.select_rows(attribute.path(), &rows, &fresh, count);
+        }
+        self.replace(|tensors| GaussianTensors {
+            means: tensors.means.select(0, rows.clone()),
+            log_scales: tensors.log_scales.select(0, rows.clone()),
+            quats: tensors.quats.select(0, rows.clone()),
+            opacity_logits: tensors.opacity_logits.select(0, rows.clone()),
+            sh_dc: tensors.sh_dc.select(0, rows.clone()),
+            sh_rest: tensors.sh_rest.select(0, rows),
+        });
+    }
+
+    /// Keeps the Gaussians where `keep` is set. `[N]`
+    pub fn keep(&mut self, keep: &[bool]) {
+        let rows: Vec<usize> = keep.iter().enumerate().filter(|(_, keep)| **keep).map(|(i, _)| i).collect();
+        self.select_rows(&rows, rows.len());
+    }
+
+    /// Changes values and keeps moments. `change` gets tensors off the tape and must return as many rows.
+    ///
+    /// # Panics
+    /// If the number of rows changes.
+    pub fn update(&mut self, change: impl FnOnce(GaussianTensors) -> GaussianTensors) {
+        let count = self.len();
+        self.replace(change);
+        assert_eq!(self.len(), count, "`update` changes values; `select_rows` changes their number");
+    }
+
+    /// Zeroes the moments of one attribute for all Gaussians.
+    pub fn reset_moments(&mut self, attribute: GaussianAttribute) {
+        self.adam.reset_moments(attribute.path());
+    }
+
+    fn replace(&mut self, change: impl FnOnce(GaussianTensors) -> GaussianTensors) {
+        let GaussianTensors { means, log_scales, quats, opacity_logits, sh_dc, sh_rest } =
+            change(self.gaussians.tensors().inner());
+        set(&mut self.gaussians.means, means);
+        set(&mut self.gaussians.log_scales, log_scales);
+        set(&mut self.gaussians.quats, quats);
+        set(&mut self.gaussians.opacity_logits, opacity_logits);
+        set(&mut self.gaussians.sh_dc, sh_dc);
+        set(&mut self.gaussians.sh_rest, sh_rest);
+    }
+}
+
+/// Gives a parameter a value that is trained further.
+fn set<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
+    *parameter = Param::initialized(parameter.id, Tensor::from_inner(value).require_grad());
+}

@@ -1,0 +1,90 @@
+//! How many Gaussians there are: when they are cloned, split and pruned.
+//!
+//! - here: [`DensityStrategy`], what the trainer asks of a strategy
+//! - `adaptive`: the strategy of 3DGS, the default
+//! - `clone_and_split`, `statistics`: its parts
+//! - `editor`: how a strategy changes the Gaussians, with the optimizer's moments in step
+//! - `significance`: scores by which Gaussians are pruned after densification (paper III-B)
+
+mod adaptive;
+pub mod clone_and_split;
+mod editor;
+pub mod significance;
+mod statistics;
+
+use std::collections::BTreeMap;
+
+use burn::tensor::{Device, Int, Tensor};
+use rand::Rng;
+
+pub use adaptive::AdaptiveDensityControl;
+pub use editor::GaussianEditor;
+pub use significance::{GaussianContributions, SignificanceScore, VolumeWeightedScore};
+pub use statistics::DensityStatistics;
+
+use crate::randomness::{Purpose, generator};
+use crate::stage::Stage;
+
+/// Where a run stands when a strategy is asked.
+#[derive(Clone, Copy, Debug)]
+pub struct Moment {
+    /// The stage.
+    pub stage: Stage,
+    /// Iteration of the stage, from 1.
+    pub iteration: usize,
+    /// Radius of the cameras' positions, world units: what "large" is measured by.
+    pub extent: f32,
+    /// Of the run.
+    pub(crate) seed: u64,
+}
+
+impl Moment {
+    /// A generator that depends on the run's seed, the stage and the iteration alone, so that a run that was resumed
+    /// draws the same numbers.
+    pub fn generator(&self) -> impl Rng + use<> {
+        generator(self.seed, Purpose::Split, self.stage, self.iteration)
+    }
+}
+
+/// What a differentiated view says about the `N` Gaussians. All tensors are off the tape.
+#[derive(Clone, Debug)]
+pub struct ViewStatistics {
+    /// `[N, 2]`: gradient of the view's loss by the projected positions, in units of half the image. None where nothing
+    /// was on the screen.
+    pub screen_gradient: Option<Tensor<2>>,
+    /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the image; -1 for Gaussians that cannot be drawn.
+    pub radii: Tensor<1, Int>,
+}
+
+/// Decides how many Gaussians there are. The trainer calls the hooks in this order in every iteration:
+/// [`after_backward`](Self::after_backward), the optimizer's step, [`after_step`](Self::after_step).
+///
+/// A strategy has its statistics for itself. What must survive a checkpoint goes through [`state`](Self::state) and
+/// [`restore`](Self::restore), so that a resumed run is the same to the last bit.
+pub trait DensityStrategy: Send {
+    /// A stage begins with `count` Gaussians: statistics begin anew. `device` is without autodiff. Not called when a run
+    /// is resumed in the middle of a stage; [`restore`](Self::restore) is.
+    fn begin_stage(&mut self, count: usize, device: &Device);
+
+    /// The views of an iteration have been differentiated: the place to gather statistics.
+    fn after_backward(&mut self, views: &[ViewStatistics], moment: &Moment);
+
+    /// The optimizer has made its step: the place to clone, split, prune and reset.
+    fn after_step(&mut self, gaussians: &mut GaussianEditor, moment: &Moment);
+
+    /// Somebody else, such as pruning by significance, has kept the rows where `keep` is set. `[N]`
+    fn rows_kept(&mut self, keep: &[bool]);
+
+    /// Whether the strategy is done with the stage: Gaussians neither come nor go any more after this iteration. From then
+    /// on spherical harmonics have a part in the rate.
+    fn is_over(&self, stage: Stage, iteration: usize) -> bool;
+
+    /// What a checkpoint must hold, by name: vectors off the tape.
+    fn state(&self) -> BTreeMap<String, Tensor<1>>;
+
+    /// Takes back what [`state`](Self::state) gave.
+    ///
+    /// # Errors
+    /// What is missing or of another size, in words.
+    fn restore(&mut self, state: BTreeMap<String, Tensor<1>>, count: usize) -> Result<(), String>;
+}

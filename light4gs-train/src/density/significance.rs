@@ -1,0 +1,73 @@
+//! Scores by which Gaussians are pruned (paper III-B).
+
+use light4gs_model::{Significance, SignificanceScore as Sum, VolumeWeight};
+
+use crate::config::{PruneConfig, PruneScore, PruneVolume};
+
+/// What the training views say of each of `N` Gaussians, each at its time.
+#[derive(Clone, Debug, Default)]
+pub struct GaussianContributions {
+    /// `[N]`: pixels that blend the Gaussian, over all views.
+    pub pixels: Vec<f64>,
+    /// `[N]`: sum over those pixels of transmittance times alpha.
+    pub blending_weight: Vec<f64>,
+    /// `[N]`: sum over those pixels of transmittance times opacity.
+    pub transmittance_opacity: Vec<f64>,
+    /// `[N]`: sum over those pixels of the Gaussian's opacity.
+    pub opacity: Vec<f64>,
+    /// `[N]`: products of the standard deviations, world units cubed.
+    pub volumes: Vec<f64>,
+}
+
+impl GaussianContributions {
+    /// From sums over views, and the Gaussians' volumes.
+    pub fn new(sums: &Significance, volumes: Vec<f64>) -> Self {
+        Self {
+            pixels: sums.scores(Sum::PixelCount),
+            blending_weight: sums.scores(Sum::BlendingWeight),
+            transmittance_opacity: sums.scores(Sum::TransmittanceOpacity),
+            opacity: sums.scores(Sum::Opacity),
+            volumes,
+        }
+    }
+}
+
+/// Says how much each Gaussian matters.
+pub trait SignificanceScore: Send {
+    /// `[N]`: the larger, the more it matters. Must be finite.
+    fn scores(&self, contributions: &GaussianContributions) -> Vec<f64>;
+}
+
+/// A sum over pixels times a factor of the Gaussian's volume: the paper's score, and its variants. The default.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VolumeWeightedScore {
+    /// What is summed.
+    pub pixel: PruneScore,
+    /// The factor.
+    pub volume: VolumeWeight,
+}
+
+impl VolumeWeightedScore {
+    /// As a configuration says.
+    pub fn new(config: &PruneConfig) -> Self {
+        let exponent = config.volume_exponent;
+        let volume = match config.volume {
+            PruneVolume::None => VolumeWeight::None,
+            PruneVolume::Clamped => VolumeWeight::Clamped { exponent },
+            PruneVolume::Unclamped => VolumeWeight::Unclamped { exponent },
+        };
+        Self { pixel: config.score, volume }
+    }
+}
+
+impl SignificanceScore for VolumeWeightedScore {
+    fn scores(&self, contributions: &GaussianContributions) -> Vec<f64> {
+        let sums = match self.pixel {
+            PruneScore::Transmittance => &contributions.transmittance_opacity,
+            PruneScore::Weight => &contributions.blending_weight,
+            PruneScore::Opacity => &contributions.opacity,
+            PruneScore::Count => &contributions.pixels,
+        };
+        sums.iter().zip(self.volume.of(&contributions.volumes)).map(|(sum, factor)| sum * factor).collect()
+    }
+}

@@ -1,0 +1,91 @@
+//! What follows training: the decoded file is measured, and `eval.json`, `renders/` and `report.html` are written.
+
+use std::fs;
+
+use light4gs_data::{DataError, Scene};
+
+use crate::config::Config;
+use crate::dataset::image_store;
+use crate::device::{self, describe};
+use crate::error::TrainError;
+use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
+use crate::observers::metrics_log::read_metrics;
+use crate::report::{CodingReport, Report, SectionBytes, SummaryTile, write_report};
+use crate::run::RunFolder;
+
+/// Views a report shows.
+const REPORT_VIEWS: usize = 6;
+
+/// Measures the run's file on its own dataset and writes everything that depends on it.
+pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Result<Evaluation, TrainError> {
+    let device = device::open(config.device)?;
+    let decoded = DecodedScene::open(&folder.stream(), &device)?;
+    let images = image_store(config);
+    let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
+    let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
+    evaluation.training_seconds = metrics.last().map(|record| record.seconds);
+    evaluation.coding = folder.read_json("coding.json")?;
+    folder.write_json("eval.json", &evaluation)?;
+    if config.eval.save_renders {
+        save_renders(folder, &views)?;
+    }
+    let report = Report {
+        title: scene.name.clone(),
+        created: created(),
+        device: evaluation.device.clone(),
+        summary: summary(&evaluation),
+        sections: evaluation
+            .sections
+            .iter()
+            .map(|section| SectionBytes { name: section.name.clone(), bytes: section.bytes })
+            .collect(),
+        coding: match &evaluation.coding {
+            Some(record) => {
+                let bit_maps = folder.read_json("bit_maps.json")?.unwrap_or_default();
+                Some(CodingReport { record: record.clone(), bit_maps })
+            }
+            None => None,
+        },
+        splits: evaluation.report_splits(),
+        pictures: {
+            let stride = views.len().div_ceil(REPORT_VIEWS).max(1);
+            views.iter().step_by(stride).map(RenderedView::picture).collect()
+        },
+        metrics,
+        config_toml: config.to_toml(),
+    };
+    write_report(&folder.path("report.html"), &report)?;
+    Ok(evaluation)
+}
+
+fn save_renders(folder: &RunFolder, views: &[RenderedView]) -> Result<(), TrainError> {
+    for view in views {
+        let path = folder.path("renders").join(view.split.name());
+        fs::create_dir_all(&path).map_err(|source| DataError::Io { action: "create", path: path.clone(), source })?;
+        view.render.save_png(&path.join(format!("{}.png", view.name)))?;
+    }
+    Ok(())
+}
+
+fn created() -> String {
+    jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M UTC").to_string()
+}
+
+fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {
+    let tile =
+        |label: &str, value: String, hint: &str| SummaryTile { label: label.to_owned(), value, hint: hint.to_owned() };
+    let mut tiles = Vec::new();
+    for split in &evaluation.splits {
+        let views = format!("mean over {} views of the decoded file", split.views.len());
+        tiles.push(tile(&format!("{} PSNR", split.split), format!("{:.2} dB", split.psnr), &views));
+        tiles.push(tile(&format!("{} SSIM", split.split), format!("{:.4}", split.ssim), &views));
+    }
+    tiles.push(tile("File", format!("{:.2} MB", evaluation.bytes as f64 / 1e6), "bytes on disk / 10^6"));
+    tiles.push(tile("Gaussians", evaluation.gaussians.to_string(), "in the file"));
+    let size = format!("{}×{}, decoding excluded", evaluation.resolution[0], evaluation.resolution[1]);
+    tiles.push(tile("Rendering", format!("{:.1} FPS", evaluation.fps), &size));
+    if let Some(seconds) = evaluation.training_seconds {
+        tiles.push(tile("Training", format!("{:.1} min", seconds / 60.0), "on this device"));
+    }
+    tiles
+}

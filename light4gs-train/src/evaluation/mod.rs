@@ -1,0 +1,243 @@
+//! Measuring a decoded file: quality on held-out views, speed, size.
+
+pub mod ablation;
+pub mod finish;
+pub mod metrics;
+
+use std::path::Path;
+use std::time::Instant;
+
+use burn::tensor::Device;
+use light4gs_codec::{SceneData, StreamInfo};
+use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
+use light4gs_model::{DynamicScene, Splatter};
+use serde::Serialize;
+
+use crate::compression::CodingRecord;
+use crate::config::EvalConfig;
+use crate::dataset::ImageSource;
+use crate::error::TrainError;
+use crate::evaluation::metrics::image_tensor;
+use crate::evaluation::metrics::{psnr, ssim};
+use crate::report::{SplitQuality, ViewPictures, ViewQuality};
+
+/// Quality of one view.
+#[derive(Clone, Debug, Serialize)]
+pub struct ViewScore {
+    /// Name of the frame.
+    pub name: String,
+    /// In [0, 1].
+    pub time: f32,
+    /// dB over the whole picture.
+    pub psnr: f64,
+    /// Structural similarity.
+    pub ssim: f64,
+}
+
+/// Quality of a split.
+#[derive(Clone, Debug, Serialize)]
+pub struct SplitScore {
+    /// `test`, `val`...
+    pub split: String,
+    /// Mean over the views.
+    pub psnr: f64,
+    /// Mean over the views.
+    pub ssim: f64,
+    /// Every view.
+    pub views: Vec<ViewScore>,
+}
+
+/// Bytes of one part of the file.
+#[derive(Clone, Debug, Serialize)]
+pub struct SectionSize {
+    /// Name of the section.
+    pub name: String,
+    /// On disk.
+    pub bytes: u64,
+}
+
+/// All that was measured, as `eval.json` holds it.
+#[derive(Clone, Debug, Serialize)]
+pub struct Evaluation {
+    /// Back end, and the adapter if it has one.
+    pub device: String,
+    /// Size of the file on disk.
+    pub bytes: u64,
+    /// By section, header included.
+    pub sections: Vec<SectionSize>,
+    /// Gaussians in the file.
+    pub gaussians: usize,
+    /// Width and height of the measured pictures.
+    pub resolution: [u32; 2],
+    /// Frames a second, deformation included, decoding excluded, after warm-up.
+    pub fps: f64,
+    /// Seconds to read, check and decode the file.
+    pub decode_seconds: f64,
+    /// Seconds of training, where known.
+    pub training_seconds: Option<f64>,
+    /// One entry a measured split.
+    pub splits: Vec<SplitScore>,
+    /// Expected and coded bits, where the run has a record of its coding.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coding: Option<CodingRecord>,
+}
+
+/// A render next to its ground truth.
+pub struct RenderedView {
+    /// Split and frame.
+    pub split: Split,
+    /// Name of the frame.
+    pub name: String,
+    /// In [0, 1].
+    pub time: f32,
+    /// dB.
+    pub psnr: f64,
+    /// As photographed.
+    pub truth: RgbImage8,
+    /// As rendered from the decoded file.
+    pub render: RgbImage8,
+}
+
+/// A decoded file, ready to render.
+pub struct DecodedScene {
+    /// The model on the device.
+    pub model: DynamicScene,
+    /// What the file says of itself.
+    pub data: SceneData,
+    /// Sections and sizes.
+    pub info: StreamInfo,
+    /// Seconds that decoding took.
+    pub decode_seconds: f64,
+    device: Device,
+}
+
+impl DecodedScene {
+    /// Reads a file onto a device.
+    pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
+        let begin = Instant::now();
+        let data = light4gs_codec::read_file(path)?;
+        let decode_seconds = begin.elapsed().as_secs_f64();
+        let info = light4gs_codec::read_info(path)?;
+        let model = DynamicScene::from_arrays(&data, device)?;
+        Ok(Self { model, data, info, decode_seconds, device: device.clone() })
+    }
+
+    /// Renders a frame's camera at its time; values are clamped to [0, 1].
+    pub fn render(&self, frame: &Frame) -> RgbImage32 {
+        let splatter = Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree));
+        let rendering = splatter.render(self.model.at(frame.time), &frame.camera, None);
+        let pixels = rendering.image.clamp(0.0, 1.0).into_data().iter::<f32>().collect();
+        RgbImage32 { width: frame.camera.width, height: frame.camera.height, pixels }
+    }
+
+    /// Sections with the header in front.
+    pub fn section_sizes(&self) -> Vec<SectionSize> {
+        section_sizes(&self.info)
+    }
+
+    /// Frames a second over a list of frames, after warm-up.
+    fn frames_per_second(&self, frames: &[Frame], eval: &EvalConfig) -> f64 {
+        let splatter = Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree));
+        let draw = |k: usize| {
+            let frame = &frames[k % frames.len()];
+            let image = splatter.render(self.model.at(frame.time), &frame.camera, None).image;
+            // Reading one value waits for the device.
+            image.slice([0..1, 0..1, 0..1]).into_scalar::<f32>()
+        };
+        for k in 0..eval.fps_warmup {
+            draw(k);
+        }
+        let count = eval.fps_frames.max(1);
+        let begin = Instant::now();
+        for k in 0..count {
+            draw(k);
+        }
+        count as f64 / begin.elapsed().as_secs_f64()
+    }
+
+    /// Measures the splits that `eval` names (those that the dataset has).
+    pub fn evaluate(
+        &self,
+        scene: &Scene,
+        images: &dyn ImageSource,
+        eval: &EvalConfig,
+        device_name: &str,
+    ) -> Result<(Evaluation, Vec<RenderedView>), TrainError> {
+        let mut splits = Vec::new();
+        let mut rendered = Vec::new();
+        for name in &eval.splits {
+            let split = Split::from(*name);
+            let frames = scene.frames(split);
+            if frames.is_empty() {
+                continue;
+            }
+            let mut views = Vec::with_capacity(frames.len());
+            for frame in frames {
+                let render = self.render(frame);
+                let truth = images.image(frame)?;
+                let image = image_tensor(&render.to_u8(), &self.device);
+                let truth_tensor = image_tensor(&truth, &self.device);
+                let psnr = psnr(image.clone(), truth_tensor.clone());
+                let ssim = f64::from(ssim(image, truth_tensor).into_scalar::<f32>());
+                views.push(ViewScore { name: frame.name.clone(), time: frame.time, psnr, ssim });
+                let (name, time) = (frame.name.clone(), frame.time);
+                let (truth, render) = ((*truth).clone(), render.to_u8());
+                rendered.push(RenderedView { split, name, time, psnr, truth, render });
+            }
+            let mean = |value: fn(&ViewScore) -> f64| views.iter().map(value).sum::<f64>() / views.len() as f64;
+            splits.push(SplitScore { split: name.to_string(), psnr: mean(|v| v.psnr), ssim: mean(|v| v.ssim), views });
+        }
+        let frames = if scene.test.is_empty() { &scene.train } else { &scene.test };
+        let camera = frames[0].camera;
+        let evaluation = Evaluation {
+            device: device_name.to_owned(),
+            bytes: self.info.bytes,
+            sections: self.section_sizes(),
+            gaussians: self.data.gaussians.len(),
+            resolution: [camera.width, camera.height],
+            fps: self.frames_per_second(frames, eval),
+            decode_seconds: self.decode_seconds,
+            training_seconds: None,
+            splits,
+            coding: None,
+        };
+        Ok((evaluation, rendered))
+    }
+}
+
+/// Sections of a file with the header in front; they add up to the file.
+pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
+    let header = SectionSize { name: "header".into(), bytes: info.header_bytes };
+    let sections = info.sections.iter().map(|s| SectionSize { name: s.name.to_owned(), bytes: s.bytes });
+    std::iter::once(header).chain(sections).collect()
+}
+
+impl Evaluation {
+    /// The part of a report that shows splits.
+    pub fn report_splits(&self) -> Vec<SplitQuality> {
+        let view = |v: &ViewScore| ViewQuality { name: v.name.clone(), time: v.time, psnr: v.psnr, ssim: v.ssim };
+        self.splits
+            .iter()
+            .map(|split| SplitQuality {
+                name: split.split.clone(),
+                psnr: split.psnr,
+                ssim: split.ssim,
+                extra: Vec::new(),
+                views: split.views.iter().map(view).collect(),
+            })
+            .collect()
+    }
+}
+
+impl RenderedView {
+    /// For the report.
+    pub fn picture(&self) -> ViewPictures {
+        ViewPictures {
+            name: format!("{} {}", self.split, self.name),
+            time: self.time,
+            psnr: self.psnr,
+            ground_truth: self.truth.clone(),
+            render: self.render.clone(),
+        }
+    }
+}

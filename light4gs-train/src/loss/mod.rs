@@ -1,0 +1,46 @@
+//! Losses: what a rendered image should be like.
+//!
+//! - here: [`Loss`], what the trainer asks of a loss
+//! - `photometric`: L1 and D-SSIM, the default
+
+mod photometric;
+
+use burn::tensor::Tensor;
+use light4gs_data::Frame;
+
+pub use photometric::{PhotometricLoss, photometric};
+
+use crate::stage::Stage;
+
+/// A rendered view beside the truth, and where the run stands.
+#[derive(Clone, Debug)]
+pub struct LossInput<'a> {
+    /// `[H, W, 3]`: as rendered over the background, on the tape; not clamped above.
+    pub image: Tensor<3>,
+    /// `[H, W]`: the rendered opacity in [0, 1], on the tape.
+    pub alpha: Tensor<2>,
+    /// `[H, W]`: view depth times blending weight, summed, world units, on the tape. Divide by `alpha` for a mean depth.
+    pub depth: Tensor<2>,
+    /// `[H, W, 3]`: the training image in [0, 1], over the same background.
+    pub truth: Tensor<3>,
+    /// The camera, the time and the name of the view.
+    pub frame: &'a Frame,
+    /// The stage.
+    pub stage: Stage,
+    /// Iteration of the stage, from 1.
+    pub iteration: usize,
+}
+
+/// A differentiable measure of what is wrong with a rendered view. Views are differentiated side by side on several
+/// threads, so a loss must be `Sync`; what it remembers across iterations belongs behind a lock.
+pub trait Loss: Send + Sync {
+    /// `[1]`, on the tape of the rendered tensors.
+    fn loss(&self, view: LossInput) -> Tensor<1>;
+}
+
+/// A function is a loss.
+impl<L: Fn(LossInput) -> Tensor<1> + Send + Sync> Loss for L {
+    fn loss(&self, view: LossInput) -> Tensor<1> {
+        self(view)
+    }
+}

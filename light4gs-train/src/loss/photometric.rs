@@ -1,0 +1,43 @@
+//! L1, squared difference and D-SSIM (3DGS, Kerbl et al. 2023, equation 7).
+
+use burn::tensor::Tensor;
+
+use super::{Loss, LossInput};
+use crate::config::TrainConfig;
+use crate::evaluation::metrics::{l1, l2, ssim};
+use crate::stage::Stage;
+
+/// `(1 - lambda) · L1 + lambda · (1 - SSIM)`, or the squared difference in the first iterations. The default.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhotometricLoss {
+    /// Weight of D-SSIM, 0 to 1; L1 has the rest.
+    pub lambda_dssim: f32,
+    /// The loss is the squared difference until this iteration of the fine stage, and in the coarse stage if it is not 0.
+    pub l2_until: usize,
+}
+
+impl PhotometricLoss {
+    /// As a configuration says.
+    pub fn new(config: &TrainConfig) -> Self {
+        Self { lambda_dssim: config.lambda_dssim, l2_until: config.l2_until }
+    }
+}
+
+impl Loss for PhotometricLoss {
+    fn loss(&self, view: LossInput) -> Tensor<1> {
+        let squared = self.l2_until > 0 && (view.stage == Stage::Coarse || view.iteration <= self.l2_until);
+        match squared {
+            true => l2(view.image, view.truth),
+            false => photometric(view.image, view.truth, self.lambda_dssim),
+        }
+    }
+}
+
+/// `(1 - lambda) · L1 + lambda · (1 - SSIM)` of images `[H, W, 3]` in [0, 1], `[1]`.
+pub fn photometric(image: Tensor<3>, truth: Tensor<3>, lambda_dssim: f32) -> Tensor<1> {
+    if lambda_dssim == 0.0 {
+        return l1(image, truth);
+    }
+    let similarity = ssim(image.clone(), truth.clone());
+    l1(image, truth) * (1.0 - lambda_dssim) + (similarity.neg() + 1.0) * lambda_dssim
+}

@@ -1,0 +1,198 @@
+//! `report.html`: what a run made and how good it is, in one file that needs nothing else.
+//!
+//! Style, script, charts (SVG) and pictures (PNG) are all inside; the page forbids itself every request. It reads
+//! without its script, in light and dark, on paper and aloud.
+
+mod chart;
+mod coding;
+mod color_map;
+mod curves;
+mod format;
+mod html;
+mod picture;
+mod quality;
+mod sizes;
+pub mod table;
+
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::path::Path;
+
+use light4gs_data::write_atomically;
+use light4gs_data::{DataError, RgbImage8};
+
+use crate::compression::{BitMap, CodingRecord};
+use crate::observers::metrics_log::MetricsRecord;
+use html::{escape, fill};
+
+const PAGE: &str = include_str!("page.html");
+const STYLE: &str = include_str!("style.css");
+const SCRIPT: &str = include_str!("script.js");
+
+/// Everything that a report shows. What is empty is left out of the page.
+#[derive(Debug, Clone, Default)]
+pub struct Report {
+    /// Heading, such as the scene's name.
+    pub title: String,
+    /// When the run ended, as it is to be read.
+    pub created: String,
+    /// Back end and machine.
+    pub device: String,
+    /// The figures at the top.
+    pub summary: Vec<SummaryTile>,
+    /// Bytes of the file by section, in the order of the file.
+    pub sections: Vec<SectionBytes>,
+    /// How the file was coded.
+    pub coding: Option<CodingReport>,
+    /// Quality by split.
+    pub splits: Vec<SplitQuality>,
+    /// Views to show beside their ground truth.
+    pub pictures: Vec<ViewPictures>,
+    /// The run's curves.
+    pub metrics: Vec<MetricsRecord>,
+    /// The configuration, as resolved.
+    pub config_toml: String,
+}
+
+/// One figure at the top of a report.
+#[derive(Debug, Clone, Default)]
+pub struct SummaryTile {
+    /// What it is: `Test PSNR`.
+    pub label: String,
+    /// The figure with its unit: `33.1 dB`.
+    pub value: String,
+    /// A word on it: `20 views, decoded file`; may be empty.
+    pub hint: String,
+}
+
+/// How a file was coded.
+#[derive(Debug, Clone)]
+pub struct CodingReport {
+    /// Expected and real bits.
+    pub record: CodingRecord,
+    /// Where the planes' bits are; may be empty.
+    pub bit_maps: Vec<BitMap>,
+}
+
+/// Size of one section of the file.
+#[derive(Debug, Clone, Default)]
+pub struct SectionBytes {
+    /// Name of the section.
+    pub name: String,
+    /// Its size.
+    pub bytes: u64,
+}
+
+/// Quality over one split.
+#[derive(Debug, Clone, Default)]
+pub struct SplitQuality {
+    /// `test`, `val`...
+    pub name: String,
+    /// Mean PSNR, dB.
+    pub psnr: f64,
+    /// Mean SSIM.
+    pub ssim: f64,
+    /// Other measures, by name; splits may have different ones.
+    pub extra: Vec<(String, f64)>,
+    /// The views.
+    pub views: Vec<ViewQuality>,
+}
+
+/// Quality of one view.
+#[derive(Debug, Clone, Default)]
+pub struct ViewQuality {
+    /// Name of the frame.
+    pub name: String,
+    /// Its time, 0 to 1.
+    pub time: f32,
+    /// PSNR over the whole picture, dB.
+    pub psnr: f64,
+    /// SSIM.
+    pub ssim: f64,
+}
+
+/// A rendered view beside its ground truth; both must have the same size.
+#[derive(Debug, Clone)]
+pub struct ViewPictures {
+    /// Name of the frame.
+    pub name: String,
+    /// Its time, 0 to 1.
+    pub time: f32,
+    /// PSNR over the whole picture, dB.
+    pub psnr: f64,
+    /// The frame of the dataset, composited.
+    pub ground_truth: RgbImage8,
+    /// The decoded file, rendered.
+    pub render: RgbImage8,
+}
+
+/// Writes the report. The file is complete or absent; one that exists is replaced.
+///
+/// # Errors
+/// [`DataError::Image`] if a render and its ground truth differ in size; [`DataError::Io`] naming `path`.
+pub fn write_report(path: &Path, report: &Report) -> Result<(), DataError> {
+    let page = page(path, report)?;
+    write_atomically(path, |out| out.write_all(page.as_bytes()))
+}
+
+fn page(path: &Path, report: &Report) -> Result<String, DataError> {
+    let sections = [
+        section("views", "Ground truth, render, error", picture::section(path, &report.pictures)?),
+        section("quality", "Quality", quality::section(&report.splits)),
+        section("size", "Bytes of the file", sizes::section(&report.sections)),
+        section("coding", "Entropy coding", coding::section(path, report.coding.as_ref())?),
+        section("curves", "Training", curves::section(&report.metrics)),
+        section("configuration", "Configuration", configuration(&report.config_toml)),
+    ];
+    Ok(fill(
+        PAGE,
+        &[
+            ("title", &escape(&report.title)),
+            ("about", &about(report)),
+            ("tiles", &tiles(&report.summary)),
+            ("sections", &sections.concat()),
+            ("style", STYLE),
+            ("script", SCRIPT),
+        ],
+    ))
+}
+
+/// A part of the page with its heading; nothing if it has no content.
+fn section(id: &str, heading: &str, content: String) -> String {
+    if content.is_empty() {
+        return String::new();
+    }
+    format!("<section aria-labelledby=\"{id}\">\n<h2 id=\"{id}\">{heading}</h2>\n{content}</section>\n")
+}
+
+fn about(report: &Report) -> String {
+    let parts = [&report.created, &report.device];
+    let parts: Vec<String> = parts.into_iter().filter(|part| !part.is_empty()).map(|part| escape(part)).collect();
+    parts.join(" &middot; ")
+}
+
+fn tiles(tiles: &[SummaryTile]) -> String {
+    if tiles.is_empty() {
+        return String::new();
+    }
+    let mut html = String::from("<dl class=\"tiles\">\n");
+    for tile in tiles {
+        let (label, value, hint) = (escape(&tile.label), escape(&tile.value), escape(&tile.hint));
+        let _ = writeln!(html, "<div><dt>{label}</dt><dd>{value}<small>{hint}</small></dd></div>");
+    }
+    html.push_str("</dl>\n");
+    html
+}
+
+fn configuration(toml: &str) -> String {
+    if toml.is_empty() {
+        return String::new();
+    }
+    let toml = escape(toml);
+    format!(
+        "<details><summary>config.toml, as resolved</summary>\n<pre tabindex=\"0\"><code>{toml}</code></pre></details>\n"
+    )
+}
+
+#[cfg(test)]
+mod tests;

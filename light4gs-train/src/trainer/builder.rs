@@ -1,0 +1,198 @@
+//! What a trainer is made of.
+
+use std::path::PathBuf;
+
+use burn::tensor::Device;
+use light4gs_data::Scene;
+
+use super::Trainer;
+use super::profile::Profile;
+use super::views::ViewPools;
+use crate::compression::Compression;
+use crate::config::Config;
+use crate::dataset::{ImageSource, image_store};
+use crate::density::{AdaptiveDensityControl, DensityStrategy, SignificanceScore, VolumeWeightedScore};
+use crate::device;
+use crate::error::TrainError;
+use crate::loss::{Loss, PhotometricLoss};
+use crate::observers::Observer;
+use crate::observers::metrics_log::MetricsLog;
+use crate::observers::tensorboard::TensorBoardLog;
+use crate::optimization::adam::Adam;
+use crate::randomness::FrameOrder;
+use crate::run::{Checkpoint, RunFolder};
+use crate::stage::Stage;
+
+/// The parts of a [`Trainer`]: those that are not given are the ones that the configuration describes.
+pub struct TrainerBuilder {
+    config: Config,
+    data: Scene,
+    device: Option<Device>,
+    images: Option<Box<dyn ImageSource>>,
+    folder: Option<RunFolder>,
+    loss: Box<dyn Loss>,
+    density: Box<dyn DensityStrategy>,
+    significance: Box<dyn SignificanceScore>,
+    observers: Vec<Box<dyn Observer>>,
+}
+
+impl TrainerBuilder {
+    pub(super) fn new(config: Config, data: Scene) -> Self {
+        Self {
+            device: None,
+            images: None,
+            folder: None,
+            loss: Box::new(PhotometricLoss::new(&config.train)),
+            density: Box::new(AdaptiveDensityControl::new(config.train.densify.clone())),
+            significance: Box::new(VolumeWeightedScore::new(&config.train.prune)),
+            observers: Vec::new(),
+            config,
+            data,
+        }
+    }
+
+    /// Trains on this device instead of the one that the configuration names.
+    pub fn device(mut self, device: Device) -> Self {
+        self.device = Some(device);
+        self
+    }
+
+    /// Where images come from; from the files of the frames if not given.
+    pub fn images(mut self, images: impl ImageSource + 'static) -> Self {
+        self.images = Some(Box::new(images));
+        self
+    }
+
+    /// Writes metrics, TensorBoard events, checkpoints and the finished file into a folder.
+    pub fn run_folder(mut self, folder: RunFolder) -> Self {
+        self.folder = Some(folder);
+        self
+    }
+
+    /// What the rendered views are compared by, instead of [`PhotometricLoss`].
+    pub fn loss(mut self, loss: impl Loss + 'static) -> Self {
+        self.loss = Box::new(loss);
+        self
+    }
+
+    /// How Gaussians come and go, instead of [`AdaptiveDensityControl`].
+    pub fn density(mut self, strategy: impl DensityStrategy + 'static) -> Self {
+        self.density = Box::new(strategy);
+        self
+    }
+
+    /// By which score Gaussians are pruned after densification, instead of
+    /// [`VolumeWeightedScore`](crate::density::VolumeWeightedScore).
+    pub fn significance(mut self, score: impl SignificanceScore + 'static) -> Self {
+        self.significance = Box::new(score);
+        self
+    }
+
+    /// One more observer. They are told in the order in which they were added, after the logs of the run folder.
+    pub fn observer(mut self, observer: impl Observer + 'static) -> Self {
+        self.observers.push(Box::new(observer));
+        self
+    }
+
+    /// Begins a run.
+    ///
+    /// # Errors
+    /// A configuration out of range; a device that there is not; a dataset without frames; logs that cannot be opened.
+    pub fn build(self) -> Result<Trainer, TrainError> {
+        let device = self.open_device()?;
+        self.begin(device)
+    }
+
+    /// Continues the run of the folder from its newest checkpoint, or begins it if it has none, to the same result as if
+    /// it had never been interrupted: bit-identical on a CPU.
+    ///
+    /// # Errors
+    /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration.
+    pub fn resume(self) -> Result<Trainer, TrainError> {
+        let device = self.open_device()?;
+        match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
+            None => self.begin(device),
+            Some(path) => {
+                let state = Checkpoint::load(&path, &self.config, &device)?;
+                self.assemble(device, state, Some(path))
+            }
+        }
+    }
+
+    fn open_device(&self) -> Result<Device, TrainError> {
+        self.config.validate()?;
+        if self.data.train.is_empty() {
+            return Err(TrainError::Input(format!("the dataset `{}` has no training frames", self.data.name)));
+        }
+        let device = match &self.device {
+            Some(device) => device.clone(),
+            None => device::open(self.config.device)?,
+        };
+        Ok(device.autodiff())
+    }
+
+    fn begin(self, device: Device) -> Result<Trainer, TrainError> {
+        device.seed(self.config.seed);
+        let state = Checkpoint {
+            scene: self.config.model.build().init(&self.data.points, &device),
+            compression: Compression::of_run(&self.config, &device),
+            adam: Adam::default(),
+            density: Default::default(),
+            stage: Stage::Coarse,
+            iteration: 0,
+            seconds: 0.0,
+        };
+        self.assemble(device, state, None)
+    }
+
+    /// `checkpoint` is the file that `state` is from.
+    fn assemble(
+        self,
+        device: Device,
+        mut state: Checkpoint,
+        checkpoint: Option<PathBuf>,
+    ) -> Result<Trainer, TrainError> {
+        let Self { config, data, images, folder, loss, mut density, significance, observers, .. } = self;
+        let count = state.scene.gaussians.len();
+        match checkpoint {
+            None => density.begin_stage(count, &device.clone().inner()),
+            Some(path) => density
+                .restore(std::mem::take(&mut state.density), count)
+                .map_err(|problem| TrainError::Checkpoint { path, problem })?,
+        }
+        let images = images.unwrap_or_else(|| Box::new(image_store(&config)));
+        images.prefetch(&data.train);
+        let mut all: Vec<Box<dyn Observer>> = Vec::new();
+        if let Some(folder) = &folder {
+            let mut metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
+            metrics.truncate_after(state.stage, state.iteration)?;
+            let step = config.train.global_step(state.stage, state.iteration) as u64;
+            let events = TensorBoardLog::create(&folder.path("events"), (step > 0).then_some(step + 1), &config.train)?;
+            all.push(Box::new(metrics));
+            all.push(Box::new(events));
+        }
+        all.extend(observers);
+        // A graphics card is kept busy by one view at a time.
+        let side_by_side = match &self.device {
+            Some(device) => device::computes_on_processor(device),
+            None => config.device.computes_on_processor(),
+        };
+        let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
+        Ok(Trainer {
+            config,
+            device,
+            data,
+            images,
+            folder,
+            state,
+            loss,
+            density,
+            significance,
+            observers: all,
+            order: FrameOrder::default(),
+            profile: Profile::off(),
+            view_pools,
+            lap: None,
+        })
+    }
+}

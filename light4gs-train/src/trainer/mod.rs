@@ -1,0 +1,333 @@
+//! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
+//!
+//! - here: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
+//! - `builder`: what a trainer is made of
+//! - `step`: one iteration
+//! - `views`: the views of an iteration, each with a tape of its own
+//! - `rate`: quantization noise, and the rate in the loss
+//! - `pruning`: pruning by significance
+//!
+//! What a researcher may want to replace are traits: [`Loss`](crate::loss::Loss),
+//! [`DensityStrategy`](crate::density::DensityStrategy), [`SignificanceScore`](crate::density::SignificanceScore),
+//! [`Observer`](crate::observers::Observer) and [`ImageSource`](crate::dataset::ImageSource).
+
+mod builder;
+pub mod profile;
+mod pruning;
+mod rate;
+mod step;
+mod views;
+
+use std::time::Instant;
+
+use burn::module::Module;
+use burn::tensor::Device;
+use light4gs_data::{Scene, Split};
+use light4gs_model::{DynamicScene, GaussianTensors, Splatter};
+
+pub use builder::TrainerBuilder;
+
+use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
+use crate::config::Config;
+use crate::dataset::ImageSource;
+use crate::density::{DensityStrategy, SignificanceScore};
+use crate::error::TrainError;
+use crate::evaluation::metrics::{image_tensor, psnr};
+use crate::loss::Loss;
+use crate::observers::metrics_log::MetricsRecord;
+use crate::observers::{Observer, SceneInTraining, StepReport};
+use crate::optimization::adam::Adam;
+use crate::randomness::FrameOrder;
+use crate::run::{Checkpoint, RunFolder, list_checkpoints};
+use crate::stage::Stage;
+use profile::Profile;
+use views::ViewPools;
+
+/// A run in progress.
+///
+/// Without a run folder everything stays in memory: there are no checkpoints and no logs then. Ten iterations with a loss
+/// of one's own, on images in memory:
+///
+/// ```
+/// use std::path::Path;
+///
+/// use light4gs_data::{Camera, Frame, PointCloud, RgbImage8, Scene, SplitFrames};
+/// use light4gs_train::config::{Config, DeviceName};
+/// use light4gs_train::loss::LossInput;
+/// use light4gs_train::dataset::MemoryImages;
+/// use light4gs_train::trainer::Trainer;
+///
+/// // Four views of an orange ball's silhouette, at four times.
+/// let image = |_| {
+///     let inside = |i: i32| (i % 32 - 16).pow(2) + (i / 32 - 16).pow(2) < 64;
+///     let pixels = (0..32 * 32).flat_map(|i| if inside(i) { [255, 128, 0] } else { [255; 3] }).collect();
+///     RgbImage8 { width: 32, height: 32, pixels }
+/// };
+/// let frames: Vec<Frame> = (0..4)
+///     .map(|k| {
+///         let (sin, cos) = (k as f32 * 1.57).sin_cos();
+///         let eye = [4.0 * cos, 4.0 * sin, 0.5].into();
+///         let camera = Camera::look_at(eye, [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 32, 32);
+///         Frame::without_image(format!("view-{k}"), camera, k as f32 / 3.0)
+///     })
+///     .collect();
+/// let images: MemoryImages = frames.iter().map(|frame| (frame.name.clone(), image(frame))).collect();
+/// let frames = SplitFrames { test: frames.clone(), train: frames, ..SplitFrames::default() };
+/// let data = Scene::new("memory", Path::new("ball"), frames, PointCloud::random(200, 0.8, 0), [1.0; 3])?;
+///
+/// let mut config = Config::from_preset("dnerf-small")?;
+/// config.device = DeviceName::Flex;
+/// config.train.coarse_iterations = 5;
+/// config.train.fine_iterations = 5;
+/// config.train.prune.fraction = 0.0;
+/// let mut trainer = Trainer::builder(config, data)
+///     .images(images)
+///     // The square root of the squared difference, smoothed: less strict than L2, more than L1.
+///     .loss(|view: LossInput| ((view.image - view.truth).powi_scalar(2) + 1e-4).sqrt().mean())
+///     .build()?;
+/// let mut losses = Vec::new();
+/// while let Some(step) = trainer.step()? {
+///     losses.push(step.loss);
+/// }
+/// assert_eq!(losses.len(), 10);
+/// # Ok::<(), light4gs_train::error::TrainError>(())
+/// ```
+pub struct Trainer {
+    config: Config,
+    device: Device,
+    data: Scene,
+    images: Box<dyn ImageSource>,
+    folder: Option<RunFolder>,
+    state: Checkpoint,
+    loss: Box<dyn Loss>,
+    density: Box<dyn DensityStrategy>,
+    significance: Box<dyn SignificanceScore>,
+    observers: Vec<Box<dyn Observer>>,
+    order: FrameOrder,
+    profile: Profile,
+    view_pools: ViewPools,
+    lap: Option<Lap>,
+}
+
+/// Since when the speed is measured; there is none before a stage has begun.
+#[derive(Clone, Copy)]
+struct Lap {
+    begin: Instant,
+    iteration: usize,
+}
+
+impl Trainer {
+    /// What a run of `config` on `data` is made of. The parts that `config` names are the defaults.
+    pub fn builder(config: Config, data: Scene) -> TrainerBuilder {
+        TrainerBuilder::new(config, data)
+    }
+
+    /// From now on measures the parts of every iteration. The run gets slower, since each part is waited for.
+    pub fn measure_stages(&mut self) {
+        self.profile = Profile::on(&self.device);
+        // Parts can only be measured one after the other.
+        self.view_pools = ViewPools::none();
+    }
+
+    /// What [`Trainer::measure_stages`] led to.
+    pub fn profile(&self) -> &Profile {
+        &self.profile
+    }
+
+    /// The dataset.
+    pub fn data(&self) -> &Scene {
+        &self.data
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The model as trained so far, on the run's device.
+    pub fn scene(&self) -> &DynamicScene {
+        &self.state.scene
+    }
+
+    /// Entropy models and quantization steps, where the run trains them.
+    pub fn compression(&self) -> Option<&Compression> {
+        self.state.compression.as_ref()
+    }
+
+    /// Stage of the next iteration, or of the last one if training is over, and iterations done in it.
+    pub fn position(&self) -> (Stage, usize) {
+        (self.state.stage, self.state.iteration)
+    }
+
+    /// Seconds of training so far, over all sessions.
+    pub fn seconds(&self) -> f64 {
+        self.state.seconds
+    }
+
+    /// Trains to the end. With a run folder, also writes `scene.l4gs` and how it was coded; returns the file's size in
+    /// bytes then.
+    ///
+    /// # Errors
+    /// As [`Trainer::step`] and [`Trainer::encode`].
+    pub fn run(&mut self) -> Result<Option<u64>, TrainError> {
+        while self.step()?.is_some() {}
+        let Some(folder) = self.folder.clone() else { return Ok(None) };
+        let coded = self.encode()?;
+        folder.write("scene.l4gs", &coded.bytes)?;
+        if let Some((record, bit_maps)) = &coded.coding {
+            folder.write_json("coding.json", record)?;
+            folder.write_json("bit_maps.json", bit_maps)?;
+        }
+        Ok(Some(coded.bytes.len() as u64))
+    }
+
+    /// The scene as it is now as the bytes of a `.l4gs` file, in the profile of the configuration. Entropy models are fitted
+    /// first if the run trains none.
+    ///
+    /// # Errors
+    /// What the codec refuses, such as values that are not finite; an image that cannot be read.
+    pub fn encode(&mut self) -> Result<CodedScene, TrainError> {
+        let trained = TrainedScene {
+            scene: &self.state.scene,
+            compression: self.state.compression.as_ref(),
+            config: &self.config,
+            data: &self.data,
+            images: &*self.images,
+            device: &self.device,
+        };
+        let observers = &mut self.observers;
+        code_scene(&trained, &mut |done, iterations| observers.iter_mut().try_for_each(|o| o.on_fit(done, iterations)))
+    }
+
+    /// One iteration: forward and backward through a batch of views, the optimizer's step, then cloning, splitting and
+    /// pruning where they are due. Metrics, checkpoints and the change of stages happen here too. Returns what happened;
+    /// nothing once training is over.
+    ///
+    /// # Errors
+    /// [`TrainError::NotFinite`] if the loss is not finite; an image that cannot be read; a log or a checkpoint that cannot be
+    /// written; an observer's own.
+    pub fn step(&mut self) -> Result<Option<StepReport>, TrainError> {
+        let Some(iterations) = self.begin_iteration()? else { return Ok(None) };
+        let stage = self.state.stage;
+        let iteration = self.state.iteration + 1;
+        let begin = Instant::now();
+        let mut report = self.optimize(stage, iteration)?;
+        self.control_density(stage, iteration);
+        self.state.iteration = iteration;
+        self.state.seconds += begin.elapsed().as_secs_f64();
+        report.gaussians = self.state.scene.gaussians.len();
+        report.seconds = self.state.seconds;
+        let scene = Snapshot { scene: &self.state.scene, stage };
+        self.observers.iter_mut().try_for_each(|observer| observer.on_step(&report, &scene))?;
+
+        let is_last = iteration == iterations;
+        if iteration.is_multiple_of(self.config.train.log_interval) || is_last {
+            self.log(&report, is_last)?;
+        }
+        let interval = self.config.train.checkpoint_interval;
+        if (interval > 0 && iteration.is_multiple_of(interval)) || is_last {
+            self.save_checkpoint()?;
+        }
+        if is_last {
+            self.lap = None;
+            self.observers.iter_mut().try_for_each(|observer| observer.on_stage_end(stage))?;
+        }
+        Ok(Some(report))
+    }
+
+    /// The length of the current stage, after changing to the next one where one is over. None at the end of training.
+    fn begin_iteration(&mut self) -> Result<Option<usize>, TrainError> {
+        if self.state.stage == Stage::Coarse && self.state.iteration >= self.config.train.coarse_iterations {
+            self.begin_fine_stage();
+        }
+        let (stage, done) = (self.state.stage, self.state.iteration);
+        let iterations = self.config.train.iterations(stage);
+        if done >= iterations {
+            return Ok(None);
+        }
+        if self.lap.is_none() {
+            self.observers.iter_mut().try_for_each(|observer| observer.on_stage(stage, done, iterations))?;
+            self.restart_lap();
+        }
+        Ok(Some(iterations))
+    }
+
+    /// The fine stage starts with a new optimizer and new statistics.
+    fn begin_fine_stage(&mut self) {
+        self.state.stage = Stage::Fine;
+        self.state.iteration = 0;
+        self.state.adam = Adam::default();
+        self.density.begin_stage(self.state.scene.gaussians.len(), &self.device.clone().inner());
+    }
+
+    fn restart_lap(&mut self) {
+        self.lap = Some(Lap { begin: Instant::now(), iteration: self.state.iteration });
+    }
+
+    fn log(&mut self, report: &StepReport, is_last: bool) -> Result<(), TrainError> {
+        let StepReport { stage, iteration, .. } = *report;
+        let rate = self.lap.map(|lap| (iteration - lap.iteration) as f64 / lap.begin.elapsed().as_secs_f64());
+        self.restart_lap();
+        let mut record = MetricsRecord::new(stage, iteration, report.seconds, report.gaussians);
+        record.loss = Some(f64::from(report.loss));
+        record.psnr = Some(psnr(report.image.clone(), report.truth.clone()));
+        record.iterations_per_second = rate;
+        record.test_psnr = self.test_psnr(stage, iteration, is_last)?;
+        self.observers.iter_mut().try_for_each(|observer| observer.on_log(&record))
+    }
+
+    fn save_checkpoint(&mut self) -> Result<(), TrainError> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let path = folder.checkpoints().join(Checkpoint::file_name(self.state.stage, self.state.iteration));
+        self.state.density = self.density.state();
+        self.state.save(&path)?;
+        let all = list_checkpoints(&folder.checkpoints());
+        for old in &all[..all.len().saturating_sub(self.config.train.keep_checkpoints.max(1))] {
+            // A checkpoint too many does no harm.
+            let _ = std::fs::remove_file(old);
+        }
+        self.restart_lap();
+        self.observers.iter_mut().try_for_each(|observer| observer.on_checkpoint(&path))
+    }
+
+    fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {
+        let step = self.config.train.global_step(stage, iteration);
+        let degree = (step / self.config.train.sh_degree_interval.max(1)).min(usize::from(self.config.model.sh_degree));
+        Splatter::new(self.data.background, degree)
+    }
+
+    /// PSNR of a few test views by the model in memory, when it is due.
+    fn test_psnr(&self, stage: Stage, iteration: usize, is_last: bool) -> Result<Option<f64>, TrainError> {
+        let eval = &self.config.eval;
+        let frames = self.data.frames(Split::Test);
+        let due = eval.interval > 0 && (iteration.is_multiple_of(eval.interval) || is_last);
+        if !due || eval.views == 0 || frames.is_empty() {
+            return Ok(None);
+        }
+        let splatter = self.splatter(stage, iteration);
+        let stride = frames.len().div_ceil(eval.views);
+        let scene = Snapshot { scene: &self.state.scene, stage };
+        let mut values = Vec::new();
+        for frame in frames.iter().step_by(stride) {
+            let image = splatter.render(scene.gaussians_at(frame.time), &frame.camera, None).image.clamp(0.0, 1.0);
+            values.push(psnr(image, image_tensor(&*self.images.image(frame)?, &self.device.clone().inner())));
+        }
+        Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
+    }
+}
+
+/// The model between two iterations.
+struct Snapshot<'a> {
+    scene: &'a DynamicScene,
+    stage: Stage,
+}
+
+impl SceneInTraining for Snapshot<'_> {
+    fn gaussians_at(&self, time: f32) -> GaussianTensors {
+        let scene = self.scene.valid();
+        match self.stage {
+            Stage::Coarse => scene.gaussians.tensors(),
+            Stage::Fine => scene.at(time),
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! Pruning by significance (STP, paper III-B).
+
+use std::collections::BTreeMap;
+
+use burn::module::Module;
+use light4gs_data::Frame;
+use light4gs_model::{Significance, least_significant};
+use rand::Rng;
+
+use super::Trainer;
+use crate::density::{GaussianContributions, GaussianEditor};
+use crate::randomness::{Purpose, generator};
+use crate::stage::Stage;
+
+impl Trainer {
+    /// Drops the Gaussians that contribute least to the training views at their times.
+    pub(super) fn prune_insignificant(&mut self, iteration: usize) {
+        // Off the tape, which would hold on to every view's tensors until the next backward pass.
+        let scene = self.state.scene.valid();
+        let splatter = self.splatter(Stage::Fine, iteration);
+        let mut sums = Significance::new(scene.gaussians.len());
+        for frame in self.pruning_views(iteration) {
+            sums.add(&splatter, scene.at(frame.time), &frame.camera);
+        }
+        let volumes: Vec<f64> = scene.gaussians.log_scales.val().sum_dim(1).exp().into_data().iter::<f64>().collect();
+        let scores = self.significance.scores(&GaussianContributions::new(&sums, volumes));
+        let drop = least_significant(&scores, self.config.train.prune.fraction);
+        let keep: Vec<bool> = drop.iter().map(|drop| !drop).collect();
+        // Never everything: an empty scene has no gradient to come back from.
+        if keep.contains(&true) && keep.contains(&false) {
+            GaussianEditor::new(&mut self.state.scene.gaussians, &mut self.state.adam).keep(&keep);
+            self.density.rows_kept(&keep);
+        }
+    }
+
+    /// Every training view, or one random view a time.
+    fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
+        if !self.config.train.prune.one_camera_per_time {
+            return self.data.train.iter().collect();
+        }
+        let mut by_time: BTreeMap<u32, Vec<&Frame>> = BTreeMap::new();
+        for frame in &self.data.train {
+            by_time.entry(frame.time.to_bits()).or_default().push(frame);
+        }
+        let mut generator = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
+        by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()
+    }
+}

@@ -1,0 +1,124 @@
+//! One iteration: forward, backward, the optimizer's step.
+
+use burn::module::Param;
+use burn::tensor::Tensor;
+use light4gs_data::Frame;
+use light4gs_model::regularizer;
+
+use super::Trainer;
+use super::views::ViewPass;
+use crate::density::{GaussianEditor, Moment, ViewStatistics};
+use crate::error::TrainError;
+use crate::observers::StepReport;
+use crate::optimization::adam::Adam;
+use crate::optimization::gradients::GradientSums;
+use crate::optimization::learning_rates::GroupRates;
+use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::stage::Stage;
+
+impl Trainer {
+    /// Forward, backward, and one optimizer step.
+    pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
+        self.profile.begin_step();
+        let batch = self.config.train.batch_size.max(1);
+        let count = self.data.train.len();
+        let indices: Vec<usize> =
+            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, count)).collect();
+        let noisy = self.quantization_noise(stage, iteration)?;
+        self.profile.lap("quantization noise");
+        let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
+        let pass = ViewPass {
+            stage,
+            iteration,
+            splatter: self.splatter(stage, iteration),
+            images: &*self.images,
+            device: &self.device,
+            loss: &*self.loss,
+            batch,
+        };
+        let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
+        let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
+        let mut gradients = GradientSums::default();
+        for view in &mut views {
+            gradients.add(std::mem::take(&mut view.gradients));
+        }
+        let rate = noisy.as_ref().and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
+        let regularizers = self.add_regularizers(stage, iteration, &mut gradients);
+        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
+        let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
+        // What an iteration reads back from the device: this number.
+        let loss: f32 = loss.into_scalar();
+        if !loss.is_finite() {
+            let last = self.folder.as_ref().and_then(|folder| folder.last_checkpoint());
+            let checkpoint = last.map_or("none".into(), |path| path.display().to_string());
+            return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss, checkpoint });
+        }
+        let last = views.last().expect("a batch has at least one view");
+        let (image, truth) = (last.image.clone(), last.truth.clone());
+        let frame = indices[batch - 1];
+
+        let statistics: Vec<ViewStatistics> = views.into_iter().map(|view| view.statistics).collect();
+        self.density.after_backward(&statistics, &self.moment(stage, iteration));
+        self.profile.lap("density statistics");
+        let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
+        let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
+        visit_parameters(&mut self.state.scene, &mut step);
+        if let Some(compression) = &mut self.state.compression {
+            visit_compression(compression, &mut step);
+            if noisy.is_some_and(|noisy| noisy.learns_steps()) {
+                compression.bound_steps(&self.config);
+            }
+        }
+        self.profile.lap("Adam");
+        Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
+    }
+
+    /// Adds the gradients of the regularizers, and returns their value, `[1]`.
+    fn add_regularizers(&mut self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Option<Tensor<1>> {
+        if stage == Stage::Coarse || self.planes_are_frozen(stage, iteration) {
+            return None;
+        }
+        let scene = &mut self.state.scene;
+        let weights = &self.config.train.regularizer;
+        let term = regularizer::weighted_sum(
+            &scene.field.hexplane,
+            weights.plane_tv,
+            weights.time_smoothness,
+            weights.time_l1,
+        );
+        let value = term.clone().inner();
+        gradients.add_scene(scene, &mut term.backward());
+        self.profile.lap("regularizers");
+        Some(value)
+    }
+
+    fn moment(&self, stage: Stage, iteration: usize) -> Moment {
+        Moment { stage, iteration, extent: self.data.extent, seed: self.config.seed }
+    }
+
+    /// Cloning, splitting and pruning, where they are due.
+    pub(super) fn control_density(&mut self, stage: Stage, iteration: usize) {
+        let moment = self.moment(stage, iteration);
+        let mut editor = GaussianEditor::new(&mut self.state.scene.gaussians, &mut self.state.adam);
+        self.density.after_step(&mut editor, &moment);
+        if stage == Stage::Fine && self.config.train.prune.is_due(iteration) {
+            self.prune_insignificant(iteration);
+        }
+        self.profile.lap("density control");
+    }
+}
+
+struct AdamVisitor<'a> {
+    adam: &'a mut Adam,
+    gradients: &'a mut GradientSums,
+    rates: GroupRates,
+}
+
+impl ParameterVisitor for AdamVisitor<'_> {
+    fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
+        if let Some(gradient) = self.gradients.remove(name) {
+            let gradient = gradient.reshape(parameter.val().dims());
+            self.adam.step(name, parameter, gradient, self.rates.of(group));
+        }
+    }
+}
