@@ -10,7 +10,7 @@ use burn::tensor::{Device, Tensor};
 use light4gs_data::{Camera, PointCloud};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
 use light4gs_model::{
-    DeformationConfig, DynamicScene, DynamicSceneConfig, Gaussians, GaussiansConfig, HexPlaneConfig, Splatter,
+    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussiansConfig, HexPlaneConfig, HexPlaneFieldConfig, Splatter,
 };
 
 const STEPS: u32 = 10;
@@ -75,8 +75,8 @@ fn train(device: &Device) -> [f32; 2] {
     for time in 1..=STEPS {
         let mut gradients = loss(&scene).backward();
         let step = AdamStep { learning_rate: 0.02, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time };
-        let DynamicScene { gaussians: Gaussians { sh_dc, .. }, hexplane, .. } = &mut scene;
-        for (parameter, moments) in std::iter::once(sh_dc).chain(&mut hexplane.planes).zip(&mut moments) {
+        let DynamicScene { gaussians, field, .. } = &mut scene;
+        for (parameter, moments) in std::iter::once(&mut gaussians.sh_dc).chain(&mut field.hexplane.planes).zip(&mut moments) {
             let Some(gradient) = parameter.val().grad_remove(&mut gradients) else { continue };
             let zeros = || [gradient.zeros_like(), gradient.zeros_like()];
             let [first, second] = moments.take().unwrap_or_else(zeros);
@@ -91,9 +91,9 @@ fn train(device: &Device) -> [f32; 2] {
 /// Its random planes and weights are drawn by hand, so that they are the same on every back end.
 fn scene(cloud: &PointCloud, device: &Device) -> DynamicScene {
     let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
-    let config = DynamicSceneConfig::new(GaussiansConfig::new(), hexplane, DeformationConfig::new(0).with_width(16));
-    let mut scene = config.init(cloud, device);
-    for (k, plane) in scene.hexplane.planes.iter_mut().enumerate() {
+    let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(16));
+    let mut scene: DynamicScene = DynamicSceneConfig::new(GaussiansConfig::new(), field).init(cloud, device);
+    for (k, plane) in scene.field.hexplane.planes.iter_mut().enumerate() {
         let shape = plane.dims();
         let values: Vec<f32> = (0..shape.iter().product()).map(|i: usize| 0.7 + 0.3 * ((i + k) as f32).sin()).collect();
         let values = Tensor::<1>::from_floats(values.as_slice(), device).reshape(shape);
