@@ -9,9 +9,10 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, s};
+use light4gs_codec::{Network, PlaneSource};
 
+use super::prior::DescribedCondition;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
 const KERNEL: usize = 5;
 
@@ -42,18 +43,14 @@ pub struct Checkerboard {
     pub conv: PlaneConv,
 }
 
-const NAME: &str = "context_prediction";
-
-impl NamedParameters for Checkerboard {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
-    }
-}
-
 impl Checkerboard {
-    /// The convolution as the stream stores it.
-    pub fn layer(&self) -> Layer<'_> {
-        Layer::conv(NAME, &self.conv)
+    /// [`Self::context`] for the codec's exact executor.
+    pub fn describe(&self) -> DescribedCondition {
+        let layer = self.conv.to_layer();
+        let (mut network, [anchors]) = Network::new([layer.inputs]);
+        let context = network.layer(anchors, layer);
+        network.output(context);
+        DescribedCondition { network, sources: vec![PlaneSource::Anchors] }
     }
 
     /// The context `[2 M, H, W]` of a plane `[M, H, W]` in original units, of which only the anchors are looked at. Zero at the

@@ -4,9 +4,11 @@ use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::Network;
+use light4gs_codec::network::Operation;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
+use crate::entropy::gaussian_conditional::NormalParameters;
 
 /// How the last layer starts.
 #[derive(Config, Debug, PartialEq)]
@@ -51,39 +53,38 @@ pub struct EntropyParameters {
     pub layers: [PlaneConv; 3],
 }
 
-/// The Gaussian of each value of a plane, in units of its step.
-#[derive(Clone, Debug)]
-pub struct PlaneGaussians {
-    /// `[M, H, W]`.
-    pub means: Tensor<3>,
-    /// `[M, H, W]`, raw: what is below [`SCALE_BOUND`](crate::entropy::gaussian_conditional::SCALE_BOUND) counts as that.
-    pub scales: Tensor<3>,
-}
-
-const NAMES: [&str; 3] = ["entropy_parameters.0", "entropy_parameters.2", "entropy_parameters.4"];
-
-impl NamedParameters for EntropyParameters {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (name, layer) in NAMES.into_iter().zip(&mut self.layers) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
-    }
-}
-
 impl EntropyParameters {
-    /// The layers as the stream stores them.
-    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
-        NAMES.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
+    /// Channels of a plane.
+    pub fn channels(&self) -> usize {
+        let [.., last] = &self.layers;
+        last.bias.dims()[0] / 2
     }
 
-    /// Gaussians of a plane of this size (height, width) from `parameters` and `context [2 M, H, W]`; what is absent
+    /// [`Self::forward`] for the codec's exact executor: parameters and context to scales, then means.
+    pub fn network(&self) -> Network {
+        let [first, rest @ ..] = &self.layers;
+        let first = first.to_layer();
+        let half = first.inputs / 2;
+        let (mut network, [parameters, context]) = Network::new([half, half]);
+        let known = network.node(Operation::Concatenate, &[parameters, context]);
+        let hidden = network.layer(known, first);
+        let output = rest.iter().fold(hidden, |hidden, layer| {
+            let rectified = network.leaky_relu(hidden, LEAKY_SLOPE as f32);
+            network.layer(rectified, layer.to_layer())
+        });
+        network.output(output);
+        network
+    }
+
+    /// Normal distributions `[M, H, W]` of the values of a plane of this size (height, width), in units of its step,
+    /// from `parameters` and `context [2 M, H, W]`; what is absent
     /// counts as zeros.
     pub fn forward(
         &self,
         parameters: Option<Tensor<3>>,
         context: Option<Tensor<3>>,
         [height, width]: [usize; 2],
-    ) -> PlaneGaussians {
+    ) -> NormalParameters<3> {
         let [first, rest @ ..] = &self.layers;
         let [outputs, inputs, ..] = first.weight.dims();
         let weight = first.weight.val().reshape([outputs, inputs]);
@@ -102,7 +103,7 @@ impl EntropyParameters {
         let output = rest.iter().fold(hidden, |hidden, layer| layer.forward(leaky_relu(hidden, LEAKY_SLOPE)));
         let [doubled, ..] = output.dims();
         let channels = doubled / 2;
-        PlaneGaussians { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
+        NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
     }
 
     /// Makes the network say about this mean and scale (in steps) for each channel, whatever it sees: the last layer's biases

@@ -4,12 +4,12 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::{Network, PlaneSource};
 
-use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
 use crate::entropy::gaussian_conditional::bits;
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, Prefixed, visit_layer};
 
 /// Configuration of a [`Hyperprior`].
 #[derive(Config, Debug)]
@@ -55,32 +55,7 @@ pub struct Hyperprior {
     pub synthesis_out: PlaneConv,
 }
 
-const ANALYSIS: [&str; 3] = ["h_a.0", "h_a.2", "h_a.4"];
-const SYNTHESIS_UP: [&str; 2] = ["h_s.0", "h_s.2"];
-const SYNTHESIS_OUT: &str = "h_s.4";
-
-impl NamedParameters for Hyperprior {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (name, layer) in ANALYSIS.into_iter().zip(&mut self.analysis) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
-        for (name, layer) in SYNTHESIS_UP.into_iter().zip(&mut self.synthesis_up) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
-        visit_layer(SYNTHESIS_OUT, &mut self.synthesis_out.weight, &mut self.synthesis_out.bias, visitor);
-        self.bottleneck.visit_parameters(&mut Prefixed { prefix: "entropy_bottleneck", visitor });
-    }
-}
-
 impl Hyperprior {
-    /// The layers as the stream stores them, and `h_a`, which it does not.
-    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
-        let analysis = ANALYSIS.into_iter().zip(&self.analysis);
-        let analysis = analysis.map(|(name, layer)| Layer { encoder_only: true, ..Layer::conv(name, layer) });
-        let up = SYNTHESIS_UP.into_iter().zip(&self.synthesis_up).map(|(name, layer)| Layer::deconv(name, layer));
-        analysis.chain(up).chain([Layer::conv(SYNTHESIS_OUT, &self.synthesis_out)])
-    }
-
     /// The latent `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
     pub fn analyze(&self, plane: Tensor<3>) -> Tensor<3> {
         let [first, second, third] = &self.analysis;
@@ -92,6 +67,19 @@ impl Hyperprior {
     pub fn synthesize(&self, latent: Tensor<3>) -> Tensor<3> {
         let up = self.synthesis_up.iter().fold(latent, |hidden, layer| leaky_relu(layer.forward(hidden), LEAKY_SLOPE));
         self.synthesis_out.forward(up)
+    }
+
+    /// [`Self::synthesize`] for the codec's exact executor.
+    pub fn synthesis_network(&self) -> Network {
+        let [first, _] = &self.synthesis_up;
+        let (mut network, [latent]) = Network::new([first.to_layer().inputs]);
+        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| {
+            let doubled = network.layer(hidden, layer.to_layer());
+            network.leaky_relu(doubled, LEAKY_SLOPE as f32)
+        });
+        let parameters = network.layer(up, self.synthesis_out.to_layer());
+        network.output(parameters);
+        network
     }
 
     /// Symbols `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
@@ -110,5 +98,10 @@ impl PriorPart for Hyperprior {
             passes: Passes::AnchorsFirst,
             hyper_bits: Some(bits(likelihood).sum()),
         })
+    }
+
+    fn describe(&self, _: usize) -> Option<DescribedPrior> {
+        let parameters = DescribedCondition { network: self.synthesis_network(), sources: vec![PlaneSource::Latent] };
+        Some(DescribedPrior { parameters: Some(parameters), context: None, passes: Passes::AnchorsFirst })
     }
 }

@@ -13,9 +13,9 @@ pub(crate) mod model;
 pub(crate) mod prior;
 
 pub use checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask, demultiplex, multiplex};
-pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
+pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, Start};
 pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};
 pub use inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig, upsample};
 pub use model::{ContextModel, ContextModelConfig, ContextParts, KernelShape, PlaneRate, QuantizedPlane};
-pub use prior::{CenteredPlanes, Passes, Prior, PriorPart};
+pub use prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};

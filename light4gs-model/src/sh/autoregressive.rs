@@ -3,14 +3,14 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::network::Operation;
+use light4gs_codec::{Network, ShPrior, ShSource};
 
 use super::entropy::{ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
-use super::network::{Names, ShNetwork};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
+use super::network::ShNetwork;
 
 /// First channel and number of channels of the degrees 1, 2 and 3.
 const DEGREES: [(usize, usize); 3] = [(0, 9), (9, 15), (24, 21)];
-const NAMES: [Names; 3] = [["sh_ar.0.0", "sh_ar.0.2"], ["sh_ar.1.0", "sh_ar.1.2"], ["sh_ar.2.0", "sh_ar.2.2"]];
 const DC: usize = 3;
 
 /// Configuration of a [`ShAutoregressive`].
@@ -45,11 +45,6 @@ pub struct ShAutoregressive {
 }
 
 impl ShAutoregressive {
-    /// The layers as the stream stores them.
-    pub fn layers(&self) -> Vec<Layer<'_>> {
-        self.degrees.iter().zip(NAMES).flat_map(|(network, names)| network.layers(names)).collect()
-    }
-
     /// Scales and means `[2 C, 1, N]` of a degree's channels, from `dc [3, N]` and the lower degrees in `values [45, N]`.
     fn output(&self, degree: usize, dc: &Tensor<2>, values: &Tensor<2>) -> Tensor<3> {
         let (lower, _) = DEGREES[degree];
@@ -90,12 +85,23 @@ impl ShEntropy for ShAutoregressive {
         }
         channels_last(Tensor::cat(decoded, 0))
     }
-}
 
-impl NamedParameters for ShAutoregressive {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (network, names) in self.degrees.iter_mut().zip(NAMES) {
-            network.visit_layers(names, visitor);
-        }
+    fn priors(&self) -> Vec<ShPrior> {
+        let prior = |(degree, (lower, _)): (&ShNetwork, (usize, usize))| {
+            let (mut network, sources, features);
+            if lower == 0 {
+                (network, [features]) = Network::new([DC as u32]);
+                sources = vec![ShSource::Dc];
+            } else {
+                let inputs;
+                (network, inputs) = Network::new([DC as u32, lower as u32]);
+                features = network.node(Operation::Concatenate, &inputs);
+                sources = vec![ShSource::Dc, ShSource::Decoded];
+            }
+            let output = degree.describe(&mut network, features);
+            network.output(output);
+            ShPrior { network, sources }
+        };
+        self.degrees.iter().zip(DEGREES).map(prior).collect()
     }
 }
