@@ -44,7 +44,8 @@ pub(crate) fn first_anchor(y: usize) -> usize {
 pub(crate) struct MaskedConvolution {
     groups: Vec<Matrix>,
     inputs_per_group: usize,
-    kernel: usize,
+    /// Rows and columns from the center of the taps that count.
+    taps: Vec<(isize, isize)>,
 }
 
 impl MaskedConvolution {
@@ -53,15 +54,19 @@ impl MaskedConvolution {
         let groups = layer.groups as usize;
         let (outputs, inputs) = (layer.outputs as usize / groups, layer.inputs as usize / groups);
         let taps: Vec<_> = masked_taps(layer.kernel).collect();
-        let area = (layer.kernel * layer.kernel) as usize;
+        let kernel = layer.kernel as usize;
+        let area = kernel * kernel;
+        let offset = |place: usize| place as isize - (kernel / 2) as isize;
         let matrix = |group: usize| {
             let bias = &layer.bias[group * outputs..(group + 1) * outputs];
             Matrix::new(inputs * taps.len(), bias, |row, column| {
-                let kernel = (group * outputs + row) * inputs + column / taps.len();
-                layer.weight[kernel * area + taps[column % taps.len()]]
+                let channel = (group * outputs + row) * inputs + column / taps.len();
+                layer.weight[channel * area + taps[column % taps.len()]]
             })
         };
-        Self { groups: (0..groups).map(matrix).collect(), inputs_per_group: inputs, kernel: layer.kernel as usize }
+        let groups = (0..groups).map(matrix).collect();
+        let taps = taps.iter().map(|tap| (offset(tap / kernel), offset(tap % kernel))).collect();
+        Self { groups, inputs_per_group: inputs, taps }
     }
 
     /// The outputs at eight neighbouring non-anchors of row `y`, the first of which is number `first` of its row.
@@ -77,12 +82,10 @@ impl MaskedConvolution {
         // column 2i + parity, those of its own row and of the second next in 2i + 1 - parity.
         let parity = (y % 2) as isize;
         let columns = Columns { first, step: 1 };
-        let (kernel, reach) = (self.kernel, (self.kernel / 2) as isize);
         for (index, group) in self.groups.iter().enumerate() {
             window.clear();
             for channel in index * self.inputs_per_group..(index + 1) * self.inputs_per_group {
-                for tap in masked_taps(kernel as u32) {
-                    let (dy, dx) = ((tap / kernel) as isize - reach, (tap % kernel) as isize - reach);
+                for &(dy, dx) in &self.taps {
                     let anchor_parity = if dy % 2 == 0 { 1 - parity } else { parity };
                     let packed_dx = (parity + dx - anchor_parity) / 2;
                     window.push(anchors.packed.lanes(channel, y, columns, dy, packed_dx));
@@ -97,6 +100,6 @@ impl MaskedConvolution {
     /// Multiplications for one place.
     pub(crate) fn work(&self) -> u64 {
         let outputs: usize = self.groups.iter().map(Matrix::padded_outputs).sum();
-        (outputs * self.inputs_per_group * masked_taps(self.kernel as u32).count()) as u64
+        (outputs * self.inputs_per_group * self.taps.len()) as u64
     }
 }
