@@ -63,7 +63,7 @@ impl VolumeWeight {
     }
 }
 
-/// Sums over pictures of what each of `N` Gaussians contributes.
+/// Sums over images of what each of `N` Gaussians contributes.
 ///
 /// ```
 /// use burn::tensor::Device;
@@ -91,13 +91,13 @@ impl Significance {
         Self { sums: vec![[0.0; 4]; count] }
     }
 
-    /// Adds the picture of raw attributes at a time, through a camera.
+    /// Adds the image of raw attributes at a time, through a camera.
     ///
     /// # Panics
     /// If the number of Gaussians is another than at the beginning.
     pub fn add(&mut self, splatter: &Splatter, gaussians: GaussianTensors, camera: &Camera) {
         let gaussians = gaussians.inner();
-        let (inputs, view) = splatter.inputs(gaussians, camera);
+        let (inputs, view) = splatter.inputs(gaussians.activated(), camera, None);
         let values = burn::tensor::Tensor::<2>::from_dispatch(Dispatch::significance(inputs, view)).into_data();
         let values: Vec<f32> = values.iter().collect();
         let (rows, _) = values.as_chunks::<4>();
@@ -109,7 +109,7 @@ impl Significance {
         }
     }
 
-    /// `[N]`: the score over all pictures so far.
+    /// `[N]`: the score over all images so far.
     pub fn scores(&self, score: SignificanceScore) -> Vec<f64> {
         let column = match score {
             SignificanceScore::PixelCount => 0,

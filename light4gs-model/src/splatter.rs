@@ -1,18 +1,13 @@
 //! Differentiable rendering of Gaussians (3DGS, Kerbl et al. 2023).
 
 use burn::backend::Dispatch;
-use burn::tensor::activation::sigmoid;
 use burn::tensor::{Bool, Int, Tensor, s};
 use light4gs_data::Camera;
 
-use crate::cpu::project::View;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
-use crate::scene::gaussians::GaussianTensors;
+use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 
-/// Logarithms of scales are cut here before the exponential.
-const MAX_LOG_SCALE: f32 = 40.0;
-
-/// A picture and what the optimiser wants to know of it.
+/// An image and what the optimizer wants to know of it.
 #[derive(Clone, Debug)]
 pub struct Rendering {
     /// `[H, W, 3]`, over the background; not clamped above.
@@ -21,7 +16,7 @@ pub struct Rendering {
     pub alpha: Tensor<2>,
     /// `[H, W]`: sum of view depth times blending weight, world units, not divided by alpha.
     pub depth: Tensor<2>,
-    /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the picture; -1 for Gaussians that are not
+    /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the image; -1 for Gaussians that are not
     /// finite or have no orientation, which are not drawn.
     pub radii: Tensor<1, Int>,
 }
@@ -38,7 +33,8 @@ impl Rendering {
     }
 }
 
-/// Renders Gaussians over a background.
+/// Renders Gaussians over a background. With an autodiff device, everything that goes in gets its gradient, so a loop and a
+/// loss of your own need nothing else of this crate:
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -49,8 +45,8 @@ impl Rendering {
 /// let cloud = PointCloud { positions: vec![[0.0; 3], [0.3, 0.0, 0.0]], colors: vec![[1.0, 0.0, 0.0]; 2] };
 /// let gaussians = GaussiansConfig::new().init(&cloud, &device);
 /// let camera = Camera::look_at([0.0, -4.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 40, 30);
-/// let picture = Splatter::new([1.0; 3], 3).render(gaussians.tensors(), &camera, None);
-/// assert_eq!(picture.image.dims(), [30, 40, 3]);
+/// let rendering = Splatter::new([1.0; 3], 3).render(gaussians.tensors(), &camera, None);
+/// assert_eq!(rendering.image.dims(), [30, 40, 3]);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splatter {
@@ -67,38 +63,26 @@ impl Splatter {
 
     /// Renders raw attributes (the activations happen here) through a camera.
     ///
-    /// `screen_offsets [N, 2]`, normally zeros, are added to the projected positions in units of half the picture;
+    /// `screen_offsets [N, 2]`, normally zeros, are added to the projected positions in units of half the image;
     /// their gradient is the screen-space gradient that drives densification.
+    ///
+    /// # Panics
+    /// If the shapes do not belong together; the message names the tensor.
     pub fn render(&self, gaussians: GaussianTensors, camera: &Camera, screen_offsets: Option<Tensor<2>>) -> Rendering {
-        let (scales, opacities) = activate(gaussians.log_scales, gaussians.opacity_logits);
-        let GaussianTensors { means, quats, sh_dc, sh_rest, .. } = gaussians;
-        self.render_activated(means, quats, scales, opacities, sh_dc, sh_rest, camera, screen_offsets)
+        self.render_activated(gaussians.activated(), camera, screen_offsets)
     }
 
-    /// What the operations on one picture take, from raw attributes.
-    pub(crate) fn inputs(&self, gaussians: GaussianTensors, camera: &Camera) -> (SplatInputs<Dispatch>, SplatView) {
-        let (scales, opacities) = activate(gaussians.log_scales, gaussians.opacity_logits);
-        let GaussianTensors { means, quats, sh_dc, sh_rest, .. } = gaussians;
-        self.activated_inputs(means, quats, scales, opacities, sh_dc, sh_rest, camera, None)
-    }
-
-    /// Renders activated attributes: standard deviations `scales [N, 3]` and `opacities [N, 1]` in [0, 1].
+    /// Renders attributes that need no activation any more: [`Self::render`] for those who have their own.
     ///
     /// # Panics
     /// If the shapes do not belong together; the message names the tensor.
     pub fn render_activated(
         &self,
-        means: Tensor<2>,
-        quats: Tensor<2>,
-        scales: Tensor<2>,
-        opacities: Tensor<2>,
-        sh_dc: Tensor<3>,
-        sh_rest: Tensor<3>,
+        gaussians: ActivatedGaussians,
         camera: &Camera,
         screen_offsets: Option<Tensor<2>>,
     ) -> Rendering {
-        let (inputs, view) =
-            self.activated_inputs(means, quats, scales, opacities, sh_dc, sh_rest, camera, screen_offsets);
+        let (inputs, view) = self.inputs(gaussians, camera, screen_offsets);
         let outputs = Dispatch::splat(inputs, view);
         let picture = Tensor::<1>::from_dispatch(outputs.picture);
         let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
@@ -112,17 +96,17 @@ impl Splatter {
         }
     }
 
-    fn activated_inputs(
+    /// What the operations on one image take, for those who call an operation of [`ops`](crate::ops) themselves.
+    ///
+    /// # Panics
+    /// If the shapes do not belong together; the message names the tensor.
+    pub fn inputs(
         &self,
-        means: Tensor<2>,
-        quats: Tensor<2>,
-        scales: Tensor<2>,
-        opacities: Tensor<2>,
-        sh_dc: Tensor<3>,
-        sh_rest: Tensor<3>,
+        gaussians: ActivatedGaussians,
         camera: &Camera,
         screen_offsets: Option<Tensor<2>>,
     ) -> (SplatInputs<Dispatch>, SplatView) {
+        let ActivatedGaussians { means, quats, scales, opacities, sh_dc, sh_rest } = gaussians;
         let count = means.dims()[0];
         let rest = sh_rest.dims()[1];
         assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
@@ -135,7 +119,7 @@ impl Splatter {
         assert_eq!(screen_offsets.dims(), [count, 2], "screen_offsets must be [N, 2]");
 
         let sh_degree = self.sh_degree.min((rest + 1).isqrt() - 1);
-        let view = SplatView(View { camera: *camera, background: self.background, sh_degree });
+        let view = SplatView::new(*camera, self.background, sh_degree);
         let inputs = SplatInputs {
             means: means.into_dispatch(),
             quats: quats.into_dispatch(),
@@ -147,10 +131,4 @@ impl Splatter {
         };
         (inputs, view)
     }
-}
-
-/// Standard deviations and opacities from what is trained.
-fn activate(log_scales: Tensor<2>, opacity_logits: Tensor<2>) -> (Tensor<2>, Tensor<2>) {
-    // Far beyond any scene, and exp stays finite, so that the way back has no 0 · infinity.
-    (log_scales.clamp_max(MAX_LOG_SCALE).exp(), sigmoid(opacity_logits))
 }

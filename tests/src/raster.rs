@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor, s};
 use light4gs_data::Camera;
-use light4gs_model::{Rendering, Splatter};
+use light4gs_model::{ActivatedGaussians, Rendering, Splatter};
 
 use crate::golden::Golden;
 
@@ -57,15 +57,14 @@ impl Leaves {
     /// Renders with the active degree.
     pub fn render(&self, camera: &Camera, background: [f32; 3], degree: usize) -> Rendering {
         let [_, coefficients, _] = self.sh.dims();
-        Splatter::new(background, degree).render_activated(
-            self.means.clone(),
-            self.quats.clone(),
-            self.scales.clone(),
-            self.opacities.clone(),
-            self.sh.clone().slice(s![.., 0..1, ..]),
-            self.sh.clone().slice(s![.., 1..coefficients, ..]),
-            camera,
-            Some(self.screen_offsets.clone()),
-        )
+        let gaussians = ActivatedGaussians {
+            means: self.means.clone(),
+            quats: self.quats.clone(),
+            scales: self.scales.clone(),
+            opacities: self.opacities.clone(),
+            sh_dc: self.sh.clone().slice(s![.., 0..1, ..]),
+            sh_rest: self.sh.clone().slice(s![.., 1..coefficients, ..]),
+        };
+        Splatter::new(background, degree).render_activated(gaussians, camera, Some(self.screen_offsets.clone()))
     }
 }

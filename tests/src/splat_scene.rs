@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Tensor, TensorData, s};
 use light4gs_data::Camera;
-use light4gs_model::{Rendering, Splatter};
+use light4gs_model::{ActivatedGaussians, Rendering, Splatter};
 
 use crate::golden::values_of;
 use crate::random::Random;
@@ -124,16 +124,9 @@ impl SceneLeaves {
     pub fn render(&self, camera: &Camera, background: [f32; 3], degree: usize) -> Rendering {
         let [means, quats, scales, opacities, sh_dc, sh_rest, offsets] = self.tensors.clone();
         let count = means.dims()[0];
-        Splatter::new(background, degree).render_activated(
-            means,
-            quats,
-            scales,
-            opacities,
-            sh_dc.reshape([count, 1, 3]),
-            sh_rest.reshape([count, 15, 3]),
-            camera,
-            Some(offsets),
-        )
+        let (sh_dc, sh_rest) = (sh_dc.reshape([count, 1, 3]), sh_rest.reshape([count, 15, 3]));
+        let gaussians = ActivatedGaussians { means, quats, scales, opacities, sh_dc, sh_rest };
+        Splatter::new(background, degree).render_activated(gaussians, camera, Some(offsets))
     }
 
     /// Gradients of `sum(picture · weights)`, `weights [H, W, 5]`, by all seven inputs.

@@ -7,7 +7,7 @@
 
 use burn::tensor::{Tensor, TensorData};
 use light4gs_data::Camera;
-use light4gs_model::Splatter;
+use light4gs_model::{ActivatedGaussians, Splatter};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run_weighed};
 use light4gs_tests::random::Random;
@@ -179,10 +179,10 @@ fn a_million_gaussians_in_one_tile() {
                 })
                 .collect();
             let [means, quats, scales, opacities, dc] = std::array::from_fn(|k| leaves[k].clone());
-            let rest = Tensor::<3>::zeros([COUNT, 0, 3], &device);
-            let dc = dc.reshape([COUNT, 1, 3]);
+            let (sh_dc, sh_rest) = (dc.reshape([COUNT, 1, 3]), Tensor::<3>::zeros([COUNT, 0, 3], &device));
+            let gaussians = ActivatedGaussians { means, quats, scales, opacities, sh_dc, sh_rest };
             let splatter = Splatter::new(BACKGROUND, 0);
-            let rendering = splatter.render_activated(means, quats, scales, opacities, dc, rest, &camera, None);
+            let rendering = splatter.render_activated(gaussians, &camera, None);
             let picture = values_of(&rendering.image);
             let gradients = (rendering.image.sum() + rendering.depth.sum()).backward();
             let of_leaves = leaves.iter().map(|leaf| values_of(&leaf.grad(&gradients).expect("a gradient")));

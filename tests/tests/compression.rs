@@ -108,7 +108,7 @@ fn the_rate_on_a_part_is_unbiased() {
     let device = Device::flex().autodiff();
     let config = config(&[]);
     let scene = scene(&config, &device);
-    let compression = Compression::new(&config, &device);
+    let compression = Compression::new(&config, scene.planes(), &device).unwrap();
     let noisy = compression.noisy(&scene, false, true);
     // The hyperprior's own noise is drawn anew each time; seeding it makes all draws see the same.
     let estimate = |fraction: f64, seed: u64| {
@@ -154,8 +154,8 @@ fn every_configuration_makes_a_file_that_decodes() {
     ] {
         let config = config(overrides);
         let scene = scene(&config, &device);
-        let mut compression = Compression::new(&config, &device);
-        compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps());
+        let mut compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        compression.start_from(scene.planes());
         let encoded =
             encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
                 .unwrap();
@@ -182,11 +182,13 @@ fn frozen_planes_are_those_of_the_file() {
             let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.05), &device);
             *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
         }
-        let mut compression = Compression::new(&config, &device);
-        let steps = compression.quantization.steps();
-        compression.context = shaken(compression.context, &scene.field.hexplane.tensors(), &steps);
+        let mut compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let mut models = compression.planes.unwrap();
+        models.context =
+            shaken(models.context, &scene.field.hexplane.tensors(), &models.quantization.steps_without_gradient());
+        compression.planes = Some(models);
         let before = scene.field.hexplane.to_arrays();
-        scene.field.hexplane = freeze_planes(&scene, &compression, &config.compression, &device).unwrap();
+        scene.field.hexplane = freeze_planes(&scene, &compression, &config.compression, &device).unwrap().unwrap();
         let frozen = scene.field.hexplane.to_arrays();
         assert_ne!(frozen, before, "{name}");
         let file =
@@ -204,7 +206,7 @@ fn a_scene_without_gaussians_is_a_file_too() {
     let mut empty = full;
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
     let scene: DynamicScene = DynamicScene::from_arrays(&empty, &device).unwrap();
-    let compression = Compression::new(&config, &device);
+    let compression = Compression::new(&config, scene.planes(), &device).unwrap();
     let encoded =
         encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
             .unwrap();

@@ -253,7 +253,7 @@ fn eval() {
         for plane in 0..planes.planes.len() {
             let (gaussians, hyper) = model.parameters_with(&parts, &planes, plane, Latent::Rounded);
             let rounded = (planes.in_steps(plane) - gaussians.means.clone()).round() + gaussians.means.clone();
-            let likelihood = gaussian_likelihood(rounded, gaussians.means, gaussians.scales);
+            let likelihood = gaussian_likelihood(rounded, gaussians);
             let what = format!("{name} eval {}", file_key(plane));
             let key = format!("eval.likelihood_y.{}", file_key(plane));
             assert_close_relative(&format!("{name} {key}"), &values_of(&likelihood), &golden.values(&key), 1e-4);

@@ -1,7 +1,7 @@
 //! Golden cases c04 (entropy bottlenecks) and c05 (Gaussian conditional) on every back end.
 
 use burn::tensor::{Device, Distribution, Gradients, Tensor};
-use light4gs_model::gaussian_conditional::{LIKELIHOOD_BOUND, bits, gaussian_likelihood};
+use light4gs_model::gaussian_conditional::{LIKELIHOOD_BOUND, NormalParameters, bits, gaussian_likelihood};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::{
     EntropyBottleneck, EntropyBottleneckConfig, FactorizedDensity, Latent, PlainDensity, ShBottleneck,
@@ -283,14 +283,17 @@ fn gaussian_conditional() {
         let means = read("in.means");
         let rounded = (read("in.y") - means.clone()).round() + means.clone();
         assert_close(&format!("{name} eval.out"), &values_of(&rounded), &golden.values("eval.out"), 1e-5);
-        let likelihood = gaussian_likelihood(rounded, means, read("in.scales"));
+        let likelihood = gaussian_likelihood(rounded, NormalParameters { means, scales: read("in.scales") });
         let expected = golden.values("eval.likelihood");
         assert_close(&format!("{name} eval.likelihood"), &values_of(&likelihood), &expected, 3e-7);
         let total = bits(likelihood).sum();
         assert_close_relative(&format!("{name} eval.bits"), &values_of(&total), &golden.values("eval.bits"), 1e-5);
 
         let noisy = read("in.y") + read("noise.noise");
-        let likelihood = gaussian_likelihood(noisy.clone(), noisy.zeros_like(), read("in.scales"));
+        let likelihood = gaussian_likelihood(
+            noisy.clone(),
+            NormalParameters { means: noisy.zeros_like(), scales: read("in.scales") },
+        );
         let expected = golden.values("noise.likelihood_no_means");
         assert_close(&format!("{name} no means"), &values_of(&likelihood), &expected, 3e-7);
 
@@ -299,7 +302,8 @@ fn gaussian_conditional() {
             // From the means on: the sum of value and noise alone, in float32, is off by more than the tolerance.
             let origin = read("in.means");
             let values = (y.clone() - origin.clone()) + read("noise.noise");
-            let likelihood = gaussian_likelihood(values, means.clone() - origin, scales.clone());
+            let likelihood =
+                gaussian_likelihood(values, NormalParameters { means: means.clone() - origin, scales: scales.clone() });
             let loss = if prefix == "noise" {
                 let expected = golden.values("noise.likelihood");
                 assert_close(&format!("{name} noise.likelihood"), &values_of(&likelihood), &expected, 3e-7);

@@ -6,6 +6,7 @@ use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
+use crate::entropy::gaussian_conditional::NormalParameters;
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
 /// How the last layer starts.
@@ -51,15 +52,6 @@ pub struct EntropyParameters {
     pub layers: [PlaneConv; 3],
 }
 
-/// The Gaussian of each value of a plane, in units of its step.
-#[derive(Clone, Debug)]
-pub struct PlaneGaussians {
-    /// `[M, H, W]`.
-    pub means: Tensor<3>,
-    /// `[M, H, W]`, raw: what is below [`SCALE_BOUND`](crate::entropy::gaussian_conditional::SCALE_BOUND) counts as that.
-    pub scales: Tensor<3>,
-}
-
 const NAMES: [&str; 3] = ["entropy_parameters.0", "entropy_parameters.2", "entropy_parameters.4"];
 
 impl NamedParameters for EntropyParameters {
@@ -76,14 +68,14 @@ impl EntropyParameters {
         NAMES.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
     }
 
-    /// Gaussians of a plane of this size (height, width) from `parameters` and `context [2 M, H, W]`; what is absent
+    /// Normal distributions `[M, H, W]` of the values of a plane of this size (height, width), in units of its step, from `parameters` and `context [2 M, H, W]`; what is absent
     /// counts as zeros.
     pub fn forward(
         &self,
         parameters: Option<Tensor<3>>,
         context: Option<Tensor<3>>,
         [height, width]: [usize; 2],
-    ) -> PlaneGaussians {
+    ) -> NormalParameters<3> {
         let [first, rest @ ..] = &self.layers;
         let [outputs, inputs, ..] = first.weight.dims();
         let weight = first.weight.val().reshape([outputs, inputs]);
@@ -102,7 +94,7 @@ impl EntropyParameters {
         let output = rest.iter().fold(hidden, |hidden, layer| layer.forward(leaky_relu(hidden, LEAKY_SLOPE)));
         let [doubled, ..] = output.dims();
         let channels = doubled / 2;
-        PlaneGaussians { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
+        NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
     }
 
     /// Makes the network say about this mean and scale (in steps) for each channel, whatever it sees: the last layer's biases

@@ -13,7 +13,7 @@ pub(crate) mod model;
 pub(crate) mod prior;
 
 pub use checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask, demultiplex, multiplex};
-pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
+pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, Start};
 pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};
 pub use inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig, upsample};

@@ -17,13 +17,13 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::plane_layout::{coding_order, is_space_time};
 
 use super::checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
-use super::entropy_parameters::{EntropyParameters, EntropyParametersConfig, PlaneGaussians, Start};
+use super::entropy_parameters::{EntropyParameters, EntropyParametersConfig, Start};
 use super::hyperprior::{Hyperprior, HyperpriorConfig};
 use super::inter_plane::{InterPlane, InterPlaneConfig};
 use super::inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig};
 use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
-use crate::entropy::gaussian_conditional::{bits, gaussian_likelihood};
+use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 use crate::entropy::quantization_steps::PlaneSteps;
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
 
@@ -293,7 +293,7 @@ impl ContextModel {
         planes: &CenteredPlanes,
         plane: usize,
         latent: Latent,
-    ) -> (PlaneGaussians, Option<Tensor<1>>) {
+    ) -> (NormalParameters<3>, Option<Tensor<1>>) {
         let prior = prior_of(parts, planes, plane, latent);
         let hyper_bits = prior.hyper_bits.clone();
         (self.gaussians(prior, &planes.planes[plane]), hyper_bits)
@@ -323,7 +323,7 @@ impl ContextModel {
         steps: &PlaneSteps,
         selection: &[usize],
         latent: Latent,
-    ) -> Vec<PlaneGaussians> {
+    ) -> Vec<NormalParameters<3>> {
         let (planes, parts) = (self.centered(planes, steps), self.parts());
         selection.iter().map(|plane| self.parameters_with(&parts, &planes, *plane, latent).0).collect()
     }
@@ -437,7 +437,7 @@ impl ContextModel {
             .collect()
     }
 
-    fn gaussians(&self, prior: Prior, plane: &Tensor<3>) -> PlaneGaussians {
+    fn gaussians(&self, prior: Prior, plane: &Tensor<3>) -> NormalParameters<3> {
         let [_, height, width] = plane.dims();
         let context = match (&self.checkerboard, prior.passes) {
             (Some(checkerboard), Passes::AnchorsFirst) => Some(checkerboard.context(plane.clone())),
@@ -454,6 +454,6 @@ fn prior_of(parts: &[Box<dyn PriorPart + '_>], planes: &CenteredPlanes, plane: u
     parts.iter().find_map(|part| part.prior(planes, plane, latent)).unwrap_or_else(Prior::constant)
 }
 
-fn value_bits(values: Tensor<3>, gaussians: PlaneGaussians) -> Tensor<3> {
-    bits(gaussian_likelihood(values, gaussians.means, gaussians.scales))
+fn value_bits(values: Tensor<3>, normal: NormalParameters<3>) -> Tensor<3> {
+    bits(gaussian_likelihood(values, normal))
 }

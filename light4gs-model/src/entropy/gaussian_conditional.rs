@@ -12,21 +12,31 @@ pub const SCALE_BOUND: f32 = 0.11;
 /// Likelihoods below this count as this: no symbol costs more than 29.9 bits.
 pub const LIKELIHOOD_BOUND: f32 = 1e-9;
 
+/// A normal distribution for each value, all of one shape and in y units.
+#[derive(Clone, Debug)]
+pub struct NormalParameters<const D: usize> {
+    /// Means.
+    pub means: Tensor<D>,
+    /// Standard deviations, raw: what is below [`SCALE_BOUND`] counts as that.
+    pub scales: Tensor<D>,
+}
+
 /// Probability of the unit interval around each value, at least [`LIKELIHOOD_BOUND`].
 ///
-/// `values`, `means` and `scales` have one shape and are in y units. Scales may be anything: they are bounded below by
+/// `values` are in y units and in the shape of the parameters. Scales may be anything: they are bounded below by
 /// [`SCALE_BOUND`], with the gradient of [`lower_bound`].
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::gaussian_conditional::gaussian_likelihood;
+/// use light4gs_model::gaussian_conditional::{NormalParameters, gaussian_likelihood};
 ///
 /// let device = Device::flex();
-/// let [value, mean, scale] = [0.0, 0.0, 1.0].map(|v| Tensor::<1>::from_floats([v], &device));
-/// let p = gaussian_likelihood(value, mean, scale).into_scalar::<f32>();
+/// let [value, means, scales] = [0.0, 0.0, 1.0].map(|v| Tensor::<1>::from_floats([v], &device));
+/// let p = gaussian_likelihood(value, NormalParameters { means, scales }).into_scalar::<f32>();
 /// assert!((p - 0.382_924_9).abs() < 1e-6);
 /// ```
-pub fn gaussian_likelihood<const D: usize>(values: Tensor<D>, means: Tensor<D>, scales: Tensor<D>) -> Tensor<D> {
+pub fn gaussian_likelihood<const D: usize>(values: Tensor<D>, parameters: NormalParameters<D>) -> Tensor<D> {
+    let NormalParameters { means, scales } = parameters;
     let scales = lower_bound(scales, SCALE_BOUND);
     // On the lower side of the mean, where the distribution function keeps its digits.
     let distance = (values - means).abs().neg();

@@ -12,6 +12,7 @@ use burn::backend::{Autodiff, Backend, ExtensionType, TensorMetadata, backend_ex
 use burn::tensor::TensorData;
 #[cfg(feature = "wgpu")]
 use burn_fusion::{Fusion, FusionBackend};
+use light4gs_data::Camera;
 
 #[cfg(feature = "wgpu")]
 use super::fusion::{int_leaf, leaf, resolve};
@@ -79,6 +80,14 @@ pub trait SplatKernels: Backend {
 /// Camera, background and active SH degree of one picture.
 #[derive(Clone, Copy, Debug)]
 pub struct SplatView(pub(crate) View);
+
+impl SplatView {
+    /// The image of `camera` over `background` (red, green, blue). `sh_degree` (0 to 3) is the highest degree of the spherical
+    /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
+    pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
+        Self(View { camera, background, sh_degree })
+    }
+}
 
 /// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
 #[backend_extension(

@@ -2,6 +2,7 @@
 
 use burn::config::Config;
 use burn::module::{Module, Param};
+use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::PointCloud;
 
@@ -71,6 +72,41 @@ impl GaussianTensors {
             opacity_logits: inner(self.opacity_logits),
             sh_dc: inner(self.sh_dc),
             sh_rest: inner(self.sh_rest),
+        }
+    }
+}
+
+/// Attributes of N Gaussians as they are drawn: standard deviations and opacities in place of what is trained for them.
+#[derive(Clone, Debug)]
+pub struct ActivatedGaussians {
+    /// `[N, 3]`, world units.
+    pub means: Tensor<2>,
+    /// `[N, 4]` as (w, x, y, z), of any length but zero.
+    pub quats: Tensor<2>,
+    /// `[N, 3]`, standard deviations in world units.
+    pub scales: Tensor<2>,
+    /// `[N, 1]` in [0, 1].
+    pub opacities: Tensor<2>,
+    /// `[N, 1, 3]`.
+    pub sh_dc: Tensor<3>,
+    /// `[N, (degree + 1)^2 - 1, 3]`.
+    pub sh_rest: Tensor<3>,
+}
+
+/// Logarithms of scales are cut here before the exponential: far beyond any scene, and the exponential stays finite, so
+/// that the backward pass has no 0 · infinity.
+const MAX_LOG_SCALE: f32 = 40.0;
+
+impl GaussianTensors {
+    /// The exponential of the logarithms, the sigmoid of the logits.
+    pub fn activated(self) -> ActivatedGaussians {
+        ActivatedGaussians {
+            means: self.means,
+            quats: self.quats,
+            scales: self.log_scales.clamp_max(MAX_LOG_SCALE).exp(),
+            opacities: sigmoid(self.opacity_logits),
+            sh_dc: self.sh_dc,
+            sh_rest: self.sh_rest,
         }
     }
 }

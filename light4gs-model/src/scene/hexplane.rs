@@ -122,9 +122,14 @@ impl HexPlane {
     }
 }
 
-/// [`HexPlane::query`] with other tensors in place of the planes, say with decoded ones.
-pub(crate) fn query_planes(points: Tensor<2>, planes: Vec<Tensor<3>>) -> Tensor<2> {
+/// [`HexPlane::query`] with other tensors in place of the planes: decoded ones, say, or planes that carry noise.
+/// Differentiable in points and planes.
+///
+/// # Panics
+/// If the points are not `[N, 4]`, or the number of planes is no multiple of six.
+pub fn query_planes(points: Tensor<2>, planes: Vec<Tensor<3>>) -> Tensor<2> {
     assert_eq!(points.dims()[1], 4, "points must be [N, 4]: x, y, z, t");
+    assert!(planes.len().is_multiple_of(PLANES_PER_SCALE), "six planes a scale, not {}", planes.len());
     let mut features: Vec<Tensor<2>> = planes
         .chunks_exact(PLANES_PER_SCALE)
         .map(|scale| {

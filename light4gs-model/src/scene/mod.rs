@@ -22,6 +22,6 @@ pub use coordinates::{Pca, SceneCoordinates};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
 pub use field::{DeformationField, Offsets};
-pub use gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
-pub use hexplane::{HexPlane, HexPlaneConfig};
+pub use gaussians::{ActivatedGaussians, GaussianTensors, Gaussians, GaussiansConfig};
+pub use hexplane::{HexPlane, HexPlaneConfig, query_planes};
 pub use hexplane_field::{HexPlaneField, HexPlaneFieldConfig};

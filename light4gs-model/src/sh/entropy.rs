@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use burn::tensor::{Device, Distribution, Tensor};
 
-use crate::entropy::gaussian_conditional::{bits, gaussian_likelihood};
+use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 
 /// Channels of the higher spherical harmonics.
 pub const SH_CHANNELS: usize = 45;
@@ -67,18 +67,17 @@ pub(crate) fn channels_last(values: Tensor<2>) -> Tensor<3> {
 
 /// Bits `[C, N]` of `values [C, N]`, given the output `[2 C, 1, N]` of a network: first scales, then means, in steps.
 pub(crate) fn gaussian_bits(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
-    let [scales, means] = scales_and_means(output);
-    bits(gaussian_likelihood(values / step, means, scales))
+    bits(gaussian_likelihood(values / step, normal_parameters(output)))
 }
 
 /// `values [C, N]` rounded around the means of a network's output `[2 C, 1, N]`.
 pub(crate) fn round_around(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
-    let [_, means] = scales_and_means(output);
+    let means = normal_parameters(output).means;
     ((values / step - means.clone()).round() + means) * step
 }
 
-fn scales_and_means(output: Tensor<3>) -> [Tensor<2>; 2] {
+fn normal_parameters(output: Tensor<3>) -> NormalParameters<2> {
     let output: Tensor<2> = output.squeeze_dim(1);
     let channels = output.dims()[0] / 2;
-    [output.clone().narrow(0, 0, channels), output.narrow(0, channels, channels)]
+    NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
 }

@@ -64,8 +64,8 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = Device::flex();
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
-    let mut compression = Compression::new(&config, &device);
-    compression.context.start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+    let mut compression = Compression::new(&config, scene.planes(), &device)?;
+    compression.start_from(scene.planes());
     let data = scene.to_arrays(SceneMeta::default());
     let input: CompressionInput =
         compression_input(&mut compression, &scene, &data, &config.compression, Profile::Compact)?;

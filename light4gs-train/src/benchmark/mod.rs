@@ -5,7 +5,6 @@ pub mod codec;
 use std::path::Path;
 use std::time::Instant;
 
-use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError, PointCloud};
@@ -25,7 +24,6 @@ use crate::error::TrainError;
 use crate::evaluation::metrics::l1;
 use crate::optimization::adam::Adam;
 use crate::optimization::gradients::GradientSums;
-use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_parameters};
 use crate::report::table::{Align, Table};
 
 /// Untimed repetitions before the timed ones.
@@ -319,14 +317,14 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     let mut adam = Adam::default();
     // Rates so small that the scene stays what it is while it is timed.
     let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
-        visit_parameters(dynamic, &mut TinySteps { adam: &mut adam, gradients: &mut gradients });
+        adam.step_module("", dynamic, &mut gradients, |_| Some(1e-12));
     };
     let mut times = [Vec::new(), Vec::new()];
     for repetition in 0..WARM_UP + repeats {
         let begin = Instant::now();
         let mut tape = loss_of(&dynamic, repetition).backward();
         let mut gradients = GradientSums::default();
-        gradients.add_scene(&mut dynamic, &mut tape);
+        gradients.add_module(&dynamic, &mut tape);
         let _ = device.sync();
         let middle = Instant::now();
         update(&mut dynamic, gradients);
@@ -343,7 +341,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     add("Adam step", adam_ms);
     add("training step", step_ms);
 
-    let compression = Compression::new(small, autodiff);
+    let compression = Compression::new(small, dynamic.planes(), autodiff).expect("the preset's models fit its planes");
     let fraction = small.compression.rate.fraction;
     let lambda = 0.05;
     for (stage, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {
@@ -353,13 +351,13 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
             repeats,
             || (),
             |()| {
-                let mut noisy = compression.noisy(&dynamic, true, true);
+                let noisy = compression.noisy(&dynamic, true, true);
                 let mut sums = GradientSums::default();
                 let image = splatter.render(noisy.scene.at(0.3), &scene.camera, None).image;
-                sums.add_scene(&mut noisy.scene, &mut l1(image, truth.clone()).backward());
+                sums.add_module(&noisy.scene, &mut l1(image, truth.clone()).backward());
                 if with_rate {
                     let rate = compression.rate(&noisy, fraction, true, &mut random);
-                    sums.add_scene(&mut noisy.scene, &mut (rate.megabytes() * lambda).backward());
+                    sums.add_module(&noisy.scene, &mut (rate.megabytes() * lambda).backward());
                 }
                 update(&mut dynamic, sums);
             },
@@ -382,20 +380,6 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
         ),
     );
     out
-}
-
-struct TinySteps<'a> {
-    adam: &'a mut Adam,
-    gradients: &'a mut GradientSums,
-}
-
-impl ParameterVisitor for TinySteps<'_> {
-    fn visit<const D: usize>(&mut self, _: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        if let Some(gradient) = self.gradients.remove(name) {
-            let gradient = gradient.reshape(parameter.val().dims());
-            self.adam.step(name, parameter, gradient, 1e-12);
-        }
-    }
 }
 
 /// One table: a row a stage, a column a device and scene.

@@ -58,7 +58,7 @@ impl Encode {
             )));
         };
         let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
-        let checkpoint = Checkpoint::load(&path, &config, &device)?;
+        let checkpoint: Checkpoint = Checkpoint::load(&path, &config, &config.model.field(), &device)?;
         let data = Scene::open(&record.scene, &load_options(&config))?;
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {

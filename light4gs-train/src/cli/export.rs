@@ -28,7 +28,7 @@ pub(super) struct Export {
 
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let decoded = DecodedScene::open(&self.file, &device::open(self.device)?)?;
+        let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
         std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
             action: "create",
             path: self.out.clone(),

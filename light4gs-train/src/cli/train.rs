@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use light4gs_data::Scene;
+use light4gs_model::HexPlaneField;
 
 use super::output::{say, say_json, tell};
 use super::progress::ProgressBars;
@@ -113,7 +114,7 @@ pub(super) fn train_to_evaluation(
         run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
-    evaluate_run(&folder, &config, &scene)
+    evaluate_run::<HexPlaneField>(&folder, &config, &scene)
 }
 
 /// A trainer of a run's folder, with progress bars.
@@ -143,7 +144,7 @@ fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
 
 fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &RunOutput) -> Result<(), TrainError> {
     run(&mut trainer, output)?;
-    let evaluation = evaluate_run(folder, config, trainer.data())?;
+    let evaluation = evaluate_run::<HexPlaneField>(folder, config, trainer.data())?;
     print_evaluation(&evaluation, output.json)?;
     if !output.json {
         say(format_args!("\nreport: {}", folder.path("report.html").display()))?;
@@ -201,7 +202,7 @@ impl Eval {
         config.device = self.device.unwrap_or(config.device);
         record.scene = self.scene.unwrap_or(record.scene);
         let scene = Scene::open(&record.scene, &load_options(&config))?;
-        print_evaluation(&evaluate_run(&folder, &config, &scene)?, self.json)
+        print_evaluation(&evaluate_run::<HexPlaneField>(&folder, &config, &scene)?, self.json)
     }
 
     fn eval_file(self) -> Result<(), TrainError> {
@@ -210,7 +211,7 @@ impl Eval {
         };
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;
-        let decoded = DecodedScene::open(&self.run, &device)?;
+        let decoded: DecodedScene = DecodedScene::open(&self.run, &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;

@@ -7,7 +7,7 @@ use burn::tensor::Device;
 use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
-use light4gs_model::{DynamicScene, Splatter};
+use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::{Deserialize, Serialize};
 
 use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit};
@@ -51,9 +51,9 @@ pub struct PlaneRecord {
 }
 
 /// A scene as trained, and where its images are.
-pub struct TrainedScene<'a> {
+pub struct TrainedScene<'a, F: DeformationField = HexPlaneField> {
     /// The model.
-    pub scene: &'a DynamicScene,
+    pub scene: &'a DynamicScene<F>,
     /// Its entropy models, if it was trained with them.
     pub compression: Option<&'a Compression>,
     /// The run's.
@@ -80,8 +80,8 @@ pub struct CodedScene {
 ///
 /// # Errors
 /// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
-pub fn code_scene(
-    trained: &TrainedScene,
+pub fn code_scene<F: DeformationField>(
+    trained: &TrainedScene<F>,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
 ) -> Result<CodedScene, TrainError> {
     let TrainedScene { scene, config, data, device, .. } = trained;
@@ -101,7 +101,7 @@ pub fn code_scene(
     let begin = Instant::now();
     let views = search_views(data);
     let inner = (*device).clone().inner();
-    let render = |data: &SceneData| render_views(data, &views, &inner);
+    let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
     let pictures = if settings.attributes.search_tolerance > 0.0 && profile == Profile::Compact {
         let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images)?;
         Some(Pictures { render: &render, error })
@@ -124,7 +124,8 @@ pub fn code_scene(
 }
 
 fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {
-    let steps = compression.quantization.steps_without_gradient().values();
+    let Some(models) = &compression.planes else { return Vec::new() };
+    let steps = models.quantization.steps_without_gradient().values();
     let record = |bytes: &PlaneBytes| PlaneRecord {
         name: plane_name(bytes.plane),
         step: steps[bytes.plane],
@@ -141,8 +142,8 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
 }
 
 /// Pixel values of all views, clamped to [0, 1].
-fn render_views(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
-    let scene: DynamicScene = DynamicScene::from_arrays(data, device).expect("arrays that came from a model make one");
+fn render_views<F: DeformationField>(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
+    let scene = DynamicScene::<F>::from_arrays(data, device).expect("arrays that came from a model make one");
     let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
     let picture = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;

@@ -9,10 +9,10 @@ use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, encode_compressed, sh_rest_coefficients,
 };
-use light4gs_model::{DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
+use light4gs_model::{DeformationField, DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
-use super::rate::known;
+use super::rate::{known, plane_tensors};
 use super::{Compression, step_search};
 use crate::config::{AttributesConfig, CompressionConfig};
 use crate::error::TrainError;
@@ -72,8 +72,8 @@ pub struct Pictures<'a> {
 
 /// Encodes a scene in a profile. Everything that is coded is decoded again and
 /// compared before this returns.
-pub fn encode(
-    scene: &DynamicScene,
+pub fn encode<F: DeformationField>(
+    scene: &DynamicScene<F>,
     compression: &Compression,
     meta: SceneMeta,
     config: &CompressionConfig,
@@ -92,7 +92,7 @@ pub fn encode(
         input.attributes = step_search::search(&data, &input.attributes, tolerance, pictures.error, pictures.render)?;
     }
     let encoded = encode_compressed(&data, &input)?;
-    let estimate = compression.estimate(&encoded.decoded, &input.sh, device)?;
+    let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;
     let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
     let coded = CodedSizes { report: encoded.report, estimate, bit_maps };
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
@@ -102,45 +102,52 @@ pub fn encode(
 const FREEZING_ROUNDS: usize = 8;
 
 /// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
-/// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn.
-/// `device`, with autodiff, is where the result lives.
+/// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn. None if
+/// there are no planes or no models of them. `device`, with autodiff, is where the result lives.
 ///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
-pub fn freeze_planes(
-    scene: &DynamicScene,
+pub fn freeze_planes<F: DeformationField>(
+    scene: &DynamicScene<F>,
     compression: &Compression,
     config: &CompressionConfig,
     device: &Device,
-) -> Result<HexPlane, TrainError> {
+) -> Result<Option<HexPlane>, TrainError> {
     let mut scene = scene.valid();
     let compression = &mut compression.valid();
     let mut data = scene.to_arrays(SceneMeta::default());
+    if scene.planes().is_none() || compression.planes.is_none() {
+        return Ok(None);
+    }
     for _ in 0..FREEZING_ROUNDS {
         let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
         let decoded = encode_compressed(&data, &input)?.decoded;
         if decoded.hexplane == data.hexplane {
             break;
         }
-        scene.field.hexplane = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
+        if let Some(planes) = scene.planes_mut() {
+            *planes = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
+        }
         data.hexplane = decoded.hexplane;
     }
-    Ok(HexPlane::from_arrays(&data.hexplane, device)?)
+    Ok(Some(HexPlane::from_arrays(&data.hexplane, device)?))
 }
 
 /// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
 /// arrays.
-pub fn compression_input(
+pub fn compression_input<F: DeformationField>(
     compression: &mut Compression,
-    scene: &DynamicScene,
+    scene: &DynamicScene<F>,
     data: &SceneData,
     config: &CompressionConfig,
     profile: Profile,
 ) -> Result<CompressionInput, TrainError> {
-    compression.context.update_quantiles();
+    if let Some(models) = &mut compression.planes {
+        models.context.update_quantiles();
+    }
     Ok(CompressionInput {
         profile,
-        planes: Some(compression.plane_coding(scene)?),
+        planes: compression.plane_coding(scene)?,
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
         attributes: attribute_steps(&config.attributes),
         weights: WeightPrecisions {
@@ -157,22 +164,17 @@ fn attribute_steps(config: &AttributesConfig) -> AttributeSteps {
 }
 
 impl Compression {
-    /// Off the tape, on which all planes at once would take a gigabyte.
-    fn valid(&self) -> Self {
-        let Self { context, quantization, sh } = self;
-        Self { context: context.valid(), quantization: quantization.valid(), sh: sh.as_ref().map(Module::valid) }
-    }
-
     /// What the codec needs to code the planes.
-    fn plane_coding(&self, scene: &DynamicScene) -> Result<PlaneCoding, TrainError> {
-        let steps = self.quantization.steps_without_gradient();
-        let symbols = self.context.hyper_symbols(&scene.field.hexplane.tensors(), &steps);
+    fn plane_coding<F: DeformationField>(&self, scene: &DynamicScene<F>) -> Result<Option<PlaneCoding>, TrainError> {
+        let (Some(models), Some(hexplane)) = (&self.planes, scene.planes()) else { return Ok(None) };
+        let steps = models.quantization.steps_without_gradient();
+        let symbols = models.context.hyper_symbols(&hexplane.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
-        Ok(PlaneCoding {
-            model: self.context.to_arrays()?,
+        Ok(Some(PlaneCoding {
+            model: models.context.to_arrays()?,
             steps: steps.to_groups(),
             hyper_symbols: symbols.into_iter().map(|plane| plane.map_or_else(Vec::new, integers)).collect(),
-        })
+        }))
     }
 
     fn sh_coding(&self, gaussians: &GaussianArrays, step: f32) -> Result<ShCoding, CodecError> {
@@ -183,13 +185,20 @@ impl Compression {
     }
 
     /// Bits that the models give for a decoded scene; `device` is the models' own.
-    pub fn estimate(&self, decoded: &SceneData, coding: &ShCoding, device: &Device) -> Result<BitEstimate, TrainError> {
-        let scene: DynamicScene = DynamicScene::from_arrays(decoded, device)?;
-        let planes = scene.field.hexplane.tensors();
+    pub fn estimate<F: DeformationField>(
+        &self,
+        decoded: &SceneData,
+        coding: &ShCoding,
+        device: &Device,
+    ) -> Result<BitEstimate, TrainError> {
+        let scene = DynamicScene::<F>::from_arrays(decoded, device)?;
+        let planes = plane_tensors(&scene);
         let all: Vec<usize> = (0..planes.len()).collect();
-        let steps = self.quantization.steps_without_gradient();
-        let rates = self.context.rate(&planes, &steps, &all, Latent::Rounded);
-        let hexplanes = rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum();
+        let hexplanes = self.planes.as_ref().map_or(0.0, |models| {
+            let steps = models.quantization.steps_without_gradient();
+            let rates = models.context.rate(&planes, &steps, &all, Latent::Rounded);
+            rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum()
+        });
         let sh = match &self.sh {
             Some(sh) if !decoded.gaussians.is_empty() => {
                 sh.bits(scene.gaussians.sh_rest.val(), &known(&scene, &planes, None)).sum().into_scalar()
@@ -201,9 +210,11 @@ impl Compression {
 
     /// Where the bits of a decoded scene's planes are.
     fn bit_maps(&self, decoded: &SceneData, device: &Device) -> Result<Vec<BitMap>, TrainError> {
+        let Some(models) = &self.planes else { return Ok(Vec::new()) };
         let planes = HexPlane::from_arrays(&decoded.hexplane, device)?.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
-        let maps = self.context.bit_map(&planes, &self.quantization.steps_without_gradient(), &all, Latent::Rounded);
+        let steps = models.quantization.steps_without_gradient();
+        let maps = models.context.bit_map(&planes, &steps, &all, Latent::Rounded);
         let map = |(plane, map): (usize, Tensor<2>)| {
             let [height, width] = map.dims().map(|length| length as u32);
             BitMap { name: plane_name(plane), width, height, bits: map.into_data().iter().collect() }

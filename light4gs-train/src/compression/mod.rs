@@ -1,6 +1,6 @@
 //! What a scene is compressed with, and the rate that this puts into the loss (paper III-C to III-E).
 //!
-//! - here: the entropy models and the quantisation steps that are trained beside a scene
+//! - here: the entropy models and the quantization steps that are trained beside a scene
 //! - `rate`: noise in place of rounding, and the estimated size of the file
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: a scene and its models into the bytes of a file
@@ -18,56 +18,88 @@ pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compr
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
 
+use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_model::{
-    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts,
+    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlane,
     ShAutoregressiveConfig, ShBottleneckConfig, ShEntropyConfig, ShEntropyModel, ShHexPlaneCoupledConfig,
     ShMixtureConfig,
 };
 
 use crate::config::{CompressionConfig, Config, ContextArchitecture, ContextConfig, ShConfig, ShModel};
+use crate::error::TrainError;
 
-/// Entropy models and quantisation steps of one scene.
-#[derive(Clone, Debug)]
+/// Entropy models and quantization steps of one scene.
+#[derive(Module, Debug)]
 pub struct Compression {
-    /// Of the hexplanes.
-    pub context: ContextModel,
-    /// Of the hexplanes.
-    pub quantization: AdaptiveQuantization,
+    /// Of the feature planes, if the deformation field has some.
+    pub planes: Option<PlaneModels>,
     /// Of the spherical harmonics beyond degree 0; the models are made for degree 3. Lower degrees are coded with the
     /// frequencies of their symbols, and have no part in the rate.
     pub sh: Option<ShEntropyModel>,
 }
 
+/// What feature planes are coded with.
+#[derive(Module, Debug)]
+pub struct PlaneModels {
+    /// What every value costs.
+    pub context: ContextModel,
+    /// How coarsely they are rounded.
+    pub quantization: AdaptiveQuantization,
+}
+
 impl Compression {
     /// Untrained models, if the run trains them: if there is a rate in its loss.
-    pub fn of_run(config: &Config, device: &Device) -> Option<Self> {
-        (config.compression.rate.lambda > 0.0).then(|| Self::new(config, device))
+    ///
+    /// # Errors
+    /// As [`Compression::new`].
+    pub fn of_run(config: &Config, planes: Option<&HexPlane>, device: &Device) -> Result<Option<Self>, TrainError> {
+        if config.compression.rate.lambda > 0.0 { Self::new(config, planes, device).map(Some) } else { Ok(None) }
     }
 
-    /// Untrained models for scenes of a configuration.
-    pub fn new(config: &Config, device: &Device) -> Self {
+    /// Untrained models for scenes of a configuration, whose deformation field has these planes.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] if the model of the spherical harmonics looks at planes and there are none.
+    pub fn new(config: &Config, planes: Option<&HexPlane>, device: &Device) -> Result<Self, TrainError> {
         let CompressionConfig { context, sh, .. } = &config.compression;
-        let planes = &config.model.hexplane;
-        let scales = planes.multipliers.len();
-        Self {
-            context: context_config(context, planes.channels).init(device),
-            quantization: quantization_config(config).init(device),
-            sh: (config.model.sh_degree == 3).then(|| sh_config(sh, planes.channels * scales).init(device)),
+        let feature_size = planes.map_or(0, HexPlane::feature_size);
+        if sh.model == ShModel::HexPlaneCoupled && feature_size == 0 {
+            return Err(TrainError::Input(format!(
+                "compression.sh.model = \"{}\" needs a deformation field with feature planes; choose another model",
+                sh.model
+            )));
+        }
+        let models = |planes: &HexPlane| PlaneModels {
+            context: context_config(context, planes.feature_size() / planes.scales()).init(device),
+            quantization: quantization_config(config, planes.scales()).init(device),
+        };
+        Ok(Self {
+            planes: planes.map(models),
+            sh: (config.model.sh_degree == 3).then(|| sh_config(sh, feature_size).init(device)),
+        })
+    }
+
+    /// Lets the context model begin with the statistics of planes.
+    pub fn start_from(&mut self, planes: Option<&HexPlane>) {
+        if let (Some(models), Some(planes)) = (&mut self.planes, planes) {
+            models.context.start_from(&planes.tensors(), &models.quantization.steps_without_gradient());
         }
     }
 
-    /// Keeps learned steps in the range that a configuration allows.
-    pub fn bound_steps(&mut self, config: &Config) {
-        if !config.compression.steps.refine {
-            self.quantization.no_finer_than(&quantization_config(config));
+    /// Keeps learned steps in the range that a configuration allows, for planes at so many scales.
+    pub fn bound_steps(&mut self, config: &Config, scales: usize) {
+        if let Some(models) = &mut self.planes
+            && !config.compression.steps.refine
+        {
+            models.quantization.no_finer_than(&quantization_config(config, scales));
         }
     }
 }
 
-fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
+fn quantization_config(config: &Config, scales: usize) -> AdaptiveQuantizationConfig {
     let steps = &config.compression.steps;
-    AdaptiveQuantizationConfig::new(config.model.hexplane.multipliers.len())
+    AdaptiveQuantizationConfig::new(scales)
         .with_space_only(steps.space_only)
         .with_space_time(steps.space_time)
         .with_per_scale(steps.per_scale)

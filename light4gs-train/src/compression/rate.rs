@@ -2,7 +2,7 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
-use light4gs_model::{DynamicScene, Latent, PlaneSteps, ShEntropy, ShKnown};
+use light4gs_model::{DeformationField, DynamicScene, HexPlane, HexPlaneField, Latent, PlaneSteps, ShEntropy, ShKnown};
 use rand::Rng;
 use rand::seq::index;
 
@@ -10,12 +10,12 @@ use super::Compression;
 
 /// A scene with the noise of quantisation, which both the picture and the rate see.
 #[derive(Clone, Debug)]
-pub struct NoisyScene {
+pub struct NoisyScene<F: DeformationField = HexPlaneField> {
     /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the
     /// scene's, since noise only adds to them; by the steps see [`NoisyScene::step_gradients`].
-    pub scene: DynamicScene,
-    /// Of the planes; they begin a tape of their own where they are learned. None if the planes are frozen: as the file
-    /// will have them, without noise, without gradient and without a part in the rate.
+    pub scene: DynamicScene<F>,
+    /// Of the planes; they begin a tape of their own where they are learned. None if there are no planes, or they are frozen:
+    /// as the file will have them, without noise, without gradient and without a part in the rate.
     pub steps: Option<PlaneSteps>,
 }
 
@@ -44,7 +44,7 @@ impl Rate {
 
     /// `[1]`: bits per plane symbol plus bits per symbol of the spherical harmonics, as the paper weighs them.
     pub fn bits_per_symbol(self) -> Tensor<1> {
-        let planes = self.planes / self.plane_symbols as f64;
+        let planes = self.planes / self.plane_symbols.max(1) as f64;
         match self.sh {
             Some(sh) if self.sh_symbols > 0 => planes + sh / self.sh_symbols as f64,
             _ => planes,
@@ -55,29 +55,43 @@ impl Rate {
 impl Compression {
     /// The scene with uniform noise as wide as the steps. `learn_steps` asks for the steps' gradients; `with_sh` puts noise
     /// on the spherical harmonics too.
-    pub fn noisy(&self, scene: &DynamicScene, learn_steps: bool, with_sh: bool) -> NoisyScene {
-        let steps = self.quantization.steps_without_gradient();
-        let noisy = steps.add_noise(
-            &scene.field.hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect::<Vec<_>>(),
-        );
-        let mut scene = scene.clone();
-        for (parameter, plane) in scene.field.hexplane.planes.iter_mut().zip(noisy) {
-            replace(parameter, plane);
-        }
-        NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: Some(steps.leaves(learn_steps)) }
+    pub fn noisy<F: DeformationField>(
+        &self,
+        scene: &DynamicScene<F>,
+        learn_steps: bool,
+        with_sh: bool,
+    ) -> NoisyScene<F> {
+        let mut noisy = scene.clone();
+        let steps = match (&self.planes, noisy.planes_mut()) {
+            (Some(models), Some(hexplane)) => {
+                let steps = models.quantization.steps_without_gradient();
+                let planes: Vec<_> =
+                    hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect();
+                for (parameter, plane) in hexplane.planes.iter_mut().zip(steps.add_noise(&planes)) {
+                    replace(parameter, plane);
+                }
+                Some(steps.leaves(learn_steps))
+            }
+            _ => None,
+        };
+        NoisyScene { scene: self.with_noisy_sh(noisy, with_sh), steps }
     }
 
     /// The same for a scene whose planes are frozen.
-    pub fn noisy_beside_frozen_planes(&self, scene: &DynamicScene, with_sh: bool) -> NoisyScene {
+    pub fn noisy_beside_frozen_planes<F: DeformationField>(
+        &self,
+        scene: &DynamicScene<F>,
+        with_sh: bool,
+    ) -> NoisyScene<F> {
         let mut scene = scene.clone();
-        for plane in &mut scene.field.hexplane.planes {
+        for plane in scene.planes_mut().into_iter().flat_map(|hexplane| &mut hexplane.planes) {
             *plane = plane.clone().set_require_grad(false);
         }
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
     }
 
     /// Begins a tape on the way.
-    fn with_noisy_sh(&self, scene: DynamicScene, with_sh: bool) -> DynamicScene {
+    fn with_noisy_sh<F: DeformationField>(&self, scene: DynamicScene<F>, with_sh: bool) -> DynamicScene<F> {
         let device = scene.gaussians.means.device();
         let mut scene = scene.fork(&device);
         if let Some(sh) = self.sh.as_ref().filter(|_| with_sh) {
@@ -89,14 +103,20 @@ impl Compression {
 
     /// Estimates the rate on a random share of the planes and of the Gaussians. Unbiased: over many draws the mean is
     /// the rate of everything.
-    pub fn rate(&self, noisy: &NoisyScene, fraction: f64, with_sh: bool, generator: &mut impl Rng) -> Rate {
+    pub fn rate<F: DeformationField>(
+        &self,
+        noisy: &NoisyScene<F>,
+        fraction: f64,
+        with_sh: bool,
+        generator: &mut impl Rng,
+    ) -> Rate {
         let scene = &noisy.scene;
-        let planes = &scene.field.hexplane.tensors();
+        let planes = &plane_tensors(scene);
         let sh_rest = scene.gaussians.sh_rest.val();
-        let plane_bits = noisy.steps.as_ref().map(|steps| {
+        let plane_bits = self.planes.as_ref().zip(noisy.steps.as_ref()).map(|(models, steps)| {
             let chosen = sample(generator, planes.len(), fraction);
             let share = planes.len() as f64 / chosen.len() as f64;
-            let bits = self.context.rate(planes, steps, &chosen, Latent::Noise);
+            let bits = models.context.rate(planes, steps, &chosen, Latent::Noise);
             let bits = bits.into_iter().map(|rate| rate.total()).reduce(|sum, plane| sum + plane);
             bits.expect("at least one plane is chosen") * share
         });
@@ -120,7 +140,7 @@ impl Compression {
     }
 }
 
-impl NoisyScene {
+impl<F: DeformationField> NoisyScene<F> {
     /// Whether the steps are learned.
     pub fn learns_steps(&self) -> bool {
         self.steps.as_ref().is_some_and(|steps| steps.of(0).is_require_grad())
@@ -129,7 +149,7 @@ impl NoisyScene {
     /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
     /// That is without the part they play through the noise.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
-        let planes = 0..self.scene.field.hexplane.planes.len();
+        let planes = 0..self.scene.planes().map_or(0, |hexplane| hexplane.planes.len());
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
     }
 }
@@ -139,8 +159,17 @@ fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
     *parameter = Param::initialized(parameter.id, value.require_grad());
 }
 
+/// The planes of a scene; none if its field has none.
+pub(super) fn plane_tensors<F: DeformationField>(scene: &DynamicScene<F>) -> Vec<Tensor<3>> {
+    scene.planes().map(HexPlane::tensors).unwrap_or_default()
+}
+
 /// What a decoder knows of the Gaussians, or of some rows of them, before it comes to their spherical harmonics.
-pub(super) fn known(scene: &DynamicScene, planes: &[Tensor<3>], rows: Option<Tensor<1, Int>>) -> ShKnown {
+pub(super) fn known<F: DeformationField>(
+    scene: &DynamicScene<F>,
+    planes: &[Tensor<3>],
+    rows: Option<Tensor<1, Int>>,
+) -> ShKnown {
     let (mut sh_dc, mut means) = (scene.gaussians.sh_dc.val(), scene.gaussians.means.val());
     if let Some(rows) = rows {
         sh_dc = sh_dc.select(0, rows.clone());

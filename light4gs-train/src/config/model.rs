@@ -1,5 +1,6 @@
 //! `[model]`: what is trained.
 
+use light4gs_model::{DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig};
 use serde::{Deserialize, Serialize};
 
 /// Sizes and switches of the model.
@@ -77,15 +78,25 @@ impl Default for DeformationConfig {
 
 impl ModelConfig {
     /// The Burn configuration that this stands for.
-    pub fn build(&self) -> light4gs_model::DynamicSceneConfig {
-        use light4gs_model as model;
+    pub fn build(&self) -> DynamicSceneConfig {
+        self.scene(self.field())
+    }
+
+    /// The same with another deformation field.
+    pub fn scene<F: DeformationField>(&self, field: F::Config) -> DynamicSceneConfig<F> {
+        let gaussians = GaussiansConfig::new().with_sh_degree(usize::from(self.sh_degree));
+        DynamicSceneConfig::new(gaussians, field).with_differentiate_points(self.deformation.differentiate_points)
+    }
+
+    /// The built-in deformation field.
+    pub fn field(&self) -> HexPlaneFieldConfig {
         let HexPlaneConfig { channels, resolution, multipliers } = self.hexplane.clone();
         let network = &self.deformation;
-        let hexplane = model::HexPlaneConfig::new()
+        let hexplane = light4gs_model::HexPlaneConfig::new()
             .with_channels(channels)
             .with_resolution(resolution)
             .with_multipliers(multipliers);
-        let deformation = model::DeformationConfig::new(channels * self.hexplane.multipliers.len())
+        let deformation = light4gs_model::DeformationConfig::new(channels * self.hexplane.multipliers.len())
             .with_width(network.width)
             .with_depth(network.depth)
             .with_position(network.position)
@@ -93,8 +104,6 @@ impl ModelConfig {
             .with_rotation(network.rotation)
             .with_opacity(network.opacity)
             .with_sh(network.sh);
-        let gaussians = model::GaussiansConfig::new().with_sh_degree(usize::from(self.sh_degree));
-        model::DynamicSceneConfig::new(gaussians, model::HexPlaneFieldConfig::new(hexplane, deformation))
-            .with_differentiate_points(network.differentiate_points)
+        HexPlaneFieldConfig::new(hexplane, deformation)
     }
 }

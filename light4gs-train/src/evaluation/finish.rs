@@ -3,6 +3,7 @@
 use std::fs;
 
 use light4gs_data::{DataError, Scene};
+use light4gs_model::DeformationField;
 
 use crate::config::Config;
 use crate::dataset::image_store;
@@ -17,9 +18,13 @@ use crate::run::RunFolder;
 const REPORT_VIEWS: usize = 6;
 
 /// Measures the run's file on its own dataset and writes everything that depends on it.
-pub fn evaluate_run(folder: &RunFolder, config: &Config, scene: &Scene) -> Result<Evaluation, TrainError> {
+pub fn evaluate_run<F: DeformationField>(
+    folder: &RunFolder,
+    config: &Config,
+    scene: &Scene,
+) -> Result<Evaluation, TrainError> {
     let device = device::open(config.device)?;
-    let decoded = DecodedScene::open(&folder.stream(), &device)?;
+    let decoded = DecodedScene::<F>::open(&folder.stream(), &device)?;
     let images = image_store(config);
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;

@@ -10,7 +10,7 @@ use std::time::Instant;
 use burn::tensor::Device;
 use light4gs_codec::{SceneData, StreamInfo};
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
-use light4gs_model::{DynamicScene, Splatter};
+use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::Serialize;
 
 use crate::compression::CodingRecord;
@@ -99,9 +99,9 @@ pub struct RenderedView {
 }
 
 /// A decoded file, ready to render.
-pub struct DecodedScene {
+pub struct DecodedScene<F: DeformationField = HexPlaneField> {
     /// The model on the device.
-    pub model: DynamicScene,
+    pub model: DynamicScene<F>,
     /// What the file says of itself.
     pub data: SceneData,
     /// Sections and sizes.
@@ -111,7 +111,7 @@ pub struct DecodedScene {
     device: Device,
 }
 
-impl DecodedScene {
+impl<F: DeformationField> DecodedScene<F> {
     /// Reads a file onto a device.
     pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();

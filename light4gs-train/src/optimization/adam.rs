@@ -1,10 +1,14 @@
-//! Adam with a state by parameter name, and row surgery for parameters whose rows come and go.
+//! Adam with a state by parameter path, and row surgery for parameters whose rows come and go.
 
 use std::collections::BTreeMap;
 
-use burn::module::Param;
+use burn::module::{Module, Param};
 use burn::tensor::{Int, Tensor};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
+use light4gs_model::parameters::{ParameterMapper, update_parameters};
+
+use super::gradients::GradientSums;
+use super::parameters::ParameterGroup;
 
 /// Moments of one parameter.
 #[derive(Clone, Debug)]
@@ -20,11 +24,23 @@ pub struct AdamState {
 /// Adam with the betas of the field (0.9, 0.999) and epsilon 1e-15; the learning rate comes with every step.
 #[derive(Clone, Debug, Default)]
 pub struct Adam {
-    /// By parameter name.
+    /// By parameter path.
     pub states: BTreeMap<String, AdamState>,
 }
 
 impl Adam {
+    /// Steps every parameter of a module that has a gradient and a learning rate. `prefix` stands in front of the
+    /// module's paths, empty for none.
+    pub fn step_module<M: Module>(
+        &mut self,
+        prefix: &str,
+        module: &mut M,
+        gradients: &mut GradientSums,
+        rate: impl Fn(ParameterGroup) -> Option<f64>,
+    ) {
+        update_parameters(module, &mut Step { adam: self, prefix, gradients, rate });
+    }
+
     /// Steps a parameter along its gradient, which has the parameter's shape and is off the tape.
     pub fn step<const D: usize>(
         &mut self,
@@ -70,5 +86,25 @@ impl Adam {
             state.first = state.first.zeros_like();
             state.second = state.second.zeros_like();
         }
+    }
+}
+
+struct Step<'a, R> {
+    adam: &'a mut Adam,
+    prefix: &'a str,
+    gradients: &'a mut GradientSums,
+    rate: R,
+}
+
+impl<R: Fn(ParameterGroup) -> Option<f64>> ParameterMapper for Step<'_, R> {
+    fn map<const D: usize>(&mut self, path: &str, mut parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let joined = if self.prefix.is_empty() { path.to_owned() } else { format!("{}.{path}", self.prefix) };
+        if let Some(rate) = ParameterGroup::of(&joined).and_then(&self.rate)
+            && let Some(gradient) = self.gradients.remove(parameter.id)
+        {
+            let gradient = gradient.reshape(parameter.dims());
+            self.adam.step(&joined, &mut parameter, gradient, rate);
+        }
+        parameter
     }
 }

@@ -1,55 +1,50 @@
-//! Gradients by parameter name, added up over the parts of a loss that are differentiated apart from each other.
+//! Gradients by parameter, added up over the parts of a loss that are differentiated apart from each other.
 
-use std::collections::BTreeMap;
+use std::collections::HashMap;
 
-use burn::module::Param;
+use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Gradients, Tensor};
-use light4gs_model::DynamicScene;
-
-use crate::compression::Compression;
-use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
 /// Sums of gradients. Equal parts, added in the same order, give equal sums to the last bit.
+///
+/// Copies of a module share the identities of its parameters, so what was found out about a copy with a tape of its own
+/// belongs to the original.
 #[derive(Debug, Default)]
 pub struct GradientSums {
-    /// By parameter name, flattened, off the tape.
-    sums: BTreeMap<String, Tensor<1>>,
+    /// Flattened, off the tape.
+    sums: HashMap<ParamId, Tensor<1>>,
 }
 
 impl GradientSums {
-    /// Adds what a backward pass found out about a scene.
-    pub fn add_scene(&mut self, scene: &mut DynamicScene, gradients: &mut Gradients) {
-        visit_parameters(scene, &mut Collect { sums: self, gradients });
-    }
-
-    /// Adds what a backward pass found out about entropy models and quantisation steps.
-    pub fn add_compression(&mut self, compression: &mut Compression, gradients: &mut Gradients) {
-        visit_compression(compression, &mut Collect { sums: self, gradients });
+    /// Adds what a backward pass found out about the parameters of a module.
+    pub fn add_module<M: Module>(&mut self, module: &M, gradients: &mut Gradients) {
+        visit_parameters(module, &mut Collect { sums: self, gradients });
     }
 
     /// Adds the sums of another part.
     pub fn add(&mut self, other: Self) {
-        for (name, gradient) in other.sums {
-            self.add_one(name, gradient);
+        for (parameter, gradient) in other.sums {
+            self.add_one(parameter, gradient);
         }
     }
 
     /// A parameter's gradient, flattened. None if no part depends on it.
-    pub fn get(&self, name: &str) -> Option<Tensor<1>> {
-        self.sums.get(name).cloned()
+    pub fn get(&self, parameter: ParamId) -> Option<Tensor<1>> {
+        self.sums.get(&parameter).cloned()
     }
 
     /// Takes a parameter's gradient out, flattened. None if no part depends on it.
-    pub fn remove(&mut self, name: &str) -> Option<Tensor<1>> {
-        self.sums.remove(name)
+    pub fn remove(&mut self, parameter: ParamId) -> Option<Tensor<1>> {
+        self.sums.remove(&parameter)
     }
 
-    fn add_one(&mut self, name: String, gradient: Tensor<1>) {
-        let sum = match self.sums.remove(&name) {
+    fn add_one(&mut self, parameter: ParamId, gradient: Tensor<1>) {
+        let sum = match self.sums.remove(&parameter) {
             Some(sum) => sum + gradient,
             None => gradient,
         };
-        self.sums.insert(name, sum);
+        self.sums.insert(parameter, sum);
     }
 }
 
@@ -59,9 +54,9 @@ struct Collect<'a> {
 }
 
 impl ParameterVisitor for Collect<'_> {
-    fn visit<const D: usize>(&mut self, _: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
+    fn visit<const D: usize>(&mut self, _: &str, parameter: &Param<Tensor<D>>) {
         if let Some(gradient) = parameter.val().grad_remove(self.gradients) {
-            self.sums.add_one(name.to_owned(), gradient.flatten(0, D - 1));
+            self.sums.add_one(parameter.id, gradient.flatten(0, D - 1));
         }
     }
 }

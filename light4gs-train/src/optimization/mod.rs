@@ -1,4 +1,4 @@
-//! Parameters by name, their gradients, learning rates and optimizer.
+//! Parameters by path: their groups, gradients, learning rates and the optimizer.
 
 pub mod adam;
 pub mod gradients;

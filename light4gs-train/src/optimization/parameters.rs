@@ -1,12 +1,9 @@
-//! Every trained tensor of a run with its name and its learning-rate group.
+//! Learning-rate groups: which parameters share a rate, by their paths.
+//!
+//! Paths are those of [`light4gs_model::parameters`], with [`COMPRESSION`] in front of those of the entropy models.
 
-use burn::module::Param;
-use burn::nn::Linear;
-use burn::tensor::Tensor;
-use light4gs_codec::plane_layout::plane_name;
-use light4gs_model::{DeformationHead, DynamicScene, NamedParameterVisitor, NamedParameters};
-
-use crate::compression::Compression;
+/// What stands in front of the paths of entropy models and quantization steps.
+pub const COMPRESSION: &str = "compression";
 
 /// Parameters that share a learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -23,23 +20,44 @@ pub enum ParameterGroup {
     ShDc,
     /// Higher spherical harmonics.
     ShRest,
-    /// Hexplanes.
+    /// Feature planes of the deformation field.
     Grid,
-    /// The deformation network.
+    /// Everything else of the deformation field.
     Deformation,
-    /// The entropy model of the hexplanes.
+    /// The entropy model of the planes.
     Context,
     /// The entropy model of the spherical harmonics.
     ShModel,
-    /// Logarithms of the hexplanes' quantisation steps.
+    /// Logarithms of the planes' quantization steps.
     Steps,
 }
 
+/// Beginning of a path, a name that must follow somewhere in it (or nothing), and the group. The first line that fits
+/// counts. What fits none, such as the scene's coordinates, is not trained.
+const GROUPS: [(&str, &str, ParameterGroup); 11] = [
+    ("gaussians.means", "", ParameterGroup::Means),
+    ("gaussians.log_scales", "", ParameterGroup::LogScales),
+    ("gaussians.quats", "", ParameterGroup::Quats),
+    ("gaussians.opacity_logits", "", ParameterGroup::Opacity),
+    ("gaussians.sh_dc", "", ParameterGroup::ShDc),
+    ("gaussians.sh_rest", "", ParameterGroup::ShRest),
+    // The planes of any field: `field.hexplane.planes.3` for the built-in one.
+    ("field", "planes", ParameterGroup::Grid),
+    ("field", "", ParameterGroup::Deformation),
+    ("compression.planes.context", "", ParameterGroup::Context),
+    ("compression.planes.quantization", "", ParameterGroup::Steps),
+    ("compression.sh", "", ParameterGroup::ShModel),
+];
+
 impl ParameterGroup {
-    /// Whether parameters of this group have a row for each Gaussian.
-    pub fn is_per_gaussian(self) -> bool {
-        use ParameterGroup::*;
-        matches!(self, Means | LogScales | Quats | Opacity | ShDc | ShRest)
+    /// The group of a parameter. None for constants.
+    pub fn of(path: &str) -> Option<Self> {
+        let fits = |(beginning, name, _): &&(&str, &str, Self)| {
+            path.strip_prefix(beginning)
+                .filter(|rest| rest.is_empty() || rest.starts_with('.'))
+                .is_some_and(|rest| name.is_empty() || rest.split('.').any(|part| part == *name))
+        };
+        GROUPS.iter().find(fits).map(|(_, _, group)| *group)
     }
 }
 
@@ -76,78 +94,61 @@ impl GaussianAttribute {
             Self::ShRest => "gaussians.sh_rest",
         }
     }
-}
 
-/// Name of a plane's parameter; planes are counted scale-major.
-pub fn plane_parameter(plane: usize) -> String {
-    format!("hexplane.{}", plane_name(plane))
-}
-
-/// Something to do with every parameter, whatever its rank.
-pub trait ParameterVisitor {
-    /// Called once a parameter, in a fixed order.
-    fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>);
-}
-
-/// Visits every trained parameter of a scene.
-pub fn visit_parameters(scene: &mut DynamicScene, visitor: &mut impl ParameterVisitor) {
-    use ParameterGroup::*;
-    let gaussians = &mut scene.gaussians;
-    visitor.visit(Means, GaussianAttribute::Means.path(), &mut gaussians.means);
-    visitor.visit(LogScales, GaussianAttribute::LogScales.path(), &mut gaussians.log_scales);
-    visitor.visit(Quats, GaussianAttribute::Quats.path(), &mut gaussians.quats);
-    visitor.visit(Opacity, GaussianAttribute::OpacityLogits.path(), &mut gaussians.opacity_logits);
-    visitor.visit(ShDc, GaussianAttribute::ShDc.path(), &mut gaussians.sh_dc);
-    visitor.visit(ShRest, GaussianAttribute::ShRest.path(), &mut gaussians.sh_rest);
-    for (i, plane) in scene.field.hexplane.planes.iter_mut().enumerate() {
-        visitor.visit(Grid, &plane_parameter(i), plane);
+    /// Whether a path is that of one of them.
+    pub fn has_path(path: &str) -> bool {
+        Self::ALL.iter().any(|attribute| attribute.path() == path)
     }
-    for (i, layer) in scene.field.deformation.trunk.iter_mut().enumerate() {
-        visit_linear(visitor, &format!("deformation.trunk.{i}"), layer);
-    }
-    let deformation = &mut scene.field.deformation;
-    let heads: [(&str, &mut Option<DeformationHead>); 5] = [
-        ("position", &mut deformation.position),
-        ("scale", &mut deformation.scale),
-        ("rotation", &mut deformation.rotation),
-        ("opacity", &mut deformation.opacity),
-        ("sh", &mut deformation.sh),
-    ];
-    for (name, head) in heads {
-        if let Some(head) = head {
-            visit_linear(visitor, &format!("deformation.{name}.hidden"), &mut head.hidden);
-            visit_linear(visitor, &format!("deformation.{name}.output"), &mut head.output);
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::module::Param;
+    use burn::tensor::{Device, Tensor};
+    use light4gs_data::PointCloud;
+    use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
+
+    use super::*;
+    use crate::compression::Compression;
+    use crate::config::Config;
+
+    #[derive(Default)]
+    struct Groups(Vec<(String, Option<ParameterGroup>)>);
+
+    impl ParameterVisitor for Groups {
+        fn visit<const D: usize>(&mut self, path: &str, _: &Param<Tensor<D>>) {
+            self.0.push((path.to_owned(), ParameterGroup::of(path)));
         }
     }
-}
 
-/// Visits every trained parameter of the entropy models and the quantisation steps.
-pub fn visit_compression(compression: &mut Compression, visitor: &mut impl ParameterVisitor) {
-    use ParameterGroup::*;
-    let Compression { context, quantization, sh } = compression;
-    context.visit_parameters(&mut InGroup { group: Context, prefix: "context", visitor });
-    quantization.visit_parameters(&mut InGroup { group: Steps, prefix: "quantization", visitor });
-    if let Some(sh) = sh {
-        sh.visit_parameters(&mut InGroup { group: ShModel, prefix: "sh_model", visitor });
-    }
-}
-
-/// Shows a module's parameters as members of a group.
-struct InGroup<'a, V> {
-    group: ParameterGroup,
-    prefix: &'static str,
-    visitor: &'a mut V,
-}
-
-impl<V: ParameterVisitor> NamedParameterVisitor for InGroup<'_, V> {
-    fn visit<const D: usize>(&mut self, name: &str, parameter: &mut Param<Tensor<D>>) {
-        self.visitor.visit(self.group, &format!("{}.{name}", self.prefix), parameter);
-    }
-}
-
-fn visit_linear(visitor: &mut impl ParameterVisitor, name: &str, layer: &mut Linear) {
-    visitor.visit(ParameterGroup::Deformation, &format!("{name}.weight"), &mut layer.weight);
-    if let Some(bias) = &mut layer.bias {
-        visitor.visit(ParameterGroup::Deformation, &format!("{name}.bias"), bias);
+    /// Whatever is trained has a group, whatever has none is a constant.
+    #[test]
+    fn every_parameter_has_its_group() {
+        let mut config = Config::default();
+        config.model.hexplane.channels = 2;
+        config.model.hexplane.resolution = [8, 8, 8, 4];
+        let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
+        let device = Device::flex();
+        let scene = config.model.build().init(&cloud, &device);
+        let compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let (mut groups, mut models) = (Groups::default(), Groups::default());
+        visit_parameters(&scene, &mut groups);
+        visit_parameters(&compression, &mut models);
+        for (path, group) in &groups.0 {
+            assert_eq!(group.is_none(), path.starts_with("coordinates."), "{path}");
+            let part = path.split('.').next().unwrap();
+            assert_eq!(part == "gaussians", GaussianAttribute::has_path(path), "{path}");
+        }
+        for attribute in GaussianAttribute::ALL {
+            assert!(groups.0.iter().any(|(path, _)| path == attribute.path()), "{attribute:?}");
+        }
+        let grid = groups.0.iter().filter(|(_, group)| *group == Some(ParameterGroup::Grid)).count();
+        assert_eq!(grid, 12);
+        for (path, _) in models.0 {
+            let path = format!("{COMPRESSION}.{path}");
+            assert!(ParameterGroup::of(&path).is_some(), "{path}");
+        }
+        assert_eq!(ParameterGroup::of("field.motion.planes.0"), Some(ParameterGroup::Grid));
+        assert_eq!(ParameterGroup::of("fields"), None);
     }
 }

@@ -10,21 +10,22 @@ use std::path::{Path, PathBuf};
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::{DataError, PointCloud, write_atomically};
-use light4gs_model::{DynamicScene, Pca, SceneCoordinates};
+use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
+use light4gs_model::{DeformationField, DynamicScene, HexPlaneField};
 use safetensors::{Dtype, SafeTensors};
 
 use crate::compression::Compression;
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::optimization::adam::{Adam, AdamState};
-use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::optimization::parameters::{COMPRESSION, GaussianAttribute};
 use crate::stage::Stage;
 
 /// A run's state after an iteration.
 #[derive(Debug)]
-pub struct Checkpoint {
+pub struct Checkpoint<F: DeformationField = HexPlaneField> {
     /// The model, on the run's device.
-    pub scene: DynamicScene,
+    pub scene: DynamicScene<F>,
     /// Entropy models and quantisation steps, where the run trains them.
     pub compression: Option<Compression>,
     /// Optimiser state.
@@ -47,33 +48,36 @@ fn entry<const D: usize>(tensor: Tensor<D>) -> Entry {
     (shape, tensor.into_data().iter::<f32>().flat_map(f32::to_le_bytes).collect())
 }
 
-struct Collect(BTreeMap<String, Entry>);
+/// Tensors to store, by name.
+struct Collect<'a> {
+    prefix: &'static str,
+    entries: &'a mut BTreeMap<String, Entry>,
+}
 
-impl ParameterVisitor for Collect {
-    fn visit<const D: usize>(&mut self, _: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        self.0.insert(format!("parameter.{name}"), entry(parameter.val()));
+impl ParameterVisitor for Collect<'_> {
+    fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>) {
+        self.entries.insert(format!("{}.{path}", self.prefix), entry(parameter.val()));
     }
 }
 
-impl Checkpoint {
+/// Names of the stored parameters: those of the scene, and those of the entropy models, begin like this.
+const SCENE: &str = "scene";
+
+impl<F: DeformationField> Checkpoint<F> {
     /// File name of a checkpoint.
     pub fn file_name(stage: Stage, iteration: usize) -> String {
         format!("{}_{iteration:06}.safetensors", stage.name())
     }
 
     /// Writes the file whole or not at all.
-    pub fn save(&mut self, path: &Path) -> Result<(), TrainError> {
-        let mut collect = Collect(BTreeMap::new());
-        visit_parameters(&mut self.scene, &mut collect);
-        if let Some(compression) = &mut self.compression {
-            visit_compression(compression, &mut collect);
+    pub fn save(&self, path: &Path) -> Result<(), TrainError> {
+        let mut entries = BTreeMap::new();
+        visit_parameters(&self.scene, &mut Collect { prefix: SCENE, entries: &mut entries });
+        if let Some(compression) = &self.compression {
+            visit_parameters(compression, &mut Collect { prefix: COMPRESSION, entries: &mut entries });
         }
-        let mut entries = collect.0;
-        let Pca { mean, axes, std } = self.scene.coordinates.pca();
-        let frame: Vec<u8> =
-            [mean.as_slice(), axes.as_flattened(), &std].concat().iter().flat_map(|v| v.to_le_bytes()).collect();
-        entries.insert("frame".into(), (vec![5, 3], frame));
         let mut metadata = HashMap::from([
+            ("field".to_owned(), F::KIND.to_owned()),
             ("stage".to_owned(), self.stage.name().to_owned()),
             ("iteration".to_owned(), self.iteration.to_string()),
             ("seconds".to_owned(), self.seconds.to_string()),
@@ -99,11 +103,11 @@ impl Checkpoint {
         Ok(write_atomically(path, |file| file.write_all(&bytes))?)
     }
 
-    /// Reads a checkpoint of a run with this configuration onto an autodiff device.
+    /// Reads a checkpoint of a run with this configuration and this deformation field onto an autodiff device.
     ///
     /// # Errors
-    /// [`TrainError::Checkpoint`] naming the tensor that is missing or of another shape.
-    pub fn load(path: &Path, config: &Config, device: &Device) -> Result<Self, TrainError> {
+    /// [`TrainError::Checkpoint`] naming the tensor that is missing or of another shape, or the other kind of field.
+    pub fn load(path: &Path, config: &Config, field: &F::Config, device: &Device) -> Result<Self, TrainError> {
         let bytes =
             std::fs::read(path).map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
         let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
@@ -119,18 +123,20 @@ impl Checkpoint {
             "fine" => Stage::Fine,
             other => return Err(failed(format!("unknown stage `{other}`"))),
         };
+        let kind = text("field")?;
+        if kind != F::KIND {
+            return Err(failed(format!("it has a deformation field of the kind `{kind}`, not `{}`", F::KIND)));
+        }
 
         // A model of the right structure, whose tensors are then replaced.
         let cloud = PointCloud { positions: vec![[0.0; 3]], colors: vec![[0.5; 3]] };
-        let mut scene = config.model.build().init(&cloud, device);
-        let mut load = Load { file: &file, device, problem: None };
-        visit_parameters(&mut scene, &mut load);
-        let mut compression = Compression::of_run(config, device);
-        if let Some(compression) = &mut compression {
-            visit_compression(compression, &mut load);
-        }
+        let mut scene = config.model.scene::<F>(field.clone()).init(&cloud, device);
+        let mut compression = Compression::of_run(config, scene.planes(), device)?;
+        let mut load = Load { prefix: SCENE, file: &file, device, problem: None };
+        scene = map_parameters(scene, &mut load);
+        load.prefix = COMPRESSION;
+        compression = compression.map(|compression| map_parameters(compression, &mut load));
         let inner = device.clone().inner();
-        let frame = load.values("frame", Some(15));
         let vector = |values: Vec<f32>| {
             let shape = [values.len()];
             Tensor::<1>::from_data(TensorData::new(values, shape), &inner)
@@ -149,9 +155,6 @@ impl Checkpoint {
         if let Some(problem) = load.problem {
             return Err(failed(problem));
         }
-        let triple = |k: usize| [frame[3 * k], frame[3 * k + 1], frame[3 * k + 2]];
-        let pca = Pca { mean: triple(0), axes: [triple(1), triple(2), triple(3)], std: triple(4) };
-        scene.coordinates = SceneCoordinates::new(&pca, device);
         Ok(Self {
             scene,
             compression,
@@ -165,6 +168,7 @@ impl Checkpoint {
 }
 
 struct Load<'a> {
+    prefix: &'static str,
     file: &'a SafeTensors<'a>,
     device: &'a Device,
     problem: Option<String>,
@@ -188,20 +192,23 @@ impl Load<'_> {
     }
 }
 
-impl ParameterVisitor for Load<'_> {
-    fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        let key = format!("parameter.{name}");
+impl ParameterMapper for Load<'_> {
+    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let key = format!("{}.{path}", self.prefix);
+        // The shape is what the configuration says, but for the number of Gaussians.
         let mut shape = parameter.dims();
-        if group.is_per_gaussian()
+        if GaussianAttribute::has_path(path)
             && let Ok(view) = self.file.tensor(&key)
         {
             shape[0] = view.shape().first().copied().unwrap_or(0);
         }
         let values = self.values(&key, Some(shape.iter().product()));
-        if self.problem.is_none() {
-            let tensor = Tensor::<D>::from_data(TensorData::new(values, shape), self.device);
-            *parameter = Param::initialized(parameter.id, tensor.require_grad());
+        if self.problem.is_some() {
+            return parameter;
         }
+        let trains = parameter.is_require_grad();
+        let tensor = Tensor::<D>::from_data(TensorData::new(values, shape), self.device);
+        Param::initialized(parameter.id, tensor.set_require_grad(trains))
     }
 }
 

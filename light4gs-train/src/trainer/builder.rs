@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use burn::tensor::Device;
 use light4gs_data::Scene;
+use light4gs_model::{DeformationField, HexPlaneField};
 
 use super::Trainer;
 use super::profile::Profile;
@@ -24,9 +25,10 @@ use crate::run::{Checkpoint, RunFolder};
 use crate::stage::Stage;
 
 /// The parts of a [`Trainer`]: those that are not given are the ones that the configuration describes.
-pub struct TrainerBuilder {
+pub struct TrainerBuilder<F: DeformationField = HexPlaneField> {
     config: Config,
     data: Scene,
+    field: F::Config,
     device: Option<Device>,
     images: Option<Box<dyn ImageSource>>,
     folder: Option<RunFolder>,
@@ -36,8 +38,8 @@ pub struct TrainerBuilder {
     observers: Vec<Box<dyn Observer>>,
 }
 
-impl TrainerBuilder {
-    pub(super) fn new(config: Config, data: Scene) -> Self {
+impl<F: DeformationField> TrainerBuilder<F> {
+    pub(super) fn new(config: Config, data: Scene, field: F::Config) -> Self {
         Self {
             device: None,
             images: None,
@@ -48,6 +50,7 @@ impl TrainerBuilder {
             observers: Vec::new(),
             config,
             data,
+            field,
         }
     }
 
@@ -98,7 +101,7 @@ impl TrainerBuilder {
     ///
     /// # Errors
     /// A configuration out of range; a device that there is not; a dataset without frames; logs that cannot be opened.
-    pub fn build(self) -> Result<Trainer, TrainError> {
+    pub fn build(self) -> Result<Trainer<F>, TrainError> {
         let device = self.open_device()?;
         self.begin(device)
     }
@@ -108,12 +111,12 @@ impl TrainerBuilder {
     ///
     /// # Errors
     /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration.
-    pub fn resume(self) -> Result<Trainer, TrainError> {
+    pub fn resume(self) -> Result<Trainer<F>, TrainError> {
         let device = self.open_device()?;
         match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
             None => self.begin(device),
             Some(path) => {
-                let state = Checkpoint::load(&path, &self.config, &device)?;
+                let state = Checkpoint::load(&path, &self.config, &self.field, &device)?;
                 self.assemble(device, state, Some(path))
             }
         }
@@ -131,11 +134,12 @@ impl TrainerBuilder {
         Ok(device.autodiff())
     }
 
-    fn begin(self, device: Device) -> Result<Trainer, TrainError> {
+    fn begin(self, device: Device) -> Result<Trainer<F>, TrainError> {
         device.seed(self.config.seed);
+        let scene = self.config.model.scene::<F>(self.field.clone()).init(&self.data.points, &device);
         let state = Checkpoint {
-            scene: self.config.model.build().init(&self.data.points, &device),
-            compression: Compression::of_run(&self.config, &device),
+            compression: Compression::of_run(&self.config, scene.planes(), &device)?,
+            scene,
             adam: Adam::default(),
             density: Default::default(),
             stage: Stage::Coarse,
@@ -149,9 +153,9 @@ impl TrainerBuilder {
     fn assemble(
         self,
         device: Device,
-        mut state: Checkpoint,
+        mut state: Checkpoint<F>,
         checkpoint: Option<PathBuf>,
-    ) -> Result<Trainer, TrainError> {
+    ) -> Result<Trainer<F>, TrainError> {
         let Self { config, data, images, folder, loss, mut density, significance, observers, .. } = self;
         let count = state.scene.gaussians.len();
         match checkpoint {

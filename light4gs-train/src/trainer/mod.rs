@@ -23,7 +23,7 @@ use std::time::Instant;
 use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_data::{Scene, Split};
-use light4gs_model::{DynamicScene, GaussianTensors, Splatter};
+use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneField, Splatter};
 
 pub use builder::TrainerBuilder;
 
@@ -92,13 +92,13 @@ use views::ViewPools;
 /// assert_eq!(losses.len(), 10);
 /// # Ok::<(), light4gs_train::error::TrainError>(())
 /// ```
-pub struct Trainer {
+pub struct Trainer<F: DeformationField = HexPlaneField> {
     config: Config,
     device: Device,
     data: Scene,
     images: Box<dyn ImageSource>,
     folder: Option<RunFolder>,
-    state: Checkpoint,
+    state: Checkpoint<F>,
     loss: Box<dyn Loss>,
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
@@ -119,7 +119,16 @@ struct Lap {
 impl Trainer {
     /// What a run of `config` on `data` is made of. The parts that `config` names are the defaults.
     pub fn builder(config: Config, data: Scene) -> TrainerBuilder {
-        TrainerBuilder::new(config, data)
+        let field = config.model.field();
+        Self::builder_with_field(config, data, field)
+    }
+}
+
+impl<F: DeformationField> Trainer<F> {
+    /// The same with a deformation field of one's own: `field` takes the place of `model.hexplane` and
+    /// `model.deformation` in the configuration.
+    pub fn builder_with_field(config: Config, data: Scene, field: F::Config) -> TrainerBuilder<F> {
+        TrainerBuilder::new(config, data, field)
     }
 
     /// From now on measures the parts of every iteration. The run gets slower, since each part is waited for.
@@ -145,7 +154,7 @@ impl Trainer {
     }
 
     /// The model as trained so far, on the run's device.
-    pub fn scene(&self) -> &DynamicScene {
+    pub fn scene(&self) -> &DynamicScene<F> {
         &self.state.scene
     }
 
@@ -278,7 +287,7 @@ impl Trainer {
 
     fn save_checkpoint(&mut self) -> Result<(), TrainError> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let path = folder.checkpoints().join(Checkpoint::file_name(self.state.stage, self.state.iteration));
+        let path = folder.checkpoints().join(Checkpoint::<F>::file_name(self.state.stage, self.state.iteration));
         self.state.density = self.density.state();
         self.state.save(&path)?;
         let all = list_checkpoints(&folder.checkpoints());
@@ -317,12 +326,12 @@ impl Trainer {
 }
 
 /// The model between two iterations.
-struct Snapshot<'a> {
-    scene: &'a DynamicScene,
+struct Snapshot<'a, F: DeformationField> {
+    scene: &'a DynamicScene<F>,
     stage: Stage,
 }
 
-impl SceneInTraining for Snapshot<'_> {
+impl<F: DeformationField> SceneInTraining for Snapshot<'_, F> {
     fn gaussians_at(&self, time: f32) -> GaussianTensors {
         let scene = self.scene.valid();
         match self.stage {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use burn::module::Module;
 use light4gs_data::Frame;
-use light4gs_model::{Significance, least_significant};
+use light4gs_model::{DeformationField, Significance, least_significant};
 use rand::Rng;
 
 use super::Trainer;
@@ -12,7 +12,7 @@ use crate::density::{GaussianContributions, GaussianEditor};
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
 
-impl Trainer {
+impl<F: DeformationField> Trainer<F> {
     /// Drops the Gaussians that contribute least to the training views at their times.
     pub(super) fn prune_insignificant(&mut self, iteration: usize) {
         // Off the tape, which would hold on to every view's tensors until the next backward pass.

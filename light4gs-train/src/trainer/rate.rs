@@ -1,24 +1,23 @@
 //! Quantization noise and the rate in a training step (paper III-C to III-E, IV-B).
 
 use burn::tensor::Tensor;
-use light4gs_model::DynamicScene;
+use light4gs_model::{DeformationField, DynamicScene};
 
 use super::Trainer;
 use crate::compression::{Compression, NoisyScene, freeze_planes};
 use crate::config::{Config, RateWeighting};
 use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
-use crate::optimization::parameters::plane_parameter;
 use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
 
-impl Trainer {
+impl<F: DeformationField> Trainer<F> {
     /// The scene as it will roughly be decoded, once the rate has entered the training.
     pub(super) fn quantization_noise(
         &mut self,
         stage: Stage,
         iteration: usize,
-    ) -> Result<Option<NoisyScene>, TrainError> {
+    ) -> Result<Option<NoisyScene<F>>, TrainError> {
         let Config { seed, compression: config, .. } = &self.config;
         let from = config.rate.from.max(1);
         if stage == Stage::Coarse || iteration < from {
@@ -29,12 +28,13 @@ impl Trainer {
         let Some(compression) = self.state.compression.as_mut() else { return Ok(None) };
         let scene = &mut self.state.scene;
         if iteration == from {
-            compression
-                .context
-                .start_from(&scene.field.hexplane.tensors(), &compression.quantization.steps_without_gradient());
+            compression.start_from(scene.planes());
         }
         if frozen && iteration == config.rate.planes_until + 1 {
-            scene.field.hexplane = freeze_planes(scene, compression, config, &self.device)?;
+            let frozen = freeze_planes(scene, compression, config, &self.device)?;
+            if let (Some(planes), Some(frozen)) = (scene.planes_mut(), frozen) {
+                *planes = frozen;
+            }
         }
         seed_device(&self.device, *seed, stage, iteration);
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
@@ -59,7 +59,7 @@ impl Trainer {
     /// weighted rate, `[1]`. `gradients` are those of the views.
     pub(super) fn add_rate(
         &mut self,
-        noisy: &NoisyScene,
+        noisy: &NoisyScene<F>,
         iteration: usize,
         gradients: &mut GradientSums,
     ) -> Option<Tensor<1>> {
@@ -67,7 +67,7 @@ impl Trainer {
         let with_sh = self.sh_counts(iteration);
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
-        let mut steps = vec![None; noisy.scene.field.hexplane.planes.len()];
+        let mut steps = vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())];
         if iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
             let rate = compression.rate(noisy, config.fraction, with_sh, &mut generator);
@@ -79,11 +79,11 @@ impl Trainer {
             value = Some(term.clone().inner());
             let mut tape = term.backward();
             steps = noisy.step_gradients(&tape);
-            gradients.add_scene(&mut noisy.scene.clone(), &mut tape);
-            gradients.add_compression(compression, &mut tape);
+            gradients.add_module(&noisy.scene, &mut tape);
+            gradients.add_module(&*compression, &mut tape);
         }
         if let Some(term) = steps_term(noisy, &self.state.scene, compression, steps, gradients) {
-            gradients.add_compression(compression, &mut term.backward());
+            gradients.add_module(&*compression, &mut term.backward());
         }
         self.profile.lap("rate");
         value
@@ -92,9 +92,9 @@ impl Trainer {
 
 /// A term with the steps' whole gradient: what the rate says of them (`direct`, by plane), and what the noisy planes pass
 /// on, which is the noise, in steps, times the gradient of what carries it. None where no step is learned.
-fn steps_term(
-    noisy: &NoisyScene,
-    scene: &DynamicScene,
+fn steps_term<F: DeformationField>(
+    noisy: &NoisyScene<F>,
+    scene: &DynamicScene<F>,
     compression: &Compression,
     direct: Vec<Option<Tensor<1>>>,
     gradients: &GradientSums,
@@ -102,11 +102,11 @@ fn steps_term(
     if !noisy.learns_steps() {
         return None;
     }
-    let steps = compression.quantization.steps();
-    let planes = scene.field.hexplane.planes.iter().zip(&noisy.scene.field.hexplane.planes).zip(direct).enumerate();
+    let steps = compression.planes.as_ref()?.quantization.steps();
+    let planes = scene.planes()?.planes.iter().zip(&noisy.scene.planes()?.planes).zip(direct).enumerate();
     let terms = planes.map(|(i, ((plane, noisy), direct))| {
         let step = steps.of(i);
-        let through_noise = gradients.get(&plane_parameter(i)).map(|gradient| {
+        let through_noise = gradients.get(plane.id).map(|gradient| {
             let noise = (noisy.val().inner() - plane.val().inner()).flatten::<1>(0, 2);
             (noise * gradient).sum() / step.clone().inner()
         });
@@ -135,8 +135,8 @@ mod tests {
         config.compression.steps.per_scale = true;
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let scene = config.model.build().init(&cloud, &device);
-        let mut compression = Compression::new(&config, &device);
-        let mut noisy = compression.noisy(&scene, true, false);
+        let compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let noisy = compression.noisy(&scene, true, false);
         // Something that planes and steps both have a part in, another one in each plane.
         let loss = |planes: &[Tensor<3>], steps: &dyn Fn(usize) -> Tensor<1>| {
             let terms = planes.iter().enumerate().map(|(i, plane)| {
@@ -145,17 +145,18 @@ mod tests {
             });
             terms.reduce(|sum, term| sum + term).unwrap()
         };
-        let log_steps = "quantization.log_steps";
+        let quantization = &compression.planes.as_ref().unwrap().quantization;
+        let log_steps = quantization.log_steps.id;
 
         let leaves = noisy.steps.clone().unwrap();
         let mut tape = loss(&noisy.scene.field.hexplane.tensors(), &|i| leaves.of(i)).backward();
         let direct = noisy.step_gradients(&tape);
         let mut apart = GradientSums::default();
-        apart.add_scene(&mut noisy.scene, &mut tape);
+        apart.add_module(&noisy.scene, &mut tape);
         let term = steps_term(&noisy, &scene, &compression, direct, &apart).unwrap();
-        apart.add_compression(&mut compression, &mut term.backward());
+        apart.add_module(&compression, &mut term.backward());
 
-        let steps = compression.quantization.steps();
+        let steps = quantization.steps();
         let pairs = scene.field.hexplane.tensors().into_iter().zip(noisy.scene.field.hexplane.tensors()).enumerate();
         let planes: Vec<_> = pairs
             .map(|(i, (plane, noisy))| {
@@ -165,7 +166,7 @@ mod tests {
             })
             .collect();
         let mut together = GradientSums::default();
-        together.add_compression(&mut compression, &mut loss(&planes, &|i| steps.of(i)).backward());
+        together.add_module(&compression, &mut loss(&planes, &|i| steps.of(i)).backward());
 
         let [apart, together] = [apart, together].map(|sums| sums.get(log_steps).unwrap().into_data());
         assert_eq!(together.num_elements(), 4);

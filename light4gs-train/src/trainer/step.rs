@@ -1,22 +1,20 @@
 //! One iteration: forward, backward, the optimizer's step.
 
-use burn::module::Param;
 use burn::tensor::Tensor;
 use light4gs_data::Frame;
-use light4gs_model::regularizer;
+use light4gs_model::{DeformationField, HexPlane, regularizer};
 
 use super::Trainer;
 use super::views::ViewPass;
 use crate::density::{GaussianEditor, Moment, ViewStatistics};
 use crate::error::TrainError;
 use crate::observers::StepReport;
-use crate::optimization::adam::Adam;
 use crate::optimization::gradients::GradientSums;
 use crate::optimization::learning_rates::GroupRates;
-use crate::optimization::parameters::{ParameterGroup, ParameterVisitor, visit_compression, visit_parameters};
+use crate::optimization::parameters::COMPRESSION;
 use crate::stage::Stage;
 
-impl Trainer {
+impl<F: DeformationField> Trainer<F> {
     /// Forward, backward, and one optimizer step.
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
         self.profile.begin_step();
@@ -61,12 +59,13 @@ impl Trainer {
         self.density.after_backward(&statistics, &self.moment(stage, iteration));
         self.profile.lap("density statistics");
         let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
-        let mut step = AdamVisitor { adam: &mut self.state.adam, gradients: &mut gradients, rates };
-        visit_parameters(&mut self.state.scene, &mut step);
+        let rate = |group| Some(rates.of(group));
+        self.state.adam.step_module("", &mut self.state.scene, &mut gradients, rate);
         if let Some(compression) = &mut self.state.compression {
-            visit_compression(compression, &mut step);
+            self.state.adam.step_module(COMPRESSION, compression, &mut gradients, rate);
             if noisy.is_some_and(|noisy| noisy.learns_steps()) {
-                compression.bound_steps(&self.config);
+                let scales = self.state.scene.planes().map_or(0, HexPlane::scales);
+                compression.bound_steps(&self.config, scales);
             }
         }
         self.profile.lap("Adam");
@@ -78,16 +77,12 @@ impl Trainer {
         if stage == Stage::Coarse || self.planes_are_frozen(stage, iteration) {
             return None;
         }
-        let scene = &mut self.state.scene;
+        let scene = &self.state.scene;
         let weights = &self.config.train.regularizer;
-        let term = regularizer::weighted_sum(
-            &scene.field.hexplane,
-            weights.plane_tv,
-            weights.time_smoothness,
-            weights.time_l1,
-        );
+        let planes = scene.planes()?;
+        let term = regularizer::weighted_sum(planes, weights.plane_tv, weights.time_smoothness, weights.time_l1);
         let value = term.clone().inner();
-        gradients.add_scene(scene, &mut term.backward());
+        gradients.add_module(scene, &mut term.backward());
         self.profile.lap("regularizers");
         Some(value)
     }
@@ -105,20 +100,5 @@ impl Trainer {
             self.prune_insignificant(iteration);
         }
         self.profile.lap("density control");
-    }
-}
-
-struct AdamVisitor<'a> {
-    adam: &'a mut Adam,
-    gradients: &'a mut GradientSums,
-    rates: GroupRates,
-}
-
-impl ParameterVisitor for AdamVisitor<'_> {
-    fn visit<const D: usize>(&mut self, group: ParameterGroup, name: &str, parameter: &mut Param<Tensor<D>>) {
-        if let Some(gradient) = self.gradients.remove(name) {
-            let gradient = gradient.reshape(parameter.val().dims());
-            self.adam.step(name, parameter, gradient, self.rates.of(group));
-        }
     }
 }

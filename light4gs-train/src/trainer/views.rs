@@ -3,7 +3,7 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_data::Frame;
-use light4gs_model::{DynamicScene, Splatter};
+use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use super::profile::Profile;
@@ -67,9 +67,9 @@ impl ViewPools {
 
 impl ViewPass<'_> {
     /// Renders and differentiates every frame. The outcome, in the order of the frames, does not depend on the pools.
-    pub(super) fn run<'f>(
+    pub(super) fn run<'f, F: DeformationField>(
         &self,
-        scene: &DynamicScene,
+        scene: &DynamicScene<F>,
         frames: &[&'f Frame],
         pools: &ViewPools,
         profile: &Profile,
@@ -96,11 +96,20 @@ impl ViewPass<'_> {
         })
     }
 
-    fn views(&self, tasks: Vec<(DynamicScene, &Frame)>, profile: &Profile) -> Result<Vec<View>, TrainError> {
+    fn views<F: DeformationField>(
+        &self,
+        tasks: Vec<(DynamicScene<F>, &Frame)>,
+        profile: &Profile,
+    ) -> Result<Vec<View>, TrainError> {
         tasks.into_iter().map(|(scene, frame)| self.view(scene, frame, profile)).collect()
     }
 
-    fn view(&self, mut scene: DynamicScene, frame: &Frame, profile: &Profile) -> Result<View, TrainError> {
+    fn view<F: DeformationField>(
+        &self,
+        scene: DynamicScene<F>,
+        frame: &Frame,
+        profile: &Profile,
+    ) -> Result<View, TrainError> {
         let gaussians = match self.stage {
             Stage::Coarse => scene.gaussians.tensors(),
             Stage::Fine => scene.at(frame.time),
@@ -126,7 +135,7 @@ impl ViewPass<'_> {
         let value = loss.clone().inner();
         let mut tape = loss.backward();
         let mut gradients = GradientSums::default();
-        gradients.add_scene(&mut scene, &mut tape);
+        gradients.add_module(&scene, &mut tape);
         profile.lap("backward");
         Ok(View {
             loss: value,
