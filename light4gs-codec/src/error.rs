@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::container::VERSION;
+use crate::stream::container::VERSION;
 
 /// What is wrong with a scene or a stream, where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
@@ -66,13 +66,23 @@ pub enum CodecError {
         /// The id that is not known.
         id: u16,
     },
-    /// The section is coded in a way that this version does not know.
-    #[error("{section}: unknown encoding {encoding}; use a newer program")]
-    UnknownEncoding {
+    /// The section holds something that this version does not know.
+    #[error("{section}: unknown kind {kind}; use a newer program")]
+    UnknownKind {
         /// The section.
         section: &'static str,
         /// The number that is not known.
-        encoding: u16,
+        kind: u8,
+    },
+    /// The numbers of a section are stored in a way that this version does not know for what it holds.
+    #[error("{section}: unknown encoding {encoding} of the kind \"{kind}\"; use a newer program")]
+    UnknownEncoding {
+        /// The section.
+        section: &'static str,
+        /// What it holds.
+        kind: &'static str,
+        /// The number that is not known.
+        encoding: u8,
     },
     /// A section stands twice in the table.
     #[error("{section}: the section stands twice in the table, expected once; write the stream again")]
@@ -85,18 +95,6 @@ pub enum CodecError {
     MissingSection {
         /// The section.
         section: &'static str,
-    },
-    /// A section lies outside the stream, on another section, or leaves a gap.
-    #[error("{section}: bytes {offset}..{offset}+{bytes} {problem}; write the stream again")]
-    SectionRange {
-        /// The section.
-        section: &'static str,
-        /// Where the table says it begins.
-        offset: u64,
-        /// The length that the table gives.
-        bytes: u64,
-        /// What is wrong with that.
-        problem: &'static str,
     },
     /// A number is beyond what a reader accepts.
     #[error("{section}: {field} is {found}, at most {limit} is accepted; make the scene smaller or raise the limit")]

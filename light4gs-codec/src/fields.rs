@@ -2,7 +2,7 @@
 
 use std::slice::from_ref;
 
-use crate::{CodecError, SceneData, sections::SectionKind};
+use crate::{CodecError, SceneData, stream::sections::Section};
 
 /// One array of numbers of a scene.
 struct Field<'a> {
@@ -13,7 +13,7 @@ struct Field<'a> {
 
 /// All numbers of `scene`, in the order of the stream.
 fn fields(scene: &SceneData) -> Vec<Field<'_>> {
-    let SceneData { meta, gaussians, frame, hexplane, deformation } = scene;
+    let SceneData { meta, gaussians, frame, hexplane, motion } = scene;
     let mut fields = Vec::new();
     let mut add = |section, name: String, values| fields.push(Field { section, name, values });
 
@@ -22,26 +22,30 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     add("meta", "background".into(), &meta.background);
     add("meta", "fov_x".into(), from_ref(&meta.fov_x));
 
-    let section = SectionKind::Gaussians.name();
+    let section = Section::Gaussians.name();
     add(section, "means".into(), gaussians.means.as_flattened());
     add(section, "log_scales".into(), gaussians.log_scales.as_flattened());
     add(section, "quats".into(), gaussians.quats.as_flattened());
     add(section, "opacity_logits".into(), &gaussians.opacity_logits);
     add(section, "sh_dc".into(), gaussians.sh_dc.as_flattened());
-    add(SectionKind::Sh.name(), "sh_rest".into(), &gaussians.sh_rest);
+    add(Section::Sh.name(), "sh_rest".into(), &gaussians.sh_rest);
 
-    let section = SectionKind::SceneFrame.name();
+    let section = Section::SceneFrame.name();
     add(section, "mean".into(), &frame.mean);
     add(section, "axes".into(), frame.axes.as_flattened());
     add(section, "std".into(), &frame.std);
 
-    let section = SectionKind::Deformation.name();
-    for layer in &deformation.layers {
-        add(section, format!("{}.weight", layer.name), &layer.weight);
-        add(section, format!("{}.bias", layer.name), &layer.bias);
+    let section = Section::Motion.name();
+    let layers = motion.network.iter().flat_map(|motion| motion.network.layers());
+    for (index, layer) in layers.enumerate() {
+        add(section, format!("layers[{index}].weight"), &layer.weight);
+        add(section, format!("layers[{index}].bias"), &layer.bias);
+    }
+    for tensor in &motion.tensors {
+        add(section, tensor.name.clone(), &tensor.values);
     }
 
-    let section = SectionKind::HexPlanes.name();
+    let section = Section::HexPlanes.name();
     for (index, plane) in hexplane.planes.iter().enumerate() {
         add(section, format!("planes[{index}].values"), &plane.values);
     }

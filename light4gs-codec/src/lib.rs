@@ -1,6 +1,6 @@
 //! The `.l4gs` stream: plain arrays in, bytes out.
 //!
-//! A dynamic scene is a set of Gaussians, a frame that normalises their positions, a multiscale hexplane and a
+//! A dynamic scene is a set of Gaussians, a frame that normalizes their positions, a multiscale hexplane and a
 //! small deformation network. [`SceneData`] holds all of it as plain arrays, [`encode`] turns it into one byte
 //! stream and [`decode`] turns the stream back, bit for bit, on every machine. `docs/format.md` describes the
 //! stream byte by byte.
@@ -19,7 +19,7 @@
 //!         sh_degree: 1,
 //!         sh_rest: vec![0.0; 9],
 //!     },
-//!     frame: SceneFrameArrays::default(), // no normalisation
+//!     frame: SceneFrameArrays::default(), // no normalization
 //!     ..Default::default()                // no hexplane, no network: a scene that does not move
 //! };
 //!
@@ -46,10 +46,11 @@
 //!
 //! # Compression
 //!
-//! [`encode_compressed`] quantises a scene and spends bits by learned distributions: planes under a [context
+//! [`encode_compressed`] quantizes a scene and spends bits by learned distributions: planes under a [context
 //! model](ContextModelArrays), spherical harmonics under [tables or small networks](ShCoding), other [`attributes`] and
 //! [network weights](network_weights) adaptively. Networks that choose a coding interval are evaluated by an executor
 //! of this crate in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
+//! They travel as [descriptions](network): what a network consists of is the model's affair, not this crate's.
 //! The encoder decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`]
 //! section by section, and [`info`] tells what is inside.
 //!
@@ -59,58 +60,43 @@
 //! [`Limits`] before memory is taken, so hostile input gets a [`CodecError`], never a panic.
 //!
 //! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`,
-//! where the file functions (`read_file`, `write_file`, ...) are absent and work is done by one thread. Elsewhere
+//! where `read_file` and `read_info` are absent and work is done by one thread. Elsewhere
 //! planes are coded by the threads of rayon's current pool; the bytes do not depend on how many there are.
 
 #![forbid(unsafe_code)]
 
 mod adaptive;
 pub mod attributes;
-mod compression;
-mod compressor;
-mod container;
-mod context_model;
 mod entropy;
 mod error;
-mod executor;
 mod fields;
 #[cfg(not(target_arch = "wasm32"))]
 mod file;
-mod harmonics;
-mod info;
 mod limits;
-mod motion;
-pub mod network_weights;
-mod open_stream;
+pub mod network;
 mod parallel;
-mod parts;
 pub mod plane_layout;
 mod planes;
-mod query;
-mod reader;
 mod scene;
-mod sections;
+mod sh;
 mod stream;
-mod writer;
 
-pub use compression::{CompressionInput, PlaneCoding, Profile, WeightPrecisions};
-pub use compressor::{CompressionReport, Encoded, encode_compressed};
-pub use container::{Encoding, MAGIC, VERSION};
-pub use context_model::{
-    ContextModelArrays, ContextModelShape, ContextParts, ConvolutionLayer, ConvolutionShape, PerGroup, SpatialKernel,
-};
 pub use entropy::FrequencyTable;
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
-pub use file::{read_file, read_info, write_atomically, write_file};
-pub use harmonics::{ShCoding, ShCondition};
-pub use info::{SectionInfo, StreamInfo, info};
+pub use file::{read_file, read_info};
 pub use limits::Limits;
-pub use open_stream::OpenStream;
-pub use parts::{PlaneDistributions, encode_planes, encode_sh, plane_distributions};
+pub use network::{Network, weights as network_weights};
+pub use planes::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, section::PlaneBytes};
 pub use scene::{
-    GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
-    SceneMeta, sh_rest_coefficients,
+    GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Plane,
+    SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
 };
-pub use sections::{coded_hexplanes::PlaneBytes, coded_sh::ShBytes};
-pub use stream::{decode, decode_with_limits, encode};
+pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
+pub use stream::{
+    CompressionInput, CompressionReport, Encoded, OpenStream, PerGroup, PlaneCoding, PlaneDistributions, Profile,
+    SectionInfo, StreamInfo, WeightPrecisions,
+    container::{MAGIC, VERSION},
+    decode, decode_with_limits, encode, encode_compressed, encode_planes, encode_sh, info, plane_distributions,
+    sections::{Encoding, Kind},
+};

@@ -4,8 +4,8 @@ use crate::CodecError;
 
 /// The most that a reader accepts, checked before memory is taken.
 ///
-/// The default is far beyond any scene that fits into a machine of today. A program that reads files of
-/// strangers may want less:
+/// The default is for files of strangers: a file takes some seconds of one thread and 256 MiB at most, or a small
+/// multiple of its own length if that is more. A program that knows its files may want less, or more:
 ///
 /// ```
 /// use light4gs_codec::{Limits, SceneData, decode_with_limits, encode};
@@ -35,17 +35,20 @@ pub struct Limits {
     pub resolution: u32,
     /// Scales of the hexplane.
     pub scales: u32,
-    /// Layers of the network.
-    pub layers: u32,
-    /// Inputs or outputs of one layer.
+    /// Networks of a section, and priors that use them.
+    pub networks: u32,
+    /// Nodes, inputs or outputs of one network.
+    pub nodes: u32,
+    /// Inputs or outputs of one layer, weights of one of its outputs, and channels of all values of a network together.
     pub layer_width: u32,
-    /// Weights of the context model, and of the networks of the spherical harmonics.
+    /// Weights of all networks of a section.
     pub layer_weights: u64,
     /// Values of all entropy-coded planes, or of the entropy-coded spherical harmonics. Coded values can take next to
     /// no bytes, so this bounds the memory that a small stream can ask for. A stream of `b` bytes may hold `64 b` of
     /// them whatever this says.
     pub coded_values: u64,
-    /// Multiplications that the networks of a stream may ask for: positions times weights.
+    /// Multiplications that the networks of the planes, or those of the spherical harmonics, may ask for. The default is
+    /// three times what the largest architecture takes for planes of the paper's size.
     pub multiplications: u64,
 }
 
@@ -61,11 +64,12 @@ impl Default for Limits {
             channels: 1 << 12,
             resolution: 1 << 16,
             scales: 16,
-            layers: 1 << 10,
+            networks: 32,
+            nodes: 256,
             layer_width: 1 << 16,
-            layer_weights: 1 << 22,
+            layer_weights: 1 << 21,
             coded_values: 1 << 23,
-            multiplications: 1 << 38,
+            multiplications: 1 << 34,
         }
     }
 }

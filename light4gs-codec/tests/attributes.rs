@@ -46,7 +46,7 @@ fn cloud(count: usize) -> GaussianArrays {
 fn round_trip(given: &GaussianArrays, steps: &AttributeSteps) -> Vec<u8> {
     let encoded = attributes::encode(given, steps).unwrap();
     let decoded = attributes::decode(&encoded.bytes, &Limits::default()).unwrap();
-    assert_eq!(decoded, attributes::quantised(given, steps).unwrap());
+    assert_eq!(decoded, attributes::quantized(given, steps).unwrap());
 
     let mut indices = encoded.order.clone();
     indices.sort_unstable();
@@ -88,7 +88,7 @@ proptest! {
         match attributes::encode(&given, &steps) {
             Ok(encoded) => prop_assert_eq!(
                 attributes::decode(&encoded.bytes, &Limits::default()).unwrap(),
-                attributes::quantised(&given, &steps).unwrap()
+                attributes::quantized(&given, &steps).unwrap()
             ),
             Err(error) => prop_assert!(error.to_string().starts_with("gaussians: "), "{}", error),
         }

@@ -3,11 +3,15 @@
 mod common;
 
 use common::compression::{
-    ALL_PARTS, compact_shape, input, model, plane_coding, reference_shape, scene, sh_networks, sh_tables, step,
+    ALL_PARTS, Parts, Random, ShKind, compact_shape, condition, distribution, input, model, plane_coding, reference_shape,
+    scene, sh_networks, sh_tables, step,
 };
 use light4gs_codec::{
-    CodecError, CompressionInput, ContextParts, Encoded, Encoding, OpenStream, PerGroup, PlaneDistributions, Profile,
-    SceneData, ShCoding, ShCondition, decode, encode_compressed, encode_planes, info, plane_distributions,
+    CodecError, CompressionInput, ContextModelArrays, Encoded, Kind, LatentArrays, Network, OpenStream, PerGroup,
+    PlaneCoding, PlaneDistributions, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, decode, encode_compressed,
+    encode_planes, info,
+    network::{LayerKind, Operation, Value},
+    plane_distributions,
 };
 use proptest::prelude::*;
 
@@ -15,10 +19,10 @@ use proptest::prelude::*;
 fn round_trip(scene: &SceneData, input: &CompressionInput) -> Encoded {
     let encoded = encode_compressed(scene, input).unwrap();
     assert_eq!(decode(&encoded.bytes).unwrap(), encoded.decoded);
-    let sections: u64 = encoded.report.sections.iter().map(|section| section.2).sum();
+    let sections: u64 = encoded.report.sections.iter().map(|section| section.3).sum();
     assert_eq!(encoded.report.header_bytes + sections, encoded.bytes.len() as u64);
     let info = info(&encoded.bytes).unwrap();
-    assert_eq!((info.version, info.profile), (2, Some(input.profile)));
+    assert_eq!((info.version, info.profile), (1, Some(input.profile)));
     assert_eq!(info.plane_bytes, encoded.report.planes);
     assert_eq!(info.gaussian_count as usize, scene.gaussians.len());
     assert_eq!(info.plane_count, scene.hexplane.planes.len());
@@ -42,7 +46,7 @@ fn errors_are_at_most_half_a_step() {
             if profile == Profile::Paper {
                 assert!(largest_error(&scene.gaussians.sh_rest, &encoded.decoded.gaussians.sh_rest) <= 0.01001);
                 assert_eq!(encoded.decoded.gaussians.means, scene.gaussians.means);
-                assert_eq!(encoded.decoded.deformation, scene.deformation);
+                assert_eq!(encoded.decoded.motion, scene.motion);
             }
         }
     }
@@ -54,26 +58,143 @@ fn every_combination_of_parts() {
     for bits in 0..32 {
         let [hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior] =
             [0, 1, 2, 3, 4].map(|bit| bits >> bit & 1 == 1);
-        let parts = ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior };
-        let shape = compact_shape(4, parts);
+        let parts = Parts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior };
         if high_scale_hyperprior && !(hyperprior && inter_scale) {
-            let input = CompressionInput {
-                profile: Profile::Paper,
-                planes: Some(plane_coding(&scene.hexplane, model(shape, 1), step(0.1))),
-                ..input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS))
-            };
-            assert!(encode_compressed(&scene, &input).unwrap_err().to_string().contains("high_scale_hyperprior"));
             continue;
         }
-        let encoded = round_trip(&scene, &input(&scene, Profile::Paper, shape));
+        let encoded = round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(4, parts)));
         for bytes in &encoded.report.planes {
             let low = bytes.plane < 6 || !inter_scale;
             let space_time = [2, 4, 5].contains(&(bytes.plane % 6));
             assert_eq!(bytes.anchors > 0, checkerboard && low, "{parts:?} {bytes:?}");
-            let hyper = if low { hyperprior && (space_time || !inter_plane) } else { high_scale_hyperprior };
-            assert!(bytes.hyperprior == 0 || hyper, "{parts:?} {bytes:?}");
+            let latent = if low { hyperprior && (space_time || !inter_plane) } else { high_scale_hyperprior };
+            assert!(bytes.latent == 0 || latent, "{parts:?} {bytes:?}");
         }
     }
+}
+
+/// What a network costs beside its weights.
+#[test]
+fn a_description_is_short() {
+    let scene = scene(0, 0, 16, [4, 4, 4, 4], &[1, 2]);
+    let encoded = round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(16, ALL_PARTS)));
+    let model = model(compact_shape(16, ALL_PARTS), 3);
+    let stored = |network: &Network| -> u64 {
+        let layers = network.layers().map(|layer| match layer.kind {
+            LayerKind::Checkerboard => layer.weights() / 25 * 12 + u64::from(layer.outputs),
+            _ => layer.weights() + u64::from(layer.outputs),
+        });
+        layers.sum()
+    };
+    let weights: u64 = model.networks.iter().map(stored).sum();
+    // Beside the description there are the latent's medians and its tables, some 20 bytes each.
+    let description = encoded.report.sections[5].3 - 4 * weights;
+    assert!(description < 200, "{description} bytes");
+}
+
+/// A context model that the codec has never heard of: halved and doubled maps, sums, products and rectifiers, planes that
+/// read planes over other axes in a chain, two networks over anchors, a latent at higher scales alone.
+#[test]
+fn a_composition_of_ones_own() {
+    const M: u32 = 4;
+    let scene = scene(5, 1, M, [8, 12, 4, 8], &[1, 2]);
+    let mut random = Random::new(21);
+    let mut networks = Vec::new();
+
+    // 0: what a decoded plane of any size says: halved, rectified, doubled, plus itself through a 7 x 7 kernel.
+    let (mut network, [plane]) = Network::new([M]);
+    let resized = network.node(Operation::Resize, &[plane]);
+    let half = network.layer(resized, random.layer(LayerKind::Halving, M, 3, 5, 1));
+    let half = network.relu(half);
+    let whole = network.layer(half, random.layer(LayerKind::Doubling, 3, 2 * M, 5, 1));
+    let wide = network.layer(resized, random.layer(LayerKind::Convolution, M, 2 * M, 7, 2));
+    let sum = network.node(Operation::Add, &[whole, wide]);
+    network.output(sum);
+    networks.push(network);
+
+    // 1: anchors through two kernels, one of which gates the other.
+    let (mut network, [anchors, again]) = Network::new([M, M]);
+    let near = network.layer(anchors, random.layer(LayerKind::Checkerboard, M, M, 3, 1));
+    let far = network.layer(again, random.layer(LayerKind::Checkerboard, M, M, 7, M));
+    let gate = network.leaky_relu(far, 0.25);
+    let product = network.node(Operation::Multiply, &[near, gate]);
+    let output = network.layer(product, random.linear(M, 2 * M));
+    network.output(output);
+    networks.push(network);
+
+    // 2: the latent, each channel's mean over columns beside its values, at the plane's size.
+    let (mut network, [latent]) = Network::new([2]);
+    let mean = network.node(Operation::MeanOverWidth, &[latent]);
+    let mean = network.layer(mean, random.layer(LayerKind::Convolution, 2, 2, 3, 1));
+    let mean = network.node(Operation::Resize, &[mean]);
+    let values = network.node(Operation::Resize, &[latent]);
+    let both = network.node(Operation::Concatenate, &[mean, values, mean]);
+    let output = network.layer(both, random.linear(6, 2 * M));
+    network.output(output);
+    networks.push(network);
+    networks.push(distribution(&mut random, M, [7, 9]));
+
+    let other = |position| condition(0, &[PlaneSource::SameScale(position)]);
+    let anchors = || condition(1, &[PlaneSource::Anchors, PlaneSource::Anchors]);
+    let prior = |first, second| PlanePrior { conditions: vec![first, second], distribution: 3 };
+    let priors = vec![
+        prior(None, anchors()),
+        prior(other(0), None),
+        prior(other(1), anchors()),
+        prior(other(5), other(2)),
+        prior(condition(0, &[PlaneSource::LowerScale]), condition(2, &[PlaneSource::Latent])),
+        prior(condition(2, &[PlaneSource::Latent]), anchors()),
+    ];
+    let model = ContextModelArrays {
+        channels: M,
+        centers: PerGroup { space_only: 0.2, space_time: 0.9 },
+        latent: Some(LatentArrays { tables: vec![common::compression::laplace_table(0.5); 2], medians: vec![0.25, -0.5] }),
+        networks,
+        priors,
+        // xy, then xz from it, then xt from that, then yz and yt and zt from what stands after them.
+        lowest: [0, 1, 2, 3, 0, 2],
+        higher: [4, 5, 4, 5, 4, 0],
+    };
+    for profile in [Profile::Compact, Profile::Paper] {
+        let planes = Some(plane_coding(&scene.hexplane, model.clone(), step(0.1)));
+        let input = CompressionInput { planes, ..input(&scene, profile, compact_shape(M, ALL_PARTS)) };
+        let encoded = round_trip(&scene, &input);
+        for (given, decoded) in scene.hexplane.planes.iter().zip(&encoded.decoded.hexplane.planes) {
+            assert!(largest_error(&given.values, &decoded.values) <= 0.0501);
+        }
+        let has_latent: Vec<_> = encoded.report.planes.iter().map(|plane| plane.latent > 0).collect();
+        assert_eq!(has_latent[..6], [false; 6]);
+        assert_eq!(has_latent[6..], [true, true, true, true, true, false]);
+    }
+
+    // Planes that wait for each other, and for what is not there.
+    let refused = |spoil: &dyn Fn(&mut ContextModelArrays)| {
+        let mut model = model.clone();
+        spoil(&mut model);
+        let coding = PlaneCoding { model, ..plane_coding(&scene.hexplane, self::model(compact_shape(M, ALL_PARTS), 1), step(0.1)) };
+        encode_planes(&scene.hexplane, &coding).unwrap_err().to_string()
+    };
+    assert!(refused(&|model| model.lowest = [2; 6]).contains("planes that wait for this one"));
+    assert!(refused(&|model| model.priors[2].conditions[0] = other(2)).contains("planes that wait for this one"));
+    assert!(refused(&|model| model.priors[2].conditions[0] = other(6)).contains("less than 6"));
+    assert!(refused(&|model| model.lowest[0] = 4).contains("the scale below"));
+    assert!(refused(&|model| model.lowest[0] = 9).contains("less than 6"));
+    assert!(refused(&|model| model.priors[0].distribution = 0).contains("looks at one place only"));
+    assert!(refused(&|model| model.priors[0].conditions[1] = other(0)).contains(""));
+    assert!(refused(&|model| model.latent = None).contains("those of its source Latent"));
+    assert!(refused(&|model| model.networks[1].outputs = vec![Value(0)]).contains("an output is anchors"));
+    let sources = [PlaneSource::Anchors, PlaneSource::LowerScale];
+    assert!(refused(&|model| model.priors[0].conditions[1] = condition(1, &sources)).contains("which a checkerboard reads"));
+    assert!(refused(&|model| model.priors[0].conditions[1] = condition(0, &[PlaneSource::Anchors])).contains("no anchors"));
+    let blur = |model: &mut ContextModelArrays| {
+        let layer = Random::new(1).layer(LayerKind::Convolution, 2 * M, 2 * M, 3, 1);
+        let output = model.networks[1].outputs[0];
+        model.networks[1].outputs = vec![model.networks[1].clone().layer(output, layer.clone())];
+        model.networks[1].layer(output, layer);
+    };
+    assert!(refused(&blur).contains("half a map"));
+    let half = |model: &mut ContextModelArrays| model.networks[0].outputs = vec![Value(3)];
+    assert!(refused(&half).contains("channels of the outputs"));
 }
 
 #[test]
@@ -86,7 +207,7 @@ fn empty_sets_and_other_numbers_of_scales() {
     for multipliers in [&[][..], &[1], &[2], &[1, 2, 4], &[1, 3, 2]] {
         let mut scene = scene(2, 2, 4, [4, 8, 4, 4], multipliers);
         if multipliers.is_empty() {
-            scene.deformation = Default::default();
+            scene.motion = Default::default();
         }
         round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS)));
         let plain = CompressionInput {
@@ -137,7 +258,7 @@ fn steps_of_each_scale_and_group() {
 fn harmonics_under_networks() {
     for degree in 0..=3 {
         let scene = scene(21, degree, 4, [4, 4, 4, 4], &[1, 2]);
-        for kind in [ShCondition::Autoregressive, ShCondition::HexplaneCoupled] {
+        for kind in [ShKind::Autoregressive, ShKind::HexPlaneCoupled, ShKind::Everything] {
             for profile in [Profile::Compact, Profile::Paper] {
                 let sh = sh_networks(kind, degree, 8);
                 let input = CompressionInput { sh, ..input(&scene, profile, compact_shape(4, ALL_PARTS)) };
@@ -146,11 +267,7 @@ fn harmonics_under_networks() {
                     let decoded = &encoded.decoded.gaussians.sh_rest;
                     assert!(largest_error(&scene.gaussians.sh_rest, decoded) <= 0.01001);
                 }
-                let expected = match kind {
-                    ShCondition::Autoregressive => Encoding::Autoregressive,
-                    ShCondition::HexplaneCoupled => Encoding::HexplaneCoupled,
-                };
-                assert_eq!(encoded.report.sections[1].1, expected);
+                assert_eq!(encoded.report.sections[1].1, Kind::ShNetworks);
             }
         }
     }
@@ -159,7 +276,7 @@ fn harmonics_under_networks() {
 #[test]
 fn harmonics_need_no_planes_unless_coupled() {
     let scene = scene(9, 2, 4, [4, 4, 4, 4], &[1]);
-    for sh in [sh_tables(2), sh_networks(ShCondition::Autoregressive, 2, 4)] {
+    for sh in [sh_tables(2), sh_networks(ShKind::Autoregressive, 2, 4)] {
         let encoded = round_trip(
             &scene,
             &CompressionInput { sh, ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS)) },
@@ -180,14 +297,14 @@ fn the_coded_bits_are_those_of_the_distributions() {
     let encoded = round_trip(&scene, &input);
     let planes = input.planes.as_ref().unwrap();
     let bytes = encode_planes(&scene.hexplane, planes).unwrap();
-    assert_eq!(bytes.len() as u64, encoded.report.sections[4].2);
+    assert_eq!(bytes.len() as u64, encoded.report.sections[4].3);
     for (index, plane) in encoded.decoded.hexplane.planes.iter().enumerate() {
         let PlaneDistributions { scales, means } =
             plane_distributions(&encoded.decoded.hexplane, planes, index).unwrap();
-        let centre = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
+        let center = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
         let mut ideal = 0.0;
         for ((&value, &scale), &mean) in plane.values.iter().zip(&scales).zip(&means) {
-            let distance = (f64::from((value - centre) / 0.1) - f64::from(mean)).round().abs();
+            let distance = (f64::from((value - center) / 0.1) - f64::from(mean)).round().abs();
             let scale = f64::from(scale.max(0.11));
             ideal -= (upper_tail((distance - 0.5) / scale) - upper_tail((distance + 0.5) / scale)).max(2e-9).log2();
         }
@@ -225,7 +342,7 @@ fn extreme_weights_do_no_harm() {
     for huge in [1e38, -1e38, 3e20, f32::MIN_POSITIVE] {
         let mut input = input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS));
         let planes = input.planes.as_mut().unwrap();
-        for layer in &mut planes.model.layers {
+        for layer in planes.model.networks.iter_mut().flat_map(Network::layers_mut) {
             layer.weight.iter_mut().step_by(3).for_each(|weight| *weight *= huge);
         }
         round_trip(&scene, &input);
@@ -244,28 +361,42 @@ fn contradictions_are_refused() {
         error.to_string()
     };
     let planes =
-        |spoil: &dyn Fn(&mut light4gs_codec::PlaneCoding)| message(&|input| spoil(input.planes.as_mut().unwrap()));
+        |spoil: &dyn Fn(&mut PlaneCoding)| message(&|input| spoil(input.planes.as_mut().unwrap()));
     assert!(planes(&|planes| planes.steps.clear()).contains("number of steps is 0"));
     assert!(planes(&|planes| planes.steps = step(0.0)).contains("step is 0"));
     assert!(planes(&|planes| planes.steps = step(f32::NAN)).contains("step is NaN"));
     assert!(planes(&|planes| planes.steps = step(1e-12)).contains("make the step larger"));
-    assert!(planes(&|planes| planes.hyper_symbols[2][0] = i32::MIN).contains("hyperprior of planes[2]"));
-    assert!(planes(&|planes| planes.hyper_symbols[2].clear()).contains("hyperprior symbols of planes[2] is 0"));
-    assert!(planes(&|planes| planes.hyper_symbols[0].push(0)).contains("hyperprior symbols of planes[0] is 1"));
-    assert!(planes(&|planes| drop(planes.hyper_symbols.pop())).contains("one list a plane"));
-    assert!(planes(&|planes| drop(planes.model.layers.pop())).contains("layers"));
-    assert!(planes(&|planes| planes.model.layers[1].weight[0] = f32::NAN).contains("h_s.2.weight is NaN"));
-    assert!(planes(&|planes| planes.model.layers[1].bias.truncate(1)).contains("length of h_s.2.bias"));
-    assert!(planes(&|planes| planes.model.shape.context_groups = 3).contains("a divisor of 4 inputs"));
-    assert!(planes(&|planes| planes.model.shape.inter_scale.kernel = 4).contains("inter_scale.kernel is 4"));
-    assert!(planes(&|planes| planes.model.shape.centres.space_time = f32::INFINITY).contains("centre of space-time"));
-    assert!(planes(&|planes| drop(planes.model.hyper_tables.pop())).contains("hyper_tables"));
-    assert!(planes(&|planes| planes.model.hyper_medians[0] = f32::NAN).contains("hyper_medians is NaN"));
+    assert!(planes(&|planes| planes.latent_symbols[2][0] = i32::MIN).contains("latent of planes[2]"));
+    assert!(planes(&|planes| planes.latent_symbols[2].clear()).contains("latent symbols of planes[2] is 0"));
+    assert!(planes(&|planes| planes.latent_symbols[0].push(0)).contains("latent symbols of planes[0] is 1"));
+    assert!(planes(&|planes| drop(planes.latent_symbols.pop())).contains("one list a plane"));
+    assert!(planes(&|planes| drop(planes.model.networks.pop())).contains("network of priors[0] is 4"));
+    fn layer(planes: &mut PlaneCoding) -> &mut light4gs_codec::network::Layer {
+        planes.model.networks[0].layers_mut().nth(1).unwrap()
+    }
+    assert!(planes(&|planes| layer(planes).weight[0] = f32::NAN).contains("networks[0], node 2, weight is NaN"));
+    assert!(planes(&|planes| layer(planes).bias.truncate(1)).contains("length of networks[0], node 2, bias"));
+    assert!(planes(&|planes| layer(planes).kernel = 3).contains("kernel is 3, expected 5"));
+    assert!(planes(&|planes| layer(planes).groups = 3).contains("a divisor of"));
+    assert!(planes(&|planes| layer(planes).inputs = 7).contains("inputs of node 2 is 7"));
+    assert!(planes(&|planes| layer(planes).kind = LayerKind::Checkerboard).contains("only checkerboard convolutions"));
+    assert!(planes(&|planes| layer(planes).kind = LayerKind::Convolution).contains("size of an output"));
+    assert!(
+        planes(&|planes| planes.model.networks[0].nodes[1].inputs = vec![Value(9)]).contains("an input of node 1 (leaky")
+    );
+    assert!(planes(&|planes| planes.model.networks[0].nodes[1].inputs.clear()).contains("inputs of node 1"));
+    assert!(
+        planes(&|planes| planes.model.networks[0].nodes[1].operation = Operation::LeakyRelu(f32::NAN)).contains("slope")
+    );
+    assert!(planes(&|planes| planes.model.centers.space_time = f32::INFINITY).contains("center of space-time"));
+    assert!(planes(&|planes| drop(planes.model.latent.as_mut().unwrap().tables.pop())).contains("0 tables, 1 medians"));
+    assert!(planes(&|planes| planes.model.latent.as_mut().unwrap().medians[0] = f32::NAN).contains("latent is NaN"));
     assert!(
         planes(&|planes| planes.model = model(compact_shape(8, ALL_PARTS), 1)).contains("channels is 4, expected 8")
     );
     assert!(message(&|input| input.sh = sh_tables(2)).contains("number of tables is 24, expected 9"));
-    assert!(message(&|input| input.sh = sh_networks(ShCondition::HexplaneCoupled, 1, 5)).contains("layers"));
+    assert!(message(&|input| input.sh = sh_networks(ShKind::HexPlaneCoupled, 1, 5)).contains("SpaceFeatures"));
+    assert!(message(&|input| input.sh = sh_networks(ShKind::Autoregressive, 2, 8)).contains("channels of all priors is 24"));
     assert!(
         message(&|input| {
             if let ShCoding::Tables { step, .. } = &mut input.sh {
@@ -294,7 +425,7 @@ prop_compose! {
     ) -> (SceneData, CompressionInput) {
         let [hyperprior, checkerboard, inter_plane, inter_scale] = [0, 1, 2, 3].map(|bit| bits >> bit & 1 == 1);
         let high_scale_hyperprior = hyperprior && inter_scale && seed % 2 == 0;
-        let parts = ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior };
+        let parts = Parts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior };
         let scene = scene(counts.0, counts.1, channels, resolution.map(|r| 4 * r), &multipliers);
         let shape = if reference { reference_shape(channels, parts) } else { compact_shape(channels, parts) };
         let steps = common::compression::step(step);
@@ -302,9 +433,10 @@ prop_compose! {
         let features = channels as usize * multipliers.len();
         let sh = match seed % 3 {
             0 => sh_tables(counts.1),
-            1 => sh_networks(ShCondition::Autoregressive, counts.1, features),
+            1 => sh_networks(ShKind::Autoregressive, counts.1, features),
             _ if features == 0 => sh_tables(counts.1),
-            _ => sh_networks(ShCondition::HexplaneCoupled, counts.1, features),
+            _ if seed % 2 == 0 => sh_networks(ShKind::Everything, counts.1, features),
+            _ => sh_networks(ShKind::HexPlaneCoupled, counts.1, features),
         };
         let others = input(&scene, profile, shape);
         (scene, CompressionInput { planes, sh, ..others })

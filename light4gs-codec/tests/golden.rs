@@ -5,38 +5,34 @@ mod common;
 use common::{compression::tiny, sample};
 use light4gs_codec::{Profile, decode, encode, encode_compressed, info};
 
-/// Written once and never again: a change of these bytes is a new version of the format.
-const VERSION_1: &[u8] = include_bytes!("data/tiny-v1.l4gs");
+/// A stream without loss. A change of its bytes is a change of the format, which is free until it is released.
+const FLOAT32: &[u8] = include_bytes!("../../tests/golden-streams/float32.l4gs");
 
 #[test]
-fn version_1_reads_as_it_did() {
-    assert_eq!(decode(VERSION_1).unwrap(), sample());
-}
-
-#[test]
-fn version_1_is_written_as_it_was() {
-    assert_eq!(encode(&sample()).unwrap(), VERSION_1);
+fn float32_reads_and_writes_as_it_did() {
+    assert_eq!(decode(FLOAT32).unwrap(), sample());
+    assert_eq!(encode(&sample()).unwrap(), FLOAT32);
 }
 
 /// Compressed streams of a day, each with the scene that it decoded to then, as a stream without loss.
 const COMPRESSED: [(Profile, &[u8], &[u8]); 2] = [
     (
         Profile::Compact,
-        include_bytes!("../../tests/golden-streams/compact-v2.l4gs"),
-        include_bytes!("../../tests/golden-streams/compact-v2.decoded.l4gs"),
+        include_bytes!("../../tests/golden-streams/compact.l4gs"),
+        include_bytes!("../../tests/golden-streams/compact.decoded.l4gs"),
     ),
     (
         Profile::Paper,
-        include_bytes!("../../tests/golden-streams/paper-v2.l4gs"),
-        include_bytes!("../../tests/golden-streams/paper-v2.decoded.l4gs"),
+        include_bytes!("../../tests/golden-streams/paper.l4gs"),
+        include_bytes!("../../tests/golden-streams/paper.decoded.l4gs"),
     ),
 ];
 
 #[test]
-fn version_2_reads_as_it_did() {
+fn compressed_streams_read_as_they_did() {
     for (profile, bytes, decoded) in COMPRESSED {
         let info = info(bytes).unwrap();
-        assert_eq!((info.version, info.profile), (2, Some(profile)));
+        assert_eq!((info.version, info.profile), (1, Some(profile)));
         // Bit by bit, on every machine.
         assert_eq!(encode(&decode(bytes).unwrap()).unwrap(), decoded);
     }
@@ -50,26 +46,27 @@ fn every_build_writes_the_same_bytes() {
         let (scene, input) = tiny(profile);
         crc32c::crc32c(&encode_compressed(&scene, &input).unwrap().bytes)
     });
-    assert_eq!(checksums, [0x7aed_e709, 0x4acf_bd44], "{checksums:#x?}");
+    assert_eq!(checksums, [0xe58e_9eb4, 0xd46b_b669], "{checksums:#x?}");
 }
 
 #[test]
-#[ignore = "writes the golden streams of version 2 anew, which only a change of the format may ask for"]
-fn write_version_2() {
+#[ignore = "writes the golden streams anew, which only a change of the format may ask for"]
+fn write_golden_streams() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden-streams");
+    std::fs::write(format!("{folder}/float32.l4gs"), encode(&sample()).unwrap()).unwrap();
     for (profile, ..) in COMPRESSED {
         let (scene, input) = tiny(profile);
         let encoded = encode_compressed(&scene, &input).unwrap();
-        std::fs::write(format!("{folder}/{}-v2.l4gs", profile.name()), &encoded.bytes).unwrap();
+        std::fs::write(format!("{folder}/{}.l4gs", profile.name()), &encoded.bytes).unwrap();
         let decoded = encode(&encoded.decoded).unwrap();
-        std::fs::write(format!("{folder}/{}-v2.decoded.l4gs", profile.name()), decoded).unwrap();
+        std::fs::write(format!("{folder}/{}.decoded.l4gs", profile.name()), decoded).unwrap();
     }
 }
 
 /// A decoder for this one stream, written from `docs/format.md` alone.
 #[test]
 fn the_bytes_lie_where_the_document_says() {
-    let bytes = VERSION_1;
+    let bytes = FLOAT32;
     let u16_at = |at: usize| u16::from_le_bytes(bytes[at..at + 2].try_into().unwrap());
     let (u32_at, u64_at) = (|at| common::u32_at(bytes, at), |at| common::u64_at(bytes, at));
     let f32_at = |at| f32::from_bits(u32_at(at));
@@ -79,7 +76,7 @@ fn the_bytes_lie_where_the_document_says() {
     let (sections, meta) = (u32_at(12) as usize, u32_at(16) as usize);
     assert_eq!(u64_at(20), bytes.len() as u64);
     let table = 32 + meta;
-    let covered = [&bytes[..28], &bytes[32..table + 24 * sections]].concat();
+    let covered = [&bytes[..28], &bytes[32..table + 16 * sections]].concat();
     assert_eq!(u32_at(28), crc32c::crc32c(&covered));
 
     let name = u32_at(32) as usize;
@@ -91,27 +88,34 @@ fn the_bytes_lie_where_the_document_says() {
     assert_eq!((u32_at(after + 76), u32_at(after + 80), f32_at(after + 84)), (800, 600, 0.75));
     assert_eq!((u32_at(after + 88), u32_at(after + 92), &bytes[after + 96..after + 102]), (2, 6, &b"author"[..]));
 
-    let start = |index: usize| u64_at(table + 24 * index + 8) as usize;
+    let mut starts = vec![table + 16 * sections];
     for index in 0..sections {
-        assert_eq!((u16_at(table + 24 * index), u16_at(table + 24 * index + 2)), (index as u16 + 1, 0));
-        let end = start(index) + u64_at(table + 24 * index + 16) as usize;
-        assert_eq!(u32_at(table + 24 * index + 4), crc32c::crc32c(&bytes[start(index)..end]));
+        let entry = table + 16 * index;
+        assert_eq!((u16_at(entry), bytes[entry + 2], bytes[entry + 3]), (index as u16 + 1, 1, 0));
+        let end = starts[index] + u64_at(entry + 8) as usize;
+        assert_eq!(u32_at(entry + 4), crc32c::crc32c(&bytes[starts[index]..end]));
+        starts.push(end);
     }
+    assert_eq!(starts[sections], bytes.len());
     let scene = sample();
-    let gaussians = start(0);
+    let gaussians = starts[0];
     assert_eq!(u32_at(gaussians), 2);
     assert_eq!(f32_at(gaussians + 4 + 12), scene.gaussians.means[1][0]);
     assert_eq!(f32_at(gaussians + 4 + 24 * 2), scene.gaussians.quats[0][0]);
     assert_eq!(f32_at(gaussians + 4 + 24 * 2 + 32 + 8), scene.gaussians.sh_dc[0][0]);
-    assert_eq!((u32_at(start(1)), bytes[start(1) + 4], f32_at(start(1) + 5)), (2, 1, scene.gaussians.sh_rest[0]));
-    assert_eq!(f32_at(start(2) + 48), 1.0);
-    assert_eq!((u32_at(start(3)), u32_at(start(3) + 4), bytes[start(3) + 8]), (3, 1, 0b101));
-    assert_eq!(
-        (u32_at(start(3) + 9), u32_at(start(3) + 13), &bytes[start(3) + 17..start(3) + 24]),
-        (2, 7, &b"trunk.0"[..])
-    );
-    let planes = start(4);
-    assert_eq!((u32_at(planes), u32_at(planes + 4), u32_at(planes + 16), u32_at(planes + 20)), (1, 2, 3, 2));
-    assert_eq!((u32_at(planes + 32), u32_at(planes + 36)), (1, 2)); // plane xy: height 1, width 2
-    assert_eq!(f32_at(planes + 32 + 12 * 8), scene.hexplane.planes[0].values[0]);
+    assert_eq!((bytes[starts[1]], bytes[starts[1] + 1], f32_at(starts[1] + 2)), (2, 1, scene.gaussians.sh_rest[0]));
+    assert_eq!(f32_at(starts[2] + 48), 1.0);
+    // Kind, a network; two inputs of 2 and 1 channels; five nodes: concatenate both, linear (the last value, 3 outputs),
+    // ReLU, linear (the last value, 3), linear (value 4, 4); outputs are the values 5 and 6; sources are features and
+    // time, outputs position and quaternion; one tensor: name, 2 axes.
+    let description = b"\x0atest-field\x01\
+        \x02\x02\x01\x05\x0d\x02\x00\x01\x80\x03\x85\x80\x03\x00\x04\x04\
+        \x02\x05\x06\x00\x02\x00\x02\x01\x05nodes\x02\x02\x03";
+    assert_eq!(&bytes[starts[3]..][..description.len()], description);
+    let weights = starts[3] + description.len();
+    let layer = scene.motion.network.as_ref().unwrap().network.layers().next().unwrap();
+    assert_eq!((f32_at(weights), f32_at(weights + 4 * 9)), (layer.weight[0], layer.bias[0]));
+    let planes = starts[4];
+    assert_eq!(&bytes[planes..planes + 9], [1, 2, 1, 1, 3, 2, 1, 2, 0]);
+    assert_eq!(f32_at(planes + 9), scene.hexplane.planes[0].values[0]);
 }

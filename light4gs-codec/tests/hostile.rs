@@ -7,7 +7,7 @@ use std::{
     sync::atomic::{AtomicUsize, Ordering},
 };
 
-use common::{ENTRY, forge_header, forge_section, put, sample, table_at, u64_at};
+use common::{ENTRY, forge_header, forge_section, payload, put, sample, start, table_at, u64_at, with_payload};
 use light4gs_codec::{CodecError, Limits, decode, decode_with_limits, encode, info};
 
 /// Remembers the largest piece of memory that anybody asked for.
@@ -37,10 +37,6 @@ fn refuse(bytes: &[u8]) -> CodecError {
     let largest = LARGEST.load(Ordering::Relaxed);
     assert!(largest < 1 << 20, "somebody asked for {largest} bytes");
     error
-}
-
-fn start(bytes: &[u8], section: usize) -> usize {
-    u64_at(bytes, table_at(bytes) + ENTRY * section + 8) as usize
 }
 
 /// The sample with `new` at `at` in a section, checksums forged.
@@ -81,9 +77,9 @@ fn forging_alone_changes_nothing() {
 
 #[test]
 fn versions_and_flags() {
-    let error = forged_prelude(8, &3u16.to_le_bytes());
-    assert!(matches!(error, CodecError::NewerVersion { found: 3 }));
-    assert!(error.to_string().contains("version 3"));
+    let error = forged_prelude(8, &2u16.to_le_bytes());
+    assert!(matches!(error, CodecError::NewerVersion { found: 2 }));
+    assert!(error.to_string().contains("version 2"));
     assert!(matches!(forged_prelude(8, &0u16.to_le_bytes()), CodecError::Invalid { .. }));
     assert!(forged_prelude(10, &[1, 0]).to_string().contains("flags"));
 }
@@ -103,31 +99,27 @@ fn huge_numbers_in_the_prelude() {
 #[test]
 fn a_table_that_lies() {
     let bytes = encode(&sample()).unwrap();
-    let range = |section, at, value: u64| {
-        let error = forged_entry(section, at, &value.to_le_bytes());
-        assert!(matches!(error, CodecError::SectionRange { .. }), "{error}");
-        error.to_string()
-    };
-    let second = start(&bytes, 1) as u64;
-    assert!(range(1, 8, second - 1).contains("overlap the section before"));
-    assert!(range(1, 8, second + 1).contains("gap"));
-    assert!(range(0, 8, 0).contains("overlap the header"));
-    assert!(range(2, 8, u64::MAX).contains("beyond the end"));
-    assert!(range(4, 8, bytes.len() as u64 + 1).contains("beyond the end"));
-    assert!(range(4, 16, u64::MAX).contains("beyond the end"));
-    let last = u64_at(&bytes, table_at(&bytes) + ENTRY * 4 + 16);
-    assert!(matches!(forged_entry(4, 16, &(last - 1).to_le_bytes()), CodecError::TrailingBytes { .. }));
+    let length = |section: usize| u64_at(&bytes, table_at(&bytes) + ENTRY * section + 8);
+    let lied = |section, value: u64| forged_entry(section, 8, &value.to_le_bytes());
+    // Too long: the last one is cut short. Too short: something is left at the end, or the bytes are others'.
+    assert!(matches!(lied(0, length(0) + 1), CodecError::Truncated { section: "hexplanes", .. }));
+    assert!(matches!(lied(2, u64::MAX), CodecError::Truncated { section: "scene_frame", .. }));
+    assert!(matches!(lied(4, length(4) + 1), CodecError::Truncated { section: "hexplanes", .. }));
+    assert!(matches!(lied(4, length(4) - 1), CodecError::TrailingBytes { section: "stream", bytes: 1 }));
+    assert!(matches!(lied(1, length(1) - 1), CodecError::TrailingBytes { section: "stream", bytes: 1 }));
 
     let error = forged_entry(3, 0, &99u16.to_le_bytes());
     assert!(matches!(error, CodecError::UnknownSection { index: 3, id: 99 }));
     assert!(matches!(forged_entry(3, 0, &1u16.to_le_bytes()), CodecError::DuplicateSection { section: "gaussians" }));
-    let error = forged_entry(4, 2, &7u16.to_le_bytes());
-    assert!(matches!(error, CodecError::UnknownEncoding { section: "hexplanes", encoding: 7 }));
+    let error = forged_entry(4, 2, &[7]);
+    assert_eq!(error.to_string(), "hexplanes: unknown kind 7; use a newer program");
+    let error = forged_entry(4, 3, &[7]);
+    assert_eq!(error.to_string(), "hexplanes: unknown encoding 7 of the kind \"explicit\"; use a newer program");
 }
 
 #[test]
 fn a_missing_section() {
-    // The last entry of the table becomes a part of no section, and its section goes.
+    // The last entry of the table goes, and its section with it.
     let bytes = encode(&sample()).unwrap();
     let (table, cut) = (table_at(&bytes), start(&bytes, 4));
     let mut shorter = bytes[..table + 4 * ENTRY].to_vec();
@@ -135,47 +127,53 @@ fn a_missing_section() {
     put(&mut shorter, 12, &4u32.to_le_bytes());
     let length = shorter.len() as u64;
     put(&mut shorter, 20, &length.to_le_bytes());
-    for section in 0..4 {
-        let offset = start(&bytes, section) as u64 - ENTRY as u64;
-        put(&mut shorter, table + section * ENTRY + 8, &offset.to_le_bytes());
-    }
     forge_header(&mut shorter);
     assert!(matches!(refuse(&shorter), CodecError::MissingSection { section: "hexplanes" }));
 }
 
+/// The sample with the first bytes of a section replaced, whatever their number.
+fn replaced(section: usize, count: usize, new: &[u8]) -> CodecError {
+    let bytes = encode(&sample()).unwrap();
+    let payload = payload(&bytes, section);
+    refuse(&with_payload(&bytes, section, &[new, &payload[count..]].concat()))
+}
+
+/// 2^32 - 1 as a varint.
+const HUGE: [u8; 5] = [0xff, 0xff, 0xff, 0xff, 0x0f];
+
 #[test]
 fn huge_counts_in_sections() {
-    let over = |section, at| {
-        let error = forged(section, at, &u32::MAX.to_le_bytes());
-        assert!(matches!(error, CodecError::OverLimit { .. }), "{error}");
-    };
-    over(0, 0); // Gaussians
-    over(1, 0);
-    over(3, 0); // width, depth, layers, length of a name
-    over(3, 4);
-    over(3, 9);
-    over(3, 13);
-    for at in [0, 4, 8, 12, 16, 20] {
-        over(4, at); // channels, resolution, scales
+    let over = |error: CodecError| assert!(matches!(error, CodecError::OverLimit { .. }), "{error}");
+    over(forged(0, 0, &u32::MAX.to_le_bytes())); // Gaussians
+    over(replaced(1, 1, &HUGE));
+    over(replaced(3, 1, &HUGE)); // length of the kind
+    let bytes = encode(&sample()).unwrap();
+    // Motion: kind, presence of a network, 2 inputs of 2 and 1 channels, 5 nodes.
+    let head = &payload(&bytes, 3)[..16];
+    assert_eq!(head, b"\x0atest-field\x01\x02\x02\x01\x05");
+    for at in 12..16 {
+        over(replaced(3, at + 1, &[&head[..at], &HUGE].concat()));
+    }
+    for at in 0..6 {
+        over(replaced(4, at + 1, &[&payload(&bytes, 4)[..at], &HUGE].concat())); // channels, resolution, scales
     }
     // The most that the limits allow is not there either.
-    for (section, at, count) in [(0, 0, 1 << 26), (1, 0, 1 << 26), (3, 9, 1 << 10), (4, 0, 1 << 12), (4, 20, 16)] {
-        let error = forged(section, at, &u32::to_le_bytes(count));
-        assert!(matches!(error, CodecError::Truncated { .. }), "{error}");
-    }
+    let cut = |error: CodecError| assert!(matches!(error, CodecError::Truncated { .. }), "{error}");
+    cut(forged(0, 0, &(1u32 << 26).to_le_bytes()));
+    cut(replaced(4, 1, &[0x80, 0x20])); // 2^12 channels
 }
 
 #[test]
 fn contradictions_in_sections() {
     let fewer = forged(0, 0, &1u32.to_le_bytes());
     assert!(matches!(fewer, CodecError::TrailingBytes { section: "gaussians", .. }));
-    assert!(forged(1, 4, &[4]).to_string().contains("degree is 4"));
-    assert!(forged(3, 8, &[0b10_0000]).to_string().contains("heads"));
-    assert!(forged(3, 17, &[0xff]).to_string().contains("UTF-8"));
-    assert!(forged(4, 0, &0u32.to_le_bytes()).to_string().contains("channels"));
-    let plane = 24 + 2 * 4;
-    assert!(forged(4, plane, &9u32.to_le_bytes()).to_string().contains("planes[0].height is 9"));
-    assert!(forged(4, plane, &0u32.to_le_bytes()).to_string().contains("planes[0].height is 0"));
+    assert!(forged(1, 1, &[4]).to_string().contains("degree is 4"));
+    assert!(forged(3, 1, &[0xff]).to_string().contains("UTF-8"));
+    assert!(forged(3, 1, b"T").to_string().contains("kind is"));
+    assert!(forged(3, 11, &[2]).to_string().contains("presence of a network is 2"));
+    assert!(forged(3, 16, &[77]).to_string().contains("operation of the network, node 0 is 77"));
+    assert!(forged(4, 0, &[0]).to_string().contains("channels"));
+    assert!(forged(4, 6, &[0]).to_string().contains("planes[0]"));
     let nan = f32::NAN.to_le_bytes();
     assert!(forged(0, 4, &nan).to_string().contains("value 0 of means is NaN"));
     assert!(forged(2, 4, &nan).to_string().contains("value 1 of mean is NaN"));
@@ -183,13 +181,7 @@ fn contradictions_in_sections() {
 
 #[test]
 fn a_section_with_another_number_of_gaussians() {
-    let mut scene = sample();
-    scene.gaussians = common::gaussians(2, 0);
-    let mut bytes = encode(&scene).unwrap();
-    let at = start(&bytes, 1);
-    put(&mut bytes, at, &3u32.to_le_bytes());
-    forge_section(&mut bytes, 1);
-    assert_eq!(refuse(&bytes).to_string(), "sh: count is 3, expected 2, the number of Gaussians");
+    assert_eq!(forged(1, 0, &[3]).to_string(), "sh: count is 3, expected 2, the number of Gaussians");
 }
 
 #[test]

@@ -10,9 +10,13 @@ use std::{
     },
 };
 
-use common::{ENTRY, compression::tiny, forge_header, payload, put, table_at, u32_at, with_payload};
+use common::{
+    ENTRY,
+    compression::{ShKind, tiny},
+    forge_header, payload, put, table_at, u32_at, with_payload,
+};
 use light4gs_codec::{
-    CodecError, CompressionInput, Limits, Profile, ShCondition, decode, decode_with_limits, encode_compressed, info,
+    CodecError, CompressionInput, Limits, Profile, decode, decode_with_limits, encode_compressed, info,
 };
 
 /// Counts the memory that is in use.
@@ -44,7 +48,7 @@ static WATCH: Watch = Watch;
 fn streams() -> Vec<Vec<u8>> {
     let mut streams: Vec<_> = [Profile::Compact, Profile::Paper].map(tiny).to_vec();
     let (scene, coupled) = tiny(Profile::Compact);
-    let sh = common::compression::sh_networks(ShCondition::HexplaneCoupled, 2, 8);
+    let sh = common::compression::sh_networks(ShKind::Everything, 2, 8);
     streams.push((scene, CompressionInput { sh, ..coupled }));
     streams.into_iter().map(|(scene, input)| encode_compressed(&scene, &input).unwrap().bytes).collect()
 }
@@ -166,32 +170,31 @@ fn every_flip_and_truncation_with_checksums_is_an_error() {
 #[test]
 fn sections_and_encodings_that_do_not_belong() {
     let bytes = &streams()[0];
-    let entry = |section: usize, at: usize, new: u16| {
+    let entry = |section: usize, at: usize, new: u8| {
         let mut bytes = bytes.clone();
         let at = table_at(&bytes) + ENTRY * section + at;
-        put(&mut bytes, at, &new.to_le_bytes());
+        put(&mut bytes, at, &[new]);
         forge_header(&mut bytes);
         decode(&bytes).unwrap_err()
     };
-    for (section, encoding) in [(0, 5), (0, 2), (1, 1), (1, 5), (2, 1), (3, 2), (4, 1), (4, 6), (5, 5)] {
-        let error = entry(section, 2, encoding);
+    for (section, kind) in [(0, 0), (0, 2), (1, 4), (2, 2), (3, 0), (4, 3), (5, 2)] {
+        let error = entry(section, 2, kind);
+        assert!(matches!(error, CodecError::UnknownKind { .. }), "{section} {kind}: {error}");
+    }
+    for (section, encoding) in [(0, 2), (2, 1), (3, 2), (4, 0), (4, 2), (5, 5)] {
+        let error = entry(section, 3, encoding);
         assert!(matches!(error, CodecError::UnknownEncoding { .. }), "{section} {encoding}: {error}");
     }
-    // Version 1 has neither the section nor the encodings.
-    let mut old = bytes.clone();
-    put(&mut old, 8, &1u16.to_le_bytes());
-    forge_header(&mut old);
-    assert!(matches!(decode(&old), Err(CodecError::UnknownEncoding { section: "gaussians", .. })));
     // The planes in full precision need no context model, and coded ones need theirs.
     let (scene, input) = tiny(Profile::Compact);
     let plain = encode_compressed(&scene, &CompressionInput { planes: None, ..input }).unwrap().bytes;
     let mut both = with_payload(bytes, 4, payload(&plain, 4));
     let at = table_at(&both) + 4 * ENTRY + 2;
-    put(&mut both, at, &[0, 0]);
+    put(&mut both, at, &[1, 0]);
     forge_header(&mut both);
     assert!(decode(&both).unwrap_err().to_string().contains("no plane is coded with it"));
     let mut none = with_payload(&plain, 4, payload(bytes, 4));
-    put(&mut none, at, &[5, 0]);
+    put(&mut none, at, &[2, 1]);
     forge_header(&mut none);
     assert!(matches!(decode(&none), Err(CodecError::MissingSection { section: "context_model" })));
 }
@@ -206,7 +209,7 @@ fn values_that_take_no_bytes_are_limited() {
     assert!(decode_with_limits(&bytes, &limits).is_ok());
     let limits = Limits { multiplications: 1000, ..Limits::default() };
     let error = decode_with_limits(&bytes, &limits).unwrap_err();
-    assert!(matches!(error, CodecError::OverLimit { section: "hexplanes", .. }), "{error}");
+    assert!(matches!(error, CodecError::OverLimit { section: "context_model", .. }), "{error}");
     let limits = Limits { layer_weights: 100, ..Limits::default() };
     let error = decode_with_limits(&bytes, &limits).unwrap_err();
     assert!(matches!(error, CodecError::OverLimit { section: "context_model", .. }), "{error}");

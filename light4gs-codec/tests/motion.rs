@@ -3,11 +3,10 @@
 mod common;
 
 use common::{hexplane, sample};
-use light4gs_codec::{HeadFlags, LinearLayer, NetworkArrays, SceneData, SceneFrameArrays};
-
-fn layer(name: &str, inputs: u32, outputs: u32, weight: &[f32], bias: &[f32]) -> LinearLayer {
-    LinearLayer { name: name.into(), inputs, outputs, weight: weight.into(), bias: bias.into() }
-}
+use light4gs_codec::{
+    MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, SceneData, SceneFrameArrays, decode, encode,
+    network::{Layer, Operation},
+};
 
 /// One channel; all planes are 1 but xt, which rises from 0 to 2 over time; the network passes the feature on.
 fn scene() -> SceneData {
@@ -21,16 +20,15 @@ fn scene() -> SceneData {
             plane.values = vec![0.0, 0.0, 1.0, 1.0, 2.0, 2.0];
         }
     }
-    scene.deformation = NetworkArrays {
-        width: 1,
-        depth: 1,
-        heads: HeadFlags { position: true, ..Default::default() },
-        layers: vec![
-            layer("trunk.0", 1, 1, &[2.0], &[-1.0]),
-            layer("position.hidden", 1, 1, &[1.0], &[0.5]),
-            layer("position.output", 1, 3, &[1.0, -1.0, 0.0], &[0.0, 0.0, 4.0]),
-        ],
-    };
+    let (mut network, [features]) = Network::new([1]);
+    let trunk = network.layer(features, Layer::linear(vec![2.0], vec![-1.0]));
+    let trunk = network.relu(trunk);
+    let hidden = network.layer(trunk, Layer::linear(vec![1.0], vec![0.5]));
+    let hidden = network.relu(hidden);
+    let position = network.layer(hidden, Layer::linear(vec![1.0, -1.0, 0.0], vec![0.0, 0.0, 4.0]));
+    network.output(position);
+    let motion = MotionNetwork { network, sources: vec![MotionSource::Features], outputs: vec![MotionOutput::Position] };
+    scene.motion = MotionArrays { kind: "hexplane".into(), network: Some(motion), tensors: Vec::new() };
     scene
 }
 
@@ -43,23 +41,54 @@ fn features_move_positions() {
     }
 }
 
+/// A field that this crate has never heard of: circles around a point, without planes, of a kind of its own.
+#[test]
+fn any_network_of_known_sources_moves() {
+    let mut scene = SceneData { hexplane: Default::default(), ..scene() };
+    scene.gaussians = common::gaussians(20, 0);
+    let (mut network, [point, time]) = Network::new([3, 1]);
+    let spread = network.layer(time, Layer::linear(vec![1.0, 2.0, 3.0], vec![0.0; 3]));
+    let product = network.node(Operation::Multiply, &[point, spread]);
+    let sum = network.node(Operation::Add, &[product, spread]);
+    network.output(sum);
+    let sources = vec![MotionSource::Point, MotionSource::Time];
+    let motion = MotionNetwork { network, sources, outputs: vec![MotionOutput::Position] };
+    scene.motion = MotionArrays { kind: "never-heard-of".into(), network: Some(motion), tensors: Vec::new() };
+    let decoded = decode(&encode(&scene).unwrap()).unwrap();
+    assert_eq!(decoded, scene);
+    // Inside of the unit ball a coordinate is half a world unit.
+    scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|x| x / 100.0));
+    for (moved, mean) in scene.positions_at(0.5).unwrap().iter().zip(&scene.gaussians.means) {
+        for (axis, scale) in [0.5f32, 1.0, 1.5].into_iter().enumerate() {
+            let expected = mean[axis] + 0.5 * mean[axis] * scale + scale;
+            assert!((moved[axis] - expected).abs() < 1e-5, "{moved:?} {mean:?}");
+        }
+    }
+}
+
 #[test]
 fn what_does_not_move_stays() {
     let mut still = scene();
-    still.deformation.heads.position = false;
+    still.motion = MotionArrays::default();
     assert_eq!(still.positions_at(0.5).unwrap(), still.gaussians.means);
+    let mut other = scene();
+    other.motion.network.as_mut().unwrap().outputs = vec![MotionOutput::LogScale];
+    assert_eq!(other.positions_at(0.5).unwrap(), other.gaussians.means);
     assert!(SceneData::default().positions_at(0.5).unwrap().is_empty());
 }
 
 #[test]
-fn a_network_without_its_layers_is_refused() {
-    let message = |spoil: fn(&mut NetworkArrays)| {
+fn a_network_that_does_not_fit_is_refused() {
+    let message = |spoil: fn(&mut SceneData)| {
         let mut scene = scene();
-        spoil(&mut scene.deformation);
+        spoil(&mut scene);
         scene.positions_at(0.0).unwrap_err().to_string()
     };
-    assert!(message(|network| network.depth = 2).contains("without trunk.1"));
-    assert!(message(|network| network.layers.truncate(2)).contains("without position.output"));
-    assert!(message(|network| network.layers[1].inputs = 2).contains("position.hidden.inputs is 2, expected 1"));
-    assert!(message(|network| network.layers[2].outputs = 4).contains("expected 3"));
+    fn network(scene: &mut SceneData) -> &mut Network {
+        &mut scene.motion.network.as_mut().unwrap().network
+    }
+    assert!(message(|scene| drop(network(scene).nodes.pop())).contains("an output is 5, expected less than 5"));
+    assert!(message(|scene| network(scene).inputs = vec![2]).contains("inputs of node 0 is 1, expected 2"));
+    assert!(message(|scene| scene.hexplane.channels = 2).contains("planes[0].values"));
+    assert!(message(|scene| network(scene).outputs.clear()).contains("number of named outputs is 1, expected 0"));
 }

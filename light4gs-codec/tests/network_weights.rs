@@ -100,8 +100,8 @@ fn damage_never_panics() {
 #[ignore = "needs trained scenes"]
 fn measured_on_trained_scenes() {
     for path in std::env::var("LIGHT4GS_SCENES").expect("paths in LIGHT4GS_SCENES").split_whitespace() {
-        let network = light4gs_codec::read_file(path.as_ref()).unwrap().deformation;
-        let tensors: Vec<_> = network.layers.into_iter().flat_map(|layer| [layer.weight, layer.bias]).collect();
+        let network = light4gs_codec::read_file(path.as_ref()).unwrap().motion.network.unwrap().network;
+        let tensors: Vec<_> = network.layers().flat_map(|layer| [layer.weight.clone(), layer.bias.clone()]).collect();
         let weights: usize = tensors.iter().map(Vec::len).sum();
         print!("{path}: {weights} weights;");
         for bits in [8, 10, 12, 16] {

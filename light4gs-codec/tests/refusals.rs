@@ -2,8 +2,17 @@
 
 mod common;
 
-use common::{layer, sample};
-use light4gs_codec::{CodecError, SceneData, encode};
+use common::sample;
+use light4gs_codec::{CodecError, MotionNetwork, MotionOutput, SceneData, encode, network::Layer};
+
+fn network(scene: &mut SceneData) -> &mut MotionNetwork {
+    scene.motion.network.as_mut().unwrap()
+}
+
+/// The first layer of what moves the sample.
+fn layer(scene: &mut SceneData) -> &mut Layer {
+    network(scene).network.layers_mut().next().unwrap()
+}
 
 /// The message for the sample after `spoil`.
 fn message(spoil: impl FnOnce(&mut SceneData)) -> String {
@@ -25,8 +34,9 @@ fn arrays_of_other_lengths() {
     assert!(message(|scene| scene.gaussians.sh_degree = 4).contains("degree is 4, expected 0, 1, 2 or 3"));
     assert!(message(|scene| drop(scene.hexplane.planes.pop())).contains("length of planes is 11, expected 12"));
     assert!(message(|scene| scene.hexplane.planes[7].values.push(0.0)).contains("planes[7].values"));
-    assert!(message(|scene| scene.deformation.layers[1].weight.clear()).contains("position.weight"));
-    assert!(message(|scene| scene.deformation.layers[1].bias.push(0.0)).contains("position.bias"));
+    assert!(message(|scene| layer(scene).weight.clear()).contains("length of the network, node 1, weight"));
+    assert!(message(|scene| layer(scene).bias.push(0.0)).contains("length of the network, node 1, bias"));
+    assert!(message(|scene| scene.motion.tensors[0].values.push(0.0)).contains("length of nodes is 7"));
 }
 
 #[test]
@@ -35,8 +45,15 @@ fn shapes_that_contradict_each_other() {
     assert!(message(|scene| scene.hexplane.resolution[3] = 5).contains("or 5"));
     assert!(message(|scene| scene.hexplane.multipliers[1] = 0).contains("more than 0"));
     assert!(message(|scene| scene.hexplane.channels = 0).contains("channels is 0"));
-    assert!(message(|scene| scene.deformation.layers.push(layer("position", 1, 1))).contains("each name once"));
-    assert!(message(|scene| scene.deformation.layers[0].inputs = 0).contains("trunk.0.inputs is 0"));
+    assert!(message(|scene| scene.motion.tensors.push(scene.motion.tensors[0].clone())).contains("each name once"));
+    assert!(message(|scene| layer(scene).inputs = 0).contains("node 1, inputs is 0"));
+    assert!(message(|scene| layer(scene).inputs = 4).contains("inputs of node 1 is 4, expected 3"));
+    assert!(message(|scene| scene.motion.kind.clear()).contains("kind is"));
+    assert!(message(|scene| scene.motion.kind = "Ünknown".into()).contains("kind is"));
+    assert!(message(|scene| network(scene).outputs[0] = MotionOutput::OpacityLogit).contains("OpacityLogit"));
+    assert!(message(|scene| network(scene).outputs[1] = MotionOutput::Position).contains("Position"));
+    assert!(message(|scene| network(scene).sources.truncate(1)).contains("number of sources is 1"));
+    assert!(message(|scene| scene.hexplane = common::hexplane(3, [2, 1, 1, 3], &[1, 2])).contains("Features is 2, expected 6"));
     assert!(message(|scene| scene.meta.bounds.reverse()).contains("bounds"));
     assert!(message(|scene| scene.meta.fps = -1.0).contains("fps is -1"));
 }
@@ -48,7 +65,8 @@ fn numbers_that_are_not_finite() {
         assert!(message(|scene| scene.gaussians.sh_rest[3] = bad).starts_with("sh: value 3 of sh_rest is"));
         assert!(message(|scene| scene.frame.axes[0][1] = bad).starts_with("scene_frame: value 1 of axes is"));
         assert!(message(|scene| scene.hexplane.planes[3].values[0] = bad).contains("planes[3].values"));
-        assert!(message(|scene| scene.deformation.layers[0].bias[0] = bad).contains("trunk.0.bias"));
+        assert!(message(|scene| layer(scene).bias[0] = bad).contains("layers[0].bias"));
+        assert!(message(|scene| scene.motion.tensors[0].values[1] = bad).contains("value 1 of nodes"));
         assert!(message(|scene| scene.meta.background[0] = bad).starts_with("meta: value 0 of background is"));
     }
 }
@@ -64,5 +82,6 @@ fn numbers_beyond_the_limits() {
     over(|scene| scene.meta.extra = (0..20).map(|i| (i.to_string(), "v".repeat(65_000))).collect());
     over(|scene| scene.hexplane.channels = u32::MAX);
     over(|scene| scene.hexplane.resolution[2] = u32::MAX);
-    over(|scene| scene.deformation.depth = u32::MAX);
+    over(|scene| scene.motion.tensors[0].shape = vec![u32::MAX; 5]);
+    over(|scene| layer(scene).outputs = u32::MAX);
 }

@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{gaussians, hexplane, layer, sample};
-use light4gs_codec::{HeadFlags, NetworkArrays, SceneData, SceneMeta, decode, encode, info};
+use common::{gaussians, hexplane, motion, sample};
+use light4gs_codec::{MotionArrays, SceneData, SceneMeta, decode, encode, info};
 use proptest::{collection::btree_map, prelude::*};
 
 #[test]
@@ -41,11 +41,15 @@ fn info_tells_what_is_inside() {
     assert_eq!((info.gaussian_count, info.sh_degree), (2, 1));
     assert_eq!((info.hexplane_channels, info.hexplane_resolution), (1, [2, 1, 1, 3]));
     assert_eq!((info.hexplane_multipliers, info.plane_count), (vec![1, 2], 12));
-    assert_eq!((info.network_width, info.network_depth, info.layer_count), (3, 1, 2));
-    assert_eq!(info.network_heads, scene.deformation.heads);
+    let network = info.motion.network.unwrap();
+    assert!(network.network.has_structure_of(&scene.motion.network.unwrap().network));
+    assert_eq!((&info.motion.kind[..], &info.motion.tensors[0].shape[..]), ("test-field", &[2, 3][..]));
+    assert_eq!(info.profile, None);
     let names: Vec<_> = info.sections.iter().map(|section| section.name).collect();
-    assert_eq!(names, ["gaussians", "sh", "scene_frame", "deformation", "hexplanes"]);
+    assert_eq!(names, ["gaussians", "sh", "scene_frame", "motion", "hexplanes"]);
     assert!(info.sections.iter().all(|section| section.encoding.name() == "float32"));
+    let kinds: Vec<_> = info.sections.iter().map(|section| section.kind.name()).collect();
+    assert_eq!(kinds, ["explicit", "explicit", "principal axes", "description", "explicit"]);
     assert_eq!(info.header_bytes + info.sections.iter().map(|section| section.bytes).sum::<u64>(), info.bytes);
     for section in &info.sections {
         let payload = &bytes[section.offset as usize..(section.offset + section.bytes) as usize];
@@ -81,29 +85,23 @@ prop_compose! {
         channels in 1u32..4,
         resolution in prop::array::uniform4(1u32..5),
         multipliers in prop::collection::vec(1u32..4, 0..=3),
-        bits in any::<[bool; 5]>(),
-        shapes in prop::collection::vec((1u32..6, 1u32..6), 0..5),
+        moves in any::<bool>(),
         values in prop::collection::vec(any::<f32>().prop_filter("finite", |x| x.is_finite()), 1..64),
     ) -> SceneData {
-        let [position, scale, rotation, opacity, sh] = bits;
-        let layers = shapes.iter().enumerate().map(|(i, &(inputs, outputs))| layer(&i.to_string(), inputs, outputs));
+        let features = channels * multipliers.len() as u32;
         let mut scene = SceneData {
             meta,
             gaussians: gaussians(count, sh_degree),
             frame: sample().frame,
             hexplane: hexplane(channels, resolution, &multipliers),
-            deformation: NetworkArrays {
-                width: shapes.len() as u32 * 3,
-                depth: shapes.len() as u32,
-                heads: HeadFlags { position, scale, rotation, opacity, sh },
-                layers: layers.collect(),
-            },
+            motion: if moves && features > 0 { motion(features) } else { MotionArrays::default() },
         };
         // Any finite bit pattern may stand anywhere.
         let mut random = values.iter().cycle();
         let arrays = [scene.gaussians.means.as_flattened_mut(), scene.gaussians.sh_rest.as_mut_slice()];
         let planes = scene.hexplane.planes.iter_mut().map(|plane| plane.values.as_mut_slice());
-        let weights = scene.deformation.layers.iter_mut().map(|layer| layer.weight.as_mut_slice());
+        let network = scene.motion.network.iter_mut().flat_map(|motion| motion.network.layers_mut());
+        let weights = network.map(|layer| layer.weight.as_mut_slice());
         for array in arrays.into_iter().chain(planes).chain(weights) {
             array.fill_with(|| *random.next().unwrap());
         }

@@ -63,12 +63,12 @@ fn modules_and_exact_executor_agree() {
             let model = shaken(config.init(&device), &planes, &steps);
             let decoded: Vec<Tensor<3>> =
                 model.quantize(&planes, &steps).into_iter().map(|plane| plane.decoded).collect();
-            let hyper_symbols = model
+            let latent_symbols = model
                 .hyper_symbols(&decoded, &steps)
                 .into_iter()
                 .map(|plane| plane.map_or_else(Vec::new, |plane| values_of(&plane).iter().map(|v| *v as i32).collect()))
                 .collect();
-            let coding = PlaneCoding { model: model.to_arrays().unwrap(), steps: steps.to_groups(), hyper_symbols };
+            let coding = PlaneCoding { model: model.to_arrays().unwrap(), steps: steps.to_groups(), latent_symbols };
             let arrays = light4gs_model::HexPlane::from_planes(decoded.clone()).to_arrays();
             let all: Vec<usize> = (0..12).collect();
             for (plane, gaussians) in

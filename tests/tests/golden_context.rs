@@ -5,10 +5,12 @@
 //! as one more [`PriorPart`], and the rest is the model itself in its reference configuration.
 
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::network::Operation;
 use light4gs_codec::plane_layout::coding_order;
+use light4gs_codec::{Network, PlaneSource};
 use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
-    CenteredPlanes, ContextModel, ContextModelConfig, InterPlane, InterScale, KernelShape, Latent, Passes, PlaneSteps,
+    CenteredPlanes, ContextModel, ContextModelConfig, DescribedCondition, DescribedPrior, InterPlane, InterScale, KernelShape, Latent, Passes, PlaneSteps,
     Prior, PriorPart, anchor_mask, checkerboard_kernel, demultiplex, multiplex, upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
@@ -81,6 +83,23 @@ impl PriorPart for ReferenceInterPlane<'_> {
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let parameters = Some(self.0.conv.forward(Self::context(planes, plane)?));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+    }
+
+    /// Where moments are stretched over the rows.
+    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
+        let sources = InterPlane::sources(plane % 6)?.map(|position| PlaneSource::SameScale(position as u8));
+        let mut layer = self.0.conv.to_layer();
+        layer.weight.iter_mut().for_each(|weight| *weight *= 0.5);
+        let (mut network, planes) = Network::new([layer.inputs; 2]);
+        let [first, second] = planes.map(|plane| {
+            let average = network.node(Operation::MeanOverWidth, &[plane]);
+            network.node(Operation::Resize, &[average])
+        });
+        let sum = network.node(Operation::Add, &[first, second]);
+        let output = network.layer(sum, layer);
+        network.output(output);
+        let parameters = Some(DescribedCondition { network, sources: sources.to_vec() });
+        Some(DescribedPrior { parameters, context: None, passes: Passes::AnchorsFirst })
     }
 }
 

@@ -1,7 +1,7 @@
-//! Compact coding of the Gaussians' attributes, but for the higher spherical harmonics (DESIGN.md, section 7).
+//! Compact coding of the Gaussians' attributes, but for the higher spherical harmonics (docs/design.md).
 //!
 //! Positions go onto a grid and into Morton order, in which they are coded as a set (`positions.rs`). The other
-//! attributes follow in that order, uniformly quantised. Each channel is predicted linearly from the nearest Gaussians
+//! attributes follow in that order, uniformly quantized. Each channel is predicted linearly from the nearest Gaussians
 //! before and from the channels before, and what the prediction misses by is coded adaptively.
 //!
 //! ```
@@ -18,7 +18,7 @@
 //! let steps = AttributeSteps::default();
 //! let encoded = attributes::encode(&gaussians, &steps)?;
 //! let decoded = attributes::decode(&encoded.bytes, &Limits::default())?;
-//! assert_eq!(decoded, attributes::quantised(&gaussians, &steps)?);
+//! assert_eq!(decoded, attributes::quantized(&gaussians, &steps)?);
 //! // Other arrays must follow the Gaussians: the first of the new order was the second.
 //! assert_eq!(encoded.order, [1, 0]);
 //! # Ok::<(), light4gs_codec::CodecError>(())
@@ -51,12 +51,10 @@ use crate::{
     CodecError, GaussianArrays, Limits,
     adaptive::{BitDecoder, BitEncoder, LARGEST_INDEX, index, reconstruct},
     limits::at_most,
-    reader::Reader,
-    sections::{self, SectionKind},
-    writer::Writer,
+    stream::{self, reader::Reader, sections::Section, writer::Writer},
 };
 
-const SECTION: &str = SectionKind::Gaussians.name();
+const SECTION: &str = Section::Gaussians.name();
 /// Bytes that many Gaussians take at least: what a count must show before memory is taken for it.
 const GAUSSIANS_A_BYTE: usize = 8;
 
@@ -64,7 +62,7 @@ const GAUSSIANS_A_BYTE: usize = 8;
 const AXES: [usize; 3] = [0, 1, 2];
 const COMPONENTS: [usize; 4] = [0, 1, 2, 3];
 /// Green first: it says most about the other two.
-const COLOURS: [usize; 3] = [1, 0, 2];
+const COLORS: [usize; 3] = [1, 0, 2];
 
 /// Coded attributes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -164,11 +162,11 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GaussianArrays, CodecErro
     Ok(reconstructed(&head, &cells, &attributes))
 }
 
-/// What [`decode`] gives for what [`encode`] writes: the quantised Gaussians in their new order.
+/// What [`decode`] gives for what [`encode`] writes: the quantized Gaussians in their new order.
 ///
 /// # Errors
 /// As [`encode`].
-pub fn quantised(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<GaussianArrays, CodecError> {
+pub fn quantized(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<GaussianArrays, CodecError> {
     let quantized = Quantized::of(gaussians, steps)?;
     Ok(reconstructed(&quantized.head(), &quantized.cells(), &quantized.attributes))
 }
@@ -213,7 +211,7 @@ struct Quantized {
 
 impl Quantized {
     fn of(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<Self, CodecError> {
-        sections::gaussians::check(gaussians, &Limits { gaussians: u32::MAX, ..Limits::default() })?;
+        stream::gaussians::check(gaussians, &Limits { gaussians: u32::MAX, ..Limits::default() })?;
         steps.check()?;
         let GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, .. } = gaussians;
         check_finite("means", means.as_flattened())?;
@@ -228,7 +226,7 @@ impl Quantized {
             split("log_scales", log_scales, steps.log_scale, AXES, &order)?,
             split("opacity_logits", opacities, steps.opacity_logit, [0], &order)?,
             split("quats", quats, steps.quaternion, COMPONENTS, &order)?,
-            split("sh_dc", sh_dc, steps.sh_dc, COLOURS, &order)?,
+            split("sh_dc", sh_dc, steps.sh_dc, COLORS, &order)?,
         ];
         let codes = order.iter().map(|&index| codes[index as usize]).collect();
         let steps = [steps.log_scale, steps.opacity_logit, steps.quaternion, steps.sh_dc];
@@ -257,7 +255,7 @@ fn reconstructed(head: &Head, cells: &[[i32; 3]], attributes: &[Vec<Vec<i32>>; 4
         log_scales: join(log_scales, log_scale, AXES),
         quats: join(quats, quaternion, COMPONENTS),
         opacity_logits: join(opacity_logits, opacity_logit, [0]).into_flattened(),
-        sh_dc: join(sh_dc, dc, COLOURS),
+        sh_dc: join(sh_dc, dc, COLORS),
         ..GaussianArrays::default()
     }
 }

@@ -6,8 +6,7 @@ use super::{SECTION, steps::check_step};
 use crate::{
     CodecError,
     adaptive::{LARGEST_STEP, index, reconstruct},
-    reader::Reader,
-    writer::Writer,
+    stream::{reader::Reader, writer::Writer},
 };
 
 /// Most bits of a coordinate, so that three fit into a Morton code.

@@ -31,7 +31,7 @@ impl Channel {
 
     /// Value minus mean.
     #[inline]
-    fn centred(&self, index: usize) -> i64 {
+    fn centered(&self, index: usize) -> i64 {
         i64::from(self.values[index]) - i64::from(self.mean)
     }
 
@@ -39,7 +39,7 @@ impl Channel {
     #[inline]
     pub(super) fn gather(&mut self, neighbors: &[u32; NEIGHBORS]) {
         let index = self.around.len();
-        let sum = if index == 0 { 0 } else { neighbors.iter().map(|&other| self.centred(other as usize)).sum() };
+        let sum = if index == 0 { 0 } else { neighbors.iter().map(|&other| self.centered(other as usize)).sum() };
         self.around.push(sum);
     }
 }
@@ -53,8 +53,8 @@ fn inputs<'a>(
     neighbors: &'a [u32; NEIGHBORS],
     index: usize,
 ) -> impl Iterator<Item = i64> + 'a {
-    let nearest = if index == 0 { 0 } else { own.centred(neighbors[0] as usize) };
-    let others = before.iter().flat_map(move |channel| [channel.centred(index), channel.around[index]]);
+    let nearest = if index == 0 { 0 } else { own.centered(neighbors[0] as usize) };
+    let others = before.iter().flat_map(move |channel| [channel.centered(index), channel.around[index]]);
     [own.around[index], nearest].into_iter().chain(others)
 }
 
@@ -85,7 +85,7 @@ impl LinearPrediction {
             for (number, input) in row.iter_mut().zip(inputs(own, before, near, index)) {
                 *number = input as f64;
             }
-            row[size] = own.centred(index) as f64;
+            row[size] = own.centered(index) as f64;
             for (equation, &number) in equations.iter_mut().zip(&row) {
                 equation.iter_mut().zip(&row).for_each(|(sum, other)| *sum += number * other);
             }

@@ -1,9 +1,9 @@
-//! How finely the attributes are quantised.
+//! How finely the attributes are quantized.
 
 use super::SECTION;
 use crate::{CodecError, adaptive::LARGEST_STEP};
 
-/// How finely each attribute of a Gaussian is quantised.
+/// How finely each attribute of a Gaussian is quantized.
 ///
 /// Every step is the distance between two neighbouring levels, so an attribute is off by half of it at most. Measured
 /// at 200 pixels, the defaults cost 0.1 dB of a scene that reaches 33 dB, and less of one that reaches 26; positions and
@@ -21,8 +21,8 @@ pub struct AttributeSteps {
     pub quaternion: f32,
     /// Step of the opacities before the sigmoid; 0.4 is 5 % of opacity at most, where it is a half.
     pub opacity_logit: f32,
-    /// Step of the spherical harmonics of degree 0; 0.04 is 2.9 of 255 levels of a colour,
-    /// so a colour is off by half of that at most.
+    /// Step of the spherical harmonics of degree 0; 0.04 is 2.9 of 255 levels of a color,
+    /// so a color is off by half of that at most.
     pub sh_dc: f32,
 }
 

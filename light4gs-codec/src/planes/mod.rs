@@ -1,22 +1,29 @@
-//! Entropy coding of the hexplanes under a context model (paper III-C, DESIGN sections 6 and 7).
+//! The hexplanes in a stream: as they are, or entropy coded under a context model (paper III-C, docs/design.md).
 //!
 //! Encoder and decoder run the same walk over the planes and ask the same networks for every value's distribution; they
 //! differ only in the [`SymbolCoder`](crate::entropy::SymbolCoder) that they hand to it.
 //!
 //! | file | what |
 //! |---|---|
-//! | `plan.rs` | what each plane is coded from, and when |
-//! | `exact_model.rs` | the context model, ready for the exact executor |
+//! | `head.rs`, `explicit.rs` | sizes of planes; planes as plain numbers |
+//! | `context_model.rs`, `context_section.rs` | the context model as data, and as bytes |
+//! | `plan.rs` | when each plane is coded |
+//! | `exact_model.rs` | the context model, ready to run |
 //! | `plane_parameters.rs` | scales and means of a row |
 //! | `walk.rs` | the symbols of one plane, in order |
-//! | `coder.rs` | all planes: encode, decode |
+//! | `coder.rs`, `section.rs` | all planes: encode, decode; their bytes |
 
 mod coder;
+mod context_model;
+pub(crate) mod context_section;
 mod exact_model;
+pub(crate) mod explicit;
+pub(crate) mod head;
 mod plan;
 mod plane_parameters;
+pub(crate) mod section;
 mod walk;
 
-pub(crate) use coder::{CodedPlanes, decode, encode, parameters, stream_order};
-pub(crate) use plan::{PlanePlan, plan};
+pub(crate) use coder::parameters;
+pub use context_model::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource};
 pub(crate) use plane_parameters::bounded_mean;

@@ -1,14 +1,16 @@
 //! Scales and means of a row of a plane.
 
 use super::{
+    context_model::PlaneSource,
     exact_model::ExactModel,
-    plan::{PlanePlan, Source},
 };
 use crate::{
     HexPlaneArrays,
-    executor::{
-        AnchorMap, Columns, Convolution, LANES, Lanes, PaddedMap, first_anchor, spread_time_means, time_means, upsample,
+    network::{
+        Maps,
+        kernels::{AnchorMap, Columns, LANES, first_anchor},
     },
+    plane_layout::{PLANES_PER_SCALE, position_of},
 };
 
 /// A mean beyond this, or one that is no number, counts as 0: the symbol must stay one that float32 can hold.
@@ -40,26 +42,6 @@ impl Part {
     }
 }
 
-/// Half of the input of `entropy_parameters`, `[2M]` at each position.
-enum Conditions<'a> {
-    Zeros,
-    Convolved(&'a Convolution, PaddedMap),
-}
-
-impl<'a> Conditions<'a> {
-    fn of(convolution: &'a Option<Convolution>, map: impl FnOnce(usize) -> PaddedMap) -> Self {
-        let convolution = convolution.as_ref().expect("a plan asks for parts that the model has");
-        Self::Convolved(convolution, map(convolution.border()))
-    }
-
-    fn fill(&self, y: usize, columns: Columns, window: &mut Vec<Lanes>, outputs: &mut [Lanes]) {
-        match self {
-            Self::Zeros => outputs.fill([0.0; LANES]),
-            Self::Convolved(convolution, map) => convolution.apply(map, y, columns, window, outputs),
-        }
-    }
-}
-
 /// Scales as the network gives them, and usable means, of one row, `[M, positions]` each.
 #[derive(Debug)]
 pub(super) struct RowParameters {
@@ -69,81 +51,74 @@ pub(super) struct RowParameters {
 
 /// What is known about one plane before its own values.
 pub(super) struct PlaneParameters<'a> {
-    model: &'a ExactModel,
-    parameters: Conditions<'a>,
-    context: Conditions<'a>,
+    model: &'a ExactModel<'a>,
+    prior: usize,
+    /// One for each input of the prior's distribution.
+    conditions: Vec<Option<KnownCondition<'a>>>,
     width: usize,
 }
 
+/// A condition with what is computed of it beforehand.
+struct KnownCondition<'a> {
+    maps: Maps<'a>,
+    reads_anchors: bool,
+}
+
 impl<'a> PlaneParameters<'a> {
-    /// From the planes that `plan` asks for, which are decoded, and the hyperprior where it asks for one.
+    /// From the planes that the plane's prior reads, which are decoded, and the symbols of its latent where it has one.
     pub(super) fn new(
-        model: &'a ExactModel,
-        plan: &PlanePlan,
+        model: &'a ExactModel<'a>,
+        plane: usize,
         size: [usize; 2],
         decoded: &HexPlaneArrays,
-        hyperprior: Option<PaddedMap>,
+        latent_symbols: &[i32],
     ) -> Self {
-        let synthesised = |hyper: Option<PaddedMap>| match (&model.synthesis, hyper) {
-            (Some(synthesis), Some(hyper)) => Conditions::Convolved(synthesis.last(), synthesis.expand(&hyper)),
-            _ => Conditions::Zeros,
+        let prior = model.prior_of(plane);
+        let known = |condition: &super::Condition| {
+            let program = &model.conditions[condition.network as usize];
+            let map = |(input, &source): (usize, &PlaneSource)| {
+                let border = program.border(input);
+                match source {
+                    PlaneSource::Anchors => None,
+                    PlaneSource::Latent => Some(model.latent(latent_symbols, size.map(|side| side / 4), border)),
+                    PlaneSource::SameScale(position) => {
+                        Some(model.plane(decoded, plane - position_of(plane) + usize::from(position), border))
+                    }
+                    PlaneSource::LowerScale => Some(model.plane(decoded, plane - PLANES_PER_SCALE, border)),
+                }
+            };
+            let maps = condition.sources.iter().enumerate().map(map).collect();
+            KnownCondition { maps: program.maps(maps, size), reads_anchors: program.reads_anchors() }
         };
-        let centre = model.shape.centres.of(plan.space_time);
-        let lower = |index: usize| {
-            let plane = &decoded.planes[index];
-            Conditions::of(&model.inter_scale, |border| {
-                upsample(&plane.values, [plane.height as usize, plane.width as usize], size, centre, border)
-            })
-        };
-        let mut context = Conditions::Zeros;
-        let parameters = match plan.source {
-            Source::Nothing => Conditions::Zeros,
-            Source::Hyperprior => synthesised(hyperprior),
-            Source::LowerScale(index) => lower(index),
-            Source::HyperpriorAndLowerScale(index) => {
-                context = lower(index);
-                synthesised(hyperprior)
-            }
-            Source::TimePlanes(indices) => {
-                let [first, second] = indices.map(|index| {
-                    let plane = &decoded.planes[index];
-                    let size = [plane.height as usize, plane.width as usize];
-                    time_means(&plane.values, size, model.shape.centres.space_time)
-                });
-                Conditions::of(&model.inter_plane, |border| spread_time_means(&first, &second, size, border))
-            }
-        };
-        Self { model, parameters, context, width: size[1] }
+        let conditions =
+            model.arrays.priors[prior].conditions.iter().map(|condition| condition.as_ref().map(known)).collect();
+        Self { model, prior, conditions, width: size[1] }
     }
 
     /// Scales and means of the positions of row `y` that belong to `part`. `anchors` are needed for the others alone.
     pub(super) fn row(&self, y: usize, part: Part, anchors: Option<&AnchorMap>) -> RowParameters {
-        let channels = self.model.shape.channels as usize;
+        let channels = self.model.arrays.channels as usize;
         let count = part.count(self.width);
         let mut row = RowParameters { scales: vec![0.0; channels * count], means: vec![0.0; channels * count] };
-        let (mut window, mut hidden) = (Vec::new(), Default::default());
-        let mut inputs = vec![[0.0; LANES]; 4 * channels];
-        let mut outputs = vec![[0.0; LANES]; 2 * channels];
+        let distribution = &self.model.distributions[self.prior][usize::from(part != Part::Anchors)];
+        let mut workspace = distribution.workspace();
+        let mut conditions: Vec<_> = self
+            .conditions
+            .iter()
+            .enumerate()
+            .filter_map(|(input, condition)| condition.as_ref().map(|condition| (input, condition)))
+            .filter(|(_, condition)| part != Part::Anchors || !condition.reads_anchors)
+            .map(|(input, condition)| (input, condition, condition.maps.workspace()))
+            .collect();
         let Columns { first: first_column, step } = part.columns(y);
         for first in (0..count).step_by(LANES) {
             let columns = Columns { first: first_column + step * first, step };
-            let (parameters, context) = inputs.split_at_mut(2 * channels);
-            self.parameters.fill(y, columns, &mut window, parameters);
-            let has_context = match (&self.model.context_prediction, anchors, &self.context) {
-                (Some(prediction), Some(anchors), _) => {
-                    prediction.apply(anchors, y, first, &mut window, context);
-                    true
-                }
-                (_, _, Conditions::Zeros) => false,
-                (_, _, conditions) => {
-                    conditions.fill(y, columns, &mut window, context);
-                    true
-                }
-            };
-            let used = if has_context { 4 * channels } else { 2 * channels };
-            self.model.entropy_parameters.apply(&inputs[..used], &mut hidden, &mut outputs);
-
-            let (scales, means) = outputs.split_at(channels);
+            for (input, condition, own) in &mut conditions {
+                let said = condition.maps.output(y, columns, anchors, own);
+                distribution.input_lanes(&mut workspace, *input).copy_from_slice(said);
+            }
+            distribution.run(&mut workspace);
+            let (scales, means) = distribution.output_lanes(&workspace, 0).split_at(channels);
             let lanes = LANES.min(count - first);
             for channel in 0..channels {
                 let at = channel * count + first;

@@ -4,29 +4,29 @@ use super::plane_parameters::{Part, PlaneParameters, RowParameters};
 use crate::{
     adaptive::Damaged,
     entropy::{Distribution, SymbolCoder, gaussian_table},
-    executor::{AnchorMap, Columns},
+    network::kernels::{AnchorMap, Columns},
     parallel,
 };
 
 /// Rows whose parameters are computed together.
 const BATCH: usize = 16;
 
-/// The grid that the values of a plane lie on: a value is `(symbol + mean) * step + centre`, each operation rounded to
+/// The grid that the values of a plane lie on: a value is `(symbol + mean) * step + center`, each operation rounded to
 /// float32.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     pub(super) step: f32,
-    pub(super) centre: f32,
+    pub(super) center: f32,
 }
 
 impl Grid {
     fn symbol(self, value: f32, mean: f32) -> i32 {
         // Out of range saturates, and is then refused.
-        ((value - self.centre) / self.step - mean).round_ties_even() as i32
+        ((value - self.center) / self.step - mean).round_ties_even() as i32
     }
 
     fn value(self, symbol: i32, mean: f32) -> f32 {
-        (symbol as f32 + mean) * self.step + self.centre
+        (symbol as f32 + mean) * self.step + self.center
     }
 }
 
@@ -44,7 +44,7 @@ pub(super) fn walk<C: SymbolCoder>(
     let mut anchors = None;
     for (part, coder) in coders {
         if *part == Part::Others {
-            anchors = Some(AnchorMap::new(values, size, grid.centre));
+            anchors = Some(AnchorMap::new(values, size, grid.center));
         }
         for first in (0..size[0]).step_by(BATCH) {
             let rows = BATCH.min(size[0] - first);

@@ -1,8 +1,10 @@
 //! Context models, tables and networks of random numbers that follow from a seed.
 
 use light4gs_codec::{
-    CompressionInput, ContextModelArrays, ContextModelShape, ContextParts, ConvolutionLayer, FrequencyTable,
-    HexPlaneArrays, LinearLayer, PerGroup, PlaneCoding, Profile, SceneData, ShCoding, ShCondition, SpatialKernel,
+    CompressionInput, Condition, ContextModelArrays, FrequencyTable, HexPlaneArrays, LatentArrays, Network, PerGroup,
+    PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
+    network::{Layer, LayerKind, Operation, Value},
+    plane_layout::SPACE_TIME_PLANES,
     sh_rest_coefficients,
 };
 
@@ -33,7 +35,17 @@ impl Random {
     }
 }
 
-pub const ALL_PARTS: ContextParts = ContextParts {
+/// What a model consists of; the codec knows nothing of these.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Parts {
+    pub hyperprior: bool,
+    pub checkerboard: bool,
+    pub inter_plane: bool,
+    pub inter_scale: bool,
+    pub high_scale_hyperprior: bool,
+}
+
+pub const ALL_PARTS: Parts = Parts {
     hyperprior: true,
     checkerboard: true,
     inter_plane: true,
@@ -41,59 +53,173 @@ pub const ALL_PARTS: ContextParts = ContextParts {
     high_scale_hyperprior: false,
 };
 
+/// Sizes of a model.
+#[derive(Clone, Copy, Debug)]
+pub struct Shape {
+    pub channels: u32,
+    pub latent_channels: u32,
+    pub synthesis: [u32; 2],
+    pub hidden: [u32; 2],
+    pub context_groups: u32,
+    /// Kernel and groups.
+    pub inter_plane: [u32; 2],
+    /// Kernel and groups.
+    pub inter_scale: [u32; 2],
+    pub parts: Parts,
+    pub centers: PerGroup,
+}
+
 /// A small model: depthwise spatial convolutions, narrow pointwise ones.
-pub fn compact_shape(channels: u32, parts: ContextParts) -> ContextModelShape {
-    ContextModelShape {
+pub fn compact_shape(channels: u32, parts: Parts) -> Shape {
+    Shape {
         channels,
-        hyper_channels: (channels / 8).max(1),
-        synthesis_channels: [channels.div_ceil(2), channels],
-        parameter_channels: [2 * channels, 2 * channels],
+        latent_channels: (channels / 8).max(1),
+        synthesis: [channels.div_ceil(2), channels],
+        hidden: [2 * channels, 2 * channels],
         context_groups: channels,
-        inter_plane: SpatialKernel { kernel: 3, groups: 2 * channels },
-        inter_scale: SpatialKernel { kernel: 3, groups: channels },
+        inter_plane: [3, 2 * channels],
+        inter_scale: [3, channels],
         parts,
-        centres: PerGroup { space_only: 0.0, space_time: 1.0 },
+        centers: PerGroup { space_only: 0.0, space_time: 1.0 },
     }
 }
 
 /// The sizes of the public code.
-pub fn reference_shape(channels: u32, parts: ContextParts) -> ContextModelShape {
-    ContextModelShape {
-        hyper_channels: (channels / 8).max(1),
-        synthesis_channels: [channels, channels * 3 / 2],
-        parameter_channels: [channels * 10 / 3, channels * 8 / 3],
+pub fn reference_shape(channels: u32, parts: Parts) -> Shape {
+    Shape {
+        latent_channels: (channels / 8).max(1),
+        synthesis: [channels, channels * 3 / 2],
+        hidden: [channels * 10 / 3, channels * 8 / 3],
         context_groups: 1,
-        inter_plane: SpatialKernel { kernel: 5, groups: 1 },
-        inter_scale: SpatialKernel { kernel: 5, groups: 1 },
-        centres: PerGroup::default(),
+        inter_plane: [5, 1],
+        inter_scale: [5, 1],
+        centers: PerGroup::default(),
         ..compact_shape(channels, parts)
     }
 }
 
-/// Random weights that keep the size of what they are applied to.
-pub fn model(shape: ContextModelShape, seed: u64) -> ContextModelArrays {
-    let mut random = Random::new(seed);
-    let layers = shape
-        .layers()
-        .into_iter()
-        .map(|shape| {
-            let fan_in = (shape.inputs / shape.groups * shape.kernel * shape.kernel) as f32;
-            let weight = random.normals(shape.weights() as usize, 1.0 / fan_in.sqrt());
-            let mut bias = random.normals(shape.outputs as usize, 0.1);
-            if shape.name == "entropy_parameters.4" {
-                let scales = shape.outputs as usize / 2;
-                bias[..scales].iter_mut().for_each(|scale| *scale += 1.0);
-            }
-            ConvolutionLayer { shape, weight, bias }
-        })
-        .collect();
-    let hyper = if shape.parts.hyperprior { shape.hyper_channels as usize } else { 0 };
-    ContextModelArrays {
-        shape,
-        layers,
-        hyper_tables: (0..hyper).map(|_| laplace_table(0.5)).collect(),
-        hyper_medians: random.normals(hyper, 0.3),
+impl Random {
+    /// Random weights that keep the size of what they are applied to.
+    pub fn layer(&mut self, kind: LayerKind, inputs: u32, outputs: u32, kernel: u32, groups: u32) -> Layer {
+        let mut layer = Layer { kind, inputs, outputs, kernel, groups, weight: Vec::new(), bias: Vec::new() };
+        let fan_in = (inputs / groups * kernel * kernel) as f32;
+        layer.weight = self.normals(layer.weights() as usize, 1.0 / fan_in.sqrt());
+        if kind == LayerKind::Checkerboard {
+            // As a decoder gets them.
+            let masked = |at: usize| (at / kernel as usize + at % kernel as usize) % 2 == 0;
+            let area = (kernel * kernel) as usize;
+            layer.weight.iter_mut().enumerate().filter(|(at, _)| masked(at % area)).for_each(|(_, weight)| *weight = 0.0);
+        }
+        layer.bias = self.normals(outputs as usize, 0.1);
+        layer
     }
+
+    pub fn linear(&mut self, inputs: u32, outputs: u32) -> Layer {
+        self.layer(LayerKind::Convolution, inputs, outputs, 1, 1)
+    }
+}
+
+/// A condition that is network `network`.
+pub fn condition(network: u32, sources: &[PlaneSource]) -> Option<Condition> {
+    Some(Condition { network, sources: sources.to_vec() })
+}
+
+/// `2M` and `2M` channels through two hidden layers to `2M`.
+pub fn distribution(random: &mut Random, channels: u32, [first, second]: [u32; 2]) -> Network {
+    let (mut network, inputs) = Network::new([2 * channels, 2 * channels]);
+    let mut value = network.node(Operation::Concatenate, &inputs);
+    for (inputs, outputs) in [(4 * channels, first), (first, second)] {
+        value = network.layer(value, random.linear(inputs, outputs));
+        value = network.leaky_relu(value, 0.01);
+    }
+    let mut last = random.linear(second, 2 * channels);
+    last.bias[..channels as usize].iter_mut().for_each(|scale| *scale += 1.0);
+    value = network.layer(value, last);
+    network.output(value);
+    network
+}
+
+/// A context model of random weights.
+pub fn model(shape: Shape, seed: u64) -> ContextModelArrays {
+    let Shape { channels: m, latent_channels, synthesis: [a, b], hidden, parts, centers, .. } = shape;
+    let mut random = Random::new(seed);
+    let mut networks = Vec::new();
+    let mut add = |network: Network| {
+        networks.push(network);
+        networks.len() as u32 - 1
+    };
+    let one = |inputs: u32, build: &mut dyn FnMut(&mut Network, Value) -> Value| {
+        let (mut network, [input]) = Network::new([inputs]);
+        let output = build(&mut network, input);
+        network.output(output);
+        network
+    };
+    let synthesis = parts.hyperprior.then(|| {
+        add(one(latent_channels, &mut |network, latent| {
+            let half = network.layer(latent, random.layer(LayerKind::Doubling, latent_channels, a, 5, 1));
+            let half = network.leaky_relu(half, 0.01);
+            let whole = network.layer(half, random.layer(LayerKind::Doubling, a, b, 5, 1));
+            let whole = network.leaky_relu(whole, 0.01);
+            network.layer(whole, random.layer(LayerKind::Convolution, b, 2 * m, 3, 1))
+        }))
+    });
+    let checkerboard = parts.checkerboard.then(|| {
+        add(one(m, &mut |network, anchors| {
+            network.layer(anchors, random.layer(LayerKind::Checkerboard, m, 2 * m, 5, shape.context_groups))
+        }))
+    });
+    let inter_plane = parts.inter_plane.then(|| {
+        let (mut network, [first, second]) = Network::new([m, m]);
+        let across = network.node(Operation::MeanOverHeight, &[first]);
+        let across = network.node(Operation::Spread, &[across]);
+        let down = network.node(Operation::MeanOverHeight, &[second]);
+        let down = network.node(Operation::Transpose, &[down]);
+        let down = network.node(Operation::Spread, &[down]);
+        let both = network.node(Operation::Concatenate, &[across, down]);
+        let [kernel, groups] = shape.inter_plane;
+        let output = network.layer(both, random.layer(LayerKind::Convolution, 2 * m, 2 * m, kernel, groups));
+        network.output(output);
+        add(network)
+    });
+    let inter_scale = parts.inter_scale.then(|| {
+        let [kernel, groups] = shape.inter_scale;
+        add(one(m, &mut |network, lower| {
+            let resized = network.node(Operation::Resize, &[lower]);
+            network.layer(resized, random.layer(LayerKind::Convolution, m, 2 * m, kernel, groups))
+        }))
+    });
+    let distribution = add(distribution(&mut random, m, hidden));
+
+    let latent = |network: Option<u32>| network.and_then(|network| condition(network, &[PlaneSource::Latent]));
+    let anchors = || checkerboard.and_then(|network| condition(network, &[PlaneSource::Anchors]));
+    let lower = || inter_scale.and_then(|network| condition(network, &[PlaneSource::LowerScale]));
+    let prior = |position: usize, higher: bool| {
+        let over_time = [[Some(2), Some(4)], [Some(2), Some(5)], [None; 2], [Some(4), Some(5)], [None; 2], [None; 2]];
+        let conditions = match (over_time[position], inter_plane) {
+            _ if higher && parts.high_scale_hyperprior => vec![latent(synthesis), lower()],
+            _ if higher && parts.inter_scale => vec![lower(), None],
+            ([Some(first), Some(second)], Some(network)) => {
+                let sources = [PlaneSource::SameScale(first), PlaneSource::SameScale(second)];
+                vec![condition(network, &sources), anchors()]
+            }
+            _ => vec![latent(synthesis), anchors()],
+        };
+        PlanePrior { conditions, distribution }
+    };
+    let mut priors: Vec<PlanePrior> = Vec::new();
+    let mut place = |prior: PlanePrior| {
+        let place = priors.iter().position(|other| *other == prior).unwrap_or(priors.len());
+        if place == priors.len() {
+            priors.push(prior);
+        }
+        place as u32
+    };
+    let [lowest, higher] = [false, true].map(|higher| std::array::from_fn(|position| place(prior(position, higher))));
+    let latent = parts.hyperprior.then(|| LatentArrays {
+        tables: (0..latent_channels).map(|_| laplace_table(0.5)).collect(),
+        medians: random.normals(latent_channels as usize, 0.3),
+    });
+    ContextModelArrays { channels: m, centers, latent, networks, priors, lowest, higher }
 }
 
 /// The table of `p(k) ~ decay^|k|`.
@@ -114,14 +240,14 @@ pub fn laplace_symbol(random: &mut Random, decay: f64) -> i32 {
 pub fn plane_coding(hexplane: &HexPlaneArrays, model: ContextModelArrays, steps: Vec<PerGroup>) -> PlaneCoding {
     let mut random = Random::new(77);
     let sizes: Vec<_> = hexplane.planes.iter().map(|plane| [plane.height, plane.width]).collect();
-    let hyper_symbols = PlaneCoding::hyper_shapes(&model.shape, &sizes)
+    let latent_symbols = PlaneCoding::latent_shapes(&model, &sizes)
         .into_iter()
         .map(|shape| {
             let count = shape.map_or(0, |shape| shape.into_iter().product::<u32>());
             (0..count).map(|_| laplace_symbol(&mut random, 0.5)).collect()
         })
         .collect();
-    PlaneCoding { model, steps, hyper_symbols }
+    PlaneCoding { model, steps, latent_symbols }
 }
 
 /// Both steps alike.
@@ -134,36 +260,52 @@ pub fn sh_tables(degree: u8) -> ShCoding {
     ShCoding::Tables { step: 0.02, tables: vec![laplace_table(0.6); 3 * sh_rest_coefficients(degree)] }
 }
 
-fn linear(random: &mut Random, name: String, inputs: usize, outputs: usize) -> LinearLayer {
-    LinearLayer {
-        name,
-        inputs: inputs as u32,
-        outputs: outputs as u32,
-        weight: random.normals(inputs * outputs, 1.0 / (inputs as f32).sqrt()),
-        bias: random.normals(outputs, 0.5),
-    }
+/// What the networks of [`sh_networks`] read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ShKind {
+    /// Degree by degree, from the color and all lower degrees.
+    Autoregressive,
+    /// One network, from the planes over space.
+    HexPlaneCoupled,
+    /// One network a degree, from everything that there is.
+    Everything,
 }
 
 /// Networks for a degree; `features` are channels times scales.
-pub fn sh_networks(kind: ShCondition, degree: u8, features: usize) -> ShCoding {
+pub fn sh_networks(kind: ShKind, degree: u8, features: usize) -> ShCoding {
     let mut random = Random::new(5);
-    let mut layers = Vec::new();
-    let mut network = |name: String, inputs: usize, outputs: usize| {
-        layers.push(linear(&mut random, format!("{name}.0"), inputs, 6));
-        layers.push(linear(&mut random, format!("{name}.2"), 6, 2 * outputs));
+    let mut prior = |sources: &[(ShSource, u32)], channels: u32| {
+        let mut network = Network { inputs: sources.iter().map(|source| source.1).collect(), ..Network::default() };
+        let inputs: Vec<_> = (0..sources.len() as u32).map(Value).collect();
+        let known = if inputs.len() > 1 { network.node(Operation::Concatenate, &inputs) } else { inputs[0] };
+        let hidden = network.layer(known, random.linear(network.inputs.iter().sum(), 6));
+        let hidden = network.leaky_relu(hidden, 0.01);
+        let output = network.layer(hidden, random.linear(6, 2 * channels));
+        network.output(output);
+        ShPrior { network, sources: sources.iter().map(|source| source.0).collect() }
     };
-    match kind {
-        ShCondition::Autoregressive => {
-            for degree in 1..=usize::from(degree) {
-                network(format!("sh_ar.{}", degree - 1), 3 * degree * degree, 3 * (2 * degree + 1));
-            }
-        }
-        ShCondition::HexplaneCoupled if degree > 0 => {
-            network("sh_hex".into(), features, 3 * sh_rest_coefficients(degree));
-        }
-        ShCondition::HexplaneCoupled => {}
-    }
-    ShCoding::Conditional { step: 0.02, kind, layers }
+    let degrees = 1..=u32::from(degree);
+    let features = (ShSource::SpaceFeatures, features as u32);
+    let priors = match kind {
+        ShKind::HexPlaneCoupled if degree == 0 => Vec::new(),
+        ShKind::HexPlaneCoupled => vec![prior(&[features], 3 * sh_rest_coefficients(degree) as u32)],
+        _ => degrees
+            .map(|degree| {
+                let mut sources = vec![(ShSource::Dc, 3)];
+                if degree > 1 {
+                    sources.push((ShSource::Decoded, 3 * (degree * degree - 1)));
+                }
+                if kind == ShKind::Everything {
+                    let single =
+                        [(ShSource::Position, 3), (ShSource::LogScale, 3), (ShSource::Quaternion, 4), (ShSource::OpacityLogit, 1)];
+                    sources.extend(single);
+                    sources.push(features);
+                }
+                prior(&sources, 3 * (2 * degree + 1))
+            })
+            .collect(),
+    };
+    ShCoding::Networks { step: 0.02, priors }
 }
 
 /// A scene of random numbers of sensible sizes.
@@ -181,15 +323,19 @@ pub fn scene(count: usize, sh_degree: u8, channels: u32, resolution: [u32; 4], m
         .map(|_| 0.02 * laplace_symbol(&mut random, 0.6) as f32 + 0.004 * random.uniform())
         .collect();
     scene.hexplane = hexplane(channels, resolution, multipliers);
+    scene.motion = match channels * multipliers.len() as u32 {
+        0 => Default::default(),
+        features => super::motion(features),
+    };
     for (index, plane) in scene.hexplane.planes.iter_mut().enumerate() {
-        let centre = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
-        plane.values.fill_with(|| centre + 0.1 * random.normal());
+        let center = if SPACE_TIME_PLANES.contains(&(index % 6)) { 1.0 } else { 0.0 };
+        plane.values.fill_with(|| center + 0.1 * random.normal());
     }
     scene
 }
 
 /// All parts, tables for the harmonics.
-pub fn input(scene: &SceneData, profile: Profile, shape: ContextModelShape) -> CompressionInput {
+pub fn input(scene: &SceneData, profile: Profile, shape: Shape) -> CompressionInput {
     CompressionInput {
         profile,
         planes: Some(plane_coding(&scene.hexplane, model(shape, 3), step(0.1))),
@@ -203,13 +349,10 @@ pub fn input(scene: &SceneData, profile: Profile, shape: ContextModelShape) -> C
 pub fn tiny(profile: Profile) -> (SceneData, CompressionInput) {
     let scene = scene(6, 2, 4, [8, 4, 4, 4], &[1, 2]);
     let (shape, kind) = match profile {
-        Profile::Compact => (compact_shape(4, ALL_PARTS), Some(ShCondition::Autoregressive)),
+        Profile::Compact => (compact_shape(4, ALL_PARTS), Some(ShKind::Autoregressive)),
         Profile::Paper => {
-            let parts = ContextParts { high_scale_hyperprior: true, ..ALL_PARTS };
-            (
-                ContextModelShape { inter_scale: SpatialKernel { kernel: 3, groups: 4 }, ..reference_shape(4, parts) },
-                None,
-            )
+            let parts = Parts { high_scale_hyperprior: true, ..ALL_PARTS };
+            (Shape { inter_scale: [3, 4], ..reference_shape(4, parts) }, None)
         }
     };
     let mut input = input(&scene, profile, shape);

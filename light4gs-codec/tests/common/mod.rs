@@ -5,8 +5,10 @@
 pub mod compression;
 
 use light4gs_codec::{
-    GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
-    SceneMeta, sh_rest_coefficients,
+    GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network, Plane,
+    SceneData, SceneFrameArrays, SceneMeta,
+    network::{Layer, Operation},
+    sh_rest_coefficients,
 };
 
 /// Numbers that differ from each other, are exact in float32 and follow from their position alone.
@@ -45,15 +47,24 @@ pub fn hexplane(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> Hex
     HexPlaneArrays { channels, resolution, multipliers: multipliers.to_vec(), planes }
 }
 
-/// One layer.
-pub fn layer(name: &str, inputs: u32, outputs: u32) -> LinearLayer {
-    LinearLayer {
-        name: name.into(),
-        inputs,
-        outputs,
-        weight: numbers((inputs * outputs) as usize),
-        bias: numbers(outputs as usize),
-    }
+/// A layer from `inputs` to `outputs` channels.
+pub fn linear(inputs: usize, outputs: usize) -> Layer {
+    Layer::linear(numbers(inputs * outputs), numbers(outputs))
+}
+
+/// A network that moves positions and rotations, and a tensor that nobody knows.
+pub fn motion(features: u32) -> MotionArrays {
+    let (mut network, inputs) = Network::new([features, 1]);
+    let known = network.node(Operation::Concatenate, &inputs);
+    let hidden = network.layer(known, linear(features as usize + 1, 3));
+    let hidden = network.relu(hidden);
+    let position = network.layer(hidden, linear(3, 3));
+    let rotation = network.layer(hidden, linear(3, 4));
+    network.outputs = vec![position, rotation];
+    let sources = vec![MotionSource::Features, MotionSource::Time];
+    let outputs = vec![MotionOutput::Position, MotionOutput::Quaternion];
+    let tensors = vec![NamedTensor { name: "nodes".into(), shape: vec![2, 3], values: numbers(6) }];
+    MotionArrays { kind: "test-field".into(), network: Some(MotionNetwork { network, sources, outputs }), tensors }
 }
 
 /// The scene.
@@ -78,17 +89,12 @@ pub fn sample() -> SceneData {
             std: [1.0, 2.0, 0.5],
         },
         hexplane: hexplane(1, [2, 1, 1, 3], &[1, 2]),
-        deformation: NetworkArrays {
-            width: 3,
-            depth: 1,
-            heads: HeadFlags { position: true, scale: false, rotation: true, opacity: false, sh: false },
-            layers: vec![layer("trunk.0", 2, 3), layer("position", 3, 1)],
-        },
+        motion: motion(2),
     }
 }
 
 /// Bytes of one entry of the table.
-pub const ENTRY: usize = 24;
+pub const ENTRY: usize = 16;
 
 /// Where the table of a stream begins.
 pub fn table_at(bytes: &[u8]) -> usize {
@@ -117,34 +123,36 @@ pub fn forge_header(bytes: &mut [u8]) {
     put(bytes, 28, &crc.to_le_bytes());
 }
 
+/// Where a section begins: where the ones before it end.
+pub fn start(bytes: &[u8], index: usize) -> usize {
+    let table = table_at(bytes);
+    let length = |section: usize| u64_at(bytes, table + ENTRY * section + 8) as usize;
+    table + ENTRY * u32_at(bytes, 12) as usize + (0..index).map(length).sum::<usize>()
+}
+
 /// Computes the checksum of a section again, then the header's.
 pub fn forge_section(bytes: &mut [u8], index: usize) {
+    let crc = crc32c::crc32c(payload(bytes, index));
     let entry = table_at(bytes) + ENTRY * index;
-    let start = u64_at(bytes, entry + 8) as usize;
-    let end = start + u64_at(bytes, entry + 16) as usize;
-    let crc = crc32c::crc32c(&bytes[start..end]);
     put(bytes, entry + 4, &crc.to_le_bytes());
     forge_header(bytes);
 }
 
 /// The payload of a section of a stream.
 pub fn payload(bytes: &[u8], index: usize) -> &[u8] {
-    let entry = table_at(bytes) + ENTRY * index;
-    let start = u64_at(bytes, entry + 8) as usize;
-    &bytes[start..start + u64_at(bytes, entry + 16) as usize]
+    let length = u64_at(bytes, table_at(bytes) + ENTRY * index + 8) as usize;
+    &bytes[start(bytes, index)..][..length]
 }
 
-/// A stream with another payload in a section; offsets, lengths and checksums fit.
+/// A stream with another payload in a section; lengths and checksums fit.
 pub fn with_payload(bytes: &[u8], index: usize, new: &[u8]) -> Vec<u8> {
     let sections = u32_at(bytes, 12) as usize;
     let mut forged = bytes[..table_at(bytes) + ENTRY * sections].to_vec();
     for section in 0..sections {
         let part = if section == index { new } else { payload(bytes, section) };
         let entry = table_at(bytes) + ENTRY * section;
-        let start = forged.len() as u64;
         put(&mut forged, entry + 4, &crc32c::crc32c(part).to_le_bytes());
-        put(&mut forged, entry + 8, &start.to_le_bytes());
-        put(&mut forged, entry + 16, &(part.len() as u64).to_le_bytes());
+        put(&mut forged, entry + 8, &(part.len() as u64).to_le_bytes());
         forged.extend(part);
     }
     let length = forged.len() as u64;

@@ -1,21 +1,13 @@
 //! The context model and the quantisation steps as the codec's plain arrays.
 
-use burn::module::Param;
-use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 use light4gs_codec::{
-    CodecError, ContextModelArrays, ContextModelShape, ContextParts as Parts, ConvolutionLayer, ConvolutionShape,
-    FrequencyTable, PerGroup, SpatialKernel,
+    CodecError, Condition, ContextModelArrays, FrequencyTable, LatentArrays, PerGroup, PlanePrior,
 };
 
 use super::model::ContextModel;
-use crate::entropy::convolution::PlaneConv;
+use super::prior::{DescribedCondition, DescribedPrior, Passes, PriorPart};
 use crate::entropy::quantization_steps::PlaneSteps;
-use crate::named_parameters::Layer;
-
-fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
-    parameter.val().into_data().iter::<f32>().collect()
-}
 
 impl PlaneSteps {
     /// A pair of steps for each scale, or one for all where they are the same.
@@ -39,58 +31,56 @@ impl ContextModel {
     /// # Errors
     /// A density that gives no frequency table; the message names what is wrong with it.
     pub fn to_arrays(&self) -> Result<ContextModelArrays, CodecError> {
-        let shape = self.stream_shape();
-        let found = self.layers();
-        let layers = shape.layers().into_iter().map(|shape| convolution_layer(shape, &found)).collect();
-        let (mut hyper_tables, mut hyper_medians) = (Vec::new(), Vec::new());
-        if let Some(hyperprior) = &self.hyperprior {
-            let bottleneck = &hyperprior.bottleneck;
-            for (channel, range) in bottleneck.symbol_ranges().into_iter().enumerate() {
-                let first = *range.start();
-                hyper_tables.push(FrequencyTable::from_pmf(first, &bottleneck.pmf(range)[channel])?);
-            }
-            hyper_medians = bottleneck.medians().into_data().iter::<f32>().collect();
-        }
-        Ok(ContextModelArrays { shape, layers, hyper_tables, hyper_medians })
+        self.to_arrays_with(&self.parts())
     }
 
-    fn stream_shape(&self) -> ContextModelShape {
-        let [first, second, last] = &self.entropy_parameters.layers;
-        let outputs = |layer: &PlaneConv| layer.weight.dims()[0] as u32;
-        let kernel = |layer: Option<&PlaneConv>| {
-            layer.map_or_else(SpatialKernel::default, |layer| SpatialKernel {
-                kernel: layer.weight.dims()[2] as u32,
-                groups: layer.groups() as u32,
-            })
-        };
-        let (hyper_channels, synthesis_channels) = self.hyperprior.as_ref().map_or((0, [0; 2]), |hyperprior| {
-            let up = hyperprior.synthesis_up.each_ref().map(|layer| layer.weight.dims()[1] as u32);
-            (outputs(&hyperprior.analysis[2]), up)
-        });
-        ContextModelShape {
-            channels: outputs(last) / 2,
-            hyper_channels,
-            synthesis_channels,
-            parameter_channels: [outputs(first), outputs(second)],
-            context_groups: kernel(self.checkerboard.as_ref().map(|part| &part.conv)).groups,
-            inter_plane: kernel(self.inter_plane.as_ref().map(|part| &part.conv)),
-            inter_scale: kernel(self.inter_scale.as_ref().map(|part| &part.conv)),
-            parts: Parts {
-                hyperprior: self.hyperprior.is_some(),
-                checkerboard: self.checkerboard.is_some(),
-                inter_plane: self.inter_plane.is_some(),
-                inter_scale: self.inter_scale.is_some(),
-                high_scale_hyperprior: self.has_high_scale_hyperprior(),
-            },
-            centres: PerGroup {
+    /// [`Self::to_arrays`] with other parts than the model's own.
+    ///
+    /// # Errors
+    /// As [`Self::to_arrays`].
+    pub fn to_arrays_with(&self, parts: &[Box<dyn PriorPart + '_>]) -> Result<ContextModelArrays, CodecError> {
+        let mut arrays = ContextModelArrays {
+            channels: self.entropy_parameters.channels() as u32,
+            centers: PerGroup {
                 space_only: self.center_of(SPACE_ONLY_PLANES[0]) as f32,
                 space_time: self.center_of(SPACE_TIME_PLANES[0]) as f32,
             },
+            ..ContextModelArrays::default()
+        };
+        let described = |plane: usize| {
+            parts.iter().find_map(|part| part.describe(plane)).unwrap_or_else(DescribedPrior::constant)
+        };
+        for plane in 0..2 * PLANES_PER_SCALE {
+            let DescribedPrior { parameters, mut context, passes } = described(plane);
+            if let (Some(checkerboard), Passes::AnchorsFirst) = (&self.checkerboard, passes) {
+                context = Some(checkerboard.describe());
+            }
+            let conditions = [parameters, context].map(|condition| {
+                let DescribedCondition { network, sources } = condition?;
+                Some(Condition { network: place(&mut arrays.networks, network), sources })
+            });
+            let distribution = place(&mut arrays.networks, self.entropy_parameters.network());
+            let prior = place(&mut arrays.priors, PlanePrior { conditions: conditions.to_vec(), distribution });
+            let priors = if plane < PLANES_PER_SCALE { &mut arrays.lowest } else { &mut arrays.higher };
+            priors[plane % PLANES_PER_SCALE] = prior;
         }
+        if let Some(hyperprior) = &self.hyperprior {
+            let bottleneck = &hyperprior.bottleneck;
+            let table = |(channel, range): (usize, std::ops::RangeInclusive<i32>)| {
+                FrequencyTable::from_pmf(*range.start(), &bottleneck.pmf(range)[channel])
+            };
+            let tables = bottleneck.symbol_ranges().into_iter().enumerate().map(table).collect::<Result<_, _>>()?;
+            arrays.latent = Some(LatentArrays { tables, medians: bottleneck.medians().into_data().iter().collect() });
+        }
+        Ok(arrays)
     }
 }
 
-fn convolution_layer(shape: ConvolutionShape, layers: &[Layer]) -> ConvolutionLayer {
-    let layer = layers.iter().find(|layer| layer.name == shape.name).expect("the stream names our own layers");
-    ConvolutionLayer { shape, weight: values(layer.weight), bias: values(layer.bias) }
+/// The place of something in a list, at the end if it is new: what several planes use stands once.
+fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
+    let place = list.iter().position(|other| *other == item).unwrap_or(list.len());
+    if place == list.len() {
+        list.push(item);
+    }
+    place as u32
 }

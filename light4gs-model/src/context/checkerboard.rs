@@ -9,7 +9,9 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, s};
+use light4gs_codec::{Network, PlaneSource};
 
+use super::prior::DescribedCondition;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
@@ -54,6 +56,15 @@ impl Checkerboard {
     /// The convolution as the stream stores it.
     pub fn layer(&self) -> Layer<'_> {
         Layer::conv(NAME, &self.conv)
+    }
+
+    /// [`Self::context`] for the codec's exact executor.
+    pub fn describe(&self) -> DescribedCondition {
+        let layer = self.conv.to_layer();
+        let (mut network, [anchors]) = Network::new([layer.inputs]);
+        let context = network.layer(anchors, layer);
+        network.output(context);
+        DescribedCondition { network, sources: vec![PlaneSource::Anchors] }
     }
 
     /// The context `[2 M, H, W]` of a plane `[M, H, W]` in original units, of which only the anchors are looked at. Zero at the

@@ -4,6 +4,8 @@ use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::Network;
+use light4gs_codec::network::Operation;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 use crate::entropy::gaussian_conditional::NormalParameters;
@@ -63,9 +65,31 @@ impl NamedParameters for EntropyParameters {
 }
 
 impl EntropyParameters {
+    /// Channels of a plane.
+    pub fn channels(&self) -> usize {
+        let [.., last] = &self.layers;
+        last.bias.dims()[0] / 2
+    }
+
     /// The layers as the stream stores them.
     pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
         NAMES.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
+    }
+
+    /// [`Self::forward`] for the codec's exact executor: parameters and context to scales, then means.
+    pub fn network(&self) -> Network {
+        let [first, rest @ ..] = &self.layers;
+        let first = first.to_layer();
+        let half = first.inputs / 2;
+        let (mut network, [parameters, context]) = Network::new([half, half]);
+        let known = network.node(Operation::Concatenate, &[parameters, context]);
+        let hidden = network.layer(known, first);
+        let output = rest.iter().fold(hidden, |hidden, layer| {
+            let rectified = network.leaky_relu(hidden, LEAKY_SLOPE as f32);
+            network.layer(rectified, layer.to_layer())
+        });
+        network.output(output);
+        network
     }
 
     /// Normal distributions `[M, H, W]` of the values of a plane of this size (height, width), in units of its step, from `parameters` and `context [2 M, H, W]`; what is absent

@@ -4,8 +4,9 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::{Network, PlaneSource};
 
-use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
 use crate::entropy::gaussian_conditional::bits;
@@ -94,6 +95,19 @@ impl Hyperprior {
         self.synthesis_out.forward(up)
     }
 
+    /// [`Self::synthesize`] for the codec's exact executor.
+    pub fn synthesis_network(&self) -> Network {
+        let [first, _] = &self.synthesis_up;
+        let (mut network, [latent]) = Network::new([first.to_layer().inputs]);
+        let up = self.synthesis_up.iter().fold(latent, |hidden, layer| {
+            let doubled = network.layer(hidden, layer.to_layer());
+            network.leaky_relu(doubled, LEAKY_SLOPE as f32)
+        });
+        let parameters = network.layer(up, self.synthesis_out.to_layer());
+        network.output(parameters);
+        network
+    }
+
     /// Symbols `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
     pub fn symbols(&self, plane: Tensor<3>) -> Tensor<3> {
         self.bottleneck.symbols(self.analyze(plane))
@@ -110,5 +124,11 @@ impl PriorPart for Hyperprior {
             passes: Passes::AnchorsFirst,
             hyper_bits: Some(bits(likelihood).sum()),
         })
+    }
+
+    fn describe(&self, _: usize) -> Option<DescribedPrior> {
+        let parameters =
+            DescribedCondition { network: self.synthesis_network(), sources: vec![PlaneSource::Latent] };
+        Some(DescribedPrior { parameters: Some(parameters), context: None, passes: Passes::AnchorsFirst })
     }
 }

@@ -3,9 +3,11 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::network::Operation;
 use light4gs_codec::plane_layout::position_of;
+use light4gs_codec::{Network, PlaneSource};
 
-use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
@@ -85,6 +87,22 @@ impl InterPlane {
         Tensor::cat(vec![along_a, along_b], 0)
     }
 
+    /// [`Self::forward`] for the codec's exact executor.
+    pub fn network(&self) -> Network {
+        let layer = self.conv.to_layer();
+        let channels = layer.inputs / 2;
+        let (mut network, [over_a, over_b]) = Network::new([channels, channels]);
+        let along_a = network.node(Operation::MeanOverHeight, &[over_a]);
+        let along_a = network.node(Operation::Spread, &[along_a]);
+        let along_b = network.node(Operation::MeanOverHeight, &[over_b]);
+        let along_b = network.node(Operation::Transpose, &[along_b]);
+        let along_b = network.node(Operation::Spread, &[along_b]);
+        let context = network.node(Operation::Concatenate, &[along_a, along_b]);
+        let parameters = network.layer(context, layer);
+        network.output(parameters);
+        network
+    }
+
     /// Parameters `[2 M, B, A]` from `over_a [M, T, A]` and `over_b [M, T, B]`.
     pub fn forward(&self, over_a: Tensor<3>, over_b: Tensor<3>) -> Tensor<3> {
         self.conv.forward(Self::context(over_a, over_b))
@@ -97,5 +115,11 @@ impl PriorPart for InterPlane {
         let [over_a, over_b] = Self::sources(position_of(plane))?.map(|position| planes.in_same_scale(plane, position));
         let parameters = Some(self.forward(over_a, over_b));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+    }
+
+    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
+        let sources = Self::sources(position_of(plane))?.map(|position| PlaneSource::SameScale(position as u8)).to_vec();
+        let parameters = Some(DescribedCondition { network: self.network(), sources });
+        Some(DescribedPrior { parameters, context: None, passes: Passes::AnchorsFirst })
     }
 }

@@ -3,9 +3,12 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::network::Operation;
+use light4gs_codec::plane_layout::scale_of;
+use light4gs_codec::{Network, PlaneSource};
 
 use super::hyperprior::Hyperprior;
-use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
+use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
@@ -57,6 +60,21 @@ impl InterScale {
         self.conv.forward(upsample(lower, size))
     }
 
+    /// [`Self::forward`] for the codec's exact executor.
+    pub fn network(&self) -> Network {
+        let layer = self.conv.to_layer();
+        let (mut network, [lower]) = Network::new([layer.inputs]);
+        let upsampled = network.node(Operation::Resize, &[lower]);
+        let parameters = network.layer(upsampled, layer);
+        network.output(parameters);
+        network
+    }
+
+    fn described_contribution(&self, plane: usize) -> Option<DescribedCondition> {
+        let network = self.network();
+        (scale_of(plane) > 0).then(|| DescribedCondition { network, sources: vec![PlaneSource::LowerScale] })
+    }
+
     fn contribution(&self, planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
         let lower = planes.one_scale_below(plane)?;
         let [_, height, width] = planes.planes[plane].dims();
@@ -69,6 +87,11 @@ impl PriorPart for InterScale {
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let parameters = Some(self.contribution(planes, plane)?);
         Some(Prior { parameters, context: None, passes: Passes::One, hyper_bits: None })
+    }
+
+    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
+        let parameters = Some(self.described_contribution(plane)?);
+        Some(DescribedPrior { parameters, context: None, passes: Passes::One })
     }
 }
 
@@ -86,6 +109,12 @@ impl PriorPart for HighScaleHyperprior<'_> {
         let context = self.inter_scale.contribution(planes, plane)?;
         let hyperprior = self.hyperprior.prior(planes, plane, latent)?;
         Some(Prior { context: Some(context), passes: Passes::One, ..hyperprior })
+    }
+
+    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
+        let context = self.inter_scale.described_contribution(plane)?;
+        let hyperprior = self.hyperprior.describe(plane)?;
+        Some(DescribedPrior { context: Some(context), passes: Passes::One, ..hyperprior })
     }
 }
 

@@ -18,4 +18,4 @@ pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};
 pub use inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig, upsample};
 pub use model::{ContextModel, ContextModelConfig, ContextParts, KernelShape, PlaneRate, QuantizedPlane};
-pub use prior::{CenteredPlanes, Passes, Prior, PriorPart};
+pub use prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};

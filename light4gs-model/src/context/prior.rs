@@ -1,6 +1,7 @@
 //! What a part of the context model contributes to a plane, and what it may look at.
 
 use burn::tensor::Tensor;
+use light4gs_codec::{Network, PlaneSource};
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, scale_of};
 
 use crate::entropy::bottleneck::Latent;
@@ -71,10 +72,45 @@ impl Prior {
 pub trait PriorPart {
     /// The prior of a plane, or nothing where this part does not apply.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior>;
+
+    /// The same for the codec's exact executor, with the same weights: what [`PriorPart::prior`] computes, in the same
+    /// order. `plane` is one of two scales, which stand for the lowest and all higher ones.
+    fn describe(&self, plane: usize) -> Option<DescribedPrior>;
+}
+
+/// A [`Prior`] as networks. Absent ones count as zeros.
+#[derive(Clone, Debug)]
+pub struct DescribedPrior {
+    /// Gives [`Prior::parameters`].
+    pub parameters: Option<DescribedCondition>,
+    /// Gives [`Prior::context`].
+    pub context: Option<DescribedCondition>,
+    /// How the values are coded.
+    pub passes: Passes,
+}
+
+impl DescribedPrior {
+    /// [`Prior::constant`].
+    pub fn constant() -> Self {
+        Self { parameters: None, context: None, passes: Passes::AnchorsFirst }
+    }
+}
+
+/// A network of one output and what it reads.
+#[derive(Clone, Debug)]
+pub struct DescribedCondition {
+    /// To `[2 M, H, W]`.
+    pub network: Network,
+    /// One for each input of the network.
+    pub sources: Vec<PlaneSource>,
 }
 
 impl<P: PriorPart> PriorPart for &P {
     fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior> {
         (**self).prior(planes, plane, latent)
+    }
+
+    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
+        (**self).describe(plane)
     }
 }

@@ -9,6 +9,7 @@ use burn::module::{Module, Param};
 use burn::nn::Initializer;
 use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, s};
+use light4gs_codec::network::{Layer, LayerKind};
 
 /// Slope below zero of every leaky rectifier of the entropy models.
 pub const LEAKY_SLOPE: f64 = 0.01;
@@ -99,6 +100,25 @@ impl PlaneConv {
     /// Groups of channels.
     pub fn groups(&self) -> usize {
         self.groups
+    }
+
+    /// The same layer for the codec's exact executor. Strides are 1 and 2.
+    pub fn to_layer(&self) -> Layer {
+        let [outputs, inputs, kernel, _] = self.weight.dims();
+        let kind = match (self.checkerboard, self.stride) {
+            (true, _) => LayerKind::Checkerboard,
+            (false, 1) => LayerKind::Convolution,
+            _ => LayerKind::Halving,
+        };
+        Layer {
+            kind,
+            inputs: (inputs * self.groups) as u32,
+            outputs: outputs as u32,
+            kernel: kernel as u32,
+            groups: self.groups as u32,
+            weight: self.weight.val().into_data().iter().collect(),
+            bias: self.bias.val().into_data().iter().collect(),
+        }
     }
 
     /// Row and column of the taps that count.
@@ -237,6 +257,20 @@ pub struct PlaneDeconv {
 }
 
 impl PlaneDeconv {
+    /// The same layer for the codec's exact executor.
+    pub fn to_layer(&self) -> Layer {
+        let [inputs, outputs, kernel, _] = self.weight.dims();
+        Layer {
+            kind: LayerKind::Doubling,
+            inputs: inputs as u32,
+            outputs: outputs as u32,
+            kernel: kernel as u32,
+            groups: 1,
+            weight: self.weight.val().into_data().iter().collect(),
+            bias: self.bias.val().into_data().iter().collect(),
+        }
+    }
+
     /// `[O, 2 H, 2 W]` from `[I, H, W]`.
     pub fn forward(&self, plane: Tensor<3>) -> Tensor<3> {
         let [inputs, height, width] = plane.dims();

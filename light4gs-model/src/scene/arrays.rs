@@ -1,16 +1,11 @@
 //! Between Burn modules and the codec's plain arrays.
 
-use burn::module::{Module, Param};
-use burn::nn::{Linear, LinearConfig};
+use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS, position_of, scale_of};
-use light4gs_codec::{
-    GaussianArrays, HeadFlags, HexPlaneArrays, LinearLayer, NetworkArrays, Plane, SceneData, SceneFrameArrays,
-    SceneMeta,
-};
+use light4gs_codec::{GaussianArrays, HexPlaneArrays, Plane, SceneData, SceneFrameArrays, SceneMeta};
 
 use super::coordinates::{Pca, SceneCoordinates};
-use super::deformation::{Deformation, DeformationHead};
 use super::dynamic_scene::DynamicScene;
 use super::field::DeformationField;
 use super::gaussians::{GaussianTensors, Gaussians};
@@ -19,25 +14,17 @@ use super::hexplane::HexPlane;
 /// Plain arrays that do not make a model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ModelError {
-    /// A layer that the flags promise is not there.
-    #[error("deformation network: layer `{0}` is missing")]
-    MissingLayer(String),
-    /// A layer has other inputs or outputs than its place asks for.
-    #[error(
-        "deformation network: layer `{name}` is {inputs} -> {outputs}, expected {expected_inputs} -> {expected_outputs}"
-    )]
-    LayerShape {
-        /// Which layer.
-        name: String,
-        /// As found.
-        inputs: usize,
-        /// As found.
-        outputs: usize,
-        /// As needed.
-        expected_inputs: usize,
-        /// As needed.
-        expected_outputs: usize,
+    /// The file moves its Gaussians in a way that this model does not know.
+    #[error("motion: the file's kind is `{found}`, this model is a `{expected}`")]
+    MotionKind {
+        /// As the file says.
+        found: String,
+        /// As the model says.
+        expected: &'static str,
     },
+    /// What moves the Gaussians is not what its kind consists of.
+    #[error("motion: {0}")]
+    Motion(String),
     /// The planes are not six a scale in the shapes that the resolution gives.
     #[error("hexplanes: {0}")]
     Planes(String),
@@ -146,99 +133,6 @@ impl HexPlane {
     }
 }
 
-fn layer_to_arrays(name: String, layer: &Linear) -> LinearLayer {
-    let [inputs, outputs] = layer.weight.dims();
-    LinearLayer {
-        name,
-        inputs: inputs as u32,
-        outputs: outputs as u32,
-        // Burn keeps [in, out], the stream [out, in].
-        weight: values(layer.weight.val().transpose()),
-        bias: layer.bias.as_ref().map(|bias| values(bias.val())).unwrap_or_else(|| vec![0.0; outputs]),
-    }
-}
-
-impl Deformation {
-    fn heads(&self) -> [(&'static str, &Option<DeformationHead>); 5] {
-        [
-            ("position", &self.position),
-            ("scale", &self.scale),
-            ("rotation", &self.rotation),
-            ("opacity", &self.opacity),
-            ("sh", &self.sh),
-        ]
-    }
-
-    /// Copies to plain arrays; layers are named `trunk.0`, `position.hidden`, `position.output` and so on.
-    pub fn to_arrays(&self) -> NetworkArrays {
-        let trunk = self.trunk.iter().enumerate().map(|(i, layer)| layer_to_arrays(format!("trunk.{i}"), layer));
-        let heads = self.heads().into_iter().filter_map(|(name, head)| head.as_ref().map(|head| (name, head)));
-        let head_layers = heads.flat_map(|(name, head)| {
-            [
-                layer_to_arrays(format!("{name}.hidden"), &head.hidden),
-                layer_to_arrays(format!("{name}.output"), &head.output),
-            ]
-        });
-        NetworkArrays {
-            width: self.trunk[0].weight.dims()[1] as u32,
-            depth: self.trunk.len() as u32,
-            heads: HeadFlags {
-                position: self.position.is_some(),
-                scale: self.scale.is_some(),
-                rotation: self.rotation.is_some(),
-                opacity: self.opacity.is_some(),
-                sh: self.sh.is_some(),
-            },
-            layers: trunk.chain(head_layers).collect(),
-        }
-    }
-
-    /// From plain arrays, for features of a known length.
-    pub fn from_arrays(arrays: &NetworkArrays, feature_size: usize, device: &Device) -> Result<Self, ModelError> {
-        let width = arrays.width as usize;
-        let layer = |name: String, expected_inputs: usize, expected_outputs: usize| {
-            let found = arrays.layers.iter().find(|layer| layer.name == name);
-            let found = found.ok_or_else(|| ModelError::MissingLayer(name.clone()))?;
-            let (inputs, outputs) = (found.inputs as usize, found.outputs as usize);
-            if (inputs, outputs) != (expected_inputs, expected_outputs)
-                || found.weight.len() != inputs * outputs
-                || found.bias.len() != outputs
-            {
-                return Err(ModelError::LayerShape { name, inputs, outputs, expected_inputs, expected_outputs });
-            }
-            let weight = Tensor::<2>::from_data(TensorData::new(found.weight.clone(), [outputs, inputs]), device);
-            let bias = Tensor::<1>::from_data(TensorData::new(found.bias.clone(), [outputs]), device);
-            let mut linear = LinearConfig::new(inputs, outputs).init(device);
-            // Copied, since a transposed view would be copied anew in every product.
-            let transposed = Tensor::from_data(weight.transpose().into_data(), device);
-            linear.weight = Param::from_tensor(transposed);
-            linear.bias = Some(Param::from_tensor(bias));
-            Ok(linear)
-        };
-        let head = |wanted: bool, name: &str, outputs: usize| -> Result<Option<DeformationHead>, ModelError> {
-            wanted
-                .then(|| {
-                    Ok(DeformationHead {
-                        hidden: layer(format!("{name}.hidden"), width, width)?,
-                        output: layer(format!("{name}.output"), width, outputs)?,
-                    })
-                })
-                .transpose()
-        };
-        let trunk = (0..arrays.depth.max(1))
-            .map(|i| layer(format!("trunk.{i}"), if i == 0 { feature_size } else { width }, width))
-            .collect::<Result<_, _>>()?;
-        Ok(Self {
-            trunk,
-            position: head(arrays.heads.position, "position", 3)?,
-            scale: head(arrays.heads.scale, "scale", 3)?,
-            rotation: head(arrays.heads.rotation, "rotation", 4)?,
-            opacity: head(arrays.heads.opacity, "opacity", 1)?,
-            sh: head(arrays.heads.sh, "sh", 48)?,
-        })
-    }
-}
-
 impl<F: DeformationField> DynamicScene<F> {
     /// Copies the model to what a `.l4gs` file holds.
     pub fn to_arrays(&self, meta: SceneMeta) -> SceneData {
@@ -247,7 +141,7 @@ impl<F: DeformationField> DynamicScene<F> {
             gaussians: self.gaussians.to_arrays(),
             frame: self.coordinates.to_arrays(),
             hexplane: self.planes().map(HexPlane::to_arrays).unwrap_or_default(),
-            deformation: self.field.to_arrays(),
+            motion: self.field.to_arrays(),
         }
     }
 
@@ -256,6 +150,9 @@ impl<F: DeformationField> DynamicScene<F> {
     /// # Errors
     /// Planes or layers that do not belong together, or are not what this kind of field needs.
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
+        if data.motion.kind != F::KIND {
+            return Err(ModelError::MotionKind { found: data.motion.kind.clone(), expected: F::KIND });
+        }
         let planes = match data.hexplane.planes.is_empty() {
             true => None,
             false => Some(HexPlane::from_arrays(&data.hexplane, device)?),
@@ -264,7 +161,7 @@ impl<F: DeformationField> DynamicScene<F> {
         Ok(Self {
             gaussians: Gaussians::from_arrays(&data.gaussians, device),
             coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device),
-            field: F::from_arrays(&data.deformation, planes, device)?,
+            field: F::from_arrays(&data.motion, planes, device)?,
             differentiate_points: true,
         }
         .no_grad())

@@ -1,11 +1,14 @@
 //! The deformation network: from a hexplane feature to changes of a Gaussian's attributes (paper III-A).
 
 use burn::config::Config;
-use burn::module::Module;
+use burn::module::{Module, Param};
 use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::activation::relu;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::network::{Layer, Value};
+use light4gs_codec::{MotionNetwork, MotionOutput, MotionSource, Network};
 
+use super::arrays::ModelError;
 use super::field::Offsets;
 
 /// Configuration of a [`Deformation`].
@@ -77,6 +80,13 @@ impl DeformationHead {
     fn forward(&self, rectified: Tensor<2>) -> Tensor<2> {
         self.output.forward(relu(self.hidden.forward(rectified)))
     }
+
+    /// [`Self::forward`] for the codec's exact executor.
+    fn describe(&self, network: &mut Network, rectified: Value) -> Value {
+        let hidden = network.layer(rectified, to_layer(&self.hidden));
+        let rectified = network.relu(hidden);
+        network.layer(rectified, to_layer(&self.output))
+    }
 }
 
 /// A trunk and a head for each attribute that changes.
@@ -128,4 +138,94 @@ impl Deformation {
             sh: run(&self.sh).map(|sh| sh.reshape([count, 16, 3])),
         }
     }
+
+    fn heads(&self) -> [(MotionOutput, &Option<DeformationHead>); 5] {
+        [
+            (MotionOutput::Position, &self.position),
+            (MotionOutput::LogScale, &self.scale),
+            (MotionOutput::Quaternion, &self.rotation),
+            (MotionOutput::OpacityLogit, &self.opacity),
+            (MotionOutput::Sh, &self.sh),
+        ]
+    }
+
+    /// [`Self::forward`] for the stream and the codec's exact executor.
+    pub fn to_motion(&self) -> MotionNetwork {
+        let [first, rest @ ..] = &self.trunk[..] else { unreachable!("a trunk has at least one layer") };
+        let first = to_layer(first);
+        let (mut network, [features]) = Network::new([first.inputs]);
+        let first = network.layer(features, first);
+        let hidden = rest.iter().fold(first, |hidden, layer| {
+            let rectified = network.relu(hidden);
+            network.layer(rectified, to_layer(layer))
+        });
+        let rectified = network.relu(hidden);
+        let mut outputs = Vec::new();
+        for (output, head) in self.heads() {
+            if let Some(head) = head {
+                let value = head.describe(&mut network, rectified);
+                network.output(value);
+                outputs.push(output);
+            }
+        }
+        MotionNetwork { network, sources: vec![MotionSource::Features], outputs }
+    }
+
+    /// From a network that [`Self::to_motion`] makes, for features of a known length.
+    ///
+    /// # Errors
+    /// Another network.
+    pub fn from_motion(motion: &MotionNetwork, feature_size: usize, device: &Device) -> Result<Self, ModelError> {
+        let has = |output| motion.outputs.contains(&output);
+        let layers: Vec<&Layer> = motion.network.layers().collect();
+        let width = layers.first().map_or(0, |layer| layer.outputs as usize);
+        let config = DeformationConfig {
+            feature_size,
+            width,
+            depth: layers.len().saturating_sub(2 * motion.outputs.len()),
+            position: has(MotionOutput::Position),
+            scale: has(MotionOutput::LogScale),
+            rotation: has(MotionOutput::Quaternion),
+            opacity: has(MotionOutput::OpacityLogit),
+            sh: has(MotionOutput::Sh),
+        };
+        let other = |what: &str| ModelError::Motion(format!("{what} are not those of a trunk with heads"));
+        // Sizes first: nothing is made for sizes that nobody has numbers for.
+        let sizes = |layer: &&Layer| layer.weight.len() as u64 == layer.weights() && layer.inputs as usize <= width.max(feature_size);
+        if width == 0 || !layers.iter().all(sizes) {
+            return Err(other("layers"));
+        }
+        let mut deformation = config.init(device);
+        let own = deformation.to_motion();
+        if (&own.sources, &own.outputs) != (&motion.sources, &motion.outputs) {
+            return Err(other("sources or outputs"));
+        }
+        if !own.network.has_structure_of(&motion.network) {
+            return Err(other("nodes"));
+        }
+        let Self { trunk, position, scale, rotation, opacity, sh } = &mut deformation;
+        let heads = [position, scale, rotation, opacity, sh].into_iter().flatten();
+        let linears = trunk.iter_mut().chain(heads.flat_map(|head| [&mut head.hidden, &mut head.output]));
+        for (linear, layer) in linears.zip(layers) {
+            load(linear, layer, device);
+        }
+        Ok(deformation)
+    }
+}
+
+/// Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
+fn to_layer(linear: &Linear) -> Layer {
+    let [_, outputs] = linear.weight.dims();
+    let bias = linear.bias.as_ref().map(|bias| bias.val().into_data().iter().collect());
+    let weight = linear.weight.val().transpose().into_data().iter().collect();
+    Layer::linear(weight, bias.unwrap_or_else(|| vec![0.0; outputs]))
+}
+
+fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
+    let (inputs, outputs) = (layer.inputs as usize, layer.outputs as usize);
+    let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), [outputs, inputs]), device);
+    let bias = Tensor::<1>::from_data(TensorData::new(layer.bias.clone(), [outputs]), device);
+    // Copied, since a transposed view would be copied anew in every product.
+    linear.weight = Param::from_tensor(Tensor::from_data(weight.transpose().into_data(), device));
+    linear.bias = Some(Param::from_tensor(bias));
 }

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::{Device, Tensor, s};
-use light4gs_codec::NetworkArrays;
+use light4gs_codec::MotionArrays;
 
 use super::arrays::ModelError;
 use super::gaussians::GaussianTensors;
@@ -42,14 +42,15 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
         None
     }
 
-    /// Its networks as the stream holds them. Planes travel apart from them.
-    fn to_arrays(&self) -> NetworkArrays;
+    /// What the stream holds of it, with [`Self::KIND`] as its kind: a network that the codec can run too, so that any
+    /// program can tell where the Gaussians are, or plain tensors. Planes travel apart from it.
+    fn to_arrays(&self) -> MotionArrays;
 
-    /// The field of a decoded file: its networks, and the planes if the file has some.
+    /// The field of a decoded file of [`Self::KIND`]: its networks, and the planes if the file has some.
     ///
     /// # Errors
     /// A layer or plane that is missing, or of another shape than the others ask for.
-    fn from_arrays(arrays: &NetworkArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError>;
+    fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError>;
 }
 
 /// Changes to add to raw attributes of N Gaussians; absent where a field leaves an attribute alone.

@@ -3,7 +3,7 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::NetworkArrays;
+use light4gs_codec::MotionArrays;
 
 use super::arrays::ModelError;
 use super::deformation::{Deformation, DeformationConfig};
@@ -72,13 +72,14 @@ impl DeformationField for HexPlaneField {
         Some(&mut self.hexplane)
     }
 
-    fn to_arrays(&self) -> NetworkArrays {
-        self.deformation.to_arrays()
+    fn to_arrays(&self) -> MotionArrays {
+        MotionArrays { kind: Self::KIND.to_owned(), network: Some(self.deformation.to_motion()), tensors: Vec::new() }
     }
 
-    fn from_arrays(arrays: &NetworkArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
         let hexplane = planes.ok_or_else(|| ModelError::Planes("none, but a hexplane field needs some".into()))?;
-        let deformation = Deformation::from_arrays(arrays, hexplane.feature_size(), device)?;
+        let motion = arrays.network.as_ref().ok_or_else(|| ModelError::Motion("no network".into()))?;
+        let deformation = Deformation::from_motion(motion, hexplane.feature_size(), device)?;
         Ok(Self { hexplane, deformation })
     }
 }

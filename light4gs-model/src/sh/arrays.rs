@@ -1,12 +1,9 @@
 //! Entropy models of the spherical harmonics as the codec's plain arrays.
 
-use burn::module::Param;
-use burn::tensor::Tensor;
-use light4gs_codec::{CodecError, FrequencyTable, LinearLayer, ShCoding, ShCondition};
+use light4gs_codec::{CodecError, FrequencyTable, ShCoding};
 
 use super::entropy::ShEntropy;
 use super::model::ShEntropyModel;
-use crate::named_parameters::Layer;
 
 /// A table goes no further than this many symbols on either side of 0; what lies beyond is escaped.
 const TABLE_REACH: i32 = 8000;
@@ -14,10 +11,6 @@ const TABLE_REACH: i32 = 8000;
 /// The symbol of a value, as far as a table reaches.
 fn table_symbol(value: f32, step: f32) -> i32 {
     ((value / step).round() as i32).clamp(-TABLE_REACH, TABLE_REACH)
-}
-
-fn values<const D: usize>(parameter: &Param<Tensor<D>>) -> Vec<f32> {
-    parameter.val().into_data().iter::<f32>().collect()
 }
 
 impl ShEntropyModel {
@@ -34,24 +27,7 @@ impl ShEntropyModel {
             let tables = pmf.iter().map(|pmf| FrequencyTable::from_pmf(low, pmf)).collect::<Result<_, _>>()?;
             return Ok(ShCoding::Tables { step, tables });
         }
-        let kind = match self {
-            Self::HexPlaneCoupled(_) => ShCondition::HexplaneCoupled,
-            _ => ShCondition::Autoregressive,
-        };
-        let layers = self.layers().iter().map(linear_layer).collect();
-        Ok(ShCoding::Conditional { step, kind, layers })
-    }
-}
-
-/// A 1×1 convolution as a linear layer.
-fn linear_layer(layer: &Layer) -> LinearLayer {
-    let [outputs, inputs, ..] = layer.weight.dims();
-    LinearLayer {
-        name: layer.name.to_owned(),
-        inputs: inputs as u32,
-        outputs: outputs as u32,
-        weight: values(layer.weight),
-        bias: values(layer.bias),
+        Ok(ShCoding::Networks { step, priors: self.priors() })
     }
 }
 

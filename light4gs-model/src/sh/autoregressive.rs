@@ -3,6 +3,8 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::network::Operation;
+use light4gs_codec::{Network, ShPrior, ShSource};
 
 use super::entropy::{ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
 use super::network::{Names, ShNetwork};
@@ -89,6 +91,25 @@ impl ShEntropy for ShAutoregressive {
             decoded.push(round_around(own, self.output(degree, &dc, &lower).detach(), self.step));
         }
         channels_last(Tensor::cat(decoded, 0))
+    }
+
+    fn priors(&self) -> Vec<ShPrior> {
+        let prior = |(degree, (lower, _)): (&ShNetwork, (usize, usize))| {
+            let (mut network, sources, features);
+            if lower == 0 {
+                (network, [features]) = Network::new([DC as u32]);
+                sources = vec![ShSource::Dc];
+            } else {
+                let inputs;
+                (network, inputs) = Network::new([DC as u32, lower as u32]);
+                features = network.node(Operation::Concatenate, &inputs);
+                sources = vec![ShSource::Dc, ShSource::Decoded];
+            }
+            let output = degree.describe(&mut network, features);
+            network.output(output);
+            ShPrior { network, sources }
+        };
+        self.degrees.iter().zip(DEGREES).map(prior).collect()
     }
 }
 

@@ -3,6 +3,7 @@
 use std::ops::RangeInclusive;
 
 use burn::tensor::{Device, Distribution, Tensor};
+use light4gs_codec::ShPrior;
 
 use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 
@@ -45,6 +46,12 @@ pub trait ShEntropy {
 
     /// `values` as a decoder gets them. Without gradient.
     fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
+
+    /// The networks behind [`Self::bits`] for the codec's exact executor, with the same weights; none where the model
+    /// travels as tables.
+    fn priors(&self) -> Vec<ShPrior> {
+        Vec::new()
+    }
 }
 
 /// An entropy model whose densities do not depend on anything: a frequency table for each channel.

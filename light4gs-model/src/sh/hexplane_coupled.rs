@@ -4,6 +4,7 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::plane_layout::PLANES_PER_SCALE;
+use light4gs_codec::{Network, ShPrior, ShSource};
 
 use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
 use super::network::{Names, ShNetwork};
@@ -83,6 +84,14 @@ impl ShEntropy for ShHexPlaneCoupled {
 
     fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
         channels_last(round_around(channels_first(values.detach()), self.output(known).detach(), self.step))
+    }
+
+    fn priors(&self) -> Vec<ShPrior> {
+        let [first, _] = &self.network.layers;
+        let (mut network, [features]) = Network::new([first.to_layer().inputs]);
+        let output = self.network.describe(&mut network, features);
+        network.output(output);
+        vec![ShPrior { network, sources: vec![ShSource::SpaceFeatures] }]
     }
 }
 

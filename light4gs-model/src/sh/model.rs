@@ -3,6 +3,7 @@
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::ShPrior;
 
 use super::autoregressive::{ShAutoregressive, ShAutoregressiveConfig};
 use super::bottleneck::{ShBottleneck, ShBottleneckConfig};
@@ -106,6 +107,10 @@ impl ShEntropy for ShEntropyModel {
 
     fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
         self.model().quantize(values, known)
+    }
+
+    fn priors(&self) -> Vec<ShPrior> {
+        self.model().priors()
     }
 }
 

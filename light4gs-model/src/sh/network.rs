@@ -3,6 +3,8 @@
 use burn::module::{Module, Param};
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::Network;
+use light4gs_codec::network::Value;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 use crate::named_parameters::{Layer, NamedParameterVisitor, visit_layer};
@@ -31,6 +33,14 @@ impl ShNetwork {
     pub(crate) fn forward(&self, features: Tensor<3>) -> Tensor<3> {
         let [first, last] = &self.layers;
         last.forward(leaky_relu(first.forward(features), LEAKY_SLOPE))
+    }
+
+    /// [`Self::forward`] for the codec's exact executor.
+    pub(crate) fn describe(&self, network: &mut Network, features: Value) -> Value {
+        let [first, last] = &self.layers;
+        let hidden = network.layer(features, first.to_layer());
+        let rectified = network.leaky_relu(hidden, LEAKY_SLOPE as f32);
+        network.layer(rectified, last.to_layer())
     }
 
     pub(crate) fn layers(&self, names: Names) -> impl Iterator<Item = Layer<'_>> {

@@ -114,7 +114,9 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
         let sections: Vec<_> = info
             .sections
             .iter()
-            .map(|s| json!({"name": s.name, "encoding": s.encoding.name(), "offset": s.offset, "bytes": s.bytes}))
+            .map(|s| {
+                json!({"name": s.name, "kind": s.kind.name(), "encoding": s.encoding.name(), "offset": s.offset, "bytes": s.bytes})
+            })
             .collect();
         return say_json(&json!({
             "version": info.version, "bytes": info.bytes, "header_bytes": info.header_bytes, "sections": sections,
@@ -123,23 +125,23 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
             "gaussians": info.gaussian_count, "sh_degree": info.sh_degree,
             "hexplane": {"channels": info.hexplane_channels, "resolution": info.hexplane_resolution,
                 "multipliers": info.hexplane_multipliers},
-            "deformation": {"width": info.network_width, "depth": info.network_depth, "layers": info.layer_count},
+            "motion": {"kind": info.motion.kind, "layers": motion_layers(info)},
             "profile": info.profile.map(|profile| profile.name()),
             "plane_steps": info.plane_steps.iter().map(|s| [s.space_only, s.space_time]).collect::<Vec<_>>(),
             "plane_bytes": info.plane_bytes.iter().map(|p| json!({"plane": plane_name(p.plane),
-                "hyperprior": p.hyperprior, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
+                "latent": p.latent, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
         }));
     }
     let rate = if *fps > 0.0 { format!(" at {fps} frames a second") } else { String::new() };
     say(format_args!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version))?;
     say(format_args!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree))?;
     say(format_args!(
-        "hexplanes: {} channels, {:?} cells times {:?}; network: width {}, {} layers",
+        "hexplanes: {} channels, {:?} cells times {:?}; motion: {}, {} layers",
         info.hexplane_channels,
         info.hexplane_resolution,
         info.hexplane_multipliers,
-        info.network_width,
-        info.layer_count
+        info.motion.kind,
+        motion_layers(info)
     ))?;
     if let Some(profile) = info.profile {
         let steps: Vec<String> = info
@@ -152,6 +154,11 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     say(format_args!("configuration {digest}\n"))?;
     let sizes = section_sizes(info);
     say(sections_table(sizes.iter().map(|s| (s.name.as_str(), s.bytes)), info.bytes))
+}
+
+/// Layers of the network that moves the Gaussians.
+fn motion_layers(info: &StreamInfo) -> usize {
+    info.motion.network.iter().flat_map(|motion| motion.network.layers()).count()
 }
 
 #[derive(Debug, Args)]
@@ -199,10 +206,13 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
         let shape = vec![data.hexplane.channels as usize, plane.height as usize, plane.width as usize];
         add(format!("hexplane.{}", plane_name(i)), shape, &plane.values);
     }
-    for layer in &data.deformation.layers {
-        let shape = vec![layer.outputs as usize, layer.inputs as usize];
-        add(format!("deformation.{}.weight", layer.name), shape, &layer.weight);
-        add(format!("deformation.{}.bias", layer.name), vec![layer.outputs as usize], &layer.bias);
+    let layers = data.motion.network.iter().flat_map(|motion| motion.network.layers());
+    for (i, layer) in layers.enumerate() {
+        add(format!("motion.{i}.weight"), vec![layer.outputs as usize, layer.inputs as usize], &layer.weight);
+        add(format!("motion.{i}.bias"), vec![layer.outputs as usize], &layer.bias);
+    }
+    for tensor in &data.motion.tensors {
+        add(format!("motion.{}", tensor.name), tensor.shape.iter().map(|side| *side as usize).collect(), &tensor.values);
     }
     tensors
 }

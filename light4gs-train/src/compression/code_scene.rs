@@ -130,7 +130,7 @@ fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<Plane
         name: plane_name(bytes.plane),
         step: steps[bytes.plane],
         symbols: encoded.decoded.hexplane.planes[bytes.plane].values.len(),
-        hyperprior_bytes: bytes.hyperprior,
+        hyperprior_bytes: bytes.latent,
         value_bytes: bytes.anchors + bytes.others,
     };
     encoded.coded.report.planes.iter().map(record).collect()

@@ -151,7 +151,7 @@ pub fn compression_input<F: DeformationField>(
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
         attributes: attribute_steps(&config.attributes),
         weights: WeightPrecisions {
-            deformation: WeightPrecision::Bits(config.weights.deformation_bits),
+            motion: WeightPrecision::Bits(config.weights.deformation_bits),
             context_model: WeightPrecision::Bits(config.weights.context_bits),
             sh: WeightPrecision::Bits(config.weights.context_bits),
         },
@@ -173,7 +173,7 @@ impl Compression {
         Ok(Some(PlaneCoding {
             model: models.context.to_arrays()?,
             steps: steps.to_groups(),
-            hyper_symbols: symbols.into_iter().map(|plane| plane.map_or_else(Vec::new, integers)).collect(),
+            latent_symbols: symbols.into_iter().map(|plane| plane.map_or_else(Vec::new, integers)).collect(),
         }))
     }
 

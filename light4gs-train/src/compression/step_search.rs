@@ -4,7 +4,7 @@
 //! each number. So for a given error in total the file is smallest when every number of every attribute brings the
 //! same share of it. One rendering an attribute tells how sensitive the pictures are to it; the steps follow from that.
 
-use light4gs_codec::attributes::{AttributeSteps, quantised};
+use light4gs_codec::attributes::{AttributeSteps, quantized};
 use light4gs_codec::{CodecError, SceneData};
 
 /// Numbers a Gaussian: position, scales, quaternion, opacity, colour.
@@ -44,7 +44,7 @@ pub(super) fn search(
     scene.gaussians.sh_rest = Vec::new();
     let exact = render(&scene);
     let distortion = |steps: &AttributeSteps| -> Result<f64, CodecError> {
-        let pictures = render(&SceneData { gaussians: quantised(&scene.gaussians, steps)?, ..scene.clone() });
+        let pictures = render(&SceneData { gaussians: quantized(&scene.gaussians, steps)?, ..scene.clone() });
         let sum: f64 = pictures.iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         Ok(sum / exact.len().max(1) as f64)
     };

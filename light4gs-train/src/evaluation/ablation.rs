@@ -141,7 +141,7 @@ pub fn to_markdown(rows: &[AblationRow]) -> String {
     );
     for row in rows {
         let [gaussians, sh, network, context, planes] =
-            ["gaussians", "sh", "deformation", "context_model", "hexplanes"].map(|name| row.section(name));
+            ["gaussians", "sh", "motion", "context_model", "hexplanes"].map(|name| row.section(name));
         text += &format!(
             "| {} | {:.2} | {:.4} | {} | {} | {gaussians} | {sh} | {network} | {context} | {planes} | {:.1} |\n",
             row.name, row.psnr, row.ssim, row.bytes, row.gaussians, row.minutes

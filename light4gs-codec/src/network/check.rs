@@ -1,0 +1,317 @@
+//! What a network must be before it runs.
+
+use super::{Layer, LayerKind, Network, Operation, Value};
+use crate::{CodecError, Limits, limits::at_most};
+
+impl Operation {
+    /// A name for messages.
+    pub(super) fn name(&self) -> &'static str {
+        match self {
+            Self::Layer(layer) => match layer.kind {
+                LayerKind::Convolution => "convolution",
+                LayerKind::Halving => "halving convolution",
+                LayerKind::Doubling => "doubling convolution",
+                LayerKind::Checkerboard => "checkerboard convolution",
+            },
+            Self::Relu => "ReLU",
+            Self::LeakyRelu(_) => "leaky ReLU",
+            Self::Resize => "resize",
+            Self::MeanOverHeight => "mean over height",
+            Self::MeanOverWidth => "mean over width",
+            Self::Transpose => "transpose",
+            Self::Spread => "spread",
+            Self::Concatenate => "concatenate",
+            Self::Add => "add",
+            Self::Multiply => "multiply",
+        }
+    }
+
+    /// Whether its input must be there as a whole map, since it looks beyond one place.
+    pub(super) fn reads_map(&self) -> bool {
+        match self {
+            Self::Layer(layer) => match layer.kind {
+                LayerKind::Convolution => layer.kernel > 1,
+                LayerKind::Halving | LayerKind::Doubling => true,
+                LayerKind::Checkerboard => false,
+            },
+            Self::Resize | Self::MeanOverHeight | Self::MeanOverWidth | Self::Transpose | Self::Spread => true,
+            _ => false,
+        }
+    }
+
+    /// Whether it is computed as a whole map, not place by place.
+    pub(super) fn makes_map(&self) -> bool {
+        match self {
+            Self::Layer(layer) => layer.kind == LayerKind::Doubling,
+            Self::Resize | Self::MeanOverHeight | Self::MeanOverWidth | Self::Transpose => true,
+            _ => false,
+        }
+    }
+
+    pub(super) fn reads_anchors(&self) -> bool {
+        matches!(self, Self::Layer(layer) if layer.kind == LayerKind::Checkerboard)
+    }
+
+    /// Zeros beyond the border that its input needs.
+    pub(super) fn border(&self) -> usize {
+        match self {
+            Self::Layer(layer) if layer.kind == LayerKind::Doubling => 1,
+            Self::Layer(layer) => layer.kernel as usize / 2,
+            _ => 0,
+        }
+    }
+}
+
+impl Network {
+    /// Channels of every value of a network whose nodes read only what is before them.
+    pub(crate) fn channels(&self) -> Vec<u64> {
+        let mut channels: Vec<u64> = self.inputs.iter().map(|&channels| channels.into()).collect();
+        for node in &self.nodes {
+            let of = |value: &Value| channels[value.0 as usize];
+            channels.push(match &node.operation {
+                Operation::Layer(layer) => layer.outputs.into(),
+                Operation::Concatenate => node.inputs.iter().map(of).sum(),
+                _ => of(&node.inputs[0]),
+            });
+        }
+        channels
+    }
+
+    /// Numbers of all weights and biases.
+    pub(crate) fn weights(&self) -> u64 {
+        self.layers().fold(0u64, |sum, layer| sum.saturating_add(layer.weights()).saturating_add(layer.outputs.into()))
+    }
+
+    /// Which inputs are anchors of a checkerboard.
+    pub(crate) fn anchor_inputs(&self) -> Vec<bool> {
+        let reads = |value: usize| {
+            self.nodes.iter().any(|node| node.operation.reads_anchors() && node.inputs[0].0 as usize == value)
+        };
+        (0..self.inputs.len()).map(reads).collect()
+    }
+
+    /// Refuses what is no network, or one beyond the limits, before anything is computed. `name` is what messages call it.
+    pub(crate) fn check(&self, section: &'static str, name: &str, limits: &Limits) -> Result<(), CodecError> {
+        self.check_structure(section, name, limits)?;
+        for (index, node) in self.nodes.iter().enumerate() {
+            if let Operation::Layer(layer) = &node.operation {
+                check_weights(layer, section, &format!("{name}, node {index}"))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// [`Network::check`] without a look at the weights.
+    pub(crate) fn check_structure(&self, section: &'static str, name: &str, limits: &Limits) -> Result<(), CodecError> {
+        let refuse = |field: String, found: String, expected: &str| {
+            Err(CodecError::invalid(section, format!("{name}, {field}"), found, expected))
+        };
+        at_most(section, format!("{name}, number of inputs"), self.inputs.len() as u64, limits.nodes)?;
+        at_most(section, format!("{name}, number of nodes"), self.nodes.len() as u64, limits.nodes)?;
+        at_most(section, format!("{name}, number of outputs"), self.outputs.len() as u64, limits.nodes)?;
+        if self.inputs.contains(&0) {
+            return refuse("channels of an input".into(), "0".into(), "1 or more");
+        }
+        for (index, node) in self.nodes.iter().enumerate() {
+            let (field, operation) = (format!("node {index}"), node.operation.name());
+            let arity = match node.operation {
+                Operation::Concatenate => node.inputs.len().max(2),
+                Operation::Add | Operation::Multiply => 2,
+                _ => 1,
+            };
+            if node.inputs.len() != arity || arity > limits.nodes as usize {
+                return refuse(format!("inputs of {field} ({operation})"), node.inputs.len().to_string(), &arity.to_string());
+            }
+            if let Some(later) = node.inputs.iter().find(|value| value.0 as usize >= self.inputs.len() + index) {
+                let expected = format!("less than {}, since a node reads only what is before it", self.inputs.len() + index);
+                return refuse(format!("an input of {field} ({operation})"), later.0.to_string(), &expected);
+            }
+            if let Operation::Layer(layer) = &node.operation {
+                check_layer(layer, section, &format!("{name}, {field}"), limits)?;
+            }
+            if let Operation::LeakyRelu(slope) = node.operation
+                && !slope.is_finite()
+            {
+                return refuse(format!("slope of {field}"), slope.to_string(), "a finite number");
+            }
+        }
+        let all = self.inputs.len() + self.nodes.len();
+        if let Some(missing) = self.outputs.iter().find(|value| value.0 as usize >= all) {
+            return refuse("an output".into(), missing.0.to_string(), &format!("less than {all}"));
+        }
+        // Concatenations may double channels from node to node.
+        let mut channels: Vec<u64> = self.inputs.iter().map(|&channels| channels.into()).collect();
+        let mut total: u64 = channels.iter().sum();
+        for (index, node) in self.nodes.iter().enumerate() {
+            let of = |value: &Value| channels[value.0 as usize];
+            let first = of(&node.inputs[0]);
+            let own = match &node.operation {
+                Operation::Layer(layer) => {
+                    if first != u64::from(layer.inputs) {
+                        return refuse(format!("inputs of node {index}"), layer.inputs.to_string(), &first.to_string());
+                    }
+                    layer.outputs.into()
+                }
+                Operation::Concatenate => node.inputs.iter().fold(0, |sum: u64, value| sum.saturating_add(of(value))),
+                Operation::Add | Operation::Multiply if of(&node.inputs[1]) != first => {
+                    let found = of(&node.inputs[1]).to_string();
+                    return refuse(format!("channels of the second input of node {index}"), found, &first.to_string());
+                }
+                _ => first,
+            };
+            channels.push(own);
+            total = total.saturating_add(own);
+            at_most(section, format!("{name}, channels of all values"), total, limits.layer_width)?;
+        }
+        at_most(section, format!("{name}, channels of all values"), total, limits.layer_width)?;
+        at_most(section, format!("{name}, number of weights"), self.weights(), limits.layer_weights)?;
+        self.check_anchors(section, name)
+    }
+
+    /// Anchors are half a map: only a checkerboard convolution can read them, and what comes of them is known at the
+    /// other half of the places alone.
+    fn check_anchors(&self, section: &'static str, name: &str) -> Result<(), CodecError> {
+        let anchors = self.anchor_inputs();
+        let mut depends = vec![false; self.inputs.len()];
+        let refuse = |index: usize, found: &str, expected: &str| {
+            Err(CodecError::invalid(section, format!("{name}, input of node {index}"), found, expected))
+        };
+        for (index, node) in self.nodes.iter().enumerate() {
+            let reads = node.inputs.iter().any(|value| anchors.get(value.0 as usize).is_some_and(|&anchors| anchors));
+            if node.operation.reads_anchors() != reads {
+                let expected = "an input of the network that only checkerboard convolutions read";
+                return refuse(index, "another value", expected);
+            }
+            let after = reads || node.inputs.iter().any(|value| depends[value.0 as usize]);
+            if after && node.operation.reads_map() {
+                return refuse(index, "half a map", "a value that does not come from anchors");
+            }
+            depends.push(after);
+        }
+        if self.outputs.iter().any(|value| anchors.get(value.0 as usize).is_some_and(|&anchors| anchors)) {
+            return Err(CodecError::invalid(section, format!("{name}, an output"), "anchors", "another value"));
+        }
+        Ok(())
+    }
+
+    /// Refuses a network that looks at more than one place.
+    pub(crate) fn check_pointwise(&self, section: &'static str, name: &str) -> Result<(), CodecError> {
+        let wide = self.nodes.iter().position(|node| node.operation.reads_map() || node.operation.reads_anchors());
+        match wide {
+            Some(index) => {
+                let found = self.nodes[index].operation.name();
+                Err(CodecError::invalid(section, format!("{name}, node {index}"), found, "what looks at one place only"))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Refuses a network with another number of outputs or output channels than those.
+    pub(crate) fn check_outputs(&self, section: &'static str, name: &str, expected: &[u64]) -> Result<(), CodecError> {
+        let channels = self.channels();
+        let found: Vec<u64> = self.outputs.iter().map(|value| channels[value.0 as usize]).collect();
+        if found == expected {
+            return Ok(());
+        }
+        let field = format!("{name}, channels of the outputs");
+        Err(CodecError::invalid(section, field, format!("{found:?}"), format!("{expected:?}")))
+    }
+
+    /// Height and width of every value, for inputs of these sizes and a target; refuses what does not fit together.
+    pub(crate) fn sizes(
+        &self,
+        section: &'static str,
+        name: &str,
+        inputs: &[[u32; 2]],
+        target: [u32; 2],
+        limits: &Limits,
+    ) -> Result<Vec<[u32; 2]>, CodecError> {
+        let mut sizes = inputs.to_vec();
+        for (index, node) in self.nodes.iter().enumerate() {
+            let of = |value: &Value| sizes[value.0 as usize];
+            let [height, width] = of(&node.inputs[0]);
+            let refuse = |found: [u32; 2], expected: [u32; 2]| {
+                let field = format!("{name}, size at node {index} ({})", node.operation.name());
+                Err(CodecError::invalid(section, field, format!("{found:?}"), format!("{expected:?}")))
+            };
+            let size = match &node.operation {
+                Operation::Layer(layer) => match layer.kind {
+                    LayerKind::Halving => [height.div_ceil(2), width.div_ceil(2)],
+                    LayerKind::Doubling => [height.saturating_mul(2), width.saturating_mul(2)],
+                    LayerKind::Convolution | LayerKind::Checkerboard => [height, width],
+                },
+                Operation::Resize => target,
+                Operation::MeanOverHeight => [1, width],
+                Operation::MeanOverWidth => [height, 1],
+                Operation::Transpose => [width, height],
+                Operation::Spread => {
+                    let fits = |side: u32, target: u32| side == 1 || side == target;
+                    if !(fits(height, target[0]) && fits(width, target[1])) {
+                        return refuse([height, width], target);
+                    }
+                    target
+                }
+                _ => {
+                    if let Some(other) = node.inputs.iter().map(of).find(|&other| other != [height, width]) {
+                        return refuse(other, [height, width]);
+                    }
+                    [height, width]
+                }
+            };
+            for side in size {
+                at_most(section, format!("{name}, size at node {index}"), side.into(), limits.resolution)?;
+            }
+            sizes.push(size);
+        }
+        for value in &self.outputs {
+            let found = sizes[value.0 as usize];
+            if found != target {
+                let field = format!("{name}, size of an output");
+                return Err(CodecError::invalid(section, field, format!("{found:?}"), format!("{target:?}")));
+            }
+        }
+        Ok(sizes)
+    }
+}
+
+fn check_layer(layer: &Layer, section: &'static str, name: &str, limits: &Limits) -> Result<(), CodecError> {
+    let Layer { kind, inputs, outputs, kernel, groups, .. } = *layer;
+    let refuse = |field: &str, found: u32, expected: &str| {
+        Err(CodecError::invalid(section, format!("{name}, {field}"), found, expected))
+    };
+    for (field, channels) in [("inputs", inputs), ("outputs", outputs)] {
+        at_most(section, format!("{name}, {field}"), channels.into(), limits.layer_width)?;
+        if channels == 0 {
+            return refuse(field, 0, "1 or more");
+        }
+    }
+    if groups == 0 || !inputs.is_multiple_of(groups) || !outputs.is_multiple_of(groups) {
+        return refuse("groups", groups, &format!("a divisor of {inputs} inputs and {outputs} outputs"));
+    }
+    if kernel.is_multiple_of(2) || kernel > 7 {
+        return refuse("kernel", kernel, "odd, at most 7");
+    }
+    match kind {
+        LayerKind::Doubling if kernel != 5 => return refuse("kernel", kernel, "5, where the size doubles"),
+        LayerKind::Doubling if groups != 1 => return refuse("groups", groups, "1, where the size doubles"),
+        LayerKind::Checkerboard if kernel == 1 => return refuse("kernel", kernel, "3, 5 or 7, for a checkerboard"),
+        _ => {}
+    }
+    let window = u64::from(inputs / groups) * u64::from(kernel) * u64::from(kernel);
+    at_most(section, format!("{name}, weights of an output"), window, limits.layer_width)
+}
+
+fn check_weights(layer: &Layer, section: &'static str, name: &str) -> Result<(), CodecError> {
+    let arrays = [("weight", &layer.weight, layer.weights()), ("bias", &layer.bias, layer.outputs.into())];
+    for (what, values, count) in arrays {
+        if values.len() as u64 != count {
+            let field = format!("length of {name}, {what}");
+            return Err(CodecError::invalid(section, field, values.len(), count.to_string()));
+        }
+        if let Some(index) = values.iter().position(|value| !value.is_finite()) {
+            let field = format!("{name}, {what}");
+            return Err(CodecError::NonFinite { section, field, index, value: values[index] });
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,29 @@
+//! The operations of a network, each in a fixed order of its sums (see [`crate::network`]).
+//!
+//! Loops run over several positions or outputs at once, which changes no output's order.
+//!
+//! | file | what |
+//! |---|---|
+//! | `lanes.rs` | a linear layer on eight positions at a time |
+//! | `padded_map.rs` | channels of a map with a border of zeros, and windows of it |
+//! | `convolution.rs`, `transposed.rs`, `masked.rs` | the kinds of convolution |
+//! | `upsampling.rs`, `reductions.rs` | to another size, means, transposition |
+
+mod convolution;
+mod lanes;
+mod masked;
+mod padded_map;
+mod reductions;
+mod transposed;
+mod upsampling;
+
+pub(crate) use convolution::Convolution;
+pub(crate) use lanes::{LANES, Lanes};
+pub(crate) use masked::{AnchorMap, MaskedConvolution, first_anchor, masked_taps};
+pub(crate) use padded_map::{Columns, PaddedMap};
+pub(crate) use reductions::{mean_over_height, mean_over_width, transposed};
+pub(crate) use transposed::TransposedConvolution;
+pub(crate) use upsampling::resized;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,77 @@
+//! The weights of networks as bytes: float32 one after the other, or quantized as in [`crate::network_weights`].
+
+use super::{
+    Network,
+    weights::{self, EncodedWeights, TensorLength, WeightPrecision, WeightTensor},
+};
+use crate::{
+    CodecError, Limits,
+    limits::at_most,
+    stream::{reader::Reader, sections::Encoding, writer::Writer},
+};
+
+/// A tensor's name in messages.
+const NAME: &str = "weights";
+
+/// Appends tensors, as float32 where there is no precision; returns them as a decoder gets them.
+pub(crate) fn write_tensors(
+    section: &'static str,
+    tensors: &[Vec<f32>],
+    precision: Option<WeightPrecision>,
+    writer: &mut Writer,
+) -> Result<Vec<Vec<f32>>, CodecError> {
+    let Some(precision) = precision else {
+        tensors.iter().for_each(|values| writer.f32s(values));
+        return Ok(tensors.to_vec());
+    };
+    let tensors: Vec<_> = tensors.iter().map(|values| WeightTensor { name: NAME, values, precision }).collect();
+    let EncodedWeights { bytes, tensors } = weights::encode(section, &tensors)?;
+    writer.bytes.extend(bytes);
+    Ok(tensors)
+}
+
+/// Tensors of known lengths from bytes, all of which must be used.
+pub(crate) fn read_tensors(
+    section: &'static str,
+    bytes: &[u8],
+    encoding: Encoding,
+    lengths: &[TensorLength<'_>],
+    limits: &Limits,
+) -> Result<Vec<Vec<f32>>, CodecError> {
+    let total = lengths.iter().fold(0u64, |sum, tensor| sum.saturating_add(tensor.length));
+    at_most(section, "number of weights", total, limits.layer_weights)?;
+    if encoding == Encoding::Quantized {
+        return weights::decode(section, bytes, lengths, limits);
+    }
+    let mut reader = Reader::new(section, bytes);
+    let tensors = lengths.iter().map(|tensor| reader.f32s(tensor.name, tensor.length)).collect::<Result<_, _>>()?;
+    reader.finish()?;
+    Ok(tensors)
+}
+
+/// Appends the weights of networks, and makes them what a decoder gets.
+pub(crate) fn write_weights(
+    section: &'static str,
+    networks: &mut [&mut Network],
+    precision: Option<WeightPrecision>,
+    writer: &mut Writer,
+) -> Result<(), CodecError> {
+    let tensors: Vec<_> = networks.iter().flat_map(|network| network.stored_tensors()).collect();
+    let mut decoded = write_tensors(section, &tensors, precision, writer)?.into_iter();
+    networks.iter_mut().for_each(|network| network.set_stored_tensors(&mut decoded));
+    Ok(())
+}
+
+/// Reads the weights of networks that have none yet.
+pub(crate) fn read_weights(
+    section: &'static str,
+    networks: &mut [&mut Network],
+    bytes: &[u8],
+    encoding: Encoding,
+    limits: &Limits,
+) -> Result<(), CodecError> {
+    let lengths: Vec<_> = networks.iter().flat_map(|network| network.tensor_lengths(NAME)).collect();
+    let mut tensors = read_tensors(section, bytes, encoding, &lengths, limits)?.into_iter();
+    networks.iter_mut().for_each(|network| network.set_stored_tensors(&mut tensors));
+    Ok(())
+}

@@ -1,0 +1,162 @@
+//! Hexplanes under a context model: sizes, steps, and a sub-stream for each part of each plane.
+
+use super::{
+    coder::{self, CodedPlanes},
+    head::{Head, SECTION},
+    plan::{stream_order, sub_streams},
+};
+use crate::{
+    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane,
+    limits::at_most,
+    plane_layout::SIZE_MULTIPLE,
+    stream::{reader::Reader, writer::Writer},
+};
+
+/// Bytes of one plane.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlaneBytes {
+    /// Position among [`HexPlaneArrays::planes`].
+    pub plane: usize,
+    /// Of the latent.
+    pub latent: u64,
+    /// Of the anchors, where they come first.
+    pub anchors: u64,
+    /// Of the other values, or all.
+    pub others: u64,
+}
+
+impl PlaneBytes {
+    /// All of the plane's bytes.
+    pub fn total(&self) -> u64 {
+        self.latent + self.anchors + self.others
+    }
+}
+
+/// Refuses what cannot be coded: planes, steps and latents that contradict the model or each other.
+pub(crate) fn check(
+    hexplane: &HexPlaneArrays,
+    model: &ContextModelArrays,
+    steps: &[PerGroup],
+    latent_symbols: &[Vec<i32>],
+) -> Result<(), CodecError> {
+    check_model(&Head::of(hexplane), model)?;
+    let scales = hexplane.multipliers.len();
+    check_steps(steps, scales)?;
+    if latent_symbols.len() != hexplane.planes.len() {
+        let expected = format!("{}, one list a plane", hexplane.planes.len());
+        return Err(CodecError::invalid(SECTION, "lists of latent symbols", latent_symbols.len(), expected));
+    }
+    for (index, (has_latent, symbols)) in model.have_latents(scales).into_iter().zip(latent_symbols).enumerate() {
+        let Plane { height, width, .. } = hexplane.planes[index];
+        let area = u64::from(height / 4) * u64::from(width / 4);
+        let expected = if has_latent { u64::from(model.latent_channels()) * area } else { 0 };
+        if symbols.len() as u64 != expected {
+            let field = format!("number of latent symbols of planes[{index}]");
+            return Err(CodecError::invalid(SECTION, field, symbols.len(), expected.to_string()));
+        }
+    }
+    Ok(())
+}
+
+/// Refuses channels other than the model's, and sizes that a latent or a checkerboard cannot have.
+fn check_model(head: &Head, model: &ContextModelArrays) -> Result<(), CodecError> {
+    if head.channels != model.channels {
+        let expected = format!("{}, those of the context model", model.channels);
+        return Err(CodecError::invalid(SECTION, "channels", head.channels, expected));
+    }
+    for (index, size) in head.sizes.iter().enumerate() {
+        if let Some(side) = size.iter().find(|side| !side.is_multiple_of(SIZE_MULTIPLE as u32)) {
+            let expected = format!("a multiple of {SIZE_MULTIPLE}");
+            return Err(CodecError::invalid(SECTION, format!("a side of planes[{index}]"), side, expected));
+        }
+    }
+    Ok(())
+}
+
+fn check_steps(steps: &[PerGroup], scales: usize) -> Result<(), CodecError> {
+    if steps.len() != 1 && steps.len() != scales {
+        let expected = format!("1, or {scales}, one a scale");
+        return Err(CodecError::invalid(SECTION, "number of steps", steps.len(), expected));
+    }
+    let is_step = |step: f32| step.is_normal() && step > 0.0;
+    match steps.iter().flat_map(|step| [step.space_only, step.space_time]).find(|&step| !is_step(step)) {
+        Some(step) => Err(CodecError::invalid(SECTION, "step", step, "a positive normal number")),
+        None => Ok(()),
+    }
+}
+
+/// Writes planes that [`check`] has passed; returns them as a decoder gets them.
+pub(crate) fn write(
+    hexplane: &HexPlaneArrays,
+    model: &ContextModelArrays,
+    steps: &[PerGroup],
+    latent_symbols: &[Vec<i32>],
+    limits: &Limits,
+    writer: &mut Writer,
+) -> Result<HexPlaneArrays, CodecError> {
+    Head::write(hexplane, writer);
+    writer.varint(steps.len() as u64);
+    steps.iter().for_each(|step| writer.f32s(&[step.space_only, step.space_time]));
+    let CodedPlanes { sub_streams, decoded } = coder::encode(hexplane, model, steps, latent_symbols, limits)?;
+    sub_streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
+    sub_streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
+    Ok(decoded)
+}
+
+/// A section taken apart.
+pub(crate) struct Parts<'a> {
+    pub(crate) head: Head,
+    pub(crate) steps: Vec<PerGroup>,
+    sub_streams: Vec<&'a [u8]>,
+}
+
+impl<'a> Parts<'a> {
+    fn read(bytes: &'a [u8], model: &ContextModelArrays, limits: &Limits) -> Result<Self, CodecError> {
+        let mut reader = Reader::new(SECTION, bytes);
+        let head = Head::read(&mut reader, limits)?;
+        check_model(&head, model)?;
+        let scales = head.multipliers.len();
+        let count = reader.varint_at_most("number of steps", limits.scales)?;
+        let steps = (0..count)
+            .map(|_| Ok(PerGroup { space_only: reader.f32("step")?, space_time: reader.f32("step")? }))
+            .collect::<Result<Vec<_>, CodecError>>()?;
+        check_steps(&steps, scales)?;
+        let count: usize = (0..head.plane_count()).map(|plane| sub_streams(model, plane)).sum();
+        let lengths = (0..count).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
+        let take = |length| reader.take("sub-stream", length);
+        let sub_streams = lengths.into_iter().map(take).collect::<Result<_, _>>()?;
+        reader.finish()?;
+        Ok(Self { head, steps, sub_streams })
+    }
+}
+
+pub(crate) fn read(bytes: &[u8], model: &ContextModelArrays, limits: &Limits) -> Result<HexPlaneArrays, CodecError> {
+    let Parts { head, steps, sub_streams } = Parts::read(bytes, model, limits)?;
+    let values = head.sizes.iter().fold(0u64, |sum, &size| sum.saturating_add(head.values(size)));
+    at_most(SECTION, "number of values", values, limits.coded_values)?;
+    let Head { channels, resolution, multipliers, sizes } = head;
+    let planes = sizes.iter().map(|&[height, width]| Plane { height, width, values: Vec::new() }).collect();
+    let hexplane = HexPlaneArrays { channels, resolution, multipliers, planes };
+    coder::decode(hexplane, model, &steps, &sub_streams, limits)
+}
+
+/// Head, steps and the bytes of every plane, without decoding. The weights of the model are not looked at.
+pub(crate) fn plane_bytes<'a>(
+    bytes: &'a [u8],
+    model: &ContextModelArrays,
+    limits: &Limits,
+) -> Result<(Parts<'a>, Vec<PlaneBytes>), CodecError> {
+    let parts = Parts::read(bytes, model, limits)?;
+    let mut planes: Vec<_> = stream_order(model, parts.head.multipliers.len())
+        .into_iter()
+        .map(|(plane, first)| {
+            let prior = model.prior(plane);
+            let mut lengths = parts.sub_streams[first..].iter().map(|stream| stream.len() as u64);
+            let mut part = |present: bool| if present { lengths.next().unwrap_or(0) } else { 0 };
+            let (latent, anchors) = (part(prior.has_latent()), part(prior.has_anchors()));
+            PlaneBytes { plane, latent, anchors, others: part(true) }
+        })
+        .collect();
+    planes.sort_by_key(|plane| plane.plane);
+    Ok((parts, planes))
+}

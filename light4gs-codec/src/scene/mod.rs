@@ -1,0 +1,138 @@
+//! What a file holds, as plain arrays.
+
+mod motion;
+pub(crate) mod query;
+
+pub use motion::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor};
+
+use std::collections::BTreeMap;
+
+/// A whole dynamic scene: everything that a `.l4gs` stream holds.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneData {
+    /// What the scene is called, how long it plays, where it lies.
+    pub meta: SceneMeta,
+    /// The canonical Gaussians.
+    pub gaussians: GaussianArrays,
+    /// The frame that normalizes positions before the hexplane is queried.
+    pub frame: SceneFrameArrays,
+    /// The multiscale hexplane; without scales where nothing moves.
+    pub hexplane: HexPlaneArrays,
+    /// How the Gaussians move.
+    pub motion: MotionArrays,
+}
+
+/// The facts about a scene that a player needs before it decodes anything.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SceneMeta {
+    /// A name for people.
+    pub name: String,
+    /// Number of frames of the source; time 0 is the first and time 1 the last.
+    pub frame_count: u32,
+    /// Frames a second of the source, 0 where it is not known.
+    pub fps: f32,
+    /// Axis-aligned box of the scene in world units: smallest corner, largest corner.
+    pub bounds: [[f32; 3]; 2],
+    /// Color behind the Gaussians, red, green, blue.
+    pub background: [f32; 3],
+    /// Digest of the configuration that the scene was trained with, zeros where there is none.
+    pub config_digest: [u8; 32],
+    /// Width in pixels of the source's default camera.
+    pub width: u32,
+    /// Height in pixels of the source's default camera.
+    pub height: u32,
+    /// Horizontal field of view in radians of the source's default camera.
+    pub fov_x: f32,
+    /// Free notes, such as the program that wrote the file.
+    pub extra: BTreeMap<String, String>,
+}
+
+/// `N` Gaussians. All arrays have `N` entries but `sh_rest`, which has `N` times [`sh_rest_coefficients`] times 3.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GaussianArrays {
+    /// Centers, in world units.
+    pub means: Vec<[f32; 3]>,
+    /// Natural logarithms of the scales.
+    pub log_scales: Vec<[f32; 3]>,
+    /// Rotations `(w, x, y, z)`, not necessarily of unit length.
+    pub quats: Vec<[f32; 4]>,
+    /// Opacities before the sigmoid.
+    pub opacity_logits: Vec<f32>,
+    /// Spherical harmonics of degree 0, red, green, blue.
+    pub sh_dc: Vec<[f32; 3]>,
+    /// Degree of the spherical harmonics, 0 to 3.
+    pub sh_degree: u8,
+    /// The other coefficients, `[N, (degree + 1)^2 - 1, 3]` row-major.
+    pub sh_rest: Vec<f32>,
+}
+
+impl GaussianArrays {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
+        self.means.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.means.is_empty()
+    }
+}
+
+/// Number of spherical harmonics a channel beyond degree 0: `(degree + 1)^2 - 1`.
+///
+/// ```
+/// assert_eq!([0, 1, 2, 3].map(light4gs_codec::sh_rest_coefficients), [0, 3, 8, 15]);
+/// ```
+pub const fn sh_rest_coefficients(degree: u8) -> usize {
+    let side = degree as usize + 1;
+    side * side - 1
+}
+
+/// Mean, principal axes and per-axis standard deviation of the initial cloud.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFrameArrays {
+    /// Mean of the cloud, in world units.
+    pub mean: [f32; 3],
+    /// `axes[j]` is principal axis `j`, of unit length.
+    pub axes: [[f32; 3]; 3],
+    /// Standard deviation along each principal axis.
+    pub std: [f32; 3],
+}
+
+impl Default for SceneFrameArrays {
+    /// The frame that changes nothing: mean 0, the world's axes, deviations 1.
+    fn default() -> Self {
+        Self { mean: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] }
+    }
+}
+
+/// Feature planes over each pair of the axes x, y, z, t, at several scales.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HexPlaneArrays {
+    /// Channels of every plane.
+    pub channels: u32,
+    /// Base resolution along x, y, z, t.
+    pub resolution: [u32; 4],
+    /// One multiplier of the resolution a scale.
+    pub multipliers: Vec<u32>,
+    /// Six planes a scale, scale-major, in the order xy, xz, xt, yz, yt, zt.
+    pub planes: Vec<Plane>,
+}
+
+impl HexPlaneArrays {
+    /// Length of a feature: channels times scales.
+    pub fn features(&self) -> u64 {
+        u64::from(self.channels) * self.multipliers.len() as u64
+    }
+}
+
+/// One feature plane. Over axes `(a, b)`, `a` before `b`, its width runs along `a` and its height along `b`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plane {
+    /// Samples along the second axis.
+    pub height: u32,
+    /// Samples along the first axis.
+    pub width: u32,
+    /// Features, `[channels, height, width]` row-major.
+    pub values: Vec<f32>,
+}

@@ -1,0 +1,255 @@
+//! How the Gaussians move, as data; and where they are at a time.
+
+use super::query::{multiply_by_sample, normalized};
+use crate::{
+    CodecError, Limits, Network, SceneData,
+    limits::at_most,
+    network::{
+        Program,
+        kernels::{LANES, Lanes},
+    },
+    plane_layout::PLANE_AXES,
+    stream::sections::Section,
+};
+
+const SECTION: &str = Section::Motion.name();
+/// The longest name of a kind.
+const LONGEST_KIND: usize = 64;
+
+/// How the Gaussians move.
+///
+/// This crate runs whatever [`MotionNetwork`] there is; `kind` is for the model that made it, and names the type that it
+/// makes of these arrays. A kind that a program does not know still decodes.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionArrays {
+    /// What the arrays are, such as `deformation`: at most 64 lower-case letters, digits, `-`, `_` and `.`; empty where
+    /// nothing moves.
+    pub kind: String,
+    /// What moves each Gaussian from features at its place, where there is such a network.
+    pub network: Option<MotionNetwork>,
+    /// What else a kind needs, such as control nodes.
+    pub tensors: Vec<NamedTensor>,
+}
+
+/// A network that gives offsets of the attributes of one Gaussian at a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionNetwork {
+    /// It looks at one Gaussian at a time.
+    pub network: Network,
+    /// What its inputs are.
+    pub sources: Vec<MotionSource>,
+    /// What its outputs are; each at most once.
+    pub outputs: Vec<MotionOutput>,
+}
+
+/// What a [`MotionNetwork`] may read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionSource {
+    /// For each scale and channel of the hexplane the product of the six samples at the Gaussian's canonical center and
+    /// the time.
+    Features,
+    /// The canonical center as the hexplane has it: x, y, z in [-1, 1].
+    Point,
+    /// The time in [0, 1].
+    Time,
+}
+
+/// What an output of a [`MotionNetwork`] is added to. Canonical attributes are those of [`crate::GaussianArrays`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotionOutput {
+    /// The center, 3 channels.
+    Position,
+    /// Logarithms of the scales, 3 channels.
+    LogScale,
+    /// The rotation before it is normalized, 4 channels.
+    Quaternion,
+    /// The opacity before the sigmoid, 1 channel.
+    OpacityLogit,
+    /// Spherical harmonics: for each coefficient, degree 0 included, red, green, blue. Those that a scene does not have
+    /// are left out.
+    Sh,
+}
+
+/// Numbers with a name.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct NamedTensor {
+    /// Unique among the tensors.
+    pub name: String,
+    /// Lengths of the axes.
+    pub shape: Vec<u32>,
+    /// Row-major.
+    pub values: Vec<f32>,
+}
+
+impl NamedTensor {
+    /// Numbers that the shape asks for.
+    pub(crate) fn length(&self) -> u64 {
+        self.shape.iter().fold(1, |length: u64, &side| length.saturating_mul(side.into()))
+    }
+}
+
+impl MotionSource {
+    pub(crate) const ALL: [Self; 3] = [Self::Features, Self::Point, Self::Time];
+
+    fn channels(self, features: u64) -> u64 {
+        match self {
+            Self::Features => features,
+            Self::Point => 3,
+            Self::Time => 1,
+        }
+    }
+}
+
+impl MotionOutput {
+    pub(crate) const ALL: [Self; 5] =
+        [Self::Position, Self::LogScale, Self::Quaternion, Self::OpacityLogit, Self::Sh];
+
+    fn has_channels(self, channels: u64) -> bool {
+        match self {
+            Self::Position | Self::LogScale => channels == 3,
+            Self::Quaternion => channels == 4,
+            Self::OpacityLogit => channels == 1,
+            Self::Sh => [1, 4, 9, 16].contains(&(channels / 3)) && channels.is_multiple_of(3),
+        }
+    }
+}
+
+impl MotionArrays {
+    /// Refuses arrays that contradict themselves.
+    pub(crate) fn check(&self, limits: &Limits) -> Result<(), CodecError> {
+        self.check_structure(limits)?;
+        if let Some(MotionNetwork { network, .. }) = &self.network {
+            network.check(SECTION, "the network", limits)?;
+        }
+        for tensor in &self.tensors {
+            if tensor.values.len() as u64 != tensor.length() {
+                let field = format!("length of {}", tensor.name);
+                return Err(CodecError::invalid(SECTION, field, tensor.values.len(), format!("{:?}", tensor.shape)));
+            }
+        }
+        Ok(())
+    }
+
+    /// [`MotionArrays::check`] without a look at the numbers.
+    pub(crate) fn check_structure(&self, limits: &Limits) -> Result<(), CodecError> {
+        let legal = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"-_.".contains(&byte);
+        let nothing = self.network.is_none() && self.tensors.is_empty();
+        if self.kind.len() > LONGEST_KIND || !self.kind.bytes().all(legal) || self.kind.is_empty() != nothing {
+            let expected = "at most 64 of a-z, 0-9, '-', '_', '.', and empty only where nothing moves";
+            return Err(CodecError::invalid(SECTION, "kind", format!("{:?}", self.kind), expected));
+        }
+        if let Some(motion) = &self.network {
+            motion.check_structure(limits)?;
+        }
+        at_most(SECTION, "number of tensors", self.tensors.len() as u64, limits.nodes)?;
+        let mut total = self.network.as_ref().map_or(0, |motion| motion.network.weights());
+        for (index, tensor) in self.tensors.iter().enumerate() {
+            at_most(SECTION, "length of a tensor's name", tensor.name.len() as u64, limits.string_bytes)?;
+            at_most(SECTION, format!("axes of {}", tensor.name), tensor.shape.len() as u64, 8u32)?;
+            if self.tensors[..index].iter().any(|other| other.name == tensor.name) {
+                let found = format!("{:?} twice", tensor.name);
+                return Err(CodecError::invalid(SECTION, "tensors", found, "each name once"));
+            }
+            total = total.saturating_add(tensor.length());
+        }
+        at_most(SECTION, "number of weights", total, limits.layer_weights)
+    }
+
+    /// Refuses a network that reads other features than a hexplane has.
+    pub(crate) fn check_features(&self, features: u64) -> Result<(), CodecError> {
+        let Some(MotionNetwork { network, sources, .. }) = &self.network else { return Ok(()) };
+        for (source, &found) in sources.iter().zip(&network.inputs) {
+            let expected = source.channels(features);
+            if u64::from(found) != expected {
+                let field = format!("channels of the input that is {source:?}");
+                return Err(CodecError::invalid(SECTION, field, found, expected.to_string()));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl MotionNetwork {
+    fn check_structure(&self, limits: &Limits) -> Result<(), CodecError> {
+        let Self { network, sources, outputs } = self;
+        network.check_structure(SECTION, "the network", limits)?;
+        network.check_pointwise(SECTION, "the network")?;
+        for (what, found, expected) in [
+            ("number of sources", sources.len(), network.inputs.len()),
+            ("number of named outputs", outputs.len(), network.outputs.len()),
+        ] {
+            if found != expected {
+                return Err(CodecError::invalid(SECTION, what, found, format!("{expected}, as the network has")));
+            }
+        }
+        let channels = network.channels();
+        for (index, (output, value)) in outputs.iter().zip(&network.outputs).enumerate() {
+            let found = channels[value.0 as usize];
+            if !output.has_channels(found) || outputs[..index].contains(output) {
+                let expected = "what it is added to, once";
+                return Err(CodecError::invalid(SECTION, format!("output {output:?}"), format!("{found} channels"), expected));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl SceneData {
+    /// The centers of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves, or where
+    /// what moves them is no [`MotionNetwork`].
+    ///
+    /// For tools that want to look into a file without a back end. It runs any network, follows the model's conventions
+    /// (docs/design.md) to float tolerance, takes some microseconds a Gaussian, and uses one thread.
+    ///
+    /// # Errors
+    /// A network that contradicts itself or the hexplane.
+    pub fn positions_at(&self, time: f32) -> Result<Vec<[f32; 3]>, CodecError> {
+        let means = &self.gaussians.means;
+        let Some(motion) = &self.motion.network else { return Ok(means.clone()) };
+        let Some(output) = motion.outputs.iter().position(|output| *output == MotionOutput::Position) else {
+            return Ok(means.clone());
+        };
+        let limits = Limits::default();
+        self.motion.check(&limits)?;
+        crate::planes::head::check(&self.hexplane, &limits)?;
+        self.motion.check_features(self.hexplane.features())?;
+        let program = Program::pointwise(&motion.network, &vec![true; motion.sources.len()]);
+        let mut workspace = program.workspace();
+        let mut moved = Vec::with_capacity(means.len());
+        for means in means.chunks(LANES) {
+            for (input, source) in motion.sources.iter().enumerate() {
+                let inputs = program.input_lanes(&mut workspace, input);
+                for (lane, &mean) in means.iter().enumerate() {
+                    match source {
+                        MotionSource::Features => set_lane(inputs, lane, &self.features(mean, time)),
+                        MotionSource::Point => set_lane(inputs, lane, &normalized(&self.frame, mean)),
+                        MotionSource::Time => set_lane(inputs, lane, &[time]),
+                    }
+                }
+            }
+            program.run(&mut workspace);
+            let [x, y, z] = program.output_lanes(&workspace, output) else { unreachable!("`check` has counted them") };
+            let shifted = |(lane, mean): (usize, &[f32; 3])| [mean[0] + x[lane], mean[1] + y[lane], mean[2] + z[lane]];
+            moved.extend(means.iter().enumerate().map(shifted));
+        }
+        Ok(moved)
+    }
+
+    /// Products of the six samples of each scale, `[channels · scales]`.
+    fn features(&self, point: [f32; 3], time: f32) -> Vec<f32> {
+        let [x, y, z] = normalized(&self.frame, point);
+        let coordinates = [x, y, z, 2.0 * time - 1.0];
+        let channels = self.hexplane.channels as usize;
+        let mut features = vec![1.0; channels * self.hexplane.multipliers.len()];
+        for (product, planes) in features.chunks_exact_mut(channels).zip(self.hexplane.planes.chunks_exact(6)) {
+            for (plane, [across, down]) in planes.iter().zip(PLANE_AXES) {
+                multiply_by_sample(plane, coordinates[across], coordinates[down], product);
+            }
+        }
+        features
+    }
+}
+
+fn set_lane(inputs: &mut [Lanes], lane: usize, values: &[f32]) {
+    inputs.iter_mut().zip(values).for_each(|(input, &value)| input[lane] = value);
+}

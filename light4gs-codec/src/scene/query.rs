@@ -1,0 +1,55 @@
+//! Points, their coordinates in the hexplane, and samples of a plane there.
+//!
+//! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
+//! hexplane-coupled harmonics are coded by these numbers.
+
+use crate::{Plane, SceneFrameArrays};
+
+/// Coordinates in [-1, 1]: standardized along the principal axes, contracted into the ball of radius 2, halved (paper
+/// III-A).
+pub(crate) fn normalized(frame: &SceneFrameArrays, point: [f32; 3]) -> [f32; 3] {
+    let offset: [f32; 3] = std::array::from_fn(|i| point[i] - frame.mean[i]);
+    let [x, y, z] = std::array::from_fn(|j| {
+        let axis = frame.axes[j];
+        (offset[0] * axis[0] + offset[1] * axis[1] + offset[2] * axis[2]) / frame.std[j]
+    });
+    let square = x * x + y * y + z * z;
+    let inverse = if square > 1.0 { 1.0 / square.sqrt() } else { 1.0 };
+    let factor = (2.0 - inverse) * inverse * 0.5;
+    [x * factor, y * factor, z * factor]
+}
+
+/// Two samples of an axis and the share of the second.
+#[derive(Clone, Copy, Debug)]
+struct Between {
+    low: usize,
+    high: usize,
+    share: f32,
+}
+
+impl Between {
+    /// Where a coordinate in [-1, 1] falls among `samples`, the first at -1 and the last at 1; outside counts as the
+    /// border.
+    fn of(coordinate: f32, samples: u32) -> Self {
+        let last = samples as usize - 1;
+        let position = (coordinate + 1.0) * 0.5 * last as f32;
+        // NaN goes the way of 0.
+        let position = if position > 0.0 { position } else { 0.0 };
+        let low = (position as usize).min(last);
+        let share = position - low as f32;
+        Self { low, high: (low + 1).min(last), share: if share < 1.0 { share } else { 1.0 } }
+    }
+}
+
+/// Multiplies `product [channels]` by the bilinear samples of a plane at `across` (width) and `down` (height).
+pub(crate) fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product: &mut [f32]) {
+    let (x, y) = (Between::of(across, plane.width), Between::of(down, plane.height));
+    let width = plane.width as usize;
+    for (product, channel) in product.iter_mut().zip(plane.values.chunks_exact(width * plane.height as usize)) {
+        let row = |y: usize| {
+            let row = &channel[y * width..(y + 1) * width];
+            row[x.low] * (1.0 - x.share) + row[x.high] * x.share
+        };
+        *product *= row(y.low) * (1.0 - y.share) + row(y.high) * y.share;
+    }
+}

@@ -1,0 +1,117 @@
+//! Distributions from networks.
+
+use super::coding::{Conditions, ShPrior, ShSource};
+use crate::{
+    network::{
+        Program, Workspace,
+        kernels::{LANES, Lanes},
+    },
+    scene::query::{multiply_by_sample, normalized},
+};
+use crate::plane_layout::PLANE_AXES;
+
+/// The networks of priors that are sound, and what they read.
+#[derive(Debug)]
+pub(super) struct Networks<'a> {
+    priors: Vec<ExactPrior<'a>>,
+    conditions: Conditions<'a>,
+    reads_features: bool,
+    /// Features of [`LANES`] Gaussians, where a prior reads them.
+    features: Vec<Lanes>,
+}
+
+#[derive(Debug)]
+struct ExactPrior<'a> {
+    sources: &'a [ShSource],
+    program: Program,
+    workspace: Workspace,
+    /// The first channel that it speaks for, and how many.
+    channels: (usize, usize),
+}
+
+impl<'a> Networks<'a> {
+    pub(super) fn new(priors: &'a [ShPrior], conditions: Conditions<'a>) -> Self {
+        let mut first = 0;
+        let exact = priors.iter().map(|ShPrior { network, sources }| {
+            let program = Program::pointwise(network, &vec![true; network.inputs.len()]);
+            let workspace = program.workspace();
+            let count = program.output_lanes(&workspace, 0).len() / 2;
+            first += count;
+            ExactPrior { sources, program, workspace, channels: (first - count, count) }
+        });
+        let priors: Vec<_> = exact.collect();
+        let reads_features = priors.iter().any(|prior| prior.sources.contains(&ShSource::SpaceFeatures));
+        Self { priors, conditions, reads_features, features: Vec::new() }
+    }
+
+    /// Multiplications for one Gaussian, or work of that size.
+    pub(super) fn work(&self) -> u64 {
+        let features = if self.reads_features { 24 * self.conditions.features() } else { 0 };
+        self.priors.iter().fold(features, |sum, prior| sum.saturating_add(prior.program.work()))
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.priors.len()
+    }
+
+    /// Looks at the Gaussians from `first` on, [`LANES`] of them.
+    pub(super) fn begin(&mut self, first: usize) {
+        if !self.reads_features {
+            return;
+        }
+        let Conditions { gaussians, frame, hexplane } = self.conditions;
+        let channels = hexplane.channels as usize;
+        self.features.clear();
+        self.features.resize(channels * hexplane.multipliers.len(), [0.0; LANES]);
+        let mut product = vec![1.0; channels];
+        for (lane, &mean) in gaussians.means[first..].iter().take(LANES).enumerate() {
+            let coordinates = normalized(frame, mean);
+            for (planes, features) in hexplane.planes.chunks_exact(6).zip(self.features.chunks_exact_mut(channels)) {
+                product.fill(1.0);
+                for (plane, [across, down]) in planes.iter().zip(PLANE_AXES) {
+                    if let (Some(&across), Some(&down)) = (coordinates.get(across), coordinates.get(down)) {
+                        multiply_by_sample(plane, across, down, &mut product);
+                    }
+                }
+                features.iter_mut().zip(&product).for_each(|(feature, &value)| feature[lane] = value);
+            }
+        }
+    }
+
+    /// The first channel of a prior, and scales and means of its channels, for the Gaussians from `first` on. `values` are
+    /// those of all channels, `[Gaussians, channels]`, of which those of the priors before are decoded.
+    pub(super) fn parameters(
+        &mut self,
+        prior: usize,
+        first: usize,
+        values: &[f32],
+        channels: usize,
+    ) -> (usize, &[Lanes], &[Lanes]) {
+        let Self { priors, conditions: Conditions { gaussians, frame, .. }, features, .. } = self;
+        let ExactPrior { sources, program, workspace, channels: (start, count) } = &mut priors[prior];
+        let lanes = LANES.min(gaussians.len() - first);
+        for (input, source) in sources.iter().enumerate() {
+            let inputs = program.input_lanes(workspace, input);
+            if *source == ShSource::SpaceFeatures {
+                inputs.copy_from_slice(features);
+                continue;
+            }
+            for lane in 0..lanes {
+                let gaussian = first + lane;
+                let mut set = |known: &[f32]| inputs.iter_mut().zip(known).for_each(|(input, &value)| input[lane] = value);
+                match source {
+                    ShSource::Dc => set(&gaussians.sh_dc[gaussian]),
+                    ShSource::Decoded => set(&values[gaussian * channels..gaussian * channels + *start]),
+                    ShSource::Position => set(&normalized(frame, gaussians.means[gaussian])),
+                    ShSource::LogScale => set(&gaussians.log_scales[gaussian]),
+                    ShSource::Quaternion => set(&gaussians.quats[gaussian]),
+                    ShSource::OpacityLogit => set(&[gaussians.opacity_logits[gaussian]]),
+                    ShSource::SpaceFeatures => {}
+                }
+            }
+        }
+        program.run(workspace);
+        let (scales, means) = program.output_lanes(workspace, 0).split_at(*count);
+        (*start, scales, means)
+    }
+}

@@ -1,0 +1,227 @@
+//! The bytes of the spherical harmonics beyond degree 0.
+
+use super::{
+    coding::{Conditions, SECTION, ShCoding, ShPrior, ShSource, check_priors, prior_name},
+    walk::{HarmonicsModel, walk},
+};
+use crate::{
+    CodecError, GaussianArrays, Limits, Network,
+    adaptive::Damaged,
+    entropy::{SymbolReader, SymbolWriter, read_tables, write_tables},
+    limits::at_most,
+    network::{
+        tensors::{read_weights, write_weights},
+        weights::WeightPrecision,
+    },
+    sh_rest_coefficients,
+    stream::{
+        reader::Reader,
+        sections::{Encoding, Kind, check_length},
+        writer::Writer,
+    },
+};
+
+/// What stands before everything else.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Head {
+    pub(crate) count: u32,
+    pub(crate) degree: u8,
+}
+
+impl Head {
+    pub(crate) fn read(reader: &mut Reader<'_>, limits: &Limits) -> Result<Self, CodecError> {
+        let head = Self { count: reader.varint_at_most("count", limits.gaussians)?, degree: reader.u8("degree")? };
+        check_degree(head.degree)?;
+        Ok(head)
+    }
+
+    fn of(gaussians: &GaussianArrays) -> Self {
+        Self { count: gaussians.len() as u32, degree: gaussians.sh_degree }
+    }
+
+    fn write(self, writer: &mut Writer) {
+        writer.varint(self.count.into());
+        writer.u8(self.degree);
+    }
+
+    /// Numbers of all Gaussians.
+    fn values(self) -> u64 {
+        u64::from(self.count) * sh_rest_coefficients(self.degree) as u64 * 3
+    }
+}
+
+fn check_degree(degree: u8) -> Result<(), CodecError> {
+    if degree <= 3 { Ok(()) } else { Err(CodecError::invalid(SECTION, "degree", degree, "0, 1, 2 or 3")) }
+}
+
+/// Refuses an unknown degree and an array of another length than the degree asks for.
+pub(crate) fn check(gaussians: &GaussianArrays) -> Result<(), CodecError> {
+    check_degree(gaussians.sh_degree)?;
+    let (count, rest) = (gaussians.len(), sh_rest_coefficients(gaussians.sh_degree));
+    let why = format!("{count} Gaussians, {rest} coefficients, 3 channels");
+    check_length(SECTION, "sh_rest", gaussians.sh_rest.len(), count as u64 * rest as u64 * 3, &why)
+}
+
+/// Bytes of the spherical harmonics.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ShBytes {
+    /// Head, tables or networks.
+    pub model: u64,
+    /// The symbols of each degree, from 1.
+    pub degrees: Vec<u64>,
+}
+
+/// Writes `sh_rest` as plain numbers.
+pub(crate) fn write_explicit(gaussians: &GaussianArrays, writer: &mut Writer) {
+    Head::of(gaussians).write(writer);
+    writer.f32s(&gaussians.sh_rest);
+}
+
+impl ShCoding {
+    pub(crate) fn kind(&self) -> Kind {
+        match self {
+            Self::Tables { .. } => Kind::ShTables,
+            Self::Networks { .. } => Kind::ShNetworks,
+        }
+    }
+
+    /// Writes tables or networks, and returns them as a decoder gets them.
+    fn write(&self, precision: Option<WeightPrecision>, writer: &mut Writer) -> Result<Self, CodecError> {
+        writer.f32(self.step());
+        match self {
+            Self::Tables { tables, .. } => {
+                writer.block(&write_tables(tables));
+                Ok(self.clone())
+            }
+            Self::Networks { step, priors } => {
+                writer.varint(priors.len() as u64);
+                for ShPrior { network, sources } in priors {
+                    network.write(writer);
+                    sources.iter().for_each(|source| writer.varint(source.number()));
+                }
+                let mut priors = priors.clone();
+                let mut weights = Writer::default();
+                let mut networks: Vec<_> = priors.iter_mut().map(|prior| &mut prior.network).collect();
+                write_weights(SECTION, &mut networks, precision, &mut weights)?;
+                writer.block(&weights.bytes);
+                Ok(Self::Networks { step: *step, priors })
+            }
+        }
+    }
+
+    fn read(
+        reader: &mut Reader<'_>,
+        (kind, encoding): (Kind, Encoding),
+        degree: u8,
+        features: u64,
+        limits: &Limits,
+    ) -> Result<Self, CodecError> {
+        let step = reader.f32("step")?;
+        let channels = 3 * sh_rest_coefficients(degree);
+        if kind == Kind::ShTables {
+            let block = reader.block("tables")?;
+            let tables = read_tables(block, channels)
+                .map_err(|Damaged| CodecError::invalid(SECTION, "tables", "damaged", "frequency tables"))?;
+            return Ok(Self::Tables { step, tables });
+        }
+        let mut priors = read_priors(reader, limits)?;
+        check_priors(&priors, channels as u64, features, limits)?;
+        let mut networks: Vec<_> = priors.iter_mut().map(|prior| &mut prior.network).collect();
+        read_weights(SECTION, &mut networks, reader.block("weights")?, encoding, limits)?;
+        Ok(Self::Networks { step, priors })
+    }
+}
+
+/// Priors without weights.
+fn read_priors(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<ShPrior>, CodecError> {
+    let count = reader.varint_at_most("number of priors", limits.networks)?;
+    let read = |index| {
+        let network = Network::read(reader, SECTION, &prior_name(index), limits)?;
+        let source = |_| {
+            let number = reader.varint("a source")?;
+            ShSource::from_number(number).ok_or_else(|| CodecError::invalid(SECTION, "a source", number, "0 to 6"))
+        };
+        let sources = (0..network.inputs.len()).map(source).collect::<Result<_, _>>()?;
+        Ok(ShPrior { network, sources })
+    };
+    (0..count as usize).map(read).collect()
+}
+
+/// Whether decoding looks at the hexplanes.
+pub(crate) fn reads_hexplanes(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<bool, CodecError> {
+    if kind != Kind::ShNetworks {
+        return Ok(false);
+    }
+    let mut reader = Reader::new(SECTION, bytes);
+    Head::read(&mut reader, limits)?;
+    reader.f32("step")?;
+    let priors = read_priors(&mut reader, limits)?;
+    Ok(priors.iter().any(|prior| prior.sources.contains(&ShSource::SpaceFeatures)))
+}
+
+/// Writes `sh_rest` of Gaussians in their final order; returns it as a decoder gets it.
+pub(crate) fn write(
+    gaussians: &GaussianArrays,
+    coding: &ShCoding,
+    precision: Option<WeightPrecision>,
+    conditions: Conditions<'_>,
+    limits: &Limits,
+    writer: &mut Writer,
+) -> Result<(Vec<f32>, ShBytes), CodecError> {
+    let degree = gaussians.sh_degree;
+    coding.check(degree, conditions.features(), limits)?;
+    let start = writer.bytes.len();
+    Head::of(gaussians).write(writer);
+    let coding = coding.write(precision, writer)?;
+
+    let mut values = gaussians.sh_rest.clone();
+    let mut writers: Vec<SymbolWriter> = (0..degree).map(|_| SymbolWriter::default()).collect();
+    let mut model = HarmonicsModel::new(&coding, conditions);
+    walk(&mut model, coding.step(), degree, &mut values, &mut writers).map_err(|Damaged| {
+        let found = format!("more than 4194304 steps of {}", coding.step());
+        CodecError::invalid(SECTION, "a value of sh_rest", found, "fewer; make the step larger")
+    })?;
+    let streams: Vec<_> = writers.iter().map(|writer| writer.finish(model.distributions())).collect();
+    streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
+    let model = (writer.bytes.len() - start) as u64;
+    streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
+    Ok((values, ShBytes { model, degrees: streams.iter().map(|stream| stream.len() as u64).collect() }))
+}
+
+/// The head and the coefficients.
+pub(crate) fn read(
+    bytes: &[u8],
+    (kind, encoding): (Kind, Encoding),
+    conditions: Conditions<'_>,
+    limits: &Limits,
+) -> Result<(Head, Vec<f32>), CodecError> {
+    let mut reader = Reader::new(SECTION, bytes);
+    let head = Head::read(&mut reader, limits)?;
+    if head.count as usize != conditions.gaussians.len() {
+        let expected = format!("{}, the number of Gaussians", conditions.gaussians.len());
+        return Err(CodecError::invalid(SECTION, "count", head.count, expected));
+    }
+    if kind == Kind::ShExplicit {
+        let values = reader.f32s("sh_rest", head.values())?;
+        reader.finish()?;
+        return Ok((head, values));
+    }
+    at_most(SECTION, "number of values", head.values(), limits.coded_values)?;
+    let coding = ShCoding::read(&mut reader, (kind, encoding), head.degree, conditions.features(), limits)?;
+    coding.check(head.degree, conditions.features(), limits)?;
+
+    let lengths = (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
+    let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "what an encoder writes");
+    let mut readers = Vec::new();
+    for length in lengths {
+        readers.push(SymbolReader::new(reader.take("sub-stream", length)?).map_err(damaged)?);
+    }
+    reader.finish()?;
+    let mut model = HarmonicsModel::new(&coding, conditions);
+    let work = model.work().saturating_mul(u64::from(head.count).next_multiple_of(8));
+    at_most(SECTION, "number of multiplications", work, limits.multiplications)?;
+    let mut values = vec![0.0; head.values() as usize];
+    walk(&mut model, coding.step(), head.degree, &mut values, &mut readers).map_err(damaged)?;
+    readers.into_iter().try_for_each(SymbolReader::finish).map_err(damaged)?;
+    Ok((head, values))
+}

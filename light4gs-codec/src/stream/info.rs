@@ -1,0 +1,139 @@
+//! What a stream holds, without decoding its numbers.
+
+use super::{
+    container::Container,
+    gaussians, meta, motion,
+    reader::Reader,
+    sections::{Encoding, Kind, Section},
+};
+use crate::{
+    CodecError, ContextModelArrays, Limits, MotionArrays, PerGroup, PlaneBytes, Profile, SceneMeta, planes, sh,
+};
+
+/// What a stream holds.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StreamInfo {
+    /// Version of the format.
+    pub version: u16,
+    /// Flags of the header; there are none yet.
+    pub flags: u16,
+    /// What a compressed stream keeps in full precision; nothing where nothing is compressed.
+    pub profile: Option<Profile>,
+    /// Bytes of the whole stream.
+    pub bytes: u64,
+    /// Bytes before the first section: prelude, meta and table.
+    pub header_bytes: u64,
+    /// The scene meta.
+    pub meta: SceneMeta,
+    /// The sections, in the order of the stream.
+    pub sections: Vec<SectionInfo>,
+    /// Number of Gaussians.
+    pub gaussian_count: u32,
+    /// Degree of the spherical harmonics.
+    pub sh_degree: u8,
+    /// Channels of the hexplane.
+    pub hexplane_channels: u32,
+    /// Base resolution of the hexplane along x, y, z, t.
+    pub hexplane_resolution: [u32; 4],
+    /// Multipliers of the resolution, one a scale.
+    pub hexplane_multipliers: Vec<u32>,
+    /// Planes of all scales.
+    pub plane_count: usize,
+    /// Bytes of each plane, in the order xy, xz, xt, yz, yt, zt, scale by scale; empty where they are float32.
+    pub plane_bytes: Vec<PlaneBytes>,
+    /// Quantization steps of the planes, one entry for all scales or one a scale; empty where they are float32.
+    pub plane_steps: Vec<PerGroup>,
+    /// The context model without its numbers, where planes are coded under one.
+    pub context_model: Option<ContextModelArrays>,
+    /// How the Gaussians move, without the numbers.
+    pub motion: MotionArrays,
+}
+
+/// One section of a stream.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SectionInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// What it holds.
+    pub kind: Kind,
+    /// How its numbers are stored.
+    pub encoding: Encoding,
+    /// Where it begins in the stream.
+    pub offset: u64,
+    /// Its length.
+    pub bytes: u64,
+    /// CRC-32C of its bytes.
+    pub crc: u32,
+}
+
+/// What a stream holds: header, meta, counts, and the size of every section.
+///
+/// All checksums are checked, so that this is also the quick test of a file for damage.
+///
+/// # Errors
+/// As [`crate::decode`], but for what only decoded numbers can show.
+pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
+    let limits = Limits::default();
+    let container = Container::read(bytes, &limits)?;
+    meta::check(&container.meta, &limits)?;
+    for section in Section::ALL {
+        if container.has(section) {
+            container.section(section)?;
+        }
+    }
+    let limits = limits.for_stream(bytes.len());
+    let open = |section: Section| {
+        let (kind, encoding, payload) = container.section(section)?;
+        Ok::<_, CodecError>((kind, encoding, Reader::new(section.name(), payload)))
+    };
+    let (_, gaussian_encoding, mut reader) = open(Section::Gaussians)?;
+    let gaussian_count = gaussians::Head::read(&mut reader, &limits)?.count;
+    let (sh_kind, _, mut reader) = open(Section::Sh)?;
+    let sh = sh::section::Head::read(&mut reader, &limits)?;
+    let motion = motion::read_description(&mut open(Section::Motion)?.2, &limits)?;
+    let (plane_kind, _, mut reader) = open(Section::HexPlanes)?;
+    let (mut plane_bytes, mut plane_steps, mut context_model) = (Vec::new(), Vec::new(), None);
+    let hexplane = if plane_kind == Kind::HexPlanesExplicit {
+        planes::head::Head::read(&mut reader, &limits)?
+    } else {
+        let model = planes::context_section::read_description(&mut open(Section::ContextModel)?.2, &limits)?;
+        let (parts, bytes) = planes::section::plane_bytes(reader.rest(), &model, &limits)?;
+        (plane_bytes, plane_steps, context_model) = (bytes, parts.steps, Some(model));
+        parts.head
+    };
+    let compact = gaussian_encoding == Encoding::Quantized;
+    let coded = compact || plane_kind != Kind::HexPlanesExplicit || sh_kind != Kind::ShExplicit;
+    let profile = if compact { Profile::Compact } else { Profile::Paper };
+
+    let sections: Vec<_> = container
+        .entries
+        .iter()
+        .map(|entry| SectionInfo {
+            name: entry.section.name(),
+            kind: entry.kind,
+            encoding: entry.encoding,
+            offset: entry.offset,
+            bytes: entry.bytes,
+            crc: entry.crc,
+        })
+        .collect();
+    Ok(StreamInfo {
+        version: container.prelude.version,
+        flags: container.prelude.flags,
+        profile: coded.then_some(profile),
+        bytes: container.prelude.file_bytes,
+        header_bytes: container.prelude.file_bytes - sections.iter().map(|section| section.bytes).sum::<u64>(),
+        meta: container.meta,
+        sections,
+        gaussian_count,
+        sh_degree: sh.degree,
+        hexplane_channels: hexplane.channels,
+        hexplane_resolution: hexplane.resolution,
+        plane_count: hexplane.plane_count(),
+        hexplane_multipliers: hexplane.multipliers,
+        plane_bytes,
+        plane_steps,
+        context_model,
+        motion,
+    })
+}

@@ -1,0 +1,84 @@
+//! The scene meta, which stands in the header.
+
+use std::collections::BTreeMap;
+
+use super::{reader::Reader, writer::Writer};
+use crate::{CodecError, Limits, SceneMeta, limits::at_most};
+
+const SECTION: &str = "meta";
+
+/// Refuses what cannot be written or makes no sense. That numbers are finite is checked elsewhere.
+pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError> {
+    at_most(SECTION, "length of name", meta.name.len() as u64, limits.string_bytes)?;
+    at_most(SECTION, "number of extra entries", meta.extra.len() as u64, limits.extras)?;
+    for (key, value) in &meta.extra {
+        at_most(SECTION, "length of an extra key", key.len() as u64, limits.string_bytes)?;
+        at_most(SECTION, format!("length of extra.{key}"), value.len() as u64, limits.string_bytes)?;
+    }
+    for (field, value) in [("fps", meta.fps), ("fov_x", meta.fov_x)] {
+        if value < 0.0 {
+            return Err(CodecError::invalid(SECTION, field, value, "0 (not known) or more"));
+        }
+    }
+    let [low, high] = meta.bounds;
+    for axis in 0..3 {
+        if low[axis] > high[axis] {
+            let found = format!("{low:?} to {high:?}");
+            return Err(CodecError::invalid(SECTION, "bounds", found, "the smallest corner, then the largest"));
+        }
+    }
+    Ok(())
+}
+
+pub(crate) fn write(meta: &SceneMeta, writer: &mut Writer) {
+    writer.string(&meta.name);
+    writer.u32(meta.frame_count);
+    writer.f32(meta.fps);
+    writer.f32s(meta.bounds.as_flattened());
+    writer.f32s(&meta.background);
+    writer.bytes.extend_from_slice(&meta.config_digest);
+    writer.u32(meta.width);
+    writer.u32(meta.height);
+    writer.f32(meta.fov_x);
+    writer.u32(meta.extra.len() as u32);
+    for (key, value) in &meta.extra {
+        writer.string(key);
+        writer.string(value);
+    }
+}
+
+pub(crate) fn read(bytes: &[u8], limits: &Limits) -> Result<SceneMeta, CodecError> {
+    let mut reader = Reader::new(SECTION, bytes);
+    let meta = SceneMeta {
+        name: reader.string("name", limits.string_bytes)?,
+        frame_count: reader.u32("frame_count")?,
+        fps: reader.f32("fps")?,
+        bounds: [reader.group("bounds")?, reader.group("bounds")?],
+        background: reader.group("background")?,
+        config_digest: reader.array("config_digest")?,
+        width: reader.u32("width")?,
+        height: reader.u32("height")?,
+        fov_x: reader.f32("fov_x")?,
+        extra: read_extra(&mut reader, limits)?,
+    };
+    reader.finish()?;
+    Ok(meta)
+}
+
+/// Keys rise strictly, so that a meta has one spelling only.
+fn read_extra(reader: &mut Reader<'_>, limits: &Limits) -> Result<BTreeMap<String, String>, CodecError> {
+    let count = reader.u32("number of extra entries")?;
+    at_most(SECTION, "number of extra entries", count.into(), limits.extras)?;
+    let mut extra = BTreeMap::new();
+    for _ in 0..count {
+        let key = reader.string("extra key", limits.string_bytes)?;
+        let value = reader.string("extra value", limits.string_bytes)?;
+        if let Some((last, _)) = extra.last_key_value()
+            && *last >= key
+        {
+            return Err(CodecError::invalid(SECTION, "extra", format!("{key:?} after {last:?}"), "rising keys"));
+        }
+        extra.insert(key, value);
+    }
+    Ok(extra)
+}

@@ -1,0 +1,92 @@
+//! A scene to bytes and back.
+//!
+//! | file | what |
+//! |---|---|
+//! | `container.rs`, `sections.rs` | header and table; which sections there are and what they may hold |
+//! | `meta.rs`, `gaussians.rs`, `scene_frame.rs`, `motion.rs` | the simple parts; planes and harmonics have folders of their own |
+//! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and doing it |
+//! | `open.rs`, `info.rs` | decoding section by section, and looking without decoding |
+
+pub(crate) mod container;
+mod compressor;
+pub(crate) mod gaussians;
+mod info;
+mod input;
+mod meta;
+mod motion;
+mod open;
+mod parts;
+pub(crate) mod reader;
+mod scene_frame;
+pub(crate) mod sections;
+pub(crate) mod writer;
+
+pub use compressor::{CompressionReport, Encoded, encode_compressed};
+pub use info::{SectionInfo, StreamInfo, info};
+pub use input::{CompressionInput, PerGroup, PlaneCoding, Profile, WeightPrecisions};
+pub use open::OpenStream;
+pub use parts::{PlaneDistributions, encode_planes, encode_sh, plane_distributions};
+
+use container::NewSection;
+use sections::{Encoding, Kind};
+use writer::Writer;
+
+use crate::{CodecError, Limits, SceneData, fields, planes, sh};
+
+/// Turns a scene into a `.l4gs` stream without loss: all numbers float32.
+///
+/// The stream is decoded again and compared with `scene`, bit by bit, before it is returned.
+///
+/// # Errors
+/// An array whose length disagrees with the others, a NaN or an infinity, a number beyond the default [`Limits`]; the
+/// message names the section and the field.
+pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
+    let limits = Limits::default();
+    check(scene, &limits)?;
+    let section = |kind: Kind, write: &dyn Fn(&mut Writer)| {
+        let mut writer = Writer::default();
+        write(&mut writer);
+        NewSection { kind, encoding: Encoding::Float32, payload: writer.bytes }
+    };
+    let mut motion_writer = Writer::default();
+    motion::write(&scene.motion, None, &mut motion_writer)?;
+    let sections = [
+        section(Kind::GaussiansExplicit, &|writer| gaussians::write(&scene.gaussians, writer)),
+        section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
+        section(Kind::SceneFramePrincipalAxes, &|writer| scene_frame::write(&scene.frame, writer)),
+        section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
+        section(Kind::HexPlanesExplicit, &|writer| planes::explicit::write(&scene.hexplane, writer)),
+    ];
+    let bytes = container::write(&scene.meta, &sections, &limits)?;
+    let decoded = decode_with_limits(&bytes, &limits)?;
+    fields::check_same_bits(scene, &decoded)?;
+    Ok(bytes)
+}
+
+/// Turns a `.l4gs` stream into the scene that it holds.
+///
+/// # Errors
+/// Whatever is wrong with the bytes; the message names the section. No input makes it panic, and none makes it take
+/// more memory than a small multiple of the input's length or of [`Limits::coded_values`], whichever is more.
+pub fn decode(bytes: &[u8]) -> Result<SceneData, CodecError> {
+    decode_with_limits(bytes, &Limits::default())
+}
+
+/// As [`decode`], within limits of the caller's.
+///
+/// # Errors
+/// As [`decode`].
+pub fn decode_with_limits(bytes: &[u8], limits: &Limits) -> Result<SceneData, CodecError> {
+    OpenStream::with_limits(bytes, limits)?.scene()
+}
+
+/// Refuses a scene that contradicts itself, for the encoder and the decoder alike.
+pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError> {
+    meta::check(&scene.meta, limits)?;
+    gaussians::check(&scene.gaussians, limits)?;
+    sh::section::check(&scene.gaussians)?;
+    fields::check_finite(scene)?;
+    scene.motion.check(limits)?;
+    planes::head::check(&scene.hexplane, limits)?;
+    scene.motion.check_features(scene.hexplane.features())
+}

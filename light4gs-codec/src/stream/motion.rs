@@ -1,0 +1,109 @@
+//! How the Gaussians move, as bytes.
+
+use super::{
+    reader::Reader,
+    sections::{Encoding, Section},
+    writer::Writer,
+};
+use crate::{
+    CodecError, Limits, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network,
+    network::{
+        tensors::{read_tensors, write_tensors},
+        weights::{TensorLength, WeightPrecision},
+    },
+};
+
+const SECTION: &str = Section::Motion.name();
+
+/// Writes arrays that are sound, as float32 where there is no precision; returns them as a decoder gets them.
+pub(crate) fn write(
+    motion: &MotionArrays,
+    precision: Option<WeightPrecision>,
+    writer: &mut Writer,
+) -> Result<MotionArrays, CodecError> {
+    writer.block(motion.kind.as_bytes());
+    writer.u8(motion.network.is_some().into());
+    let mut tensors = Vec::new();
+    if let Some(MotionNetwork { network, sources, outputs }) = &motion.network {
+        network.write(writer);
+        sources.iter().for_each(|source| writer.u8(place(&MotionSource::ALL, source)));
+        outputs.iter().for_each(|output| writer.u8(place(&MotionOutput::ALL, output)));
+        tensors = network.stored_tensors();
+    }
+    writer.varint(motion.tensors.len() as u64);
+    for NamedTensor { name, shape, values } in &motion.tensors {
+        writer.block(name.as_bytes());
+        writer.varint(shape.len() as u64);
+        shape.iter().for_each(|&side| writer.varint(side.into()));
+        tensors.push(values.clone());
+    }
+    let mut decoded = motion.clone();
+    set_tensors(&mut decoded, write_tensors(SECTION, &tensors, precision, writer)?);
+    Ok(decoded)
+}
+
+fn place<T: PartialEq>(all: &[T], one: &T) -> u8 {
+    all.iter().position(|other| other == one).unwrap_or(0) as u8
+}
+
+fn set_tensors(motion: &mut MotionArrays, tensors: Vec<Vec<f32>>) {
+    let mut tensors = tensors.into_iter();
+    if let Some(MotionNetwork { network, .. }) = &mut motion.network {
+        network.set_stored_tensors(&mut tensors);
+    }
+    motion.tensors.iter_mut().zip(tensors).for_each(|(tensor, values)| tensor.values = values);
+}
+
+fn read_text(reader: &mut Reader<'_>, field: &str, limits: &Limits) -> Result<String, CodecError> {
+    let length = reader.varint_at_most(&format!("length of {field}"), limits.string_bytes)?;
+    let bytes = reader.take(field, length.into())?;
+    let text = std::str::from_utf8(bytes).map_err(|error| CodecError::invalid(SECTION, field, error, "UTF-8"))?;
+    Ok(text.to_owned())
+}
+
+fn read_one<T: Copy>(reader: &mut Reader<'_>, field: &str, all: &[T]) -> Result<T, CodecError> {
+    let number = reader.u8(field)?;
+    all.get(usize::from(number)).copied().ok_or_else(|| {
+        CodecError::invalid(SECTION, field, number, format!("less than {}; use a newer program", all.len()))
+    })
+}
+
+/// Reads the arrays without their numbers.
+pub(crate) fn read_description(reader: &mut Reader<'_>, limits: &Limits) -> Result<MotionArrays, CodecError> {
+    let kind = read_text(reader, "kind", limits)?;
+    let network = match reader.u8("presence of a network")? {
+        0 => None,
+        1 => {
+            let network = Network::read(reader, SECTION, "the network", limits)?;
+            let source = |_: &u32| read_one(reader, "a source of the network", &MotionSource::ALL);
+            let sources = network.inputs.iter().map(source).collect::<Result<_, _>>()?;
+            let output = |_| read_one(reader, "an output of the network", &MotionOutput::ALL);
+            let outputs = (0..network.outputs.len()).map(output).collect::<Result<_, _>>()?;
+            Some(MotionNetwork { network, sources, outputs })
+        }
+        other => return Err(CodecError::invalid(SECTION, "presence of a network", other, "0 or 1")),
+    };
+    let count = reader.varint_at_most("number of tensors", limits.nodes)?;
+    let mut tensors = Vec::new();
+    for _ in 0..count {
+        let name = read_text(reader, "name of a tensor", limits)?;
+        let axes = reader.varint_at_most("axes of a tensor", 8)?;
+        let shape = (0..axes).map(|_| reader.varint_at_most("side of a tensor", u32::MAX)).collect::<Result<_, _>>()?;
+        tensors.push(NamedTensor { name, shape, values: Vec::new() });
+    }
+    let motion = MotionArrays { kind, network, tensors };
+    motion.check_structure(limits)?;
+    Ok(motion)
+}
+
+/// Reads the arrays.
+pub(crate) fn read(bytes: &[u8], encoding: Encoding, limits: &Limits) -> Result<MotionArrays, CodecError> {
+    let mut reader = Reader::new(SECTION, bytes);
+    let mut motion = read_description(&mut reader, limits)?;
+    let network = motion.network.iter().flat_map(|motion| motion.network.tensor_lengths("weights"));
+    let named = motion.tensors.iter().map(|tensor| TensorLength { name: &tensor.name, length: tensor.length() });
+    let lengths: Vec<_> = network.chain(named).collect();
+    let tensors = read_tensors(SECTION, reader.rest(), encoding, &lengths, limits)?;
+    set_tensors(&mut motion, tensors);
+    Ok(motion)
+}

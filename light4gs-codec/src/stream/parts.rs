@@ -1,0 +1,78 @@
+//! Parts of the compressor by themselves, for those who measure, compare or draw.
+//!
+//! Decoding by parts is [`crate::OpenStream`]'s; the other attributes are in [`crate::attributes`].
+
+use super::{gaussians, sections::Section, writer::Writer};
+use crate::{
+    CodecError, GaussianArrays, HexPlaneArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding, planes,
+    sh::{self, coding::Conditions},
+};
+
+/// The bytes of coded planes, with the model's weights as they are given.
+///
+/// # Errors
+/// As [`crate::encode_compressed`].
+pub fn encode_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<Vec<u8>, CodecError> {
+    check_planes(hexplane, coding)?;
+    let mut writer = Writer::default();
+    let PlaneCoding { model, steps, latent_symbols } = coding;
+    planes::section::write(hexplane, model, steps, latent_symbols, &Limits::default(), &mut writer)?;
+    Ok(writer.bytes)
+}
+
+/// The bytes of coded spherical harmonics, with float32 weights. `frame` and `hexplane`, decoded, matter to priors
+/// that read them.
+///
+/// # Errors
+/// As [`crate::encode_compressed`].
+pub fn encode_sh(
+    gaussians: &GaussianArrays,
+    coding: &ShCoding,
+    frame: &SceneFrameArrays,
+    hexplane: &HexPlaneArrays,
+) -> Result<Vec<u8>, CodecError> {
+    let limits = Limits::default();
+    gaussians::check(gaussians, &limits)?;
+    sh::section::check(gaussians)?;
+    planes::head::check(hexplane, &limits)?;
+    let mut writer = Writer::default();
+    let conditions = Conditions { gaussians, frame, hexplane };
+    sh::section::write(gaussians, coding, None, conditions, &limits, &mut writer)?;
+    Ok(writer.bytes)
+}
+
+/// Gaussians that the values of a plane are coded under, `[M, height, width]` each, in units of the quantization step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlaneDistributions {
+    /// Standard deviations as the networks give them; they are bounded below by 0.11 when they are used.
+    pub scales: Vec<f32>,
+    /// Means.
+    pub means: Vec<f32>,
+}
+
+/// What the exact executor gives for one plane of a decoded hexplane: the distributions that a stream's intervals come
+/// from. The step is not asked for, since all networks see planes in their own units.
+///
+/// # Errors
+/// As [`crate::encode_compressed`]; a plane that is not there.
+pub fn plane_distributions(
+    hexplane: &HexPlaneArrays,
+    coding: &PlaneCoding,
+    plane: usize,
+) -> Result<PlaneDistributions, CodecError> {
+    check_planes(hexplane, coding)?;
+    if plane >= hexplane.planes.len() {
+        let expected = format!("less than {}", hexplane.planes.len());
+        return Err(CodecError::invalid(Section::HexPlanes.name(), "plane", plane, expected));
+    }
+    let symbols = &coding.latent_symbols[plane];
+    let (scales, means) = planes::parameters(hexplane, &coding.model, symbols, plane, &Limits::default())?;
+    Ok(PlaneDistributions { scales, means })
+}
+
+fn check_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<(), CodecError> {
+    let limits = Limits::default();
+    planes::head::check(hexplane, &limits)?;
+    coding.model.check(&limits)?;
+    planes::section::check(hexplane, &coding.model, &coding.steps, &coding.latent_symbols)
+}

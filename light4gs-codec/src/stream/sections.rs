@@ -1,0 +1,178 @@
+//! Which sections there are, what they may hold, and how their numbers are stored.
+
+use crate::CodecError;
+
+/// A section of a stream.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Section {
+    Gaussians,
+    Sh,
+    SceneFrame,
+    Motion,
+    HexPlanes,
+    ContextModel,
+}
+
+impl Section {
+    /// Every section, in the order of their numbers.
+    pub(crate) const ALL: [Self; 6] =
+        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Motion, Self::HexPlanes, Self::ContextModel];
+
+    /// The number that stands in the table.
+    pub(crate) const fn id(self) -> u16 {
+        match self {
+            Self::Gaussians => 1,
+            Self::Sh => 2,
+            Self::SceneFrame => 3,
+            Self::Motion => 4,
+            Self::HexPlanes => 5,
+            Self::ContextModel => 6,
+        }
+    }
+
+    /// The section with a number of the table.
+    pub(crate) fn from_id(id: u16) -> Option<Self> {
+        Self::ALL.into_iter().find(|section| section.id() == id)
+    }
+
+    /// The name in messages.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Gaussians => "gaussians",
+            Self::Sh => "sh",
+            Self::SceneFrame => "scene_frame",
+            Self::Motion => "motion",
+            Self::HexPlanes => "hexplanes",
+            Self::ContextModel => "context_model",
+        }
+    }
+}
+
+/// What a section holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Kind {
+    /// Gaussians, each with its own attributes.
+    GaussiansExplicit,
+    /// Spherical harmonics as they are.
+    ShExplicit,
+    /// Spherical harmonics under one frequency table a channel.
+    ShTables,
+    /// Spherical harmonics under distributions that networks give.
+    ShNetworks,
+    /// Mean, principal axes and deviations of a cloud.
+    SceneFramePrincipalAxes,
+    /// A description of what moves the Gaussians; it says itself what it is.
+    MotionDescription,
+    /// Planes as they are.
+    HexPlanesExplicit,
+    /// Planes under a context model.
+    HexPlanesContextCoded,
+    /// A context model as networks.
+    ContextModelNetworks,
+}
+
+impl Kind {
+    const ALL: [Self; 9] = [
+        Self::GaussiansExplicit,
+        Self::ShExplicit,
+        Self::ShTables,
+        Self::ShNetworks,
+        Self::SceneFramePrincipalAxes,
+        Self::MotionDescription,
+        Self::HexPlanesExplicit,
+        Self::HexPlanesContextCoded,
+        Self::ContextModelNetworks,
+    ];
+
+    /// The section that may hold it, and the number that then stands in the table.
+    pub(crate) const fn place(self) -> (Section, u8) {
+        match self {
+            Self::GaussiansExplicit => (Section::Gaussians, 1),
+            Self::ShExplicit => (Section::Sh, 1),
+            Self::ShTables => (Section::Sh, 2),
+            Self::ShNetworks => (Section::Sh, 3),
+            Self::SceneFramePrincipalAxes => (Section::SceneFrame, 1),
+            Self::MotionDescription => (Section::Motion, 1),
+            Self::HexPlanesExplicit => (Section::HexPlanes, 1),
+            Self::HexPlanesContextCoded => (Section::HexPlanes, 2),
+            Self::ContextModelNetworks => (Section::ContextModel, 1),
+        }
+    }
+
+    /// The kind with a number of the table in a section.
+    pub(crate) fn from_number(section: Section, number: u8) -> Result<Self, CodecError> {
+        let known = Self::ALL.into_iter().find(|kind| kind.place() == (section, number));
+        known.ok_or(CodecError::UnknownKind { section: section.name(), kind: number })
+    }
+
+    /// The encodings that it may have.
+    fn encodings(self) -> &'static [Encoding] {
+        match self {
+            Self::ShExplicit | Self::SceneFramePrincipalAxes | Self::HexPlanesExplicit => &[Encoding::Float32],
+            Self::ShTables | Self::HexPlanesContextCoded => &[Encoding::Quantized],
+            _ => &[Encoding::Float32, Encoding::Quantized],
+        }
+    }
+
+    /// The name of the kind in its section.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::GaussiansExplicit | Self::ShExplicit | Self::HexPlanesExplicit => "explicit",
+            Self::ShTables => "tables",
+            Self::ShNetworks | Self::ContextModelNetworks => "networks",
+            Self::SceneFramePrincipalAxes => "principal axes",
+            Self::MotionDescription => "description",
+            Self::HexPlanesContextCoded => "context coded",
+        }
+    }
+}
+
+/// How the numbers of a section are stored; where they are networks, their weights.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum Encoding {
+    /// Plain little-endian float32.
+    Float32,
+    /// Quantized, then entropy coded.
+    Quantized,
+}
+
+impl Encoding {
+    /// The number that stands in the table.
+    pub const fn number(self) -> u8 {
+        match self {
+            Self::Float32 => 0,
+            Self::Quantized => 1,
+        }
+    }
+
+    /// The encoding with a number of the table, for a kind that may have it.
+    pub(crate) fn from_number(kind: Kind, number: u8) -> Result<Self, CodecError> {
+        let known = kind.encodings().iter().copied().find(|encoding| encoding.number() == number);
+        let section = kind.place().0.name();
+        known.ok_or(CodecError::UnknownEncoding { section, kind: kind.name(), encoding: number })
+    }
+
+    /// A name for people.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Float32 => "float32",
+            Self::Quantized => "quantized",
+        }
+    }
+}
+
+/// Refuses an array whose length is not what the counts and shapes say.
+pub(crate) fn check_length(
+    section: &'static str,
+    field: impl Into<String>,
+    found: usize,
+    expected: u64,
+    why: &str,
+) -> Result<(), CodecError> {
+    if found as u64 == expected {
+        return Ok(());
+    }
+    Err(CodecError::invalid(section, format!("length of {}", field.into()), found, format!("{expected} ({why})")))
+}
