@@ -18,7 +18,7 @@ use light4gs_train::dataset::load_options;
 use light4gs_train::trainer::Trainer;
 
 /// Slope of the activations where they are negative.
-const SLOPE: f32 = 0.2;
+const SLOPE: f32 = 0.25;
 
 /// Configuration of a [`SharedTrajectories`].
 #[derive(Config, Debug)]
@@ -67,7 +67,8 @@ impl DeformationField for SharedTrajectories {
     }
 
     fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
-        let branch = |[first, second]: &[Linear; 2], input| second.forward(leaky_relu(first.forward(input), SLOPE));
+        let branch =
+            |[first, second]: &[Linear; 2], input| second.forward(leaky_relu(first.forward(input), SLOPE.into()));
         let [count, _] = points.dims();
         let time = Tensor::full([count, 1], time, &points.device());
         let along = branch(&self.place, points) * branch(&self.pace, time);
@@ -77,7 +78,7 @@ impl DeformationField for SharedTrajectories {
     fn to_arrays(&self) -> MotionArrays {
         // The same as `offsets`, as data. `Point` and `Time` are what the codec calls these inputs.
         let (mut network, [point, time]) = Network::new([3, 1]);
-        let mut branch = |network: &mut Network, [first, second]: &[Linear; 2], input| {
+        let branch = |network: &mut Network, [first, second]: &[Linear; 2], input| {
             let hidden = network.layer(input, to_layer(first));
             let hidden = network.leaky_relu(hidden, SLOPE);
             network.layer(hidden, to_layer(second))

@@ -3,8 +3,8 @@
 mod common;
 
 use common::compression::{
-    ALL_PARTS, Parts, Random, ShKind, compact_shape, condition, distribution, input, model, plane_coding, reference_shape,
-    scene, sh_networks, sh_tables, step,
+    ALL_PARTS, Parts, Random, ShKind, compact_shape, condition, distribution, input, model, plane_coding,
+    reference_shape, scene, sh_networks, sh_tables, step,
 };
 use light4gs_codec::{
     CodecError, CompressionInput, ContextModelArrays, Encoded, Kind, LatentArrays, Network, OpenStream, PerGroup,
@@ -148,7 +148,10 @@ fn a_composition_of_ones_own() {
     let model = ContextModelArrays {
         channels: M,
         centers: PerGroup { space_only: 0.2, space_time: 0.9 },
-        latent: Some(LatentArrays { tables: vec![common::compression::laplace_table(0.5); 2], medians: vec![0.25, -0.5] }),
+        latent: Some(LatentArrays {
+            tables: vec![common::compression::laplace_table(0.5); 2],
+            medians: vec![0.25, -0.5],
+        }),
         networks,
         priors,
         // xy, then xz from it, then xt from that, then yz and yt and zt from what stands after them.
@@ -171,7 +174,10 @@ fn a_composition_of_ones_own() {
     let refused = |spoil: &dyn Fn(&mut ContextModelArrays)| {
         let mut model = model.clone();
         spoil(&mut model);
-        let coding = PlaneCoding { model, ..plane_coding(&scene.hexplane, self::model(compact_shape(M, ALL_PARTS), 1), step(0.1)) };
+        let coding = PlaneCoding {
+            model,
+            ..plane_coding(&scene.hexplane, self::model(compact_shape(M, ALL_PARTS), 1), step(0.1))
+        };
         encode_planes(&scene.hexplane, &coding).unwrap_err().to_string()
     };
     assert!(refused(&|model| model.lowest = [2; 6]).contains("planes that wait for this one"));
@@ -184,8 +190,12 @@ fn a_composition_of_ones_own() {
     assert!(refused(&|model| model.latent = None).contains("those of its source Latent"));
     assert!(refused(&|model| model.networks[1].outputs = vec![Value(0)]).contains("an output is anchors"));
     let sources = [PlaneSource::Anchors, PlaneSource::LowerScale];
-    assert!(refused(&|model| model.priors[0].conditions[1] = condition(1, &sources)).contains("which a checkerboard reads"));
-    assert!(refused(&|model| model.priors[0].conditions[1] = condition(0, &[PlaneSource::Anchors])).contains("no anchors"));
+    assert!(
+        refused(&|model| model.priors[0].conditions[1] = condition(1, &sources)).contains("which a checkerboard reads")
+    );
+    assert!(
+        refused(&|model| model.priors[0].conditions[1] = condition(0, &[PlaneSource::Anchors])).contains("no anchors")
+    );
     let blur = |model: &mut ContextModelArrays| {
         let layer = Random::new(1).layer(LayerKind::Convolution, 2 * M, 2 * M, 3, 1);
         let output = model.networks[1].outputs[0];
@@ -360,8 +370,7 @@ fn contradictions_are_refused() {
         assert!(!error.is_internal(), "{error}");
         error.to_string()
     };
-    let planes =
-        |spoil: &dyn Fn(&mut PlaneCoding)| message(&|input| spoil(input.planes.as_mut().unwrap()));
+    let planes = |spoil: &dyn Fn(&mut PlaneCoding)| message(&|input| spoil(input.planes.as_mut().unwrap()));
     assert!(planes(&|planes| planes.steps.clear()).contains("number of steps is 0"));
     assert!(planes(&|planes| planes.steps = step(0.0)).contains("step is 0"));
     assert!(planes(&|planes| planes.steps = step(f32::NAN)).contains("step is NaN"));
@@ -382,11 +391,13 @@ fn contradictions_are_refused() {
     assert!(planes(&|planes| layer(planes).kind = LayerKind::Checkerboard).contains("only checkerboard convolutions"));
     assert!(planes(&|planes| layer(planes).kind = LayerKind::Convolution).contains("size of an output"));
     assert!(
-        planes(&|planes| planes.model.networks[0].nodes[1].inputs = vec![Value(9)]).contains("an input of node 1 (leaky")
+        planes(&|planes| planes.model.networks[0].nodes[1].inputs = vec![Value(9)])
+            .contains("an input of node 1 (leaky")
     );
     assert!(planes(&|planes| planes.model.networks[0].nodes[1].inputs.clear()).contains("inputs of node 1"));
     assert!(
-        planes(&|planes| planes.model.networks[0].nodes[1].operation = Operation::LeakyRelu(f32::NAN)).contains("slope")
+        planes(&|planes| planes.model.networks[0].nodes[1].operation = Operation::LeakyRelu(f32::NAN))
+            .contains("slope")
     );
     assert!(planes(&|planes| planes.model.centers.space_time = f32::INFINITY).contains("center of space-time"));
     assert!(planes(&|planes| drop(planes.model.latent.as_mut().unwrap().tables.pop())).contains("0 tables, 1 medians"));
@@ -396,7 +407,9 @@ fn contradictions_are_refused() {
     );
     assert!(message(&|input| input.sh = sh_tables(2)).contains("number of tables is 24, expected 9"));
     assert!(message(&|input| input.sh = sh_networks(ShKind::HexPlaneCoupled, 1, 5)).contains("SpaceFeatures"));
-    assert!(message(&|input| input.sh = sh_networks(ShKind::Autoregressive, 2, 8)).contains("channels of all priors is 24"));
+    assert!(
+        message(&|input| input.sh = sh_networks(ShKind::Autoregressive, 2, 8)).contains("channels of all priors is 24")
+    );
     assert!(
         message(&|input| {
             if let ShCoding::Tables { step, .. } = &mut input.sh {

@@ -27,7 +27,8 @@ fn scene() -> SceneData {
     let hidden = network.relu(hidden);
     let position = network.layer(hidden, Layer::linear(vec![1.0, -1.0, 0.0], vec![0.0, 0.0, 4.0]));
     network.output(position);
-    let motion = MotionNetwork { network, sources: vec![MotionSource::Features], outputs: vec![MotionOutput::Position] };
+    let motion =
+        MotionNetwork { network, sources: vec![MotionSource::Features], outputs: vec![MotionOutput::Position] };
     scene.motion = MotionArrays { kind: "hexplane".into(), network: Some(motion), tensors: Vec::new() };
     scene
 }

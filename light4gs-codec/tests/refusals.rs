@@ -53,7 +53,10 @@ fn shapes_that_contradict_each_other() {
     assert!(message(|scene| network(scene).outputs[0] = MotionOutput::OpacityLogit).contains("OpacityLogit"));
     assert!(message(|scene| network(scene).outputs[1] = MotionOutput::Position).contains("Position"));
     assert!(message(|scene| network(scene).sources.truncate(1)).contains("number of sources is 1"));
-    assert!(message(|scene| scene.hexplane = common::hexplane(3, [2, 1, 1, 3], &[1, 2])).contains("Features is 2, expected 6"));
+    assert!(
+        message(|scene| scene.hexplane = common::hexplane(3, [2, 1, 1, 3], &[1, 2]))
+            .contains("Features is 2, expected 6")
+    );
     assert!(message(|scene| scene.meta.bounds.reverse()).contains("bounds"));
     assert!(message(|scene| scene.meta.fps = -1.0).contains("fps is -1"));
 }

@@ -120,10 +120,15 @@ impl Network {
                 _ => 1,
             };
             if node.inputs.len() != arity || arity > limits.nodes as usize {
-                return refuse(format!("inputs of {field} ({operation})"), node.inputs.len().to_string(), &arity.to_string());
+                return refuse(
+                    format!("inputs of {field} ({operation})"),
+                    node.inputs.len().to_string(),
+                    &arity.to_string(),
+                );
             }
             if let Some(later) = node.inputs.iter().find(|value| value.0 as usize >= self.inputs.len() + index) {
-                let expected = format!("less than {}, since a node reads only what is before it", self.inputs.len() + index);
+                let expected =
+                    format!("less than {}, since a node reads only what is before it", self.inputs.len() + index);
                 return refuse(format!("an input of {field} ({operation})"), later.0.to_string(), &expected);
             }
             if let Operation::Layer(layer) = &node.operation {
@@ -200,7 +205,12 @@ impl Network {
         match wide {
             Some(index) => {
                 let found = self.nodes[index].operation.name();
-                Err(CodecError::invalid(section, format!("{name}, node {index}"), found, "what looks at one place only"))
+                Err(CodecError::invalid(
+                    section,
+                    format!("{name}, node {index}"),
+                    found,
+                    "what looks at one place only",
+                ))
             }
             None => Ok(()),
         }

@@ -176,7 +176,10 @@ fn read_node(
         let (kernel, groups) = match code {
             LINEAR => (1, 1),
             DOUBLING => (5, 1),
-            _ => (reader.u8("kernel of a layer")?.into(), reader.varint_at_most("groups of a layer", limits.layer_width)?),
+            _ => (
+                reader.u8("kernel of a layer")?.into(),
+                reader.varint_at_most("groups of a layer", limits.layer_width)?,
+            ),
         };
         let inputs = u32::try_from(channels[first.0 as usize]).unwrap_or(u32::MAX);
         Ok(Operation::Layer(Layer { kind, inputs, outputs, kernel, groups, weight: Vec::new(), bias: Vec::new() }))

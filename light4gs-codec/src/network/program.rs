@@ -63,7 +63,10 @@ struct Step {
 #[derive(Debug)]
 enum StepKind {
     Pointwise(Convolution),
-    Convolution { convolution: Convolution, stride: usize },
+    Convolution {
+        convolution: Convolution,
+        stride: usize,
+    },
     Checkerboard(MaskedConvolution),
     Doubling(TransposedConvolution),
     Activation(Activation),
@@ -419,13 +422,20 @@ impl Program {
     }
 
     /// One value as a map, from those before it.
-    fn make_map(&self, plan: &MapPlan, maps: &[Option<PaddedMap>], target: [usize; 2], work: &mut Workspace) -> PaddedMap {
+    fn make_map(
+        &self,
+        plan: &MapPlan,
+        maps: &[Option<PaddedMap>],
+        target: [usize; 2],
+        work: &mut Workspace,
+    ) -> PaddedMap {
         let ValuePlan { channels, slot, border, .. } = self.values[plan.value];
         let border = border.unwrap_or(0);
         let step = &self.steps[plan.value - self.inputs.len()];
         let input = |index: usize| maps[step.inputs[index]].as_ref().expect("maps are made in order");
         let Some(schedule) = &plan.schedule else {
-            let activate = |values: &mut [Lanes]| step.activation.iter().for_each(|activation| activation.apply(values));
+            let activate =
+                |values: &mut [Lanes]| step.activation.iter().for_each(|activation| activation.apply(values));
             return match &*step.kind {
                 StepKind::Doubling(convolution) => convolution.apply(input(0), border, activate),
                 StepKind::Resize => resized(input(0), target, border),
@@ -606,8 +616,7 @@ impl Maps<'_> {
 fn spread(map: &PaddedMap, y: usize, columns: Columns, outputs: &mut [Lanes]) {
     let y = if map.height == 1 { 0 } else { y };
     for (channel, lanes) in outputs.iter_mut().enumerate() {
-        *lanes =
-            if map.width == 1 { [map.row(channel, y)[0]; LANES] } else { map.lanes(channel, y, columns, 0, 0) };
+        *lanes = if map.width == 1 { [map.row(channel, y)[0]; LANES] } else { map.lanes(channel, y, columns, 0, 0) };
     }
 }
 

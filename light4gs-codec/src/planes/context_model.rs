@@ -3,7 +3,7 @@
 use crate::{
     CodecError, FrequencyTable, Limits, Network, PerGroup,
     limits::at_most,
-    plane_layout::{PLANES_PER_SCALE, PLANE_NAMES},
+    plane_layout::{PLANE_NAMES, PLANES_PER_SCALE},
 };
 
 pub(super) const SECTION: &str = "context_model";
@@ -160,7 +160,8 @@ impl ContextModelArrays {
             }
             levels(&priors.map(|prior| &self.priors[prior as usize]))?;
         }
-        let below = |&prior: &u32| self.priors[prior as usize].sources().any(|source| source == PlaneSource::LowerScale);
+        let below =
+            |&prior: &u32| self.priors[prior as usize].sources().any(|source| source == PlaneSource::LowerScale);
         if let Some(position) = self.lowest.iter().position(below) {
             let field = format!("a source of {} (lowest scale)", PLANE_NAMES[position]);
             return invalid(&field, "the scale below", "something that is there");
@@ -170,7 +171,12 @@ impl ContextModelArrays {
 
     fn network(&self, name: &str, index: u32) -> Result<&Network, CodecError> {
         self.networks.get(index as usize).ok_or_else(|| {
-            CodecError::invalid(SECTION, format!("network of {name}"), index, format!("less than {}", self.networks.len()))
+            CodecError::invalid(
+                SECTION,
+                format!("network of {name}"),
+                index,
+                format!("less than {}", self.networks.len()),
+            )
         })
     }
 

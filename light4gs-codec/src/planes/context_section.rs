@@ -1,6 +1,8 @@
 //! The context model of the hexplanes as bytes: its description, the latent's tables, the weights.
 
-use super::context_model::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, SECTION, network_name};
+use super::context_model::{
+    Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, SECTION, network_name,
+};
 use crate::{
     CodecError, Limits, Network, PerGroup,
     entropy::{read_tables, write_tables},

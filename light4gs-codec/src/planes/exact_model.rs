@@ -33,17 +33,14 @@ impl<'a> ExactModel<'a> {
         let distributions = arrays.priors.iter().map(|prior| {
             let index = prior.distribution as usize;
             let whole = all[index].as_ref().expect("made above for what is used");
-            [false, true].map(|with_anchors| {
-                whole.with_present(&arrays.networks[index], &present(prior, with_anchors))
-            })
+            [false, true].map(|with_anchors| whole.with_present(&arrays.networks[index], &present(prior, with_anchors)))
         });
         let latent = arrays.latent.as_ref();
         Self {
             distributions: distributions.collect(),
             conditions: arrays.networks.iter().map(Program::over_maps).collect(),
-            latent_distributions: latent.map_or_else(Vec::new, |latent| {
-                latent.tables.iter().map(|table| table.distribution()).collect()
-            }),
+            latent_distributions: latent
+                .map_or_else(Vec::new, |latent| latent.tables.iter().map(|table| table.distribution()).collect()),
             arrays,
         }
     }
@@ -79,7 +76,12 @@ impl<'a> ExactModel<'a> {
     }
 
     /// Refuses planes that are more work than the limits allow, and sizes that do not fit the networks.
-    pub(super) fn check_cost(&self, stages: &[Vec<usize>], sizes: &[[u32; 2]], limits: &Limits) -> Result<(), CodecError> {
+    pub(super) fn check_cost(
+        &self,
+        stages: &[Vec<usize>],
+        sizes: &[[u32; 2]],
+        limits: &Limits,
+    ) -> Result<(), CodecError> {
         let mut work = 0u64;
         for stage in stages {
             let mut numbers = 0u64;

@@ -157,8 +157,12 @@ fn multiplied_time(hexplane: &HexPlaneArrays) -> Option<u64> {
     let mut bits = 0;
     let scales = hexplane.planes.chunks_exact(PLANE_AXES.len()).zip(&hexplane.multipliers);
     for (scale, (planes, &multiplier)) in scales.enumerate() {
-        let times: Vec<u32> =
-            planes.iter().zip(PLANE_AXES).filter(|(_, axes)| axes[1] == TIME_AXIS).map(|(plane, _)| plane.height).collect();
+        let times: Vec<u32> = planes
+            .iter()
+            .zip(PLANE_AXES)
+            .filter(|(_, axes)| axes[1] == TIME_AXIS)
+            .map(|(plane, _)| plane.height)
+            .collect();
         if times.iter().any(|&time| time != times[0]) {
             return None;
         }

@@ -1,9 +1,6 @@
 //! Scales and means of a row of a plane.
 
-use super::{
-    context_model::PlaneSource,
-    exact_model::ExactModel,
-};
+use super::{context_model::PlaneSource, exact_model::ExactModel};
 use crate::{
     HexPlaneArrays,
     network::{

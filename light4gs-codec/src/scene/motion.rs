@@ -101,8 +101,7 @@ impl MotionSource {
 }
 
 impl MotionOutput {
-    pub(crate) const ALL: [Self; 5] =
-        [Self::Position, Self::LogScale, Self::Quaternion, Self::OpacityLogit, Self::Sh];
+    pub(crate) const ALL: [Self; 5] = [Self::Position, Self::LogScale, Self::Quaternion, Self::OpacityLogit, Self::Sh];
 
     fn has_channels(self, channels: u64) -> bool {
         match self {
@@ -187,7 +186,12 @@ impl MotionNetwork {
             let found = channels[value.0 as usize];
             if !output.has_channels(found) || outputs[..index].contains(output) {
                 let expected = "what it is added to, once";
-                return Err(CodecError::invalid(SECTION, format!("output {output:?}"), format!("{found} channels"), expected));
+                return Err(CodecError::invalid(
+                    SECTION,
+                    format!("output {output:?}"),
+                    format!("{found} channels"),
+                    expected,
+                ));
             }
         }
         Ok(())

@@ -1,6 +1,7 @@
 //! Distributions from networks.
 
 use super::coding::{Conditions, ShPrior, ShSource};
+use crate::plane_layout::PLANE_AXES;
 use crate::{
     network::{
         Program, Workspace,
@@ -8,7 +9,6 @@ use crate::{
     },
     scene::query::{multiply_by_sample, normalized},
 };
-use crate::plane_layout::PLANE_AXES;
 
 /// The networks of priors that are sound, and what they read.
 #[derive(Debug)]
@@ -98,7 +98,8 @@ impl<'a> Networks<'a> {
             }
             for lane in 0..lanes {
                 let gaussian = first + lane;
-                let mut set = |known: &[f32]| inputs.iter_mut().zip(known).for_each(|(input, &value)| input[lane] = value);
+                let mut set =
+                    |known: &[f32]| inputs.iter_mut().zip(known).for_each(|(input, &value)| input[lane] = value);
                 match source {
                     ShSource::Dc => set(&gaussians.sh_dc[gaussian]),
                     ShSource::Decoded => set(&values[gaussian * channels..gaussian * channels + *start]),

@@ -63,8 +63,7 @@ pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<
     scene_frame::write(&scene.frame, &mut writer);
     push(&mut sections, Kind::SceneFramePrincipalAxes, Encoding::Float32, writer);
     let precision = compact(input.weights.context_model);
-    let (hexplane, planes) =
-        write_planes(&scene.hexplane, input.planes.as_ref(), precision, &limits, &mut sections)?;
+    let (hexplane, planes) = write_planes(&scene.hexplane, input.planes.as_ref(), precision, &limits, &mut sections)?;
 
     let conditions = Conditions { gaussians: &attributes, frame: &scene.frame, hexplane: &hexplane };
     let rest = reordered(&scene.gaussians, &order);

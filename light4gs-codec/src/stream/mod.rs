@@ -7,8 +7,8 @@
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and doing it |
 //! | `open.rs`, `info.rs` | decoding section by section, and looking without decoding |
 
-pub(crate) mod container;
 mod compressor;
+pub(crate) mod container;
 pub(crate) mod gaussians;
 mod info;
 mod input;

@@ -45,13 +45,8 @@ pub struct Parts {
     pub high_scale_hyperprior: bool,
 }
 
-pub const ALL_PARTS: Parts = Parts {
-    hyperprior: true,
-    checkerboard: true,
-    inter_plane: true,
-    inter_scale: true,
-    high_scale_hyperprior: false,
-};
+pub const ALL_PARTS: Parts =
+    Parts { hyperprior: true, checkerboard: true, inter_plane: true, inter_scale: true, high_scale_hyperprior: false };
 
 /// Sizes of a model.
 #[derive(Clone, Copy, Debug)]
@@ -108,7 +103,12 @@ impl Random {
             // As a decoder gets them.
             let masked = |at: usize| (at / kernel as usize + at % kernel as usize) % 2 == 0;
             let area = (kernel * kernel) as usize;
-            layer.weight.iter_mut().enumerate().filter(|(at, _)| masked(at % area)).for_each(|(_, weight)| *weight = 0.0);
+            layer
+                .weight
+                .iter_mut()
+                .enumerate()
+                .filter(|(at, _)| masked(at % area))
+                .for_each(|(_, weight)| *weight = 0.0);
         }
         layer.bias = self.normals(outputs as usize, 0.1);
         layer
@@ -296,8 +296,12 @@ pub fn sh_networks(kind: ShKind, degree: u8, features: usize) -> ShCoding {
                     sources.push((ShSource::Decoded, 3 * (degree * degree - 1)));
                 }
                 if kind == ShKind::Everything {
-                    let single =
-                        [(ShSource::Position, 3), (ShSource::LogScale, 3), (ShSource::Quaternion, 4), (ShSource::OpacityLogit, 1)];
+                    let single = [
+                        (ShSource::Position, 3),
+                        (ShSource::LogScale, 3),
+                        (ShSource::Quaternion, 4),
+                        (ShSource::OpacityLogit, 1),
+                    ];
                     sources.extend(single);
                     sources.push(features);
                 }

@@ -5,8 +5,8 @@
 pub mod compression;
 
 use light4gs_codec::{
-    GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network, Plane,
-    SceneData, SceneFrameArrays, SceneMeta,
+    GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network,
+    Plane, SceneData, SceneFrameArrays, SceneMeta,
     network::{Layer, Operation},
     sh_rest_coefficients,
 };

@@ -1,9 +1,7 @@
 //! The context model and the quantisation steps as the codec's plain arrays.
 
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
-use light4gs_codec::{
-    CodecError, Condition, ContextModelArrays, FrequencyTable, LatentArrays, PerGroup, PlanePrior,
-};
+use light4gs_codec::{CodecError, Condition, ContextModelArrays, FrequencyTable, LatentArrays, PerGroup, PlanePrior};
 
 use super::model::ContextModel;
 use super::prior::{DescribedCondition, DescribedPrior, Passes, PriorPart};
@@ -47,9 +45,8 @@ impl ContextModel {
             },
             ..ContextModelArrays::default()
         };
-        let described = |plane: usize| {
-            parts.iter().find_map(|part| part.describe(plane)).unwrap_or_else(DescribedPrior::constant)
-        };
+        let described =
+            |plane: usize| parts.iter().find_map(|part| part.describe(plane)).unwrap_or_else(DescribedPrior::constant);
         for plane in 0..2 * PLANES_PER_SCALE {
             let DescribedPrior { parameters, mut context, passes } = described(plane);
             if let (Some(checkerboard), Passes::AnchorsFirst) = (&self.checkerboard, passes) {

@@ -127,8 +127,7 @@ impl PriorPart for Hyperprior {
     }
 
     fn describe(&self, _: usize) -> Option<DescribedPrior> {
-        let parameters =
-            DescribedCondition { network: self.synthesis_network(), sources: vec![PlaneSource::Latent] };
+        let parameters = DescribedCondition { network: self.synthesis_network(), sources: vec![PlaneSource::Latent] };
         Some(DescribedPrior { parameters: Some(parameters), context: None, passes: Passes::AnchorsFirst })
     }
 }

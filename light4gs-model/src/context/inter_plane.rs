@@ -118,7 +118,8 @@ impl PriorPart for InterPlane {
     }
 
     fn describe(&self, plane: usize) -> Option<DescribedPrior> {
-        let sources = Self::sources(position_of(plane))?.map(|position| PlaneSource::SameScale(position as u8)).to_vec();
+        let sources =
+            Self::sources(position_of(plane))?.map(|position| PlaneSource::SameScale(position as u8)).to_vec();
         let parameters = Some(DescribedCondition { network: self.network(), sources });
         Some(DescribedPrior { parameters, context: None, passes: Passes::AnchorsFirst })
     }

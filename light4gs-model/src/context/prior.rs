@@ -1,8 +1,8 @@
 //! What a part of the context model contributes to a plane, and what it may look at.
 
 use burn::tensor::Tensor;
-use light4gs_codec::{Network, PlaneSource};
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, scale_of};
+use light4gs_codec::{Network, PlaneSource};
 
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::quantization_steps::PlaneSteps;

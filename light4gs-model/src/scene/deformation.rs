@@ -191,7 +191,9 @@ impl Deformation {
         };
         let other = |what: &str| ModelError::Motion(format!("{what} are not those of a trunk with heads"));
         // Sizes first: nothing is made for sizes that nobody has numbers for.
-        let sizes = |layer: &&Layer| layer.weight.len() as u64 == layer.weights() && layer.inputs as usize <= width.max(feature_size);
+        let sizes = |layer: &&Layer| {
+            layer.weight.len() as u64 == layer.weights() && layer.inputs as usize <= width.max(feature_size)
+        };
         if width == 0 || !layers.iter().all(sizes) {
             return Err(other("layers"));
         }

@@ -212,7 +212,11 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
         add(format!("motion.{i}.bias"), vec![layer.outputs as usize], &layer.bias);
     }
     for tensor in &data.motion.tensors {
-        add(format!("motion.{}", tensor.name), tensor.shape.iter().map(|side| *side as usize).collect(), &tensor.values);
+        add(
+            format!("motion.{}", tensor.name),
+            tensor.shape.iter().map(|side| *side as usize).collect(),
+            &tensor.values,
+        );
     }
     tensors
 }

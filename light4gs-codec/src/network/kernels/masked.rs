@@ -61,11 +61,7 @@ impl MaskedConvolution {
                 layer.weight[kernel * area + taps[column % taps.len()]]
             })
         };
-        Self {
-            groups: (0..groups).map(matrix).collect(),
-            inputs_per_group: inputs,
-            kernel: layer.kernel as usize,
-        }
+        Self { groups: (0..groups).map(matrix).collect(), inputs_per_group: inputs, kernel: layer.kernel as usize }
     }
 
     /// The outputs at eight neighbouring non-anchors of row `y`, the first of which is number `first` of its row.

@@ -180,7 +180,10 @@ fn means_and_transposition() {
     let values: Vec<f32> = (0..24).map(|i| i as f32).collect();
     let map = PaddedMap::centered(&values, [3, 4], 0.0, 1);
     let down = mean_over_height(&map, 1);
-    assert_eq!((down.height, down.row(0, 0), down.row(1, 0)), (1, &[4.0, 5.0, 6.0, 7.0][..], &[16.0, 17.0, 18.0, 19.0][..]));
+    assert_eq!(
+        (down.height, down.row(0, 0), down.row(1, 0)),
+        (1, &[4.0, 5.0, 6.0, 7.0][..], &[16.0, 17.0, 18.0, 19.0][..])
+    );
     let across = mean_over_width(&map, 0);
     assert_eq!((across.width, across.row(0, 1), across.row(1, 2)), (1, &[5.5][..], &[21.5][..]));
     let other = transposed(&map, 2);
