@@ -22,7 +22,6 @@ pub mod entropy;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod gpu_error;
-mod named_parameters;
 pub mod ops;
 pub mod parameters;
 pub mod scene;
@@ -33,7 +32,6 @@ mod splatter;
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;
-pub use named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
 pub use scene::*;
 pub use sh::*;
 pub use significance::{Significance, SignificanceScore, VolumeWeight, least_significant};

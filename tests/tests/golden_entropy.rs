@@ -20,16 +20,21 @@ fn latent(golden: &Golden, name: &str, device: &Device) -> Tensor<3> {
     channels_first(golden.tensor(name, device))
 }
 
+/// The golden file's name of one of our parameters.
+fn name_in_file(path: &str) -> &str {
+    path.strip_prefix("density.").unwrap_or(path)
+}
+
 fn bottleneck_of(golden: &Golden, device: &Device) -> EntropyBottleneck {
     let mut bottleneck = EntropyBottleneckConfig::new(golden.shape("x")[1]).init(device);
-    load(&mut bottleneck, golden, |name| Some(format!("param.{name}")));
+    load(&mut bottleneck, golden, |path| Some(format!("param.{}", name_in_file(path))));
     bottleneck
 }
 
 fn param_gradients<'a>(golden: &'a Golden, prefix: &str) -> impl Fn(&str) -> Option<Vec<f32>> + use<'a> {
     let prefix = prefix.to_owned();
-    move |name| {
-        let name = format!("{prefix}.grad.{name}");
+    move |path| {
+        let name = format!("{prefix}.grad.{}", name_in_file(path));
         golden.has(&name).then(|| golden.values(&name))
     }
 }
@@ -69,7 +74,7 @@ fn bottleneck_gradients() {
     let golden = Golden::open("c04_entropy_bottleneck");
     for (name, device) in devices() {
         let device = device.autodiff();
-        let mut bottleneck = bottleneck_of(&golden, &device);
+        let bottleneck = bottleneck_of(&golden, &device);
 
         let x = golden.tensor::<4>("x", &device).require_grad();
         let noisy = channels_first(x.clone()) + latent(&golden, "noise.noise", &device);
@@ -78,13 +83,13 @@ fn bottleneck_gradients() {
         assert_close(&format!("{name} out"), &values_of(&received), &expected("noise.out"), 1e-5);
         assert_close(&format!("{name} likelihood"), &values_of(&likelihood), &expected("noise.likelihood"), 5e-7);
         let loss = (likelihood * latent(&golden, "noise.w", &device)).sum();
-        check_bottleneck(&format!("{name} noise"), &mut bottleneck, &golden, "noise", &x, &loss.backward());
+        check_bottleneck(&format!("{name} noise"), &bottleneck, &golden, "noise", &x, &loss.backward());
 
         let x = golden.tensor::<4>("x", &device).require_grad();
         let (_, likelihood) = bottleneck.forward(bits_input(&golden, &x, &device), Latent::Exact);
         let loss = bits(likelihood).sum();
         assert_close_relative(&format!("{name} bits"), &values_of(&loss), &golden.values("bits.total"), 1e-4);
-        check_bottleneck(&format!("{name} bits"), &mut bottleneck, &golden, "bits", &x, &loss.backward());
+        check_bottleneck(&format!("{name} bits"), &bottleneck, &golden, "bits", &x, &loss.backward());
     }
 }
 
@@ -94,7 +99,7 @@ fn bits_input(golden: &Golden, x: &Tensor<4>, device: &Device) -> Tensor<3> {
 
 fn check_bottleneck(
     what: &str,
-    bottleneck: &mut EntropyBottleneck,
+    bottleneck: &EntropyBottleneck,
     golden: &Golden,
     prefix: &str,
     x: &Tensor<4>,
@@ -170,7 +175,7 @@ fn bottleneck_tables() {
     bottleneck.update_quantiles();
     assert_close_relative("quantiles", &values_of(&bottleneck.quantiles.val()), &expected, 1e-3);
 
-    load(&mut bottleneck, &golden, |name| (name == "quantiles").then(|| "param.quantiles_initial".to_owned()));
+    load(&mut bottleneck, &golden, |path| (path == "quantiles").then(|| "param.quantiles_initial".to_owned()));
     check(&bottleneck, "table_default_quantiles");
 }
 
@@ -192,7 +197,7 @@ fn bottleneck_cumulative_and_auxiliary_loss() {
             .collect();
         assert_close_relative("plain logits", &logits, &expected, 1e-6);
 
-        load(&mut bottleneck, &golden, |name| (name == "quantiles").then(|| "param.quantiles_initial".to_owned()));
+        load(&mut bottleneck, &golden, |path| (path == "quantiles").then(|| "param.quantiles_initial".to_owned()));
         let loss = bottleneck.auxiliary_loss();
         assert_close_relative(&format!("{name} aux"), &values_of(&loss), &golden.values("aux_loss_initial"), 1e-4);
         let gradients = loss.backward();
@@ -205,7 +210,7 @@ fn bottleneck_cumulative_and_auxiliary_loss() {
 
 fn sh_of(golden: &Golden, device: &Device) -> ShBottleneck {
     let mut model = ShBottleneckConfig::new().with_step(golden.scalar("Q")).init(device);
-    load(&mut model, golden, |name| Some(format!("param.{name}")));
+    load(&mut model, golden, |path| Some(format!("param.{}", name_in_file(path))));
     model
 }
 
@@ -223,7 +228,7 @@ fn sh_bottleneck() {
     let golden = Golden::open("c04_sh_bottleneck");
     for (name, device) in devices() {
         let device = device.autodiff();
-        let mut model = sh_of(&golden, &device);
+        let model = sh_of(&golden, &device);
         let step = golden.scalar("Q");
         for prefix in ["noise", "symbols"] {
             let what = format!("{name} {prefix}");
@@ -245,7 +250,7 @@ fn sh_bottleneck() {
             let gradients = total.backward();
             let gradient = values_of(&x.grad(&gradients).unwrap());
             assert_close_relative(&format!("{what} grad_x"), &gradient, &expected("grad_x"), 1e-4);
-            let compared = compare_gradients(&what, &mut model, &gradients, 1e-4, param_gradients(&golden, prefix));
+            let compared = compare_gradients(&what, &model, &gradients, 1e-4, param_gradients(&golden, prefix));
             assert_eq!(compared, 3 * 4, "{what}: compared parameters");
         }
     }

@@ -13,7 +13,6 @@ use light4gs_codec::{Network, PlaneSource};
 
 use super::prior::DescribedCondition;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
 const KERNEL: usize = 5;
 
@@ -44,20 +43,7 @@ pub struct Checkerboard {
     pub conv: PlaneConv,
 }
 
-const NAME: &str = "context_prediction";
-
-impl NamedParameters for Checkerboard {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
-    }
-}
-
 impl Checkerboard {
-    /// The convolution as the stream stores it.
-    pub fn layer(&self) -> Layer<'_> {
-        Layer::conv(NAME, &self.conv)
-    }
-
     /// [`Self::context`] for the codec's exact executor.
     pub fn describe(&self) -> DescribedCondition {
         let layer = self.conv.to_layer();

@@ -9,7 +9,6 @@ use light4gs_codec::network::Operation;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 use crate::entropy::gaussian_conditional::NormalParameters;
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
 /// How the last layer starts.
 #[derive(Config, Debug, PartialEq)]
@@ -54,26 +53,11 @@ pub struct EntropyParameters {
     pub layers: [PlaneConv; 3],
 }
 
-const NAMES: [&str; 3] = ["entropy_parameters.0", "entropy_parameters.2", "entropy_parameters.4"];
-
-impl NamedParameters for EntropyParameters {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (name, layer) in NAMES.into_iter().zip(&mut self.layers) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
-    }
-}
-
 impl EntropyParameters {
     /// Channels of a plane.
     pub fn channels(&self) -> usize {
         let [.., last] = &self.layers;
         last.bias.dims()[0] / 2
-    }
-
-    /// The layers as the stream stores them.
-    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
-        NAMES.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
     }
 
     /// [`Self::forward`] for the codec's exact executor: parameters and context to scales, then means.
@@ -92,7 +76,8 @@ impl EntropyParameters {
         network
     }
 
-    /// Normal distributions `[M, H, W]` of the values of a plane of this size (height, width), in units of its step, from `parameters` and `context [2 M, H, W]`; what is absent
+    /// Normal distributions `[M, H, W]` of the values of a plane of this size (height, width), in units of its step,
+    /// from `parameters` and `context [2 M, H, W]`; what is absent
     /// counts as zeros.
     pub fn forward(
         &self,

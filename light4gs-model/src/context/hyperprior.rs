@@ -10,7 +10,6 @@ use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, P
 use crate::entropy::bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig};
 use crate::entropy::gaussian_conditional::bits;
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, Prefixed, visit_layer};
 
 /// Configuration of a [`Hyperprior`].
 #[derive(Config, Debug)]
@@ -56,32 +55,7 @@ pub struct Hyperprior {
     pub synthesis_out: PlaneConv,
 }
 
-const ANALYSIS: [&str; 3] = ["h_a.0", "h_a.2", "h_a.4"];
-const SYNTHESIS_UP: [&str; 2] = ["h_s.0", "h_s.2"];
-const SYNTHESIS_OUT: &str = "h_s.4";
-
-impl NamedParameters for Hyperprior {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (name, layer) in ANALYSIS.into_iter().zip(&mut self.analysis) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
-        for (name, layer) in SYNTHESIS_UP.into_iter().zip(&mut self.synthesis_up) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
-        visit_layer(SYNTHESIS_OUT, &mut self.synthesis_out.weight, &mut self.synthesis_out.bias, visitor);
-        self.bottleneck.visit_parameters(&mut Prefixed { prefix: "entropy_bottleneck", visitor });
-    }
-}
-
 impl Hyperprior {
-    /// The layers as the stream stores them, and `h_a`, which it does not.
-    pub fn layers(&self) -> impl Iterator<Item = Layer<'_>> {
-        let analysis = ANALYSIS.into_iter().zip(&self.analysis);
-        let analysis = analysis.map(|(name, layer)| Layer { encoder_only: true, ..Layer::conv(name, layer) });
-        let up = SYNTHESIS_UP.into_iter().zip(&self.synthesis_up).map(|(name, layer)| Layer::deconv(name, layer));
-        analysis.chain(up).chain([Layer::conv(SYNTHESIS_OUT, &self.synthesis_out)])
-    }
-
     /// The latent `[N, H / 4, W / 4]` of a plane `[M, H, W]` in steps.
     pub fn analyze(&self, plane: Tensor<3>) -> Tensor<3> {
         let [first, second, third] = &self.analysis;

@@ -10,7 +10,6 @@ use light4gs_codec::{Network, PlaneSource};
 use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
 /// Configuration of an [`InterPlane`].
 #[derive(Config, Debug)]
@@ -43,20 +42,7 @@ pub struct InterPlane {
     pub conv: PlaneConv,
 }
 
-const NAME: &str = "inter_plane";
-
-impl NamedParameters for InterPlane {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
-    }
-}
-
 impl InterPlane {
-    /// The convolution as the stream stores it.
-    pub fn layer(&self) -> Layer<'_> {
-        Layer::conv(NAME, &self.conv)
-    }
-
     /// Positions of the space-time planes over the two axes of the plane at `position`; none if that holds time itself.
     pub fn sources(position: usize) -> Option<[usize; 2]> {
         const XT: usize = 2;

@@ -11,7 +11,6 @@ use super::hyperprior::Hyperprior;
 use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::convolution::{PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters, visit_layer};
 
 /// Configuration of an [`InterScale`].
 #[derive(Config, Debug)]
@@ -41,20 +40,7 @@ pub struct InterScale {
     pub conv: PlaneConv,
 }
 
-const NAME: &str = "inter_scale";
-
-impl NamedParameters for InterScale {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        visit_layer(NAME, &mut self.conv.weight, &mut self.conv.bias, visitor);
-    }
-}
-
 impl InterScale {
-    /// The convolution as the stream stores it.
-    pub fn layer(&self) -> Layer<'_> {
-        Layer::conv(NAME, &self.conv)
-    }
-
     /// Parameters `[2 M, H, W]` from the plane `[M, h, w]` below.
     pub fn forward(&self, lower: Tensor<3>, size: [usize; 2]) -> Tensor<3> {
         self.conv.forward(upsample(lower, size))

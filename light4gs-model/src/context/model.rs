@@ -25,7 +25,6 @@ use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 use crate::entropy::quantization_steps::PlaneSteps;
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
 
 /// Parts of a [`ContextModel`], each of which an ablation may switch off.
 #[derive(Config, Debug, PartialEq)]
@@ -209,24 +208,6 @@ pub struct ContextModel {
     high_scale_hyperprior: bool,
     space_only_center: f64,
     space_time_center: f64,
-}
-
-impl NamedParameters for ContextModel {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        if let Some(hyperprior) = &mut self.hyperprior {
-            hyperprior.visit_parameters(visitor);
-        }
-        if let Some(checkerboard) = &mut self.checkerboard {
-            checkerboard.visit_parameters(visitor);
-        }
-        if let Some(inter_plane) = &mut self.inter_plane {
-            inter_plane.visit_parameters(visitor);
-        }
-        if let Some(inter_scale) = &mut self.inter_scale {
-            inter_scale.visit_parameters(visitor);
-        }
-        self.entropy_parameters.visit_parameters(visitor);
-    }
 }
 
 impl ContextModel {
@@ -421,20 +402,6 @@ impl ContextModel {
         if let Some(hyperprior) = &mut self.hyperprior {
             hyperprior.bottleneck.update_quantiles();
         }
-    }
-
-    /// Every layer by its name in the stream, in a fixed order. (The bottleneck travels as tables.)
-    pub fn layers(&self) -> Vec<Layer<'_>> {
-        let hyperprior = self.hyperprior.iter().flat_map(Hyperprior::layers);
-        let checkerboard = self.checkerboard.iter().map(Checkerboard::layer);
-        let inter_plane = self.inter_plane.iter().map(InterPlane::layer);
-        let inter_scale = self.inter_scale.iter().map(InterScale::layer);
-        hyperprior
-            .chain(checkerboard)
-            .chain(inter_plane)
-            .chain(inter_scale)
-            .chain(self.entropy_parameters.layers())
-            .collect()
     }
 
     fn gaussians(&self, prior: Prior, plane: &Tensor<3>) -> NormalParameters<3> {

@@ -6,7 +6,6 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, is_space_time, scale_of};
 
 use super::quantization_steps::PlaneSteps;
-use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
 
 /// Configuration of an [`AdaptiveQuantization`].
 #[derive(Config, Debug)]
@@ -61,12 +60,6 @@ pub struct AdaptiveQuantization {
     /// `[2]` or `[2 · scales]`: space-only, space-time.
     pub log_steps: Param<Tensor<1>>,
     scales: usize,
-}
-
-impl NamedParameters for AdaptiveQuantization {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        visitor.visit("log_steps", &mut self.log_steps);
-    }
 }
 
 impl AdaptiveQuantization {

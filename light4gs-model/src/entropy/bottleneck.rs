@@ -8,7 +8,6 @@ use burn::tensor::{Device, Distribution, Tensor, s};
 
 use super::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
 use super::gaussian_conditional::LIKELIHOOD_BOUND;
-use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
 use crate::ops::lower_bound::lower_bound;
 
 /// Probability that the outermost quantiles leave outside, both sides together.
@@ -65,13 +64,6 @@ pub struct EntropyBottleneck {
     pub density: FactorizedDensity,
     /// `[C, 1, 3]`: where the lower tail ends, the median, where the upper tail begins.
     pub quantiles: Param<Tensor<3>>,
-}
-
-impl NamedParameters for EntropyBottleneck {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        self.density.visit_parameters(visitor);
-        visitor.visit("quantiles", &mut self.quantiles);
-    }
 }
 
 impl EntropyBottleneck {

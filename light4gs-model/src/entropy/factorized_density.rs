@@ -6,8 +6,6 @@ use burn::module::{Module, Param};
 use burn::tensor::activation::softplus;
 use burn::tensor::{Device, Distribution, Tensor};
 
-use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
-
 /// Configuration of a [`FactorizedDensity`].
 #[derive(Config, Debug)]
 pub struct FactorizedDensityConfig {
@@ -56,18 +54,6 @@ pub struct FactorizedDensity {
     pub biases: Vec<Param<Tensor<3>>>,
     /// `[C, out, 1]` a layer, through tanh; the last layer may lack them.
     pub factors: Vec<Param<Tensor<3>>>,
-}
-
-impl NamedParameters for FactorizedDensity {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (kind, parameters) in
-            [("matrices", &mut self.matrices), ("biases", &mut self.biases), ("factors", &mut self.factors)]
-        {
-            for (i, parameter) in parameters.iter_mut().enumerate() {
-                visitor.visit(&format!("{kind}.{i}"), parameter);
-            }
-        }
-    }
 }
 
 impl FactorizedDensity {

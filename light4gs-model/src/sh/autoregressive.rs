@@ -7,12 +7,10 @@ use light4gs_codec::network::Operation;
 use light4gs_codec::{Network, ShPrior, ShSource};
 
 use super::entropy::{ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
-use super::network::{Names, ShNetwork};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
+use super::network::ShNetwork;
 
 /// First channel and number of channels of the degrees 1, 2 and 3.
 const DEGREES: [(usize, usize); 3] = [(0, 9), (9, 15), (24, 21)];
-const NAMES: [Names; 3] = [["sh_ar.0.0", "sh_ar.0.2"], ["sh_ar.1.0", "sh_ar.1.2"], ["sh_ar.2.0", "sh_ar.2.2"]];
 const DC: usize = 3;
 
 /// Configuration of a [`ShAutoregressive`].
@@ -47,11 +45,6 @@ pub struct ShAutoregressive {
 }
 
 impl ShAutoregressive {
-    /// The layers as the stream stores them.
-    pub fn layers(&self) -> Vec<Layer<'_>> {
-        self.degrees.iter().zip(NAMES).flat_map(|(network, names)| network.layers(names)).collect()
-    }
-
     /// Scales and means `[2 C, 1, N]` of a degree's channels, from `dc [3, N]` and the lower degrees in `values [45, N]`.
     fn output(&self, degree: usize, dc: &Tensor<2>, values: &Tensor<2>) -> Tensor<3> {
         let (lower, _) = DEGREES[degree];
@@ -110,13 +103,5 @@ impl ShEntropy for ShAutoregressive {
             ShPrior { network, sources }
         };
         self.degrees.iter().zip(DEGREES).map(prior).collect()
-    }
-}
-
-impl NamedParameters for ShAutoregressive {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        for (network, names) in self.degrees.iter_mut().zip(NAMES) {
-            network.visit_layers(names, visitor);
-        }
     }
 }

@@ -9,7 +9,6 @@ use burn::tensor::{Device, Tensor};
 use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
 use crate::entropy::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
 use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
-use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
 
 /// Configuration of a [`ShBottleneck`].
 #[derive(Config, Debug)]
@@ -61,6 +60,10 @@ impl ShEntropy for ShBottleneck {
     fn quantize(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
         (values.detach() / self.step).round() * self.step
     }
+
+    fn tables(&self) -> Option<&dyn ShTables> {
+        Some(self)
+    }
 }
 
 impl ShTables for ShBottleneck {
@@ -74,11 +77,5 @@ impl ShTables for ShBottleneck {
             symbols.clone().map(probability).collect()
         };
         (0..density.channels()).map(of_channel).collect()
-    }
-}
-
-impl NamedParameters for ShBottleneck {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        self.density.visit_parameters(visitor);
     }
 }

@@ -3,7 +3,9 @@
 use std::ops::RangeInclusive;
 
 use burn::tensor::{Device, Distribution, Tensor};
-use light4gs_codec::ShPrior;
+use light4gs_codec::{CodecError, ShCoding, ShPrior};
+
+use super::tables::table_coding;
 
 use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 
@@ -28,7 +30,8 @@ impl ShKnown {
     }
 }
 
-/// An entropy model of `sh_rest`.
+/// An entropy model of `sh_rest`. A model of one's own implements this; [`channels_first`], [`gaussian_bits`] and
+/// [`ShNetwork`](crate::ShNetwork) are what the built-in ones are made of.
 pub trait ShEntropy {
     /// Distance between the values of neighbouring symbols.
     fn step(&self) -> f32;
@@ -47,10 +50,27 @@ pub trait ShEntropy {
     /// `values` as a decoder gets them. Without gradient.
     fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
 
+    /// The model's frequency tables, if its densities depend on nothing; it then travels as such.
+    fn tables(&self) -> Option<&dyn ShTables> {
+        None
+    }
+
     /// The networks behind [`Self::bits`] for the codec's exact executor, with the same weights; none where the model
     /// travels as tables.
     fn priors(&self) -> Vec<ShPrior> {
         Vec::new()
+    }
+
+    /// What a decoder needs to read `sh_rest`, `[N, 15, 3]` row-major. Tables go as far as these values do.
+    ///
+    /// # Errors
+    /// Values that are not finite, or too many steps apart for a table.
+    fn to_coding(&self, sh_rest: &[f32]) -> Result<ShCoding, CodecError> {
+        let step = self.step();
+        match self.tables() {
+            Some(tables) => table_coding(sh_rest, step, |symbols| tables.pmf(symbols)),
+            None => Ok(ShCoding::Networks { step, priors: self.priors() }),
+        }
     }
 }
 
@@ -61,24 +81,24 @@ pub trait ShTables {
 }
 
 /// `[45, N]` from `[N, 15, 3]`.
-pub(crate) fn channels_first(values: Tensor<3>) -> Tensor<2> {
+pub fn channels_first(values: Tensor<3>) -> Tensor<2> {
     let count = values.dims()[0];
     values.reshape([count, SH_CHANNELS]).transpose()
 }
 
 /// `[N, 15, 3]` from `[45, N]`.
-pub(crate) fn channels_last(values: Tensor<2>) -> Tensor<3> {
+pub fn channels_last(values: Tensor<2>) -> Tensor<3> {
     let count = values.dims()[1];
     values.transpose().reshape([count, SH_CHANNELS / 3, 3])
 }
 
 /// Bits `[C, N]` of `values [C, N]`, given the output `[2 C, 1, N]` of a network: first scales, then means, in steps.
-pub(crate) fn gaussian_bits(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
+pub fn gaussian_bits(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
     bits(gaussian_likelihood(values / step, normal_parameters(output)))
 }
 
 /// `values [C, N]` rounded around the means of a network's output `[2 C, 1, N]`.
-pub(crate) fn round_around(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
+pub fn round_around(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
     let means = normal_parameters(output).means;
     ((values / step - means.clone()).round() + means) * step
 }

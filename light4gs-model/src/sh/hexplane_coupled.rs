@@ -7,11 +7,8 @@ use light4gs_codec::plane_layout::PLANES_PER_SCALE;
 use light4gs_codec::{Network, ShPrior, ShSource};
 
 use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
-use super::network::{Names, ShNetwork};
-use crate::named_parameters::{Layer, NamedParameterVisitor, NamedParameters};
+use super::network::ShNetwork;
 use crate::scene::hexplane::query_planes;
-
-const NAMES: Names = ["sh_hex.0", "sh_hex.2"];
 
 /// Configuration of a [`ShHexPlaneCoupled`].
 #[derive(Config, Debug)]
@@ -46,11 +43,6 @@ pub struct ShHexPlaneCoupled {
 }
 
 impl ShHexPlaneCoupled {
-    /// The layers as the stream stores them.
-    pub fn layers(&self) -> Vec<Layer<'_>> {
-        self.network.layers(NAMES).collect()
-    }
-
     /// Scales and means `[90, 1, N]`.
     fn output(&self, known: &ShKnown) -> Tensor<3> {
         self.network.forward(space_feature(&known.planes, known.positions.clone()).transpose().unsqueeze_dim(1))
@@ -92,11 +84,5 @@ impl ShEntropy for ShHexPlaneCoupled {
         let output = self.network.describe(&mut network, features);
         network.output(output);
         vec![ShPrior { network, sources: vec![ShSource::SpaceFeatures] }]
-    }
-}
-
-impl NamedParameters for ShHexPlaneCoupled {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        self.network.visit_layers(NAMES, visitor);
     }
 }

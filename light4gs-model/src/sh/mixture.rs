@@ -10,7 +10,6 @@ use burn::tensor::{Device, Tensor};
 use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last};
 use crate::entropy::factorized_density::{logistic_interval, plain_logistic_interval};
 use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
-use crate::named_parameters::{NamedParameterVisitor, NamedParameters};
 use crate::ops::lower_bound::lower_bound;
 
 /// Configuration of a [`ShMixture`].
@@ -84,6 +83,10 @@ impl ShEntropy for ShMixture {
     fn quantize(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
         (values.detach() / self.step).round() * self.step
     }
+
+    fn tables(&self) -> Option<&dyn ShTables> {
+        Some(self)
+    }
 }
 
 impl ShTables for ShMixture {
@@ -105,13 +108,5 @@ impl ShTables for ShMixture {
             symbols.clone().map(probability).collect()
         };
         (0..SH_CHANNELS).map(of_channel).collect()
-    }
-}
-
-impl NamedParameters for ShMixture {
-    fn visit_parameters(&mut self, visitor: &mut impl NamedParameterVisitor) {
-        visitor.visit("weight_logits", &mut self.weight_logits);
-        visitor.visit("means", &mut self.means);
-        visitor.visit("log_scales", &mut self.log_scales);
     }
 }

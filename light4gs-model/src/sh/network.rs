@@ -7,10 +7,6 @@ use light4gs_codec::Network;
 use light4gs_codec::network::Value;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
-use crate::named_parameters::{Layer, NamedParameterVisitor, visit_layer};
-
-/// Names of the two layers in the stream.
-pub(crate) type Names = [&'static str; 2];
 
 /// Features `[I, 1, N]` to scales and means `[2 C, 1, N]`: linear, rectifier, linear. Gaussians are the columns of a plane with one row.
 #[derive(Module, Debug)]
@@ -21,7 +17,7 @@ pub struct ShNetwork {
 
 impl ShNetwork {
     /// The last layer starts at scale `scale` and mean 0, with a tenth of PyTorch's weights.
-    pub(crate) fn new(inputs: usize, hidden: usize, channels: usize, scale: f32, device: &Device) -> Self {
+    pub fn new(inputs: usize, hidden: usize, channels: usize, scale: f32, device: &Device) -> Self {
         let [first, mut last] = [(inputs, hidden), (hidden, 2 * channels)]
             .map(|(inputs, outputs)| PlaneConvConfig::new(inputs, outputs, 1).init(device));
         let bias = [vec![scale; channels], vec![0.0; channels]].concat();
@@ -30,26 +26,17 @@ impl ShNetwork {
         Self { layers: [first, last] }
     }
 
-    pub(crate) fn forward(&self, features: Tensor<3>) -> Tensor<3> {
+    /// `[2 C, 1, N]` from `features [I, 1, N]`.
+    pub fn forward(&self, features: Tensor<3>) -> Tensor<3> {
         let [first, last] = &self.layers;
         last.forward(leaky_relu(first.forward(features), LEAKY_SLOPE))
     }
 
     /// [`Self::forward`] for the codec's exact executor.
-    pub(crate) fn describe(&self, network: &mut Network, features: Value) -> Value {
+    pub fn describe(&self, network: &mut Network, features: Value) -> Value {
         let [first, last] = &self.layers;
         let hidden = network.layer(features, first.to_layer());
         let rectified = network.leaky_relu(hidden, LEAKY_SLOPE as f32);
         network.layer(rectified, last.to_layer())
-    }
-
-    pub(crate) fn layers(&self, names: Names) -> impl Iterator<Item = Layer<'_>> {
-        names.into_iter().zip(&self.layers).map(|(name, layer)| Layer::conv(name, layer))
-    }
-
-    pub(crate) fn visit_layers(&mut self, names: Names, visitor: &mut impl NamedParameterVisitor) {
-        for (name, layer) in names.into_iter().zip(&mut self.layers) {
-            visit_layer(name, &mut layer.weight, &mut layer.bias, visitor);
-        }
     }
 }

@@ -22,11 +22,10 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_model::{
     AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlane,
-    ShAutoregressiveConfig, ShBottleneckConfig, ShEntropyConfig, ShEntropyModel, ShHexPlaneCoupledConfig,
-    ShMixtureConfig,
+    ShEntropyModel,
 };
 
-use crate::config::{CompressionConfig, Config, ContextArchitecture, ContextConfig, ShConfig, ShModel};
+use crate::config::{CompressionConfig, Config, ContextArchitecture, ContextConfig};
 use crate::error::TrainError;
 
 /// Entropy models and quantization steps of one scene.
@@ -64,7 +63,7 @@ impl Compression {
     pub fn new(config: &Config, planes: Option<&HexPlane>, device: &Device) -> Result<Self, TrainError> {
         let CompressionConfig { context, sh, .. } = &config.compression;
         let feature_size = planes.map_or(0, HexPlane::feature_size);
-        if sh.model == ShModel::HexPlaneCoupled && feature_size == 0 {
+        if sh.model.0.needs_planes() && feature_size == 0 {
             return Err(TrainError::Input(format!(
                 "compression.sh.model = \"{}\" needs a deformation field with feature planes; choose another model",
                 sh.model
@@ -76,7 +75,7 @@ impl Compression {
         };
         Ok(Self {
             planes: planes.map(models),
-            sh: (config.model.sh_degree == 3).then(|| sh_config(sh, feature_size).init(device)),
+            sh: (config.model.sh_degree == 3).then(|| sh.model.0.config(sh.step as f32, feature_size).init(device)),
         })
     }
 
@@ -118,25 +117,4 @@ fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig
         .with_inter_scale(config.inter_scale)
         .with_high_scale_hyperprior(config.high_scale_hyperprior);
     sizes.with_parts(parts)
-}
-
-/// Width of the densities of spherical harmonics before training, in the units of the values. The reference begins at 8,
-/// and in its log the rate needs hundreds of iterations to come down from there; our runs are shorter.
-const SH_INITIAL_SCALE: f64 = 0.3;
-
-fn sh_config(config: &ShConfig, feature_size: usize) -> ShEntropyConfig {
-    let step = config.step as f32;
-    match config.model {
-        ShModel::MixtureOfLogistics => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
-        ShModel::ChannelAutoregressive => {
-            ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step))
-        }
-        ShModel::HexPlaneCoupled => {
-            ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(feature_size).with_step(step))
-        }
-        ShModel::Factorized => {
-            let bottleneck = ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE);
-            ShEntropyConfig::Factorized(bottleneck)
-        }
-    }
 }

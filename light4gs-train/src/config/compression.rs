@@ -1,9 +1,13 @@
 //! `[compression]`: how small, and how (paper III-C to III-E).
 
-use light4gs_codec::Profile;
-use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::str::FromStr;
 
-use super::choice::choice;
+use light4gs_codec::Profile;
+use light4gs_model::ShKind;
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+
+use super::choice::{UnknownChoice, choice};
 
 /// What the file looks like, and what is trained for its sake.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -146,17 +150,33 @@ pub struct ShConfig {
     pub learning_rate_final: f64,
 }
 
-choice! {
-    /// The entropy models of the spherical harmonics.
-    pub enum ShModel: "model" {
-        /// One learned density a channel: the paper's.
-        Factorized = "factorized",
-        /// A mixture of logistics a channel.
-        MixtureOfLogistics = "mixture_of_logistics",
-        /// Every degree is predicted from those below it.
-        ChannelAutoregressive = "channel_autoregressive",
-        /// The parameters follow from the hexplane features at the Gaussian's position.
-        HexPlaneCoupled = "hexplane_coupled",
+/// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. Which there are is said in the model crate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShModel(pub ShKind);
+
+impl fmt::Display for ShModel {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.pad(self.0.name())
+    }
+}
+
+impl FromStr for ShModel {
+    type Err = UnknownChoice;
+
+    fn from_str(name: &str) -> Result<Self, UnknownChoice> {
+        ShKind::by_name(name).map(Self).ok_or_else(|| UnknownChoice::new("model", name, &ShKind::NAMES))
+    }
+}
+
+impl Serialize for ShModel {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(self.0.name())
+    }
+}
+
+impl<'de> Deserialize<'de> for ShModel {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
     }
 }
 
@@ -247,7 +267,7 @@ impl Default for StepsConfig {
 
 impl Default for ShConfig {
     fn default() -> Self {
-        Self { model: ShModel::Factorized, step: 0.02, learning_rate_init: 5e-3, learning_rate_final: 5e-4 }
+        Self { model: ShModel(ShKind::Factorized), step: 0.02, learning_rate_init: 5e-3, learning_rate_final: 5e-4 }
     }
 }
 

@@ -1,9 +1,8 @@
-//! Entropy models of the spherical harmonics as the codec's plain arrays.
+//! Frequency tables of the spherical harmonics for the codec.
+
+use std::ops::RangeInclusive;
 
 use light4gs_codec::{CodecError, FrequencyTable, ShCoding};
-
-use super::entropy::ShEntropy;
-use super::model::ShEntropyModel;
 
 /// A table goes no further than this many symbols on either side of 0; what lies beyond is escaped.
 const TABLE_REACH: i32 = 8000;
@@ -13,22 +12,20 @@ fn table_symbol(value: f32, step: f32) -> i32 {
     ((value / step).round() as i32).clamp(-TABLE_REACH, TABLE_REACH)
 }
 
-impl ShEntropyModel {
-    /// What a decoder needs to read `sh_rest`, `[N, 15, 3]` row-major. Tables go as far as these values do.
-    ///
-    /// # Errors
-    /// Values that are not finite, or too many steps apart for a table.
-    pub fn to_coding(&self, sh_rest: &[f32]) -> Result<ShCoding, CodecError> {
-        let step = self.step();
-        if let Some(tables) = self.tables() {
-            let symbols = sh_rest.iter().map(|value| table_symbol(*value, step));
-            let (low, high) = symbols.fold((0, 0), |(low, high), k| (low.min(k), high.max(k)));
-            let pmf = tables.pmf(low..=high);
-            let tables = pmf.iter().map(|pmf| FrequencyTable::from_pmf(low, pmf)).collect::<Result<_, _>>()?;
-            return Ok(ShCoding::Tables { step, tables });
-        }
-        Ok(ShCoding::Networks { step, priors: self.priors() })
-    }
+/// Coding of `sh_rest`, `[N, 15, 3]` row-major, with a table for each channel that goes as far as these values do. `pmf`
+/// gives each channel's probabilities of a range of symbols.
+///
+/// # Errors
+/// Values that are not finite, or too many steps apart for a table.
+pub(super) fn table_coding(
+    sh_rest: &[f32],
+    step: f32,
+    pmf: impl FnOnce(RangeInclusive<i32>) -> Vec<Vec<f64>>,
+) -> Result<ShCoding, CodecError> {
+    let symbols = sh_rest.iter().map(|value| table_symbol(*value, step));
+    let (low, high) = symbols.fold((0, 0), |(low, high), k| (low.min(k), high.max(k)));
+    let tables = pmf(low..=high).iter().map(|pmf| FrequencyTable::from_pmf(low, pmf)).collect::<Result<_, _>>()?;
+    Ok(ShCoding::Tables { step, tables })
 }
 
 /// Coding of `sh_rest`, `[N, channels]` row-major, without a trained model: a table a channel, from how often each
