@@ -94,9 +94,10 @@ pub use scene::{
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use stream::{
-    CompressionInput, CompressionReport, Encoded, OpenStream, PerGroup, PlaneCoding, PlaneDistributions, Profile,
+    CompressionInput, CompressionReport, Distributions, Encoded, OpenStream, PerGroup, PlaneCoding, Profile,
     SectionInfo, StreamInfo, WeightPrecisions,
     container::{MAGIC, VERSION},
     decode, decode_with_limits, encode, encode_compressed, encode_planes, encode_sh, info, plane_distributions,
     sections::{Encoding, Kind},
+    sh_distributions,
 };

@@ -7,8 +7,8 @@ use common::compression::{
     reference_shape, scene, sh_networks, sh_tables, step,
 };
 use light4gs_codec::{
-    CodecError, CompressionInput, ContextModelArrays, Encoded, Kind, LatentArrays, Network, OpenStream, PerGroup,
-    PlaneCoding, PlaneDistributions, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, decode, encode_compressed,
+    CodecError, CompressionInput, ContextModelArrays, Distributions, Encoded, Kind, LatentArrays, Network, OpenStream,
+    PerGroup, PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, decode, encode_compressed,
     encode_planes, info,
     network::{LayerKind, Operation, Value},
     plane_distributions,
@@ -309,8 +309,7 @@ fn the_coded_bits_are_those_of_the_distributions() {
     let bytes = encode_planes(&scene.hexplane, planes).unwrap();
     assert_eq!(bytes.len() as u64, encoded.report.sections[4].3);
     for (index, plane) in encoded.decoded.hexplane.planes.iter().enumerate() {
-        let PlaneDistributions { scales, means } =
-            plane_distributions(&encoded.decoded.hexplane, planes, index).unwrap();
+        let Distributions { scales, means } = plane_distributions(&encoded.decoded.hexplane, planes, index).unwrap();
         let center = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
         let mut ideal = 0.0;
         for ((&value, &scale), &mean) in plane.values.iter().zip(&scales).zip(&means) {

@@ -11,7 +11,7 @@ use crate::config::ConfigError;
 /// An error of training, evaluation or the command line.
 #[derive(Debug, thiserror::Error)]
 pub enum TrainError {
-    /// A dataset, a picture or a file.
+    /// A dataset, an image or a file.
     #[error(transparent)]
     Data(#[from] DataError),
     /// A configuration.

@@ -11,6 +11,7 @@ pub mod device;
 pub mod error;
 pub mod evaluation;
 pub mod loss;
+pub mod memory;
 pub mod observers;
 pub mod optimization;
 mod randomness;

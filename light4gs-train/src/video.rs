@@ -188,7 +188,7 @@ mod tests {
         let frames = [frame(3, 2, 10), frame(3, 2, 20)].map(Ok::<_, DataError>);
         let files = write_png_sequence(&folder.path().join("new"), frames).expect("files");
         assert_eq!(files.len(), 2);
-        let picture = image::open(folder.path().join("new/0001.png")).expect("a picture").to_rgb8();
-        assert_eq!((picture.dimensions(), picture.get_pixel(2, 1).0), ((3, 2), [20; 3]));
+        let image = image::open(folder.path().join("new/0001.png")).expect("an image").to_rgb8();
+        assert_eq!((image.dimensions(), image.get_pixel(2, 1).0), ((3, 2), [20; 3]));
     }
 }

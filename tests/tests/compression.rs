@@ -168,10 +168,14 @@ fn every_configuration_makes_a_file_that_decodes() {
         // What the sub-streams of a plane spend on whole words at their ends, and quantised weights.
         let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
+        let sh_bytes: u64 = coded.report.sh.degrees.iter().sum();
+        let (expected, found) = (coded.estimate.sh, 8.0 * sh_bytes as f64);
+        let slack = 60.0 * coded.report.sh.degrees.len() as f64 + 0.002 * found;
+        assert!((expected - found).abs() <= slack, "{overrides:?}: {expected} bits of harmonics, {found} in the file");
     }
 }
 
-/// Once settled, planes are what the file has, bit for bit: what learns around them learns around the right thing.
+/// Once frozen, planes are what the file has, bit for bit: what learns around them learns around the right thing.
 #[test]
 fn frozen_planes_are_those_of_the_file() {
     for (name, device) in devices() {

@@ -1,7 +1,7 @@
 //! The decoder on bytes whose checksums fit.
 //!
 //! Start from the golden streams, from the folder of `light4gs-codec` and with a nightly compiler:
-//! `cargo +nightly fuzz run decode fuzz/corpus/decode ../tests/golden-streams tests/data`
+//! `cargo +nightly fuzz run decode fuzz/corpus/decode ../tests/golden-streams`
 
 #![no_main]
 
@@ -9,7 +9,7 @@ use libfuzzer_sys::fuzz_target;
 use light4gs_codec::{Limits, decode_with_limits, encode, info};
 
 const PRELUDE: usize = 32;
-const ENTRY: usize = 24;
+const ENTRY: usize = 16;
 
 /// Small enough that a lie about a size is found out quickly.
 const LIMITS: Limits = Limits {
@@ -22,8 +22,9 @@ const LIMITS: Limits = Limits {
     channels: 64,
     resolution: 1 << 8,
     scales: 4,
-    layers: 32,
-    layer_width: 256,
+    networks: 8,
+    nodes: 32,
+    layer_width: 1 << 10,
     layer_weights: 1 << 16,
     coded_values: 1 << 14,
     multiplications: 1 << 24,
@@ -40,7 +41,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// Makes the length of the stream, the offsets and the checksums fit, where there is a table at all.
+/// Makes the length of the stream, those of the sections and the checksums fit, where there is a table at all.
 fn forge(bytes: &mut [u8]) -> Option<()> {
     let length = bytes.len() as u64;
     bytes.get_mut(20..28)?.copy_from_slice(&length.to_le_bytes());
@@ -52,13 +53,12 @@ fn forge(bytes: &mut [u8]) -> Option<()> {
     for section in 0..sections {
         let entry = table + section * ENTRY;
         let left = bytes.len() - start;
-        let stated = u64::from_le_bytes(*bytes.get(entry + 16..)?.first_chunk()?);
+        let stated = u64::from_le_bytes(*bytes.get(entry + 8..)?.first_chunk()?);
         // The last section takes what the others have left.
         let size = if section + 1 == sections { left } else { left.min(stated.try_into().unwrap_or(left)) };
         let crc = crc32c::crc32c(&bytes[start..start + size]);
         bytes[entry + 4..entry + 8].copy_from_slice(&crc.to_le_bytes());
-        bytes[entry + 8..entry + 16].copy_from_slice(&(start as u64).to_le_bytes());
-        bytes[entry + 16..entry + 24].copy_from_slice(&(size as u64).to_le_bytes());
+        bytes[entry + 8..entry + 16].copy_from_slice(&(size as u64).to_le_bytes());
         start += size;
     }
     let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes[..28]), &bytes[PRELUDE..end]);

@@ -5,14 +5,16 @@ use super::{
     walk::{HarmonicsModel, walk},
 };
 use crate::{
-    CodecError, GaussianArrays, Limits, Network,
+    CodecError, Distributions, GaussianArrays, Limits, Network,
     adaptive::Damaged,
     entropy::{SymbolReader, SymbolWriter, read_tables, write_tables},
     limits::at_most,
     network::{
+        kernels::LANES,
         tensors::{read_weights, write_weights},
         weights::WeightPrecision,
     },
+    planes::bounded_mean,
     sh_rest_coefficients,
     stream::{
         reader::Reader,
@@ -224,4 +226,32 @@ pub(crate) fn read(
     walk(&mut model, coding.step(), head.degree, &mut values, &mut readers).map_err(damaged)?;
     readers.into_iter().try_for_each(SymbolReader::finish).map_err(damaged)?;
     Ok((head, values))
+}
+
+/// Scales and means of decoded harmonics.
+pub(crate) fn distributions(
+    gaussians: &GaussianArrays,
+    coding: &ShCoding,
+    conditions: Conditions<'_>,
+    limits: &Limits,
+) -> Result<Distributions, CodecError> {
+    coding.check(gaussians.sh_degree, conditions.features(), limits)?;
+    let HarmonicsModel::Networks(mut networks) = HarmonicsModel::new(coding, conditions) else {
+        return Err(CodecError::invalid(SECTION, "coding", "tables", "networks"));
+    };
+    let (values, channels) = (&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree));
+    let mut all = Distributions { scales: vec![0.0; values.len()], means: vec![0.0; values.len()] };
+    for first in (0..gaussians.len()).step_by(LANES) {
+        networks.begin(first);
+        for prior in 0..networks.len() {
+            let (start, scales, means) = networks.parameters(prior, first, values, channels);
+            for (channel, (scales, means)) in (start..).zip(scales.iter().zip(means)) {
+                for lane in 0..LANES.min(gaussians.len() - first) {
+                    let at = (first + lane) * channels + channel;
+                    (all.scales[at], all.means[at]) = (scales[lane], bounded_mean(means[lane]));
+                }
+            }
+        }
+    }
+    Ok(all)
 }

@@ -25,7 +25,7 @@ pub use compressor::{CompressionReport, Encoded, encode_compressed};
 pub use info::{SectionInfo, StreamInfo, info};
 pub use input::{CompressionInput, PerGroup, PlaneCoding, Profile, WeightPrecisions};
 pub use open::OpenStream;
-pub use parts::{PlaneDistributions, encode_planes, encode_sh, plane_distributions};
+pub use parts::{Distributions, encode_planes, encode_sh, plane_distributions, sh_distributions};
 
 use container::NewSection;
 use sections::{Encoding, Kind};

@@ -41,17 +41,17 @@ pub fn encode_sh(
     Ok(writer.bytes)
 }
 
-/// Gaussians that the values of a plane are coded under, `[M, height, width]` each, in units of the quantization step.
+/// Gaussians that values are coded under, in units of the quantization step.
 #[derive(Clone, Debug, PartialEq)]
-pub struct PlaneDistributions {
+pub struct Distributions {
     /// Standard deviations as the networks give them; they are bounded below by 0.11 when they are used.
     pub scales: Vec<f32>,
     /// Means.
     pub means: Vec<f32>,
 }
 
-/// What the exact executor gives for one plane of a decoded hexplane: the distributions that a stream's intervals come
-/// from. The step is not asked for, since all networks see planes in their own units.
+/// What the exact executor gives for one plane of a decoded hexplane, `[M, height, width]`: the distributions that a
+/// stream's intervals come from. The step is not asked for, since all networks see planes in their own units.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`]; a plane that is not there.
@@ -59,7 +59,7 @@ pub fn plane_distributions(
     hexplane: &HexPlaneArrays,
     coding: &PlaneCoding,
     plane: usize,
-) -> Result<PlaneDistributions, CodecError> {
+) -> Result<Distributions, CodecError> {
     check_planes(hexplane, coding)?;
     if plane >= hexplane.planes.len() {
         let expected = format!("less than {}", hexplane.planes.len());
@@ -67,7 +67,24 @@ pub fn plane_distributions(
     }
     let symbols = &coding.latent_symbols[plane];
     let (scales, means) = planes::parameters(hexplane, &coding.model, symbols, plane, &Limits::default())?;
-    Ok(PlaneDistributions { scales, means })
+    Ok(Distributions { scales, means })
+}
+
+/// What the exact executor gives for the spherical harmonics of decoded Gaussians, `[N, channels]`.
+///
+/// # Errors
+/// As [`crate::encode_compressed`]; a coding without networks.
+pub fn sh_distributions(
+    gaussians: &GaussianArrays,
+    coding: &ShCoding,
+    frame: &SceneFrameArrays,
+    hexplane: &HexPlaneArrays,
+) -> Result<Distributions, CodecError> {
+    let limits = Limits::default();
+    gaussians::check(gaussians, &limits)?;
+    sh::section::check(gaussians)?;
+    planes::head::check(hexplane, &limits)?;
+    sh::section::distributions(gaussians, coding, Conditions { gaussians, frame, hexplane }, &limits)
 }
 
 fn check_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<(), CodecError> {

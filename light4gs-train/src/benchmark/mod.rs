@@ -46,7 +46,7 @@ pub struct BenchScene {
 }
 
 impl BenchScene {
-    /// A seeded cloud of `count` Gaussians in the unit ball before a camera with a square picture.
+    /// A seeded cloud of `count` Gaussians in the unit ball before a camera with a square image.
     pub fn generate(count: usize, size: u32) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(count as u64);
         let mut symmetric = |half: f32| rng.random_range(-half..half);
@@ -264,7 +264,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
             repeats,
             || still.tensors(),
             |g| {
-                // A picture of one pixel: everything but the blending.
+                // An image of one pixel: everything but the blending.
                 let camera = Camera { width: 1, height: 1, ..scene.camera };
                 splatter.render(g, &camera, None)
             },

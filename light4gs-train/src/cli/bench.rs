@@ -22,7 +22,7 @@ pub(super) struct Bench {
     /// Gaussians of the generated scenes.
     #[arg(long, value_delimiter = ',', default_value = "5000,20000,100000")]
     gaussians: Vec<usize>,
-    /// Widths and heights of the generated scenes' pictures.
+    /// Widths and heights of the generated scenes' images.
     #[arg(long, value_delimiter = ',', default_value = "400,800")]
     size: Vec<u32>,
     /// Timed repetitions of each stage, after two untimed ones.

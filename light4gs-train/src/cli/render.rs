@@ -45,7 +45,7 @@ pub(super) struct Render {
     /// The moment of a frozen path, in [0, 1].
     #[arg(long, default_value_t = 0.0)]
     time: f32,
-    /// Width in pixels; the training pictures' if not given.
+    /// Width in pixels; the training images' if not given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16_384))]
     width: Option<u32>,
     /// Distance of the orbit from the origin, world units.
@@ -73,12 +73,12 @@ impl Render {
         check_output(&self.out)?;
         let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
         let frames = self.camera_frames(&decoded)?;
-        let pictures = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
+        let images = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
         if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
-            let count = write_gif(&self.out, pictures, self.fps, Looping::Forever)?;
+            let count = write_gif(&self.out, images, self.fps, Looping::Forever)?;
             say(format_args!("wrote {} ({count} frames)", self.out.display()))?;
         } else {
-            let files = write_png_sequence(&self.out, pictures)?;
+            let files = write_png_sequence(&self.out, images)?;
             say(format_args!("wrote {} frames to {}", files.len(), self.out.display()))?;
         }
         Ok(())

@@ -15,13 +15,13 @@ pub(super) struct Synth {
     /// Width and height in pixels.
     #[arg(long, default_value_t = 200)]
     resolution: u32,
-    /// Training pictures.
+    /// Training images.
     #[arg(long, default_value_t = 100)]
     train_frames: usize,
-    /// Test pictures.
+    /// Test images.
     #[arg(long, default_value_t = 20)]
     test_frames: usize,
-    /// Validation pictures.
+    /// Validation images.
     #[arg(long, default_value_t = 10)]
     val_frames: usize,
     /// Seed of the cameras.

@@ -207,7 +207,7 @@ impl Eval {
 
     fn eval_file(self) -> Result<(), TrainError> {
         let Some(scene) = self.scene else {
-            return Err(TrainError::Input("a .l4gs file holds no pictures; name the dataset with --scene DIR".into()));
+            return Err(TrainError::Input("a .l4gs file holds no images; name the dataset with --scene DIR".into()));
         };
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;

@@ -10,7 +10,7 @@ use light4gs_data::{Frame, Scene};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::{BitEstimate, BitMap, Compression, EncodedScene, Pictures, encode, fit};
+use super::{BitEstimate, BitMap, Compression, EncodedScene, SearchImages, encode, fit};
 use crate::config::{Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
 use crate::error::TrainError;
@@ -102,13 +102,13 @@ pub fn code_scene<F: DeformationField>(
     let views = search_views(data);
     let inner = (*device).clone().inner();
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
-    let pictures = if settings.attributes.search_tolerance > 0.0 && profile == Profile::Compact {
+    let images = if settings.attributes.search_tolerance > 0.0 && profile == Profile::Compact {
         let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images)?;
-        Some(Pictures { render: &render, error })
+        Some(SearchImages { render: &render, error })
     } else {
         None
     };
-    let encoded = encode(scene, &compression, meta, settings, profile, pictures, device)?;
+    let encoded = encode(scene, &compression, meta, settings, profile, images, device)?;
     let sizes = &encoded.coded.report;
     let hexplane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
     let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
@@ -145,11 +145,11 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
 fn render_views<F: DeformationField>(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
     let scene = DynamicScene::<F>::from_arrays(data, device).expect("arrays that came from a model make one");
     let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
-    let picture = |frame: &&Frame| {
+    let image = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;
         image.clamp(0.0, 1.0).into_data().iter::<f32>().collect::<Vec<_>>()
     };
-    views.iter().flat_map(picture).collect()
+    views.iter().flat_map(image).collect()
 }
 
 fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &dyn ImageSource) -> Result<f64, TrainError> {

@@ -61,9 +61,9 @@ pub struct BitEstimate {
     pub sh: f64,
 }
 
-/// Pictures for the search of attribute steps: `render` gives some training views of Gaussians as pixel values, `error`
+/// Images for the search of attribute steps: `render` gives some training views of Gaussians as pixel values, `error`
 /// is the mean squared error of the scene's own.
-pub struct Pictures<'a> {
+pub struct SearchImages<'a> {
     /// Renders plain arrays; other parts of the scene are as decoded.
     pub render: &'a dyn Fn(&SceneData) -> Vec<f32>,
     /// Against the truth.
@@ -78,18 +78,18 @@ pub fn encode<F: DeformationField>(
     meta: SceneMeta,
     config: &CompressionConfig,
     profile: Profile,
-    pictures: Option<Pictures>,
+    images: Option<SearchImages>,
     device: &Device,
 ) -> Result<EncodedScene, TrainError> {
     let (scene, device) = (&scene.valid(), &device.clone().inner());
     let compression = &mut compression.valid();
     let data = scene.to_arrays(meta);
     let mut input = compression_input(compression, scene, &data, config, profile)?;
-    if let (Some(pictures), Profile::Compact) = (pictures, input.profile)
+    if let (Some(images), Profile::Compact) = (images, input.profile)
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
-        input.attributes = step_search::search(&data, &input.attributes, tolerance, pictures.error, pictures.render)?;
+        input.attributes = step_search::search(&data, &input.attributes, tolerance, images.error, images.render)?;
     }
     let encoded = encode_compressed(&data, &input)?;
     let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;
@@ -105,6 +105,8 @@ const FREEZING_ROUNDS: usize = 8;
 /// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn. None if
 /// there are no planes or no models of them. `device`, with autodiff, is where the result lives.
 ///
+/// Planes do not depend on Gaussians, so the scene that is coded here for their sake has none.
+///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
 pub fn freeze_planes<F: DeformationField>(
@@ -115,10 +117,11 @@ pub fn freeze_planes<F: DeformationField>(
 ) -> Result<Option<HexPlane>, TrainError> {
     let mut scene = scene.valid();
     let compression = &mut compression.valid();
-    let mut data = scene.to_arrays(SceneMeta::default());
     if scene.planes().is_none() || compression.planes.is_none() {
         return Ok(None);
     }
+    let mut data = scene.to_arrays(SceneMeta::default());
+    data.gaussians = GaussianArrays { sh_degree: data.gaussians.sh_degree, ..GaussianArrays::default() };
     for _ in 0..FREEZING_ROUNDS {
         let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
         let decoded = encode_compressed(&data, &input)?.decoded;

@@ -14,7 +14,9 @@ mod rate;
 mod step_search;
 
 pub use code_scene::{CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
-pub use encoder::{BitEstimate, BitMap, CodedSizes, EncodedScene, Pictures, compression_input, encode, freeze_planes};
+pub use encoder::{
+    BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, freeze_planes,
+};
 pub use fit::fit;
 pub use rate::{NoisyScene, Rate};
 

@@ -1,8 +1,8 @@
 //! How coarsely positions, scales, rotations, opacities and constant colours may be quantised.
 //!
-//! The error that an attribute's step puts into the pictures grows with its square, and a halved step costs a bit for
+//! The error that an attribute's step puts into the images grows with its square, and a halved step costs a bit for
 //! each number. So for a given error in total the file is smallest when every number of every attribute brings the
-//! same share of it. One rendering an attribute tells how sensitive the pictures are to it; the steps follow from that.
+//! same share of it. One rendering an attribute tells how sensitive the images are to it; the steps follow from that.
 
 use light4gs_codec::attributes::{AttributeSteps, quantized};
 use light4gs_codec::{CodecError, SceneData};
@@ -27,11 +27,11 @@ fn from_array([position, log_scale, quaternion, opacity_logit, sh_dc]: [f32; 5])
     AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }
 }
 
-/// Steps that cost at most about `tolerance` dB on the pictures that `render` makes, starting from `given`.
+/// Steps that cost at most about `tolerance` dB on the images that `render` makes, starting from `given`.
 ///
 /// `render` gives the same views of any scene, as one list of pixel values; `error` is the mean squared error of those
 /// of the scene as it is. Spherical harmonics are left out: they have a step of their own, and hardly matter to how
-/// sensitive the pictures are to the rest.
+/// sensitive the images are to the rest.
 pub(super) fn search(
     scene: &SceneData,
     given: &AttributeSteps,
@@ -44,8 +44,8 @@ pub(super) fn search(
     scene.gaussians.sh_rest = Vec::new();
     let exact = render(&scene);
     let distortion = |steps: &AttributeSteps| -> Result<f64, CodecError> {
-        let pictures = render(&SceneData { gaussians: quantized(&scene.gaussians, steps)?, ..scene.clone() });
-        let sum: f64 = pictures.iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let images = render(&SceneData { gaussians: quantized(&scene.gaussians, steps)?, ..scene.clone() });
+        let sum: f64 = images.iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         Ok(sum / exact.len().max(1) as f64)
     };
     let budget = error * (10f64.powf(tolerance / 10.0) - 1.0);
@@ -90,8 +90,8 @@ mod tests {
         SceneData { gaussians, ..SceneData::default() }
     }
 
-    /// "Pictures" that are ten times as sensitive to opacities as to colours, and to nothing else.
-    fn pictures(scene: &SceneData) -> Vec<f32> {
+    /// "Images" that are ten times as sensitive to opacities as to colours, and to nothing else.
+    fn images(scene: &SceneData) -> Vec<f32> {
         let GaussianArrays { sh_dc, opacity_logits, .. } = &scene.gaussians;
         let opacities = opacity_logits.iter().map(|logit| 10.0 * logit);
         sh_dc.as_flattened().iter().copied().chain(opacities).collect()
@@ -100,9 +100,9 @@ mod tests {
     #[test]
     fn sensitive_attributes_get_finer_steps() {
         let given = AttributeSteps { position: 1e-4, opacity_logit: 0.02, sh_dc: 0.02, ..AttributeSteps::default() };
-        let steps = search(&scene(), &given, 0.1, 1e-3, &pictures).unwrap();
+        let steps = search(&scene(), &given, 0.1, 1e-3, &images).unwrap();
         assert!(steps.opacity_logit < 0.5 * steps.sh_dc, "{steps:?}");
-        // The pictures do not see scales and rotations at all.
+        // The images do not see scales and rotations at all.
         assert_eq!(steps.log_scale, given.log_scale * LARGEST_GROWTH as f32);
         assert_eq!(steps.quaternion, given.quaternion * LARGEST_GROWTH as f32);
     }
@@ -110,7 +110,7 @@ mod tests {
     #[test]
     fn a_smaller_tolerance_gives_finer_steps() {
         let given = AttributeSteps { position: 1e-4, opacity_logit: 0.02, sh_dc: 0.02, ..AttributeSteps::default() };
-        let at = |tolerance| search(&scene(), &given, tolerance, 1e-3, &pictures).unwrap();
+        let at = |tolerance| search(&scene(), &given, tolerance, 1e-3, &images).unwrap();
         assert!(at(0.02).opacity_logit < at(0.2).opacity_logit);
     }
 }

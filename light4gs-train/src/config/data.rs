@@ -4,16 +4,16 @@ use serde::{Deserialize, Serialize};
 
 use super::optional;
 
-/// Pictures and the cloud that training starts from.
+/// Images and the cloud that training starts from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DataConfig {
-    /// Pictures are resized to this width; `None` (0 in TOML) leaves them as they are.
+    /// Images are resized to this width; `None` (0 in TOML) leaves them as they are.
     #[serde(with = "optional")]
     pub resolution: Option<u32>,
     /// Colour behind transparent pixels, each channel in [0, 1].
     pub background: [f32; 3],
-    /// Upper bound of the memory that decoded pictures may take, in MiB.
+    /// Upper bound of the memory that decoded images may take, in MiB.
     pub memory_limit_mib: u64,
     /// Number of Gaussians to start from where the dataset brings no point cloud.
     pub initial_points: usize,

@@ -13,7 +13,7 @@ const MAX_CHANNELS: usize = 1024;
 const MAX_WIDTH: usize = 4096;
 const MAX_DEPTH: usize = 64;
 const MAX_GAUSSIANS: usize = 50_000_000;
-const MAX_PICTURE_WIDTH: u32 = 16_384;
+const MAX_IMAGE_WIDTH: u32 = 16_384;
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check::default();
@@ -28,8 +28,8 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
 
 fn data(check: &mut Check, data: &DataConfig) {
     if let Some(width) = data.resolution {
-        check.that("data.resolution", (8..=MAX_PICTURE_WIDTH).contains(&width), || {
-            format!("is {width}; it must be 0 (leave pictures as they are) or 8 to {MAX_PICTURE_WIDTH} pixels")
+        check.that("data.resolution", (8..=MAX_IMAGE_WIDTH).contains(&width), || {
+            format!("is {width}; it must be 0 (leave images as they are) or 8 to {MAX_IMAGE_WIDTH} pixels")
         });
     }
     check.that("data.background", data.background.iter().all(|c| (0.0..=1.0).contains(c)), || {

@@ -52,9 +52,9 @@ pub fn evaluate_run<F: DeformationField>(
             None => None,
         },
         splits: evaluation.report_splits(),
-        pictures: {
+        images: {
             let stride = views.len().div_ceil(REPORT_VIEWS).max(1);
-            views.iter().step_by(stride).map(RenderedView::picture).collect()
+            views.iter().step_by(stride).map(RenderedView::image).collect()
         },
         metrics,
         config_toml: config.to_toml(),

@@ -19,7 +19,7 @@ use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::evaluation::metrics::image_tensor;
 use crate::evaluation::metrics::{psnr, ssim};
-use crate::report::{SplitQuality, ViewPictures, ViewQuality};
+use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
 #[derive(Clone, Debug, Serialize)]
@@ -28,7 +28,7 @@ pub struct ViewScore {
     pub name: String,
     /// In [0, 1].
     pub time: f32,
-    /// dB over the whole picture.
+    /// dB over the whole image.
     pub psnr: f64,
     /// Structural similarity.
     pub ssim: f64,
@@ -67,7 +67,7 @@ pub struct Evaluation {
     pub sections: Vec<SectionSize>,
     /// Gaussians in the file.
     pub gaussians: usize,
-    /// Width and height of the measured pictures.
+    /// Width and height of the measured images.
     pub resolution: [u32; 2],
     /// Frames a second, deformation included, decoding excluded, after warm-up.
     pub fps: f64,
@@ -231,8 +231,8 @@ impl Evaluation {
 
 impl RenderedView {
     /// For the report.
-    pub fn picture(&self) -> ViewPictures {
-        ViewPictures {
+    pub fn image(&self) -> ViewImages {
+        ViewImages {
             name: format!("{} {}", self.split, self.name),
             time: self.time,
             psnr: self.psnr,

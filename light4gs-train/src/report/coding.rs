@@ -10,7 +10,7 @@ use super::CodingReport;
 use super::color_map::{css_gradient, inferno};
 use super::format::{count, fixed};
 use super::html::escape;
-use super::picture::data_uri;
+use super::images::data_uri;
 use crate::compression::BitMap;
 
 pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<String, DataError> {
@@ -73,8 +73,8 @@ fn maps(html: &mut String, path: &Path, bit_maps: &[BitMap]) -> Result<(), DataE
     );
     for map in bit_maps {
         let pixels = map.bits.iter().flat_map(|bits| inferno(bits / most)).collect();
-        let picture = RgbImage8 { width: map.width, height: map.height, pixels };
-        let data = data_uri(&picture).map_err(|error| DataError::Image {
+        let image = RgbImage8 { width: map.width, height: map.height, pixels };
+        let data = data_uri(&image).map_err(|error| DataError::Image {
             path: path.to_path_buf(),
             problem: format!("bit map of plane {}: {error}", map.name),
             remedy: "this is a fault of the program: please report it".to_owned(),

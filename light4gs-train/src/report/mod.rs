@@ -1,6 +1,6 @@
 //! `report.html`: what a run made and how good it is, in one file that needs nothing else.
 //!
-//! Style, script, charts (SVG) and pictures (PNG) are all inside; the page forbids itself every request. It reads
+//! Style, script, charts (SVG) and images (PNG) are all inside; the page forbids itself every request. It reads
 //! without its script, in light and dark, on paper and aloud.
 
 mod chart;
@@ -9,7 +9,7 @@ mod color_map;
 mod curves;
 mod format;
 mod html;
-mod picture;
+mod images;
 mod quality;
 mod sizes;
 pub mod table;
@@ -47,7 +47,7 @@ pub struct Report {
     /// Quality by split.
     pub splits: Vec<SplitQuality>,
     /// Views to show beside their ground truth.
-    pub pictures: Vec<ViewPictures>,
+    pub images: Vec<ViewImages>,
     /// The run's curves.
     pub metrics: Vec<MetricsRecord>,
     /// The configuration, as resolved.
@@ -105,7 +105,7 @@ pub struct ViewQuality {
     pub name: String,
     /// Its time, 0 to 1.
     pub time: f32,
-    /// PSNR over the whole picture, dB.
+    /// PSNR over the whole image, dB.
     pub psnr: f64,
     /// SSIM.
     pub ssim: f64,
@@ -113,12 +113,12 @@ pub struct ViewQuality {
 
 /// A rendered view beside its ground truth; both must have the same size.
 #[derive(Debug, Clone)]
-pub struct ViewPictures {
+pub struct ViewImages {
     /// Name of the frame.
     pub name: String,
     /// Its time, 0 to 1.
     pub time: f32,
-    /// PSNR over the whole picture, dB.
+    /// PSNR over the whole image, dB.
     pub psnr: f64,
     /// The frame of the dataset, composited.
     pub ground_truth: RgbImage8,
@@ -137,7 +137,7 @@ pub fn write_report(path: &Path, report: &Report) -> Result<(), DataError> {
 
 fn page(path: &Path, report: &Report) -> Result<String, DataError> {
     let sections = [
-        section("views", "Ground truth, render, error", picture::section(path, &report.pictures)?),
+        section("views", "Ground truth, render, error", images::section(path, &report.images)?),
         section("quality", "Quality", quality::section(&report.splits)),
         section("size", "Bytes of the file", sizes::section(&report.sections)),
         section("coding", "Entropy coding", coding::section(path, report.coding.as_ref())?),

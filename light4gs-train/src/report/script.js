@@ -1,4 +1,4 @@
-// Compares ground truth and render of one view behind a movable border. The pictures are those of the page.
+// Compares ground truth and render of one view behind a movable border. The images are those of the page.
 (() => {
   const dialog = document.querySelector("dialog");
   if (!dialog || !dialog.showModal) return;

@@ -2,7 +2,7 @@ use super::*;
 use crate::compression::{BitEstimate, PlaneRecord};
 use crate::stage::Stage;
 
-fn picture(width: u32, height: u32, shift: u8) -> RgbImage8 {
+fn image(width: u32, height: u32, shift: u8) -> RgbImage8 {
     let at = |x: u32, y: u32| [(x * 2) as u8, (y * 2) as u8, 128].map(|v: u8| v.saturating_add(shift));
     let pixels = (0..height).flat_map(|y| (0..width).flat_map(move |x| at(x, y))).collect();
     RgbImage8 { width, height, pixels }
@@ -41,12 +41,12 @@ fn sample() -> Report {
             extra: vec![("LPIPS".into(), 0.05)],
             views: vec![view("r_000"), view("r_001")],
         }],
-        pictures: vec![ViewPictures {
+        images: vec![ViewImages {
             name: "r_000".into(),
             time: 0.5,
             psnr: 31.0,
-            ground_truth: picture(40, 30, 0),
-            render: picture(40, 30, 9),
+            ground_truth: image(40, 30, 0),
+            render: image(40, 30, 9),
         }],
         metrics,
         config_toml: "seed = 0 # <&>\n".into(),
@@ -140,7 +140,7 @@ fn odd_values_do_no_harm() {
 #[test]
 fn sizes_that_differ_are_refused_and_named() {
     let mut report = sample();
-    report.pictures[0].render = picture(30, 40, 0);
+    report.images[0].render = image(30, 40, 0);
     let message = page(Path::new("report.html"), &report).expect_err("sizes").to_string();
     assert!(message.contains("r_000") && message.contains("30x40") && message.contains("40x30"), "{message}");
 }

@@ -9,7 +9,7 @@ use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use light4gs_data::{DataError, RgbImage8};
 
-use super::ViewPictures;
+use super::ViewImages;
 use super::color_map::{css_gradient, inferno};
 use super::format::fixed;
 use super::html::escape;
@@ -18,7 +18,7 @@ use super::html::escape;
 /// good render has anywhere but along an edge.
 const BRIGHTEST_ERROR: f32 = 0.2;
 
-pub(super) fn section(path: &Path, views: &[ViewPictures]) -> Result<String, DataError> {
+pub(super) fn section(path: &Path, views: &[ViewImages]) -> Result<String, DataError> {
     if views.is_empty() {
         return Ok(String::new());
     }
@@ -34,7 +34,7 @@ pub(super) fn section(path: &Path, views: &[ViewPictures]) -> Result<String, Dat
     Ok(html)
 }
 
-fn figure(html: &mut String, path: &Path, view: &ViewPictures) -> Result<(), DataError> {
+fn figure(html: &mut String, path: &Path, view: &ViewImages) -> Result<(), DataError> {
     let wrong = |problem: String| DataError::Image {
         path: path.to_path_buf(),
         problem: format!("view {}: {problem}", view.name),
@@ -49,13 +49,13 @@ fn figure(html: &mut String, path: &Path, view: &ViewPictures) -> Result<(), Dat
          <button type=\"button\" class=\"compare\" hidden>Compare</button></figcaption>\n<div class=\"triple\">\n",
         fixed(view.time.into(), 3)
     );
-    for (kind, picture) in [("Ground truth", &view.ground_truth), ("Render", &view.render), ("Error", &error)] {
-        let data = data_uri(picture).map_err(|error| wrong(error.to_string()))?;
+    for (kind, image) in [("Ground truth", &view.ground_truth), ("Render", &view.render), ("Error", &error)] {
+        let data = data_uri(image).map_err(|error| wrong(error.to_string()))?;
         let alt = match kind {
             "Error" => format!("Error of {name}: PSNR {psnr} dB"),
             _ => format!("{kind} of {name}"),
         };
-        let (width, height) = (picture.width, picture.height);
+        let (width, height) = (image.width, image.height);
         let _ = writeln!(
             html,
             "<div><img src=\"{data}\" alt=\"{alt}\" width=\"{width}\" height=\"{height}\"><span>{kind}</span></div>"
@@ -84,9 +84,9 @@ fn error_map(truth: &RgbImage8, render: &RgbImage8) -> Result<RgbImage8, String>
     Ok(RgbImage8 { width, height, pixels })
 }
 
-/// The picture as a PNG inside the page.
-pub(super) fn data_uri(picture: &RgbImage8) -> image::ImageResult<String> {
+/// The image as a PNG inside the page.
+pub(super) fn data_uri(image: &RgbImage8) -> image::ImageResult<String> {
     let mut png = Vec::new();
-    PngEncoder::new(&mut png).write_image(&picture.pixels, picture.width, picture.height, ExtendedColorType::Rgb8)?;
+    PngEncoder::new(&mut png).write_image(&image.pixels, image.width, image.height, ExtendedColorType::Rgb8)?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(png)))
 }
