@@ -45,3 +45,20 @@ fn the_index_is_complete() {
     }
     assert_eq!(index.matches("(examples/").count(), names().len());
 }
+
+/// Code that docs/extending.md quotes from an example stands in that example, line for line.
+#[test]
+fn quoted_code_is_the_examples() {
+    let document = include_str!("../../docs/extending.md");
+    let lines = |text: &str| text.lines().map(|line| line.trim().to_owned() + "\n").collect::<String>();
+    let mut quotes = 0;
+    for quote in document.split("<!-- quoted from ").skip(1) {
+        let (name, rest) = quote.split_once(" -->").expect("a comment has an end");
+        let code = rest.split("```rust\n").nth(1).and_then(|code| code.split("```").next()).expect("code follows");
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("examples/{name}.rs"));
+        let example = std::fs::read_to_string(&path).unwrap();
+        assert!(lines(&example).contains(&lines(code)), "not in {}:\n{code}", path.display());
+        quotes += 1;
+    }
+    assert!(quotes > 0);
+}

@@ -1,5 +1,6 @@
 //! Ten training steps on every back end of this build, with this crate and Burn alone: a scene learns to look like
-//! another one, and every back end has to arrive at the same loss.
+//! another one, and every back end has to arrive at the same loss, with the same significance of its Gaussians. The
+//! elementwise operations of the entropy models have to agree as well.
 //!
 //! `cargo run --release -p light4gs-model --example ten_steps`
 
@@ -13,28 +14,32 @@ use burn::module::Param;
 use burn::tensor::{Device, Gradients, Tensor};
 use light4gs_data::{Camera, PointCloud};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
+use light4gs_model::ops::lower_bound::lower_bound;
+use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::parameters::{ParameterMapper, map_parameters, update_parameters};
 use light4gs_model::{
-    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussiansConfig, HexPlaneConfig, HexPlaneFieldConfig, Splatter,
+    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussiansConfig, HexPlaneConfig, HexPlaneFieldConfig,
+    Significance, SignificanceScore, Splatter,
 };
 
 const STEPS: u32 = 10;
 
 fn main() -> Result<(), Box<dyn Error>> {
-    let mut losses: Vec<(&str, [f32; 2])> = Vec::new();
+    let mut numbers: Vec<(&str, Vec<f32>)> = Vec::new();
     for (name, device) in devices() {
-        let [first, last] = train(&device.autodiff());
+        let device = device.autodiff();
+        let [first, last, significance] = train(&device);
         println!("{name:>8}: loss {first:.6} before, {last:.6} after {STEPS} steps");
         if last >= 0.9 * first {
             return Err(format!("{name} has learned nothing").into());
         }
-        losses.push((name, [first, last]));
+        numbers.push((name, [vec![first, last, significance], elementwise(&device)].concat()));
     }
-    let Some((reference, expected)) = losses.first() else { return Err("this build has no back end".into()) };
-    for (name, found) in &losses {
+    let Some((reference, expected)) = numbers.first() else { return Err("this build has no back end".into()) };
+    for (name, found) in &numbers {
         for (found, expected) in found.iter().zip(expected) {
-            if (found - expected).abs() > 1e-3 * expected {
-                return Err(format!("{name} has a loss of {found} where {reference} has {expected}").into());
+            if (found - expected).abs() > 1e-3 * expected.abs() {
+                return Err(format!("{name} has {found} where {reference} has {expected}").into());
             }
         }
     }
@@ -54,8 +59,8 @@ fn devices() -> Vec<(&'static str, Device)> {
     ]
 }
 
-/// The loss before the first step and after the last.
-fn train(device: &Device) -> [f32; 2] {
+/// The loss before the first step and after the last, and the sum of the Gaussians' blending weights in the end.
+fn train(device: &Device) -> [f32; 3] {
     let positions: Vec<[f32; 3]> =
         (0..200).map(|i| i as f32).map(|i| [i.sin(), (1.7 * i).sin(), (2.3 * i).sin()]).collect();
     let cloud = |colors: Vec<[f32; 3]>| PointCloud { positions: positions.clone(), colors };
@@ -83,7 +88,25 @@ fn train(device: &Device) -> [f32; 2] {
         let gradients = loss(&scene).backward();
         update_parameters(&mut scene, &mut Adam { gradients, moments: &mut moments, time });
     }
-    [first, loss(&scene).into_scalar()]
+    let mut significance = Significance::new(scene.gaussians.len());
+    significance.add(&splatter, scene.at(0.0), &cameras[0]);
+    let weights: f64 = significance.scores(SignificanceScore::BlendingWeight).iter().sum();
+    [first, loss(&scene).into_scalar(), weights as f32]
+}
+
+/// Values and gradients of the normal distribution and of the lower bound.
+fn elementwise(device: &Device) -> Vec<f32> {
+    let values = || Tensor::<1>::from_floats([-6.0, -1.5, -0.2, 0.0, 0.7, 3.0], device).require_grad();
+    let weights = Tensor::<1>::from_floats([1.0, -1.0, 2.0, -2.0, 1.5, -0.5], device);
+    let mut found = Vec::new();
+    for operation in [normal_cdf::<1> as fn(_) -> _, |x| lower_bound(x, 0.5)] {
+        let x = values();
+        let y = operation(x.clone());
+        let gradient = x.grad(&(y.clone() * weights.clone()).sum().backward()).expect("it has one");
+        found.extend(y.inner().into_data().iter::<f32>());
+        found.extend(gradient.into_data().iter::<f32>());
+    }
+    found
 }
 
 /// One step on every parameter that has a gradient.

@@ -4,15 +4,14 @@
 //! of time, adds the two maps up, and shares its convolution with the inter-scale context. That part is written here
 //! as one more [`PriorPart`], and the rest is the model itself in its reference configuration.
 
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::network::Operation;
 use light4gs_codec::plane_layout::coding_order;
 use light4gs_codec::{Network, PlaneSource};
 use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
     CenteredPlanes, ContextModel, ContextModelConfig, DescribedCondition, DescribedPrior, InterPlane, InterScale,
-    KernelShape, Latent, Passes, PlaneSteps, Prior, PriorPart, anchor_mask, checkerboard_kernel, demultiplex,
-    multiplex, upsample,
+    KernelShape, Latent, Passes, PlaneSteps, Prior, PriorPart, anchor_mask, checkerboard_kernel, upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::named::{compare_gradients, load};
@@ -126,6 +125,30 @@ fn parts(model: &ContextModel) -> Vec<Box<dyn PriorPart + '_>> {
     let last = parts.len() - 1;
     parts.insert(last, Box::new(ReferenceInterPlane(model.inter_scale.as_ref().unwrap())));
     parts
+}
+
+/// Anchors and the others of `[C, H, W]` (H and W even), each `[2 C, H / 2, W / 2]`: first the even rows' values, then the odd
+/// rows'.
+fn demultiplex(plane: Tensor<3>) -> [Tensor<3>; 2] {
+    let [channels, height, width] = plane.dims();
+    let split: Tensor<5> = plane.reshape([channels, height / 2, 2, width / 2, 2]);
+    let phase = |row: usize, column: usize| {
+        let values = split.clone().slice(s![.., .., row..row + 1, .., column..column + 1]);
+        values.reshape([channels, height / 2, width / 2])
+    };
+    [[phase(0, 1), phase(1, 0)], [phase(0, 0), phase(1, 1)]].map(|halves| Tensor::cat(halves.into(), 0))
+}
+
+/// The inverse of [`demultiplex`].
+fn multiplex(anchors: Tensor<3>, others: Tensor<3>) -> Tensor<3> {
+    let [doubled, height, width] = anchors.dims();
+    let channels = doubled / 2;
+    let phase = |values: &Tensor<3>, half: usize| {
+        values.clone().narrow(0, half * channels, channels).reshape([channels, height, 1, width, 1])
+    };
+    let even: Tensor<5> = Tensor::cat(vec![phase(&others, 0), phase(&anchors, 0)], 4);
+    let odd = Tensor::cat(vec![phase(&anchors, 1), phase(&others, 1)], 4);
+    Tensor::cat(vec![even, odd], 2).reshape([channels, 2 * height, 2 * width])
 }
 
 #[test]

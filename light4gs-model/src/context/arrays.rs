@@ -3,7 +3,7 @@
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 use light4gs_codec::{CodecError, Condition, ContextModelArrays, FrequencyTable, LatentArrays, PerGroup, PlanePrior};
 
-use super::model::ContextModel;
+use super::ContextModel;
 use super::prior::{DescribedCondition, DescribedPrior, Passes, PriorPart};
 use crate::entropy::quantization_steps::PlaneSteps;
 

@@ -8,7 +8,7 @@
 
 use burn::config::Config;
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, s};
+use burn::tensor::{Device, Tensor};
 use light4gs_codec::{Network, PlaneSource};
 
 use super::prior::DescribedCondition;
@@ -76,28 +76,4 @@ impl Checkerboard {
 pub fn anchor_mask([height, width]: [usize; 2], device: &Device) -> Tensor<3> {
     let mask: Vec<f32> = (0..height * width).map(|i| ((i / width + i % width) % 2) as f32).collect();
     Tensor::<1>::from_floats(mask.as_slice(), device).reshape([1, height, width])
-}
-
-/// Anchors and the others of `[C, H, W]` (H and W even), each `[2 C, H / 2, W / 2]`: first the even rows' values, then the odd
-/// rows'.
-pub fn demultiplex(plane: Tensor<3>) -> [Tensor<3>; 2] {
-    let [channels, height, width] = plane.dims();
-    let split: Tensor<5> = plane.reshape([channels, height / 2, 2, width / 2, 2]);
-    let phase = |row: usize, column: usize| {
-        let values = split.clone().slice(s![.., .., row..row + 1, .., column..column + 1]);
-        values.reshape([channels, height / 2, width / 2])
-    };
-    [[phase(0, 1), phase(1, 0)], [phase(0, 0), phase(1, 1)]].map(|halves| Tensor::cat(halves.into(), 0))
-}
-
-/// The inverse of [`demultiplex`].
-pub fn multiplex(anchors: Tensor<3>, others: Tensor<3>) -> Tensor<3> {
-    let [doubled, height, width] = anchors.dims();
-    let channels = doubled / 2;
-    let phase = |values: &Tensor<3>, half: usize| {
-        values.clone().narrow(0, half * channels, channels).reshape([channels, height, 1, width, 1])
-    };
-    let even: Tensor<5> = Tensor::cat(vec![phase(&others, 0), phase(&anchors, 0)], 4);
-    let odd = Tensor::cat(vec![phase(&anchors, 1), phase(&others, 1)], 4);
-    Tensor::cat(vec![even, odd], 2).reshape([channels, 2 * height, 2 * width])
 }

@@ -1,7 +1,19 @@
-//! The multiscale hexplane context model (paper III-C; DESIGN section 6): what every value of the hexplane costs in the file.
+//! The multiscale hexplane context model, MHCM (paper III-C): a normal distribution for every value of every plane, and so
+//! what it costs in the file.
 //!
-//! [`ContextModel`] is a list of [`PriorPart`]s ([`Hyperprior`], [`InterPlane`], [`InterScale`]), a [`Checkerboard`] and the
-//! network that turns what they know into a Gaussian for each value, [`EntropyParameters`].
+//! One set of weights for all planes, from the lowest scale up. Which part speaks for a plane:
+//!
+//! | plane | parameters | then |
+//! |---|---|---|
+//! | lowest scale, space-time | [`Hyperprior`] of the plane itself | [`Checkerboard`] |
+//! | lowest scale, space-only | [`InterPlane`], from the decoded space-time planes | [`Checkerboard`] |
+//! | higher scales | [`InterScale`], from the decoded plane one scale below | all at once |
+//!
+//! Where a part is switched off, the next one that applies takes its place: inter-scale, inter-plane, hyperprior,
+//! then a constant. [`EntropyParameters`] turns what the parts know into the distribution.
+//!
+//! Which parts there are is said in this file and nowhere else. A new one is a file of its own with a [`PriorPart`], which
+//! computes its prior with Burn and describes the same network for the codec, and an entry in [`ContextModel::parts`].
 
 mod arrays;
 pub(crate) mod checkerboard;
@@ -9,13 +21,190 @@ pub(crate) mod entropy_parameters;
 pub(crate) mod hyperprior;
 pub(crate) mod inter_plane;
 pub(crate) mod inter_scale;
-pub(crate) mod model;
 pub(crate) mod prior;
+mod rate;
 
-pub use checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask, demultiplex, multiplex};
+pub use checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
 pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, Start};
 pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};
 pub use inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig, upsample};
-pub use model::{ContextModel, ContextModelConfig, ContextParts, KernelShape, PlaneRate, QuantizedPlane};
 pub use prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
+pub use rate::{PlaneRate, QuantizedPlane};
+
+use burn::config::Config;
+use burn::module::Module;
+use burn::tensor::Device;
+
+/// Parts of a [`ContextModel`], each of which an ablation may switch off.
+#[derive(Config, Debug, PartialEq)]
+pub struct ContextParts {
+    /// A transmitted latent for planes that nothing else describes.
+    #[config(default = true)]
+    pub hyperprior: bool,
+    /// Anchors first, the others in sight of them.
+    #[config(default = true)]
+    pub checkerboard: bool,
+    /// Space-only planes from space-time planes.
+    #[config(default = true)]
+    pub inter_plane: bool,
+    /// Higher scales from the scale below.
+    #[config(default = true)]
+    pub inter_scale: bool,
+    /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
+    #[config(default = false)]
+    pub high_scale_hyperprior: bool,
+}
+
+/// Kernel and groups of a convolution.
+#[derive(Config, Debug, PartialEq)]
+pub struct KernelShape {
+    /// Side of the kernel, odd.
+    pub kernel: usize,
+    /// Groups of channels.
+    pub groups: usize,
+}
+
+/// Configuration of a [`ContextModel`]. Take one of the presets and change what you like.
+#[derive(Config, Debug)]
+pub struct ContextModelConfig {
+    /// Channels of a plane, M.
+    pub channels: usize,
+    /// Channels of the hyperprior's latent, N.
+    pub hyper_channels: usize,
+    /// Channels between the layers of the hyperprior's synthesis, A and B.
+    pub synthesis_channels: [usize; 2],
+    /// Widths of the hidden layers of [`EntropyParameters`], C and D.
+    pub parameter_channels: [usize; 2],
+    /// Groups of the checkerboard's convolution.
+    pub context_groups: usize,
+    /// The inter-plane convolution.
+    pub inter_plane: KernelShape,
+    /// The inter-scale convolution.
+    pub inter_scale: KernelShape,
+    /// What is there.
+    #[config(default = "ContextParts::new()")]
+    pub parts: ContextParts,
+    /// Subtracted from the space-only planes before anything else.
+    #[config(default = 0.0)]
+    pub space_only_center: f64,
+    /// Subtracted from the space-time planes before anything else; they start at 1.
+    #[config(default = 1.0)]
+    pub space_time_center: f64,
+    /// How the last layer starts.
+    #[config(default = "Start::Unit")]
+    pub start: Start,
+}
+
+impl ContextModelConfig {
+    /// The sizes, centres, composition and initial values of the authors' code for planes of M channels.
+    pub fn reference(channels: usize) -> Self {
+        let kernel = KernelShape::new(5, 1);
+        let hidden = [10 * channels / 3, 8 * channels / 3];
+        let synthesis = [channels, 3 * channels / 2];
+        Self::new(channels, (channels / 8).max(1), synthesis, hidden, 1, kernel.clone(), kernel)
+            .with_parts(ContextParts::new().with_high_scale_hyperprior(true))
+            .with_space_time_center(0.0)
+            .with_start(Start::PyTorch)
+    }
+
+    /// Few weights, since they are part of the file: about 6000 in the decoder for 16 channels. Contexts look at each channel by
+    /// itself; only the 1×1 layers mix channels.
+    pub fn compact(channels: usize) -> Self {
+        let hidden = (3 * channels / 2).max(1);
+        let inter_plane = KernelShape::new(3, 2 * channels);
+        let inter_scale = KernelShape::new(3, channels);
+        Self::new(channels, 4, [4, 4], [hidden, hidden], channels, inter_plane, inter_scale)
+    }
+
+    /// Random weights; see [`Start`] for the last layer.
+    ///
+    /// # Panics
+    /// If the high-scale hyperprior is on without the two parts that it consists of, or groups do not divide channels.
+    pub fn init(&self, device: &Device) -> ContextModel {
+        let ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior } = self.parts;
+        assert!(
+            !high_scale_hyperprior || (hyperprior && inter_scale),
+            "`high_scale_hyperprior` needs `hyperprior` and `inter_scale`"
+        );
+        let channels = self.channels;
+        ContextModel {
+            hyperprior: hyperprior
+                .then(|| HyperpriorConfig::new(channels, self.hyper_channels, self.synthesis_channels).init(device)),
+            checkerboard: checkerboard
+                .then(|| CheckerboardConfig::new(channels).with_groups(self.context_groups).init(device)),
+            inter_plane: inter_plane.then(|| {
+                let KernelShape { kernel, groups } = self.inter_plane;
+                InterPlaneConfig::new(channels).with_kernel(kernel).with_groups(groups).init(device)
+            }),
+            inter_scale: inter_scale.then(|| {
+                let KernelShape { kernel, groups } = self.inter_scale;
+                InterScaleConfig::new(channels).with_kernel(kernel).with_groups(groups).init(device)
+            }),
+            entropy_parameters: EntropyParametersConfig::new(channels, self.parameter_channels)
+                .with_start(self.start.clone())
+                .init(device),
+            high_scale_hyperprior,
+            space_only_center: self.space_only_center,
+            space_time_center: self.space_time_center,
+        }
+    }
+}
+
+/// The context model. See the [module's documentation](self) for what it consists of.
+///
+/// Planes are `[M, H, W]`, scale-major, six a scale in the order of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES), H and W multiples
+/// of 4, in original units. For training they carry uniform noise of their steps' width
+/// ([`PlaneSteps::add_noise`]), and the parameters of a plane depend only on the noisy values of others, so a random
+/// subset of planes gives an unbiased estimate of the rate.
+///
+/// ```
+/// use burn::tensor::Device;
+/// use light4gs_model::{ContextModelConfig, HexPlaneConfig, Latent, PlaneSteps};
+///
+/// let device = Device::flex();
+/// let hexplane = HexPlaneConfig::new().with_channels(8).with_resolution([8, 8, 8, 4]).init(&device);
+/// let model = ContextModelConfig::compact(8).init(&device);
+/// let steps = PlaneSteps::fixed(&[0.1; 12], &device);
+/// let planes: Vec<_> = hexplane.planes.iter().map(|plane| plane.val()).collect();
+/// let rates = model.rate(&steps.add_noise(&planes), &steps, &[2, 6], Latent::Noise);
+/// // A space-time plane of the lowest scale has a hyperprior, a plane above has none.
+/// assert!(rates[0].hyper_bits.is_some() && rates[1].hyper_bits.is_none());
+/// ```
+#[derive(Module, Debug)]
+pub struct ContextModel {
+    /// `h_a`, `h_s` and the latent's bottleneck.
+    pub hyperprior: Option<Hyperprior>,
+    /// `context_prediction`.
+    pub checkerboard: Option<Checkerboard>,
+    /// `inter_plane`.
+    pub inter_plane: Option<InterPlane>,
+    /// `inter_scale`.
+    pub inter_scale: Option<InterScale>,
+    /// `entropy_parameters`.
+    pub entropy_parameters: EntropyParameters,
+    high_scale_hyperprior: bool,
+    space_only_center: f64,
+    space_time_center: f64,
+}
+
+impl ContextModel {
+    /// The composition: for each plane the first part that applies gives its prior.
+    pub fn parts(&self) -> Vec<Box<dyn PriorPart + '_>> {
+        let mut parts: Vec<Box<dyn PriorPart>> = Vec::new();
+        match (&self.hyperprior, &self.inter_scale) {
+            (Some(hyperprior), Some(inter_scale)) if self.high_scale_hyperprior => {
+                parts.push(Box::new(HighScaleHyperprior { hyperprior, inter_scale }));
+            }
+            (_, Some(inter_scale)) => parts.push(Box::new(inter_scale)),
+            _ => {}
+        }
+        if let Some(inter_plane) = &self.inter_plane {
+            parts.push(Box::new(inter_plane));
+        }
+        if let Some(hyperprior) = &self.hyperprior {
+            parts.push(Box::new(hyperprior));
+        }
+        parts
+    }
+}

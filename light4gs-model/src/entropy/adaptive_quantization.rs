@@ -1,4 +1,4 @@
-//! Adaptive quantisation: learned steps (paper III-D; DESIGN section 6).
+//! Adaptive quantisation: learned steps (paper III-D; docs/design.md).
 
 use burn::config::Config;
 use burn::module::{Module, Param};
@@ -13,10 +13,10 @@ pub struct AdaptiveQuantizationConfig {
     /// Scales of the hexplane.
     pub scales: usize,
     /// Initial step of the space-only planes.
-    #[config(default = 0.1)]
+    #[config(default = 0.05)]
     pub space_only: f64,
     /// Initial step of the space-time planes.
-    #[config(default = 0.1)]
+    #[config(default = 0.05)]
     pub space_time: f64,
     /// Whether each scale has its own pair of steps.
     #[config(default = false)]
@@ -50,10 +50,10 @@ impl AdaptiveQuantizationConfig {
 /// use burn::tensor::Device;
 /// use light4gs_model::AdaptiveQuantizationConfig;
 ///
-/// let quantization = AdaptiveQuantizationConfig::new(2).with_space_time(0.05).init(&Device::flex());
+/// let quantization = AdaptiveQuantizationConfig::new(2).with_space_time(0.1).init(&Device::flex());
 /// let steps = quantization.steps().values();
 /// assert_eq!(steps.len(), 12);
-/// assert!((steps[0] - 0.1).abs() < 1e-6 && (steps[2] - 0.05).abs() < 1e-6);
+/// assert!((steps[0] - 0.05).abs() < 1e-6 && (steps[2] - 0.1).abs() < 1e-6);
 /// ```
 #[derive(Module, Debug)]
 pub struct AdaptiveQuantization {

@@ -92,11 +92,6 @@ pub struct PlaneConv {
 }
 
 impl PlaneConv {
-    /// Rows and columns between outputs.
-    pub fn stride(&self) -> usize {
-        self.stride
-    }
-
     /// Groups of channels.
     pub fn groups(&self) -> usize {
         self.groups

@@ -38,17 +38,30 @@ pub fn time_l1(hexplane: &HexPlane) -> Tensor<1> {
     sum_over(hexplane, SPACE_TIME_PLANES, |plane| (plane - 1.0).abs().mean())
 }
 
-/// The three terms with their weights, `[1]`; terms of weight 0 are not computed.
-pub fn weighted_sum(hexplane: &HexPlane, plane: f32, time: f32, l1: f32) -> Tensor<1> {
-    let mut sum = Tensor::zeros([1], &hexplane.planes[0].device());
-    if plane != 0.0 {
-        sum = sum + plane_smoothness(hexplane) * plane;
+/// Weights of the three terms.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PlaneRegularizer {
+    /// Of [`plane_smoothness`].
+    pub plane_smoothness: f32,
+    /// Of [`time_smoothness`].
+    pub time_smoothness: f32,
+    /// Of [`time_l1`].
+    pub time_l1: f32,
+}
+
+impl PlaneRegularizer {
+    /// The weighted sum of the terms, `[1]`; terms of weight 0 are not computed.
+    pub fn loss(&self, hexplane: &HexPlane) -> Tensor<1> {
+        let mut sum = Tensor::zeros([1], &hexplane.planes[0].device());
+        if self.plane_smoothness != 0.0 {
+            sum = sum + plane_smoothness(hexplane) * self.plane_smoothness;
+        }
+        if self.time_smoothness != 0.0 {
+            sum = sum + time_smoothness(hexplane) * self.time_smoothness;
+        }
+        if self.time_l1 != 0.0 {
+            sum = sum + time_l1(hexplane) * self.time_l1;
+        }
+        sum
     }
-    if time != 0.0 {
-        sum = sum + time_smoothness(hexplane) * time;
-    }
-    if l1 != 0.0 {
-        sum = sum + time_l1(hexplane) * l1;
-    }
-    sum
 }

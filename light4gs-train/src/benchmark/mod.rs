@@ -10,7 +10,6 @@ use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError, PointCloud};
 use light4gs_model::{
     DeformationConfig, DynamicScene, DynamicSceneConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter,
-    regularizer,
 };
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -303,16 +302,10 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     let config = small.model.build();
     let mut dynamic = scene.dynamic(&config, autodiff);
     let truth = Tensor::<3>::zeros([height, width, 3], autodiff);
-    let weights = small.train.regularizer.clone();
+    let regularizer = small.train.regularizer.build();
     let loss_of = |scene_model: &DynamicScene, frame: usize| {
         let image = splatter.render(scene_model.at(0.3), &scene.camera_at(frame), None).image;
-        let regularization = regularizer::weighted_sum(
-            &scene_model.field.hexplane,
-            weights.plane_tv,
-            weights.time_smoothness,
-            weights.time_l1,
-        );
-        l1(image, truth.clone()) + regularization
+        l1(image, truth.clone()) + regularizer.loss(&scene_model.field.hexplane)
     };
     let mut adam = Adam::default();
     // Rates so small that the scene stays what it is while it is timed.

@@ -3,7 +3,10 @@
 use std::fmt;
 use std::str::FromStr;
 
-use light4gs_codec::Profile;
+use light4gs_codec::attributes::AttributeSteps;
+use light4gs_codec::network_weights::WeightPrecision;
+use light4gs_codec::{Profile, WeightPrecisions};
+use light4gs_model::AdaptiveQuantizationConfig;
 use light4gs_model::ShKind;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
@@ -198,6 +201,11 @@ pub struct AttributesConfig {
     pub search_tolerance: f64,
 }
 
+/// Bits a weight may have.
+pub(super) const LEAST_WEIGHT_BITS: u8 = 4;
+/// Bits a weight may have.
+pub(super) const MOST_WEIGHT_BITS: u8 = 16;
+
 /// Quantisation of network weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -253,13 +261,14 @@ impl Default for ContextConfig {
 
 impl Default for StepsConfig {
     fn default() -> Self {
+        let AdaptiveQuantizationConfig { space_only, space_time, per_scale, .. } = AdaptiveQuantizationConfig::new(1);
         Self {
-            space_only: 0.05,
-            space_time: 0.05,
+            space_only,
+            space_time,
             adaptive: true,
             adaptive_from: 15_000,
             refine: false,
-            per_scale: false,
+            per_scale,
             learning_rate: 2e-3,
         }
     }
@@ -273,19 +282,19 @@ impl Default for ShConfig {
 
 impl Default for AttributesConfig {
     fn default() -> Self {
-        Self {
-            position: 0.05,
-            log_scale: 0.1,
-            quaternion: 0.02,
-            opacity_logit: 0.4,
-            sh_dc: 0.04,
-            search_tolerance: 0.05,
-        }
+        let AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc } = AttributeSteps::default();
+        Self { position, log_scale, quaternion, opacity_logit, sh_dc, search_tolerance: 0.05 }
     }
 }
 
 impl Default for WeightsConfig {
     fn default() -> Self {
-        Self { deformation_bits: 10, context_bits: 8 }
+        let WeightPrecisions { motion, context_model, .. } = WeightPrecisions::default();
+        let bits = |precision| match precision {
+            WeightPrecision::Bits(bits) => bits,
+            // The configuration knows bits only; so many lose nothing that matters.
+            WeightPrecision::Step(_) => MOST_WEIGHT_BITS,
+        };
+        Self { deformation_bits: bits(motion), context_bits: bits(context_model) }
     }
 }

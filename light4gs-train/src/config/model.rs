@@ -57,20 +57,23 @@ impl Default for ModelConfig {
 
 impl Default for HexPlaneConfig {
     fn default() -> Self {
-        Self { channels: 32, resolution: [64, 64, 64, 24], multipliers: vec![1, 2] }
+        let light4gs_model::HexPlaneConfig { channels, resolution, multipliers } =
+            light4gs_model::HexPlaneConfig::new();
+        Self { channels, resolution, multipliers }
     }
 }
 
 impl Default for DeformationConfig {
     fn default() -> Self {
+        let network = light4gs_model::DeformationConfig::new(0);
         Self {
-            width: 64,
-            depth: 1,
-            position: true,
-            scale: true,
-            rotation: true,
-            opacity: false,
-            sh: false,
+            width: network.width,
+            depth: network.depth,
+            position: network.position,
+            scale: network.scale,
+            rotation: network.rotation,
+            opacity: network.opacity,
+            sh: network.sh,
             differentiate_points: true,
         }
     }

@@ -58,6 +58,19 @@ fn base_is_the_default_and_writes_every_key() {
     }
 }
 
+/// One number stands as float32 there and as float64 here.
+#[test]
+fn the_step_of_spherical_harmonics_is_that_of_the_models() {
+    use light4gs_model::{ShAutoregressiveConfig, ShBottleneckConfig, ShHexPlaneCoupledConfig, ShMixtureConfig};
+    let steps = [
+        ShBottleneckConfig::new().step,
+        ShMixtureConfig::new().step,
+        ShAutoregressiveConfig::new().step,
+        ShHexPlaneCoupledConfig::new(8).step,
+    ];
+    assert_eq!(steps, [Config::default().compression.sh.step as f32; 4]);
+}
+
 #[test]
 fn an_unknown_key_is_named_with_file_line_and_nearest_key() {
     let folder = folder_with("mine.toml", "extends = \"dnerf\"\n\n[train.densify]\nintervall = 50\n");

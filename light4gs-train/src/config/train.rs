@@ -1,5 +1,6 @@
 //! `[train]`: how it is trained.
 
+use light4gs_model::regularizer::PlaneRegularizer;
 use serde::{Deserialize, Serialize};
 
 use super::{PruneConfig, optional};
@@ -138,6 +139,14 @@ pub struct RegularizerConfig {
     pub time_smoothness: f32,
     /// Distance of the space-time planes from 1, which means "no motion".
     pub time_l1: f32,
+}
+
+impl RegularizerConfig {
+    /// The regularizer that this stands for.
+    pub fn build(&self) -> PlaneRegularizer {
+        let Self { plane_tv, time_smoothness, time_l1 } = *self;
+        PlaneRegularizer { plane_smoothness: plane_tv, time_smoothness, time_l1 }
+    }
 }
 
 impl Default for TrainConfig {

@@ -2,6 +2,7 @@
 
 use light4gs_codec::plane_layout::check_resolution;
 
+use super::compression::{LEAST_WEIGHT_BITS, MOST_WEIGHT_BITS};
 use super::{
     CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, LearningRates,
     ModelConfig, Problem, PruneConfig, RegularizerConfig, TrainConfig,
@@ -210,8 +211,10 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.that("compression.attributes.search_tolerance", tolerance.is_finite() && tolerance >= 0.0, || {
         format!("is {tolerance}; it must be finite and at least 0 dB")
     });
-    check.range("compression.weights.deformation_bits", weights.deformation_bits as usize, 4, 16);
-    check.range("compression.weights.context_bits", weights.context_bits as usize, 4, 16);
+    for (name, bits) in [("deformation_bits", weights.deformation_bits), ("context_bits", weights.context_bits)] {
+        let (least, most) = (LEAST_WEIGHT_BITS.into(), MOST_WEIGHT_BITS.into());
+        check.range(&format!("compression.weights.{name}"), bits.into(), least, most);
+    }
 }
 
 fn eval(check: &mut Check, eval: &EvalConfig) {

@@ -2,7 +2,7 @@
 
 use burn::tensor::Tensor;
 use light4gs_data::Frame;
-use light4gs_model::{DeformationField, HexPlane, regularizer};
+use light4gs_model::{DeformationField, HexPlane};
 
 use super::Trainer;
 use super::views::ViewPass;
@@ -78,9 +78,7 @@ impl<F: DeformationField> Trainer<F> {
             return None;
         }
         let scene = &self.state.scene;
-        let weights = &self.config.train.regularizer;
-        let planes = scene.planes()?;
-        let term = regularizer::weighted_sum(planes, weights.plane_tv, weights.time_smoothness, weights.time_l1);
+        let term = self.config.train.regularizer.build().loss(scene.planes()?);
         let value = term.clone().inner();
         gradients.add_module(scene, &mut term.backward());
         self.profile.lap("regularizers");

@@ -1,145 +1,14 @@
-//! The multiscale hexplane context model, MHCM (paper III-C; DESIGN section 6): a Gaussian for every value of every plane.
-//!
-//! One set of weights for all planes, from the lowest scale up. Which part speaks for a plane:
-//!
-//! | plane | parameters | then |
-//! |---|---|---|
-//! | lowest scale, space-time | [`Hyperprior`] of the plane itself | [`Checkerboard`] |
-//! | lowest scale, space-only | [`InterPlane`], from the decoded space-time planes | [`Checkerboard`] |
-//! | higher scales | [`InterScale`], from the decoded plane one scale below | all at once |
-//!
-//! Where a part is switched off, the next one that applies takes its place: inter-scale, inter-plane, hyperprior,
-//! then a constant.
+//! What planes cost under a context model, and planes as the codec leaves them.
 
-use burn::config::Config;
-use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::{coding_order, is_space_time};
 
-use super::checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
-use super::entropy_parameters::{EntropyParameters, EntropyParametersConfig, Start};
-use super::hyperprior::{Hyperprior, HyperpriorConfig};
-use super::inter_plane::{InterPlane, InterPlaneConfig};
-use super::inter_scale::{HighScaleHyperprior, InterScale, InterScaleConfig};
+use super::ContextModel;
+use super::checkerboard::anchor_mask;
 use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 use crate::entropy::quantization_steps::PlaneSteps;
-
-/// Parts of a [`ContextModel`], each of which an ablation may switch off.
-#[derive(Config, Debug, PartialEq)]
-pub struct ContextParts {
-    /// A transmitted latent for planes that nothing else describes.
-    #[config(default = true)]
-    pub hyperprior: bool,
-    /// Anchors first, the others in sight of them.
-    #[config(default = true)]
-    pub checkerboard: bool,
-    /// Space-only planes from space-time planes.
-    #[config(default = true)]
-    pub inter_plane: bool,
-    /// Higher scales from the scale below.
-    #[config(default = true)]
-    pub inter_scale: bool,
-    /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
-    #[config(default = false)]
-    pub high_scale_hyperprior: bool,
-}
-
-/// Kernel and groups of a convolution.
-#[derive(Config, Debug, PartialEq)]
-pub struct KernelShape {
-    /// Side of the kernel, odd.
-    pub kernel: usize,
-    /// Groups of channels.
-    pub groups: usize,
-}
-
-/// Configuration of a [`ContextModel`]. Take one of the presets and change what you like.
-#[derive(Config, Debug)]
-pub struct ContextModelConfig {
-    /// Channels of a plane, M.
-    pub channels: usize,
-    /// Channels of the hyperprior's latent, N.
-    pub hyper_channels: usize,
-    /// Channels between the layers of the hyperprior's synthesis, A and B.
-    pub synthesis_channels: [usize; 2],
-    /// Widths of the hidden layers of [`EntropyParameters`], C and D.
-    pub parameter_channels: [usize; 2],
-    /// Groups of the checkerboard's convolution.
-    pub context_groups: usize,
-    /// The inter-plane convolution.
-    pub inter_plane: KernelShape,
-    /// The inter-scale convolution.
-    pub inter_scale: KernelShape,
-    /// What is there.
-    #[config(default = "ContextParts::new()")]
-    pub parts: ContextParts,
-    /// Subtracted from the space-only planes before anything else.
-    #[config(default = 0.0)]
-    pub space_only_center: f64,
-    /// Subtracted from the space-time planes before anything else; they start at 1.
-    #[config(default = 1.0)]
-    pub space_time_center: f64,
-    /// How the last layer starts.
-    #[config(default = "Start::Unit")]
-    pub start: Start,
-}
-
-impl ContextModelConfig {
-    /// The sizes, centres, composition and initial values of the authors' code for planes of M channels.
-    pub fn reference(channels: usize) -> Self {
-        let kernel = KernelShape::new(5, 1);
-        let hidden = [10 * channels / 3, 8 * channels / 3];
-        let synthesis = [channels, 3 * channels / 2];
-        Self::new(channels, (channels / 8).max(1), synthesis, hidden, 1, kernel.clone(), kernel)
-            .with_parts(ContextParts::new().with_high_scale_hyperprior(true))
-            .with_space_time_center(0.0)
-            .with_start(Start::PyTorch)
-    }
-
-    /// Few weights, since they are part of the file: about 6000 in the decoder for 16 channels. Contexts look at each channel by
-    /// itself; only the 1×1 layers mix channels.
-    pub fn compact(channels: usize) -> Self {
-        let hidden = (3 * channels / 2).max(1);
-        let inter_plane = KernelShape::new(3, 2 * channels);
-        let inter_scale = KernelShape::new(3, channels);
-        Self::new(channels, 4, [4, 4], [hidden, hidden], channels, inter_plane, inter_scale)
-    }
-
-    /// Random weights; see [`Start`] for the last layer.
-    ///
-    /// # Panics
-    /// If the high-scale hyperprior is on without the two parts that it consists of, or groups do not divide channels.
-    pub fn init(&self, device: &Device) -> ContextModel {
-        let ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior } = self.parts;
-        assert!(
-            !high_scale_hyperprior || (hyperprior && inter_scale),
-            "`high_scale_hyperprior` needs `hyperprior` and `inter_scale`"
-        );
-        let channels = self.channels;
-        ContextModel {
-            hyperprior: hyperprior
-                .then(|| HyperpriorConfig::new(channels, self.hyper_channels, self.synthesis_channels).init(device)),
-            checkerboard: checkerboard
-                .then(|| CheckerboardConfig::new(channels).with_groups(self.context_groups).init(device)),
-            inter_plane: inter_plane.then(|| {
-                let KernelShape { kernel, groups } = self.inter_plane;
-                InterPlaneConfig::new(channels).with_kernel(kernel).with_groups(groups).init(device)
-            }),
-            inter_scale: inter_scale.then(|| {
-                let KernelShape { kernel, groups } = self.inter_scale;
-                InterScaleConfig::new(channels).with_kernel(kernel).with_groups(groups).init(device)
-            }),
-            entropy_parameters: EntropyParametersConfig::new(channels, self.parameter_channels)
-                .with_start(self.start.clone())
-                .init(device),
-            high_scale_hyperprior,
-            space_only_center: self.space_only_center,
-            space_time_center: self.space_time_center,
-        }
-    }
-}
 
 /// Bits of a plane.
 #[derive(Clone, Debug)]
@@ -173,63 +42,7 @@ pub struct QuantizedPlane {
     pub rate: PlaneRate,
 }
 
-/// The context model. See the [module's documentation](self) for what it consists of.
-///
-/// Planes are `[M, H, W]`, scale-major, six a scale in the order of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES), H and W multiples
-/// of 4, in original units. For training they carry uniform noise of their steps' width
-/// ([`PlaneSteps::add_noise`]), and the parameters of a plane depend only on the noisy values of others, so a random
-/// subset of planes gives an unbiased estimate of the rate.
-///
-/// ```
-/// use burn::tensor::Device;
-/// use light4gs_model::{ContextModelConfig, HexPlaneConfig, Latent, PlaneSteps};
-///
-/// let device = Device::flex();
-/// let hexplane = HexPlaneConfig::new().with_channels(8).with_resolution([8, 8, 8, 4]).init(&device);
-/// let model = ContextModelConfig::compact(8).init(&device);
-/// let steps = PlaneSteps::fixed(&[0.1; 12], &device);
-/// let planes: Vec<_> = hexplane.planes.iter().map(|plane| plane.val()).collect();
-/// let rates = model.rate(&steps.add_noise(&planes), &steps, &[2, 6], Latent::Noise);
-/// // A space-time plane of the lowest scale has a hyperprior, a plane above has none.
-/// assert!(rates[0].hyper_bits.is_some() && rates[1].hyper_bits.is_none());
-/// ```
-#[derive(Module, Debug)]
-pub struct ContextModel {
-    /// `h_a`, `h_s` and the latent's bottleneck.
-    pub hyperprior: Option<Hyperprior>,
-    /// `context_prediction`.
-    pub checkerboard: Option<Checkerboard>,
-    /// `inter_plane`.
-    pub inter_plane: Option<InterPlane>,
-    /// `inter_scale`.
-    pub inter_scale: Option<InterScale>,
-    /// `entropy_parameters`.
-    pub entropy_parameters: EntropyParameters,
-    high_scale_hyperprior: bool,
-    space_only_center: f64,
-    space_time_center: f64,
-}
-
 impl ContextModel {
-    /// The composition: for each plane the first part that applies gives its prior.
-    pub fn parts(&self) -> Vec<Box<dyn PriorPart + '_>> {
-        let mut parts: Vec<Box<dyn PriorPart>> = Vec::new();
-        match (&self.hyperprior, &self.inter_scale) {
-            (Some(hyperprior), Some(inter_scale)) if self.high_scale_hyperprior => {
-                parts.push(Box::new(HighScaleHyperprior { hyperprior, inter_scale }));
-            }
-            (_, Some(inter_scale)) => parts.push(Box::new(inter_scale)),
-            _ => {}
-        }
-        if let Some(inter_plane) = &self.inter_plane {
-            parts.push(Box::new(inter_plane));
-        }
-        if let Some(hyperprior) = &self.hyperprior {
-            parts.push(Box::new(hyperprior));
-        }
-        parts
-    }
-
     /// What is subtracted from a plane before anything else.
     pub fn center_of(&self, plane: usize) -> f64 {
         if is_space_time(plane) { self.space_time_center } else { self.space_only_center }
@@ -389,11 +202,6 @@ impl ContextModel {
             .map(|(sum, squares)| (squares / count - (sum / count).powi(2)).max(0.0).sqrt().max(SMALLEST_START) as f32)
             .collect();
         self.entropy_parameters.start_from(&means, &scales);
-    }
-
-    /// Whether higher scales transmit a latent as well.
-    pub fn has_high_scale_hyperprior(&self) -> bool {
-        self.high_scale_hyperprior
     }
 
     /// Puts the hyperprior's quantiles where its densities have them; see

@@ -1,0 +1,171 @@
+//! A deformation field of one's own, from one's own crate: trained, coded, decoded. Nothing of Light4GS is edited.
+//!
+//! The field has no planes. A few trajectories over time are shared by the whole scene, and each place mixes them: offset =
+//! W · (where(x, y, z) × when(t)), two small branches that are multiplied. The codec has never heard of such a field. The
+//! field describes its network as a list of layers, the stream carries the list, and any decoder can run it.
+
+use burn::config::Config;
+use burn::module::{Module, Param};
+use burn::nn::{Linear, LinearConfig};
+use burn::tensor::activation::leaky_relu;
+use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::network::{Layer, Operation};
+use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, decode};
+use light4gs_data::Scene;
+use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
+use light4gs_model::{DeformationField, DynamicScene, HexPlane, HexPlaneField, ModelError, Offsets};
+use light4gs_train::dataset::load_options;
+use light4gs_train::trainer::Trainer;
+
+/// Slope of the activations where they are negative.
+const SLOPE: f32 = 0.25;
+
+/// Configuration of a [`SharedTrajectories`].
+#[derive(Config, Debug)]
+struct SharedTrajectoriesConfig {
+    /// Width of both branches.
+    #[config(default = 32)]
+    width: usize,
+    /// Number of trajectories.
+    #[config(default = 8)]
+    trajectories: usize,
+}
+
+/// What moves the Gaussians.
+#[derive(Module, Debug)]
+struct SharedTrajectories {
+    /// `[3]` to `[W]` to `[K]`: how much of each trajectory a place takes.
+    place: [Linear; 2],
+    /// `[1]` to `[W]` to `[K]`: how far along each trajectory is.
+    pace: [Linear; 2],
+    /// `[K]` to `[3]`: the directions of the trajectories.
+    directions: Linear,
+}
+
+impl SharedTrajectories {
+    /// Every layer, in the order in which [`DeformationField::to_arrays`] describes them.
+    fn layers_mut(&mut self) -> [&mut Linear; 5] {
+        let ([place_1, place_2], [pace_1, pace_2]) = (&mut self.place, &mut self.pace);
+        [place_1, place_2, pace_1, pace_2, &mut self.directions]
+    }
+}
+
+impl DeformationField for SharedTrajectories {
+    type Config = SharedTrajectoriesConfig;
+
+    /// The stream's name of it. A program that reads a file of another kind says so by this name.
+    const KIND: &'static str = "shared-trajectories";
+
+    fn init(config: &SharedTrajectoriesConfig, device: &Device) -> Self {
+        let linear = |inputs, outputs| LinearConfig::new(inputs, outputs).init(device);
+        let &SharedTrajectoriesConfig { width, trajectories } = config;
+        Self {
+            place: [linear(3, width), linear(width, trajectories)],
+            pace: [linear(1, width), linear(width, trajectories)],
+            directions: linear(trajectories, 3),
+        }
+    }
+
+    fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
+        let branch =
+            |[first, second]: &[Linear; 2], input| second.forward(leaky_relu(first.forward(input), SLOPE.into()));
+        let [count, _] = points.dims();
+        let time = Tensor::full([count, 1], time, &points.device());
+        let along = branch(&self.place, points) * branch(&self.pace, time);
+        Offsets { position: Some(self.directions.forward(along)), ..Offsets::default() }
+    }
+
+    fn to_arrays(&self) -> MotionArrays {
+        // The same as `offsets`, as data. `Point` and `Time` are what the codec calls these inputs.
+        let (mut network, [point, time]) = Network::new([3, 1]);
+        let branch = |network: &mut Network, [first, second]: &[Linear; 2], input| {
+            let hidden = network.layer(input, to_layer(first));
+            let hidden = network.leaky_relu(hidden, SLOPE);
+            network.layer(hidden, to_layer(second))
+        };
+        let place = branch(&mut network, &self.place, point);
+        let pace = branch(&mut network, &self.pace, time);
+        let along = network.node(Operation::Multiply, &[place, pace]);
+        let offset = network.layer(along, to_layer(&self.directions));
+        network.output(offset);
+        let sources = vec![MotionSource::Point, MotionSource::Time];
+        let network = MotionNetwork { network, sources, outputs: vec![MotionOutput::Position] };
+        MotionArrays { kind: Self::KIND.to_owned(), network: Some(network), tensors: Vec::new() }
+    }
+
+    fn from_arrays(arrays: &MotionArrays, _planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+        let wrong = |what: &str| ModelError::Motion(format!("{what}, expected those of shared trajectories"));
+        let motion = arrays.network.as_ref().ok_or_else(|| wrong("no network"))?;
+        let layers: Vec<&Layer> = motion.network.layers().collect();
+        let &[place, _, _, _, directions] = layers.as_slice() else { return Err(wrong("other layers")) };
+        // A file may come from anybody. The field is made with the file's sizes, which the codec has checked and bounded, and
+        // compared node by node before its numbers are taken over.
+        let (width, trajectories) = (place.outputs as usize, directions.inputs as usize);
+        let mut field = Self::init(&SharedTrajectoriesConfig { width, trajectories }, device);
+        let ours = field.to_arrays().network.expect("this kind has a network");
+        if !ours.network.has_structure_of(&motion.network) || ours.sources != motion.sources {
+            return Err(wrong("other nodes"));
+        }
+        for (linear, layer) in field.layers_mut().into_iter().zip(layers) {
+            load(linear, layer, device);
+        }
+        Ok(field)
+    }
+}
+
+/// Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
+fn to_layer(linear: &Linear) -> Layer {
+    let values = |tensor: burn::tensor::TensorData| tensor.iter::<f32>().collect::<Vec<f32>>();
+    let bias = linear.bias.as_ref().expect("these layers have a bias");
+    Layer::linear(values(linear.weight.val().transpose().into_data()), values(bias.val().into_data()))
+}
+
+/// The way back.
+fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
+    let shape = [layer.outputs as usize, layer.inputs as usize];
+    let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), shape), device).transpose();
+    linear.weight = Param::from_tensor(Tensor::from_data(weight.into_data(), device));
+    linear.bias = Some(Param::from_tensor(Tensor::from_floats(layer.bias.as_slice(), device)));
+}
+
+fn main() -> Outcome {
+    let folder = tempfile::tempdir()?;
+    let config = tiny_config()?;
+    let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
+
+    // Trained: by the usual trainer, which finds the parameters by itself.
+    let field = SharedTrajectoriesConfig::new();
+    let mut trainer = Trainer::<SharedTrajectories>::builder_with_field(config, data, field).build()?;
+    let mut losses = Vec::new();
+    while let Some(step) = trainer.step()? {
+        losses.push(step.loss);
+    }
+    let (first, last) = first_and_last(&losses);
+    println!("loss: {first:.3} in the first tenth of the run, {last:.3} in the last");
+    assert!(last < 0.7 * first);
+    let moved = |scene: &DynamicScene<SharedTrajectories>| scene.at(0.9).means - scene.at(0.1).means;
+    assert!(moved(trainer.scene()).abs().max().into_scalar::<f32>() > 1e-3, "nothing moves");
+
+    // Coded: in the profile of the configuration, everything quantized and entropy coded.
+    let bytes = trainer.encode()?.bytes;
+    println!("{} bytes", bytes.len());
+
+    // Decoded: the arrays name the kind, and the field is made of them again.
+    let arrays = decode(&bytes)?;
+    assert_eq!(arrays.motion.kind, "shared-trajectories");
+    let device = Device::flex();
+    let decoded = DynamicScene::<SharedTrajectories>::from_arrays(&arrays, &device)?;
+    assert_eq!(decoded.field.to_arrays(), arrays.motion);
+
+    // The codec runs the network too, without Burn and exactly: the two agree to float tolerance.
+    let ours: Vec<f32> = decoded.at(0.3).means.into_data().iter::<f32>().collect();
+    let exact = arrays.positions_at(0.3)?.concat();
+    let difference = ours.iter().zip(&exact).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    println!("largest difference between Burn and the codec: {difference:e}");
+    assert!(difference < 1e-4);
+
+    // Another model refuses the file by name.
+    let refused = DynamicScene::<HexPlaneField>::from_arrays(&arrays, &device).unwrap_err().to_string();
+    assert!(refused.contains("shared-trajectories"), "{refused}");
+    Ok(())
+}
