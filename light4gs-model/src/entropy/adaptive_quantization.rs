@@ -1,4 +1,4 @@
-//! Adaptive quantisation: learned steps (paper III-D; DESIGN section 6).
+//! Adaptive quantisation: learned steps (paper III-D).
 
 use burn::config::Config;
 use burn::module::{Module, Param};

@@ -1,4 +1,4 @@
-//! The factorised entropy bottleneck of the hyperprior's latents (Ballé et al. 2018, as in CompressAI; DESIGN section 6).
+//! The factorised entropy bottleneck of the hyperprior's latents (Ballé et al. 2018, as in CompressAI).
 
 use std::ops::RangeInclusive;
 

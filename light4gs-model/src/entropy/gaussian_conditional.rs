@@ -1,4 +1,4 @@
-//! The Gaussian conditional entropy model (Minnen et al. 2018, as in CompressAI; DESIGN section 6).
+//! The Gaussian conditional entropy model (Minnen et al. 2018, as in CompressAI).
 //!
 //! Everything is in *y units*: a value divided by its quantisation step, so that a symbol's interval has length 1.
 
