@@ -66,7 +66,7 @@ wgsl! {
 /// What several stages share.
 pub mod include {
     wgsl! {
-        /// Thresholds and units: those of `light4gs-model/src/cpu`, DESIGN section 3.
+        /// Thresholds and units: those of `light4gs-model/src/cpu`, docs/design.md.
         CONSTANTS = "include/constants";
         /// The steps of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian
         /// to the factor of its 2D covariance.

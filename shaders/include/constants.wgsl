@@ -1,4 +1,4 @@
-// Thresholds and units: those of `light4gs-model/src/cpu`, DESIGN section 3.
+// Thresholds and units: those of `light4gs-model/src/cpu`, docs/design.md.
 
 const NEAR: f32 = 0.2;
 const DILATION: f32 = 0.3;

@@ -1,4 +1,4 @@
-//! A slow, plain rasteriser in float64, written from `DESIGN.md` section 3 and sharing no code with the operation:
+//! A slow, plain rasteriser in float64, written from `docs/design.md` (conventions) and sharing no code with the operation:
 //! a loop over pixels, and in each one over all Gaussians by depth.
 //!
 //! It also says where float32 may decide otherwise than float64 (a threshold within rounding), so that a test can

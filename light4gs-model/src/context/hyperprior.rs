@@ -1,4 +1,4 @@
-//! The hyperprior: a small latent that is transmitted and describes a plane (Ballé et al. 2018).
+//! The hyperprior: a small latent that is transmitted and describes a plane (Ballé et al. 2018; docs/design.md).
 
 use burn::config::Config;
 use burn::module::Module;

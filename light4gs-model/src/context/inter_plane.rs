@@ -35,7 +35,7 @@ impl InterPlaneConfig {
 /// Parameters of the plane over (a, b) from the planes over (a, t) and (b, t).
 ///
 /// Each is averaged over time, which leaves a vector along a and one along b; spread over the plane and put side by side
-/// they are the context `[2 M, H, W]` of a convolution. (The reference averages over space; see docs/design.md, departures.)
+/// they are the context `[2 M, H, W]` of a convolution. (The reference averages over space; see docs/design.md.)
 #[derive(Module, Debug)]
 pub struct InterPlane {
     /// `[2 M, H, W]` to `[2 M, H, W]`.

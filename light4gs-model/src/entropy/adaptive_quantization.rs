@@ -1,4 +1,4 @@
-//! Adaptive quantisation: learned steps (paper III-D).
+//! Adaptive quantisation: learned steps (paper III-D; docs/design.md).
 
 use burn::config::Config;
 use burn::module::{Module, Param};

@@ -1,4 +1,4 @@
-//! Entropy models of the higher spherical harmonics (paper III-D): four of them, one interface.
+//! Entropy models of the higher spherical harmonics (paper III-D; docs/design.md): four of them, one interface.
 //!
 //! | model | a value's density comes from | travels as |
 //! |---|---|---|

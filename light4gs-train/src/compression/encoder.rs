@@ -1,4 +1,4 @@
-//! A scene and its entropy models into the bytes of a file (paper III-E, DESIGN section 7).
+//! A scene and its entropy models into the bytes of a file (paper III-E, docs/design.md).
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
