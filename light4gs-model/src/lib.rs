@@ -1,20 +1,22 @@
 //! Burn modules of a dynamic scene made of deformable 3D Gaussians.
 //!
-//! | part | what it is | paper |
+//! | room | what is in it | paper |
 //! |---|---|---|
-//! | [`Gaussians`] | a static set of Gaussians | III-A |
-//! | [`SceneCoordinates`] | PCA and contraction of world coordinates to [-1, 1] | III-A |
-//! | [`HexPlane`] | six feature planes over the pairs of x, y, z, t, at several scales | III-A |
-//! | [`Deformation`] | from a feature to changes of position, scale, rotation | III-A |
+//! | [`scene`] | [`Gaussians`]; world coordinates to [-1, 1] ([`SceneCoordinates`]); what moves the Gaussians ([`DeformationField`], and the paper's, [`HexPlaneField`]); all of it together ([`DynamicScene`]) | III-A |
 //! | [`Splatter`] | differentiable rendering | 3DGS |
 //! | [`Significance`] | what each Gaussian contributes over views and times | III-B |
-//! | [`ContextModel`] | what every value of the hexplane costs in the file: the multiscale hexplane context model | III-C |
-//! | [`AdaptiveQuantization`] | learned quantisation steps | III-D |
-//! | [`ShEntropyModel`] | what every spherical harmonic costs in the file: four models | III-D |
-//! | [`DynamicScene`] | all of it together: Gaussians at a time, and the plain arrays of a `.l4gs` file | III |
+//! | [`context`] | what every value of the hexplane costs in the file: the multiscale hexplane [`ContextModel`] | III-C |
+//! | [`sh`] | what every spherical harmonic costs in the file: four models behind [`ShEntropy`] | III-D |
+//! | [`entropy`] | what those are made of: densities, convolutions over planes, quantization steps ([`AdaptiveQuantization`]) | III-D |
+//! | [`parameters`] | every float parameter of a module with its path | |
+//! | [`ops`] | custom operations with hand-written derivatives | |
 //!
-//! Every part is a Burn module of its own (`Config` and `init`) and works alone. Custom operations with hand-written
-//! derivatives are in [`ops`]; the device that a tensor lies on chooses their back end at run time.
+//! Everything that learns is a Burn module of its own (`Config` and `init`) and works alone. The device that a tensor lies on
+//! chooses the back end of the custom operations at run time.
+//!
+//! What can be exchanged without touching this crate: the field ([`DeformationField`]), parts of the context model
+//! ([`PriorPart`]), the entropy model of the spherical harmonics ([`ShEntropy`]), and the loop around all of them. Each
+//! describes its networks for the codec beside its own forward pass, so that both compute the same.
 
 pub mod context;
 mod cpu;

@@ -54,7 +54,7 @@ impl ContextModel {
         CenteredPlanes { planes, steps: steps.clone() }
     }
 
-    /// Bits of the selected planes. The values are taken as they are: noisy in training, quantised in an evaluation.
+    /// Bits of the selected planes. The values are taken as they are: noisy in training, quantized in an evaluation.
     /// Differentiable in planes, steps and weights.
     pub fn rate(
         &self,

@@ -187,7 +187,7 @@ impl ShiftedCopies {
         let after = |length: usize, padded: usize| (padded * stride).saturating_sub(length + before);
         let padding = [(before, after(height, padded_rows)), (before, after(width, padded_columns))];
         let padded = plane.pad(padding, PadMode::Constant(0.0));
-        // A picture for each phase of the stride, within which a tap is a plain shift.
+        // An image for each phase of the stride, within which a tap is a plain shift.
         let phases = if stride == 1 {
             padded
         } else {

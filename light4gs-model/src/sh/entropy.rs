@@ -36,7 +36,7 @@ pub trait ShEntropy {
     /// Distance between the values of neighbouring symbols.
     fn step(&self) -> f32;
 
-    /// Bits of each value, `[N, 15, 3]`, of `values [N, 15, 3]`: noisy in training, quantised in an evaluation.
+    /// Bits of each value, `[N, 15, 3]`, of `values [N, 15, 3]`: noisy in training, quantized in an evaluation.
     /// Differentiable in the values, in what is known and in the weights.
     fn bits(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
 
