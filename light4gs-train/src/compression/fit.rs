@@ -32,6 +32,10 @@ pub fn fit<F: DeformationField>(
     let context = decay(settings.context.learning_rate_init, settings.context.learning_rate_final);
     let sh = decay(settings.sh.learning_rate_init, settings.sh.learning_rate_final);
     compression.start_from(scene.planes());
+    if compression.planes.is_none() && compression.sh.is_none() {
+        // A field without planes, and spherical harmonics that are coded with their frequencies: no model is trained.
+        return Ok(compression);
+    }
     let mut adam = Adam::default();
     for iteration in 1..=iterations {
         seed_device(device, config.seed, Stage::Fine, iteration);
