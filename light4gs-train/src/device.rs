@@ -10,12 +10,9 @@ use crate::error::TrainError;
 
 /// The back ends that this build contains, by name: those of [`DEVICES`] whose Cargo feature is on.
 pub fn built_in() -> Vec<&'static str> {
-    let is_built_in = |name: &&str| match *name {
-        "ndarray" => cfg!(feature = "ndarray"),
-        "flex" => cfg!(feature = "flex"),
-        "wgpu" => cfg!(feature = "wgpu"),
-        _ => false,
-    };
+    let features =
+        [("ndarray", cfg!(feature = "ndarray")), ("flex", cfg!(feature = "flex")), ("wgpu", cfg!(feature = "wgpu"))];
+    let is_built_in = |name: &&str| features.contains(&(*name, true));
     DEVICES.iter().copied().filter(is_built_in).collect()
 }
 

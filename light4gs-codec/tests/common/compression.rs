@@ -101,7 +101,7 @@ impl Random {
         layer.weight = self.normals(layer.weights() as usize, 1.0 / fan_in.sqrt());
         if kind == LayerKind::Checkerboard {
             // As a decoder gets them.
-            let masked = |at: usize| (at / kernel as usize + at % kernel as usize) % 2 == 0;
+            let masked = |at: usize| (at / kernel as usize + at % kernel as usize).is_multiple_of(2);
             let area = (kernel * kernel) as usize;
             layer
                 .weight

@@ -155,7 +155,7 @@ impl ContextModelConfig {
 ///
 /// Planes are `[M, H, W]`, scale-major, six a scale in the order of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES), H and W multiples
 /// of 4, in original units. For training they carry uniform noise of their steps' width
-/// ([`PlaneSteps::add_noise`]), and the parameters of a plane depend only on the noisy values of others, so a random
+/// ([`PlaneSteps::add_noise`](crate::PlaneSteps::add_noise)), and the parameters of a plane depend only on the noisy values of others, so a random
 /// subset of planes gives an unbiased estimate of the rate.
 ///
 /// ```

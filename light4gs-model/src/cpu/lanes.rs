@@ -184,6 +184,7 @@ mod avx2 {
     pub(super) struct Avx2(__m256);
 
     // SAFETY of every block: see the type. Loads and stores go through references to whole arrays.
+    #[expect(clippy::undocumented_unsafe_blocks, reason = "one argument holds for all of them")]
     impl Lanes for Avx2 {
         #[inline(always)]
         fn splat(value: f32) -> Self {

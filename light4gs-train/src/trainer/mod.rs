@@ -7,9 +7,9 @@
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `pruning`: pruning by significance
 //!
-//! What a researcher may want to replace are traits: [`Loss`](crate::loss::Loss),
-//! [`DensityStrategy`](crate::density::DensityStrategy), [`SignificanceScore`](crate::density::SignificanceScore),
-//! [`Observer`](crate::observers::Observer) and [`ImageSource`](crate::dataset::ImageSource).
+//! What a researcher may want to replace are traits: [`Loss`],
+//! [`DensityStrategy`], [`SignificanceScore`],
+//! [`Observer`] and [`ImageSource`].
 
 mod builder;
 pub mod profile;
