@@ -120,7 +120,7 @@ fn to_layer(linear: &Linear) -> Layer {
     Layer::linear(values(linear.weight.val().transpose().into_data()), values(bias.val().into_data()))
 }
 
-/// The way back.
+/// From the layers of a stream.
 fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
     let shape = [layer.outputs as usize, layer.inputs as usize];
     let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), shape), device).transpose();

@@ -11,3 +11,8 @@ pub mod random;
 pub mod raster;
 pub mod splat_scene;
 pub mod twin;
+
+/// The README's program compiles and runs.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -4,12 +4,10 @@
 //! four vector loads; C is padded with zeros. The backward pass gives each block of channels to one task, which alone
 //! writes that block's gradients: no atomics, and the same sums whatever the number of threads.
 
+use light4gs_codec::plane_layout::PLANE_AXES;
 use rayon::prelude::*;
 
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
-
-/// The axes (x = 0, y = 1, z = 2, t = 3) of the six planes: first along the width, second along the height.
-pub(crate) const PLANE_AXES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 
 /// Points a forward task handles.
 const CHUNK: usize = 1024;

@@ -18,13 +18,10 @@ mod data;
 mod device_name;
 mod error;
 mod eval;
-mod layers;
+mod layering;
 mod model;
 mod optional;
-mod overrides;
-mod presets;
 mod prune;
-mod schema;
 mod train;
 mod validate;
 
@@ -36,6 +33,8 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use layering::layers;
+
 pub use choice::UnknownChoice;
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
@@ -45,8 +44,8 @@ pub use data::DataConfig;
 pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin, Problem};
 pub use eval::{EvalConfig, EvalSplit};
+pub use layering::presets::preset_names;
 pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
-pub use presets::preset_names;
 pub use prune::{PruneConfig, PruneScore, PruneVolume};
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 

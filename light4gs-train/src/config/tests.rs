@@ -1,5 +1,6 @@
 use std::fs;
 
+use super::layering::{presets, schema};
 use super::*;
 
 fn problem_text(result: Result<Config, ConfigError>) -> String {

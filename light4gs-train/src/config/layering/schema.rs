@@ -3,15 +3,15 @@
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::{Config, ConfigError, Origin};
+use super::super::{Config, ConfigError, Origin};
 
 /// The default configuration as a table: every key that exists, with a value of its type.
-pub(super) fn defaults() -> Table {
+pub(in crate::config) fn defaults() -> Table {
     Table::try_from(Config::default()).expect("the default configuration holds only what TOML can")
 }
 
 /// Checks that `layer` has only known keys, with values of the right types. `text` gives the line numbers.
-pub(super) fn check(layer: &Table, text: &str, origin: &Origin) -> Result<(), ConfigError> {
+pub(in crate::config) fn check(layer: &Table, text: &str, origin: &Origin) -> Result<(), ConfigError> {
     let known = defaults();
     check_table(&known, layer, &mut Vec::new(), &Context { known: &known, text, origin })
 }

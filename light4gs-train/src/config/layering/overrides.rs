@@ -2,7 +2,8 @@
 
 use toml::Table;
 
-use super::{ConfigError, Origin, schema};
+use super::super::{ConfigError, Origin};
+use super::schema;
 
 /// One override as a layer.
 pub(super) fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {

@@ -5,13 +5,18 @@ use std::path::{Path, PathBuf};
 
 use toml::{Table, Value};
 
-use super::{Config, ConfigError, Origin, overrides, presets, schema};
+use super::super::{Config, ConfigError, Origin};
+use super::{overrides, presets, schema};
 
 /// The key by which a layer names the one below it.
 const EXTENDS: &str = "extends";
 
 /// Reads the layer at `top` and all below it, lays `above` and then the overrides on top, and validates.
-pub(super) fn resolve(top: &Origin, above: &[Origin], override_texts: &[String]) -> Result<Config, ConfigError> {
+pub(in crate::config) fn resolve(
+    top: &Origin,
+    above: &[Origin],
+    override_texts: &[String],
+) -> Result<Config, ConfigError> {
     let mut layers = Vec::new();
     collect(top, None, &mut Vec::new(), &mut layers)?;
     layers.reverse();
@@ -30,7 +35,11 @@ pub(super) fn resolve(top: &Origin, above: &[Origin], override_texts: &[String])
 }
 
 /// The same for text, whose `extends` may name a preset or a path relative to the working folder.
-pub(super) fn resolve_text(text: &str, origin: &str, override_texts: &[String]) -> Result<Config, ConfigError> {
+pub(in crate::config) fn resolve_text(
+    text: &str,
+    origin: &str,
+    override_texts: &[String],
+) -> Result<Config, ConfigError> {
     let origin = Origin::Text(origin.to_owned());
     let (layer, extends) = parse(text, &origin)?;
     let mut layers = vec![(origin.clone(), layer)];
@@ -45,7 +54,7 @@ pub(super) fn resolve_text(text: &str, origin: &str, override_texts: &[String]) 
 }
 
 /// What `name` means: a preset, or a path relative to `folder`.
-pub(super) fn named(name: &str, folder: Option<&Path>) -> Origin {
+pub(in crate::config) fn named(name: &str, folder: Option<&Path>) -> Origin {
     let path = folder.unwrap_or(Path::new("")).join(name);
     let plain = !name.ends_with(".toml") && !name.contains(['/', '\\']);
     let preset = plain && (presets::text(name).is_some() || !path.is_file());

@@ -4,7 +4,7 @@ macro_rules! presets {
     ($($name:literal),* $(,)?) => {
         /// Name and text of every preset, sorted by name.
         pub(super) const PRESETS: &[(&str, &str)] =
-            &[$(($name, include_str!(concat!("../../configs/", $name, ".toml")))),*];
+            &[$(($name, include_str!(concat!("../../../configs/", $name, ".toml")))),*];
     };
 }
 
@@ -47,12 +47,12 @@ pub fn preset_names() -> Vec<&'static str> {
 }
 
 /// The text of a preset.
-pub(super) fn text(name: &str) -> Option<&'static str> {
+pub(in crate::config) fn text(name: &str) -> Option<&'static str> {
     PRESETS.iter().find(|(known, _)| *known == name).map(|(_, text)| *text)
 }
 
 /// The preset whose name is most like `name`.
-pub(super) fn nearest(name: &str) -> &'static str {
+pub(in crate::config) fn nearest(name: &str) -> &'static str {
     PRESETS
         .iter()
         .map(|(known, _)| *known)
