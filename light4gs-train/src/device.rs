@@ -16,6 +16,17 @@ pub fn built_in() -> Vec<&'static str> {
     DEVICES.iter().copied().filter(is_built_in).collect()
 }
 
+/// The device for work of which every back end makes the same: `flex` where this build contains it, else the first that
+/// it contains.
+///
+/// # Errors
+/// [`TrainError::Input`] where this build contains none.
+pub fn any() -> Result<Device, TrainError> {
+    let names = built_in();
+    let name = names.iter().find(|name| **name == "flex").or(names.first());
+    device_by_name(name.ok_or_else(|| TrainError::Input("this program was built without a back end".into()))?)
+}
+
 /// The device that a name stands for, without autodiff: `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by
 /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (a software driver).
 ///
@@ -95,17 +106,14 @@ mod wgpu {
 
 /// Whether a device's work is done by the processor's own threads, as the caller's is.
 pub fn computes_on_processor(device: &Device) -> bool {
+    let processors: &[fn() -> Device] = &[
+        #[cfg(feature = "ndarray")]
+        Device::ndarray,
+        #[cfg(feature = "flex")]
+        Device::flex,
+    ];
     let device = device.clone().inner();
-    let mut processor = false;
-    #[cfg(feature = "ndarray")]
-    {
-        processor |= device == Device::ndarray();
-    }
-    #[cfg(feature = "flex")]
-    {
-        processor |= device == Device::flex();
-    }
-    processor
+    processors.iter().any(|processor| device == processor())
 }
 
 /// The name that a wgpu device's adapter has for itself; none for the processor's back ends.

@@ -61,7 +61,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 
 /// Times every coder: best of `repeats`.
 pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
-    let device = Device::flex();
+    let device = crate::device::any()?;
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&config, scene.planes(), &device)?;
