@@ -1,7 +1,7 @@
 // Second half of the query's derivative: every cell gathers what the samples around it hand over.
 //
 // One invocation owns one cell of one plane, with all its channels. A sample reaches its low cell and the next ones along
-// width and height, so a cell looks at the samples that begin in it and in three neighbours. Samples come sorted by low
+// width and height, so a cell looks at the samples that begin in it and in three neighbors. Samples come sorted by low
 // cell (`order`, ranges in `starts`), and equal ones in the order of points, so the four are two ranges; every sum has one
 // order, and no atomics. Writes the planes' gradients, each [C, H · W], from the places in `parts`; a launch takes so many
 // samples of a cell that no loop gets too long, and later launches add the rest.
@@ -45,7 +45,7 @@ fn main(
     let row = cell / width;
     let at_left = cell - row * width == 0u;
 
-    // Places in `order`: from the left neighbour's samples on, from the own column's on, and the end; first those that
+    // Places in `order`: from the left neighbor's samples on, from the own column's on, and the end; first those that
     // begin in the row above, then those of the own row.
     var above = vec3<u32>(0u);
     if (row > 0u) {

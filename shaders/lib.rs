@@ -16,7 +16,7 @@ wgsl! {
     ADAM = "adam";
     /// Puts the Gaussians' numbers of cells into the order of depths.
     CELL_COUNTS = "cell_counts";
-    /// Colour of every Gaussian from its spherical harmonics, seen from the camera.
+    /// Color of every Gaussian from its spherical harmonics, seen from the camera.
     COLOR = "color";
     /// Second half of the query's derivative: every cell gathers what the samples around it hand over.
     HEXPLANE_GATHER = "hexplane_gather";
@@ -54,7 +54,7 @@ wgsl! {
     RASTERIZE = "rasterize";
     /// Derivative of the blending by every splat, front to back like the forward pass.
     RASTERIZE_BACKWARD = "rasterize_backward";
-    /// What every splat contributes to one picture, without its colour: the sums behind significance pruning
+    /// What every splat contributes to one image, without its color: the sums behind significance pruning
     /// (paper III-B).
     SIGNIFICANCE = "significance";
     /// Adds up every Gaussian's sums over its cells.
@@ -97,7 +97,7 @@ pub mod include {
         TEAM_SUM_OF_MANY = "include/team_sum_of_many";
         /// A team is a workgroup of TEAM invocations that blends one cell.
         TEAM_WORKGROUP = "include/team_workgroup";
-        /// What is drawn, from where: one uniform for all stages of a picture.
+        /// What is drawn, from where: one uniform for all stages of a image.
         VIEW = "include/view";
     }
 }

@@ -165,7 +165,7 @@ fn main(
     );
     let along_forward = vec2<f32>(dot3(d_row_x, forward), dot3(d_row_y, forward));
     let d_slope = select(-along_forward * focal * inverse_z, vec2<f32>(0.0), g.slope_clamped);
-    // The centre on the screen.
+    // The center on the screen.
     let d_pixel = d_position * focal * inverse_z;
     let d_view_xy = d_slope * inverse_z + d_pixel;
     let d_view_z = -along_rows * focal * inverse_z * inverse_z - d_slope * g.position.xy * inverse_z * inverse_z

@@ -8,14 +8,14 @@
 //   color += T · alpha · color_i,  depth += T · alpha · z_i,  T *= 1 - alpha
 //
 // Reads the cell's range in `order`, the numbers of intersections by cell, and `gaussians`, their Gaussians. Writes
-// `picture`: colour over the background [H, W, 3], then alpha [H, W], then depth [H, W]. Between two parts of a list
-// (see PART) the picture holds the sums so far, and T, negative where the pixel has stopped, in the place of alpha.
+// `rendering`: color over the background [H, W, 3], then alpha [H, W], then depth [H, W]. Between two parts of a list
+// (see PART) the image holds the sums so far, and T, negative where the pixel has stopped, in the place of alpha.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
 @group(0) @binding(2) var<storage, read_write> gaussians: array<u32>;
 @group(0) @binding(3) var<storage, read_write> splats: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read_write> picture: array<f32>;
+@group(0) @binding(4) var<storage, read_write> rendering: array<f32>;
 @group(0) @binding(5) var<uniform> view: View;
 
 @compute @workgroup_size(TEAM)
@@ -40,15 +40,15 @@ fn main(
     var blue: array<vec4<f32>, QUADS>;
     var depth: array<vec4<f32>, QUADS>;
     for (var k = 0u; k < PIXELS; k++) {
-        let inside = in_picture(own, k);
+        let inside = in_image(own, k);
         transmittance[k / 4u][k % 4u] = select(-1.0, 1.0, inside);
         if (view.cells.z > 0u && inside) {
             let at = pixel_index(own, k);
-            red[k / 4u][k % 4u] = picture[3u * at];
-            green[k / 4u][k % 4u] = picture[3u * at + 1u];
-            blue[k / 4u][k % 4u] = picture[3u * at + 2u];
-            transmittance[k / 4u][k % 4u] = picture[3u * pixel_count + at];
-            depth[k / 4u][k % 4u] = picture[4u * pixel_count + at];
+            red[k / 4u][k % 4u] = rendering[3u * at];
+            green[k / 4u][k % 4u] = rendering[3u * at + 1u];
+            blue[k / 4u][k % 4u] = rendering[3u * at + 2u];
+            transmittance[k / 4u][k % 4u] = rendering[3u * pixel_count + at];
+            depth[k / 4u][k % 4u] = rendering[4u * pixel_count + at];
         }
     }
 
@@ -83,7 +83,7 @@ fn main(
     }
 
     for (var k = 0u; k < PIXELS; k++) {
-        if (in_picture(own, k)) {
+        if (in_image(own, k)) {
             let at = pixel_index(own, k);
             var rgb = vec3<f32>(red[k / 4u][k % 4u], green[k / 4u][k % 4u], blue[k / 4u][k % 4u]);
             var alpha = transmittance[k / 4u][k % 4u];
@@ -91,11 +91,11 @@ fn main(
                 rgb += abs(alpha) * view.background.xyz;
                 alpha = 1.0 - abs(alpha);
             }
-            picture[3u * at] = rgb.x;
-            picture[3u * at + 1u] = rgb.y;
-            picture[3u * at + 2u] = rgb.z;
-            picture[3u * pixel_count + at] = alpha;
-            picture[4u * pixel_count + at] = depth[k / 4u][k % 4u];
+            rendering[3u * at] = rgb.x;
+            rendering[3u * at + 1u] = rgb.y;
+            rendering[3u * at + 2u] = rgb.z;
+            rendering[3u * pixel_count + at] = alpha;
+            rendering[4u * pixel_count + at] = depth[k / 4u][k % 4u];
         }
     }
 }

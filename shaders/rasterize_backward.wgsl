@@ -1,10 +1,10 @@
 // Derivative of the blending by every splat, front to back like the forward pass.
 //
-// With v_i the splat's colour and depth weighed by the upstream gradient, the pixel's value is
+// With v_i the splat's color and depth weighed by the upstream gradient, the pixel's value is
 // S = sum_i w_i v_i + T_end · v_background, and dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i).
-// S is known from the finished picture, so a running remainder is all that is needed.
+// S is known from the finished image, so a running remainder is all that is needed.
 //
-// Teams, cells and pixels as in `rasterize.wgsl`. Reads also the finished picture and `upstream`, its gradient, in the
+// Teams, cells and pixels as in `rasterize.wgsl`. Reads also the finished image and `upstream`, its gradient, in the
 // same layout. Writes ten sums over the cell's pixels for each of its intersections, at ten times its number: gradients
 // of red, green, blue and depth, then the moments of p = alpha · dS/dalpha: p, p dx, p dy, p dx², p dx dy, p dy².
 // Nobody else writes there, so that the sums do not depend on any order. `carried` holds T and the remainder of every
@@ -14,7 +14,7 @@
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
 @group(0) @binding(2) var<storage, read_write> gaussians: array<u32>;
 @group(0) @binding(3) var<storage, read_write> splats: array<vec4<f32>>;
-@group(0) @binding(4) var<storage, read_write> picture: array<f32>;
+@group(0) @binding(4) var<storage, read_write> rendering: array<f32>;
 @group(0) @binding(5) var<storage, read_write> upstream: array<f32>;
 @group(0) @binding(6) var<storage, read_write> sums: array<f32>;
 @group(0) @binding(7) var<storage, read_write> carried: array<f32>;
@@ -50,7 +50,7 @@ fn main(
         let quad = k / 4u;
         let part_of_quad = k % 4u;
         transmittance[quad][part_of_quad] = -1.0;
-        if (in_picture(own, k)) {
+        if (in_image(own, k)) {
             let at = pixel_index(own, k);
             let rgb = vec3<f32>(upstream[3u * at], upstream[3u * at + 1u], upstream[3u * at + 2u]);
             let up_z = upstream[4u * pixel_count + at];
@@ -63,10 +63,10 @@ fn main(
                 left[quad][part_of_quad] = carried[pixel_count + at];
             } else {
                 transmittance[quad][part_of_quad] = 1.0;
-                let color = vec3<f32>(picture[3u * at], picture[3u * at + 1u], picture[3u * at + 2u]);
+                let color = vec3<f32>(rendering[3u * at], rendering[3u * at + 1u], rendering[3u * at + 2u]);
                 // The background's value; alpha is 1 - T, hence the minus.
-                left[quad][part_of_quad] = dot3(color, rgb) + picture[4u * pixel_count + at] * up_z
-                    - (1.0 - picture[3u * pixel_count + at]) * upstream[3u * pixel_count + at];
+                left[quad][part_of_quad] = dot3(color, rgb) + rendering[4u * pixel_count + at] * up_z
+                    - (1.0 - rendering[3u * pixel_count + at]) * upstream[3u * pixel_count + at];
             }
         }
     }
@@ -150,7 +150,7 @@ fn main(
 
     if (view.cells.w == 0u) {
         for (var k = 0u; k < PIXELS; k++) {
-            if (in_picture(own, k)) {
+            if (in_image(own, k)) {
                 let at = pixel_index(own, k);
                 carried[at] = transmittance[k / 4u][k % 4u];
                 carried[pixel_count + at] = left[k / 4u][k % 4u];

@@ -1,4 +1,4 @@
-// What every splat contributes to one picture, without its colour: the sums behind significance pruning (paper III-B).
+// What every splat contributes to one image, without its color: the sums behind significance pruning (paper III-B).
 //
 // Teams, cells, pixels and decisions as in `rasterize.wgsl`. Writes three sums over the cell's pixels for each of its
 // intersections, at three times its number: the pixels that blend the splat, T · alpha, and T, with T the transmittance
@@ -35,7 +35,7 @@ fn main(
     var transmittance: array<vec4<f32>, QUADS>;
     for (var k = 0u; k < PIXELS; k++) {
         var before = -1.0;
-        if (in_picture(own, k)) {
+        if (in_image(own, k)) {
             before = 1.0;
             if (view.cells.z > 0u) {
                 before = carried[pixel_index(own, k)];
@@ -86,7 +86,7 @@ fn main(
 
     if (view.cells.w == 0u) {
         for (var k = 0u; k < PIXELS; k++) {
-            if (in_picture(own, k)) {
+            if (in_image(own, k)) {
                 carried[pixel_index(own, k)] = transmittance[k / 4u][k % 4u];
             }
         }

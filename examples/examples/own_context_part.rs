@@ -116,7 +116,7 @@ fn main() -> Outcome {
     let expected = quantized[XZ].rate.values_bits.clone().into_scalar::<f32>();
     let decoded: Vec<Tensor<3>> = quantized.into_iter().map(|plane| plane.decoded).collect();
     let symbols = |latent: Tensor<3>| latent.into_data().iter::<f32>().map(|symbol| symbol as i32).collect();
-    let latents = model.usual.hyper_symbols(&planes, &steps).into_iter();
+    let latents = model.usual.latent_symbols(&planes, &steps).into_iter();
     let coding = PlaneCoding {
         model: model.usual.to_arrays_with(&model.parts())?,
         steps: steps.to_groups(),

@@ -9,7 +9,7 @@
 //! use light4gs_codec::{GaussianArrays, SceneData, SceneFrameArrays, SceneMeta, decode, encode, info};
 //!
 //! let scene = SceneData {
-//!     meta: SceneMeta { name: "one grey ball".into(), frame_count: 1, fps: 30.0, ..Default::default() },
+//!     meta: SceneMeta { name: "one gray ball".into(), frame_count: 1, fps: 30.0, ..Default::default() },
 //!     gaussians: GaussianArrays {
 //!         means: vec![[0.0, 0.5, 2.0]],
 //!         log_scales: vec![[-3.0; 3]],

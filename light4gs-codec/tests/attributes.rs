@@ -11,7 +11,7 @@ fn gaussians(count: impl Into<prop::collection::SizeRange>, spread: f32) -> impl
     prop::collection::vec(prop::array::uniform14(-spread..=spread), count).prop_map(|rows| from_rows(&rows))
 }
 
-/// Gaussians from rows of mean, log scales, quaternion, opacity, colour.
+/// Gaussians from rows of mean, log scales, quaternion, opacity, color.
 fn from_rows(rows: &[[f32; 14]]) -> GaussianArrays {
     GaussianArrays {
         means: rows.iter().map(|r| [r[0], r[1], r[2]]).collect(),

@@ -8,7 +8,7 @@ const ROTATION_TOLERANCE: f64 = 1e-3;
 /// An OpenCV pinhole camera: +x right, +y down, +z forward; `x_cam = rotation * x_world + translation`.
 ///
 /// Pixel `(i, j)` sees `u = fx * x / z + cx - 0.5`, compared with the integer `i` (and `v` likewise
-/// with `j`): the centre of the image is at `cx = width / 2`.
+/// with `j`): the center of the image is at `cx = width / 2`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
     /// World to camera rotation `[3, 3]` (orthonormal, determinant 1).
@@ -76,13 +76,13 @@ pub enum PoseError {
 }
 
 impl Camera {
-    /// Centre of projection in world units.
+    /// Center of projection in world units.
     pub fn center(&self) -> Vec3 {
         -(self.rotation.transpose() * self.translation)
     }
 
     /// A camera from a Blender/NeRF pose: rows of a camera-to-world matrix in OpenGL axes
-    /// (+x right, +y up, looking along -z), with square pixels and a centred principal point.
+    /// (+x right, +y up, looking along -z), with square pixels and a centered principal point.
     ///
     /// `fov_x` is the full horizontal field of view in radians.
     ///
@@ -123,7 +123,7 @@ impl Camera {
         // OpenGL -> OpenCV: y and z change sign. The inverse of a rotation is its transpose.
         let rotation = DMat3::from_cols(column(0), -column(1), -column(2)).transpose();
         let translation = -(rotation * column(3));
-        Ok(Self::centred(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height))
+        Ok(Self::centered(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height))
     }
 
     /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the image.
@@ -142,11 +142,11 @@ impl Camera {
         let down = forward.cross(right);
         let rotation = DMat3::from_cols(right, down, forward).transpose();
         let translation = -(rotation * eye64);
-        Self::centred(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height)
+        Self::centered(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height)
     }
 
     /// Square pixels, principal point in the middle.
-    fn centred(rotation: Mat3, translation: Vec3, fov_x: f32, width: u32, height: u32) -> Self {
+    fn centered(rotation: Mat3, translation: Vec3, fov_x: f32, width: u32, height: u32) -> Self {
         let focal = (f64::from(width) / (2.0 * (f64::from(fov_x) / 2.0).tan())) as f32;
         Self {
             rotation,
@@ -211,7 +211,7 @@ impl Camera {
         )
     }
 
-    /// A world point in pixels `(u, v)` (integers are pixel centres) and its depth along +z.
+    /// A world point in pixels `(u, v)` (integers are pixel centers) and its depth along +z.
     ///
     /// Points with a depth of 0 or less are behind the camera: their `u`, `v` mean nothing.
     pub fn project(&self, point: Vec3) -> (f32, f32, f32) {
@@ -219,7 +219,7 @@ impl Camera {
         (self.fx * p.x / p.z + self.cx - 0.5, self.fy * p.y / p.z + self.cy - 0.5, p.z)
     }
 
-    /// World direction (unit length) through pixel coordinates `(u, v)`; integers are pixel centres.
+    /// World direction (unit length) through pixel coordinates `(u, v)`; integers are pixel centers.
     pub fn ray_direction(&self, u: f32, v: f32) -> Vec3 {
         let in_camera = Vec3::new((u + 0.5 - self.cx) / self.fx, (v + 0.5 - self.cy) / self.fy, 1.0);
         (self.rotation.transpose() * in_camera).normalize()

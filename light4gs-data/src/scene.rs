@@ -89,9 +89,9 @@ pub struct Scene {
     pub background: [f32; 3],
     /// Where the Gaussians start.
     pub points: PointCloud,
-    /// Mean of the training cameras' centres, world units.
+    /// Mean of the training cameras' centers, world units.
     pub camera_mean: [f32; 3],
-    /// 1.1 times the largest distance of a training camera's centre from their mean, world units
+    /// 1.1 times the largest distance of a training camera's center from their mean, world units
     /// (1 if they all coincide, since learning rates are multiplied by it).
     pub extent: f32,
 }
@@ -131,7 +131,7 @@ impl Scene {
     }
 }
 
-/// Mean of the cameras' centres, and 1.1 times the largest distance from it (1 if that is 0).
+/// Mean of the cameras' centers, and 1.1 times the largest distance from it (1 if that is 0).
 fn mean_and_extent(frames: &[Frame]) -> ([f32; 3], f32) {
     let centers: Vec<glam::DVec3> = frames.iter().map(|frame| frame.camera.center().as_dvec3()).collect();
     let mean = centers.iter().sum::<glam::DVec3>() / centers.len().max(1) as f64;

@@ -72,7 +72,7 @@ fn a_good_scene_opens() {
     assert_eq!((camera.width, camera.height, camera.cx, camera.cy), (16, 12, 8.0, 6.0));
     assert!((camera.fov().0 - 0.7).abs() < 1e-6 && (camera.fx - camera.fy).abs() < 1e-5);
     assert_eq!(camera.center().to_array(), [0.0, 0.5, 4.0]);
-    // Centres are 0, 1, 2, 3, 4 along x.
+    // Centers are 0, 1, 2, 3, 4 along x.
     assert!((scene.extent - 2.2).abs() < 1e-6);
     let image = ImageStore::new(&options, 1 << 20).get(&scene.train[1]).unwrap();
     assert_eq!((image.width, image.height, image.pixels.len()), (16, 12, 576));

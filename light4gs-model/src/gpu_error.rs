@@ -23,7 +23,7 @@ pub enum GpuError {
     },
     /// Results cannot be read: the device is lost, out of memory, or an earlier operation failed.
     #[error(
-        "the GPU could not finish `{operation}`: {reason}. If memory is short, render smaller pictures or fewer \
+        "the GPU could not finish `{operation}`: {reason}. If memory is short, render smaller images or fewer \
          Gaussians; if the device was lost, start again from the last checkpoint"
     )]
     Device {
@@ -35,7 +35,7 @@ pub enum GpuError {
     /// A buffer is larger than the adapter can bind.
     #[error(
         "the buffer `{buffer}` would take {bytes} bytes, and this adapter binds at most {limit}: render smaller \
-         pictures or fewer Gaussians, or choose another adapter"
+         images or fewer Gaussians, or choose another adapter"
     )]
     TooLarge {
         /// What it holds.
@@ -45,9 +45,9 @@ pub enum GpuError {
         /// The adapter's limit.
         limit: u64,
     },
-    /// The picture has more parts than a launch can name.
-    #[error("a picture of {width}×{height} is too large for this adapter; at most {limit} cells of 16×16 pixels")]
-    Picture {
+    /// The image has more parts than a launch can name.
+    #[error("a image of {width}×{height} is too large for this adapter; at most {limit} cells of 16×16 pixels")]
+    Image {
         /// Pixels.
         width: u32,
         /// Pixels.

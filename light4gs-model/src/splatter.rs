@@ -84,14 +84,14 @@ impl Splatter {
     ) -> Rendering {
         let (inputs, view) = self.inputs(gaussians, camera, screen_offsets);
         let outputs = Dispatch::splat(inputs, view);
-        let picture = Tensor::<1>::from_dispatch(outputs.picture);
+        let rendering = Tensor::<1>::from_dispatch(outputs.rendering);
         let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels = width * height;
         Rendering {
-            image: picture.clone().slice(s![0..3 * pixels]).reshape([height, width, 3]),
-            alpha: picture.clone().slice(s![3 * pixels..4 * pixels]).reshape([height, width]),
-            depth: picture.slice(s![4 * pixels..5 * pixels]).reshape([height, width]),
+            image: rendering.clone().slice(s![0..3 * pixels]).reshape([height, width, 3]),
+            alpha: rendering.clone().slice(s![3 * pixels..4 * pixels]).reshape([height, width]),
+            depth: rendering.slice(s![4 * pixels..5 * pixels]).reshape([height, width]),
             radii,
         }
     }

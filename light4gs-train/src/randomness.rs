@@ -17,7 +17,7 @@ pub(crate) enum Purpose {
     Split,
     /// The views that significance is measured on.
     PruningViews,
-    /// Quantisation noise and the choice of planes and Gaussians for the rate.
+    /// Quantization noise and the choice of planes and Gaussians for the rate.
     Rate,
 }
 

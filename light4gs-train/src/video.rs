@@ -24,7 +24,7 @@ pub enum Looping {
 /// for a mistake.
 pub const MAX_GIF_FPS: f32 = 50.0;
 
-/// Effort of the colour quantiser, 1 (best) to 30 (fast).
+/// Effort of the color quantizer, 1 (best) to 30 (fast).
 const GIF_SPEED: i32 = 10;
 
 /// Writes frames as an animated GIF and returns their number. All frames must be of one size.

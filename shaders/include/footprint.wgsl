@@ -9,7 +9,7 @@ struct Footprint {
     free: vec4<bool>,
 }
 
-// `dx` and `dy` go from the pixels to the centre.
+// `dx` and `dy` go from the pixels to the center.
 fn footprint(conic: vec3<f32>, opacity: f32, dx: f32, dy: vec4<f32>) -> Footprint {
     let power = (-0.5 * conic.z * dy) * dy + (-0.5 * conic.x * dx * dx - conic.y * dx * dy);
     let raw = opacity * exp(power);

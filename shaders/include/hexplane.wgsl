@@ -32,7 +32,7 @@ fn first_cell(planes: Planes, plane: u32) -> u32 {
     return planes.first_cells_b[plane - 4u];
 }
 
-// Where a point falls, axis by axis. Align-corners: -1 is the first cell's centre, 1 the last one's; border clamp.
+// Where a point falls, axis by axis. Align-corners: -1 is the first cell's center, 1 the last one's; border clamp.
 struct AxisSamples {
     low: vec4<u32>,
     high: vec4<u32>,

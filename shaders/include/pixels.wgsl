@@ -19,7 +19,7 @@ fn pixel_y(own: OwnPixels, k: u32) -> u32 {
     return own.first_y + k * ROW_STEP;
 }
 
-fn in_picture(own: OwnPixels, k: u32) -> bool {
+fn in_image(own: OwnPixels, k: u32) -> bool {
     return own.x < view.size.x && pixel_y(own, k) < view.size.y;
 }
 

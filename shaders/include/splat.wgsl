@@ -2,7 +2,7 @@
 //
 //   0: x, y, depth, opacity
 //   1: inverse of the 2D covariance xx, xy, yy; reach
-//   2: red, green, blue (not below 0); what became of the colour, see `color.wgsl`
+//   2: red, green, blue (not below 0); what became of the color, see `color.wgsl`
 //   3: 2D covariance xx, yy; radius in pixels; number of cells that it touches
 //
 // The reach is twice the exponent at which alpha falls below 1/255; negative if it never gets there.
@@ -23,7 +23,7 @@ struct Rectangle {
     high: vec2<u32>,
 }
 
-// Tiles of the 3-sigma box, truncated as in the original rasteriser.
+// Tiles of the 3-sigma box, truncated as in the original rasterizer.
 fn tile_rectangle(position: vec2<f32>, radius: f32) -> Rectangle {
     let tile = f32(TILE);
     let reach = vec2<f32>(min(radius, 2147483648.0));
@@ -52,7 +52,7 @@ fn quadratic_form(conic: vec3<f32>, x: f32, y: f32) -> f32 {
 }
 
 // Whether the splat's alpha reaches the threshold anywhere in the cell: the smallest exponent over the pixels' bounding
-// rectangle, found on its edges unless the centre is inside.
+// rectangle, found on its edges unless the center is inside.
 fn reaches(splat: Splat, column: u32, row: u32) -> bool {
     let low = vec2<f32>(vec2<u32>(column, row) * CELL) - splat.position;
     let high = low + f32(CELL - 1u);

@@ -1,4 +1,4 @@
-// What is drawn, from where: one uniform for all stages of a picture. A stage declares it as `view`.
+// What is drawn, from where: one uniform for all stages of a image. A stage declares it as `view`.
 
 struct View {
     // Columns of the rotation from world to camera. In w: focal lengths x and y, principal point x, all in pixels.
@@ -10,7 +10,7 @@ struct View {
     // Position of the camera in the world.
     center: vec4<f32>,
     background: vec4<f32>,
-    // Largest slopes x/z and y/z of the Jacobian, then half the picture's width and height.
+    // Largest slopes x/z and y/z of the Jacobian, then half the image's width and height.
     limits: vec4<f32>,
     // Width and height in pixels, then in tiles.
     size: vec4<u32>,

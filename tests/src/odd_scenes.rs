@@ -4,9 +4,9 @@ use burn::tensor::Device;
 use light4gs_data::Camera;
 
 use crate::random::Random;
-use crate::splat_scene::{ATTRIBUTES, MEANS, OPACITIES, QUATS, SCALES, SH_DC, SplatScene, WIDTHS, picture_of};
+use crate::splat_scene::{ATTRIBUTES, MEANS, OPACITIES, QUATS, SCALES, SH_DC, SplatScene, WIDTHS, image_of};
 
-/// Background of the pictures.
+/// Background of the images.
 pub const BACKGROUND: [f32; 3] = [0.1, 0.6, 1.0];
 /// Widths and heights, most of them no multiples of a tile.
 pub const SIZES: [[u32; 2]; 6] = [[1, 1], [17, 31], [40, 30], [16, 16], [64, 3], [33, 48]];
@@ -14,12 +14,12 @@ pub const SIZES: [[u32; 2]; 6] = [[1, 1], [17, 31], [40, 30], [16, 16], [64, 3],
 /// What a rendering and its backward pass give.
 pub struct Run {
     /// `[H, W, 5]`.
-    pub picture: Vec<f32>,
+    pub image: Vec<f32>,
     /// `[N]`.
     pub radii: Vec<i64>,
     /// How many could not be drawn.
     pub invalid: usize,
-    /// Of the sum of the picture times random weights, by the seven inputs.
+    /// Of the sum of the image times random weights, by the seven inputs.
     pub gradients: [Vec<f32>; 7],
 }
 
@@ -33,10 +33,10 @@ pub fn run(scene: &SplatScene, camera: &Camera, degree: usize, device: &Device) 
 pub fn run_weighed(scene: &SplatScene, camera: &Camera, degree: usize, device: &Device, weights: &[f64]) -> Run {
     let leaves = scene.leaves(&device.clone().autodiff());
     let rendering = leaves.render(camera, BACKGROUND, degree);
-    let picture = picture_of(&rendering);
+    let image = image_of(&rendering);
     let radii = rendering.radii.to_data().iter::<i64>().collect();
     let invalid = rendering.invalid_count();
-    Run { picture, radii, invalid, gradients: leaves.gradients(rendering, weights) }
+    Run { image, radii, invalid, gradients: leaves.gradients(rendering, weights) }
 }
 
 /// A point `depth` in front of the camera, `x` and `y` in half fields of view off its axis.
@@ -65,7 +65,7 @@ pub fn make_odd(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut 
     }
 }
 
-/// Makes a Gaussian one that cannot be drawn; it stands in the picture otherwise. Returns what was done.
+/// Makes a Gaussian one that cannot be drawn; it stands in the image otherwise. Returns what was done.
 pub fn poison(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) -> String {
     let place = point_in_view(camera, random.uniform(-0.8, 0.8) as f32, random.uniform(-0.8, 0.8) as f32, 3.0);
     scene.row_mut(MEANS, i).copy_from_slice(&place);

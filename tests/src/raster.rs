@@ -1,4 +1,4 @@
-//! Rendering the golden rasteriser scenes.
+//! Rendering the golden rasterizer scenes.
 
 use burn::tensor::{Device, Tensor, s};
 use light4gs_data::Camera;

@@ -44,7 +44,7 @@ pub struct Ranges {
     pub opacities: [f64; 2],
     /// Standard deviation of the harmonics of degree 0 and of the higher ones.
     pub sh: [f64; 2],
-    /// Largest screen offset, half pictures.
+    /// Largest screen offset, half images.
     pub offset: f64,
 }
 
@@ -129,7 +129,7 @@ impl SceneLeaves {
         Splatter::new(background, degree).render_activated(gaussians, camera, Some(offsets))
     }
 
-    /// Gradients of `sum(picture · weights)`, `weights [H, W, 5]`, by all seven inputs.
+    /// Gradients of `sum(image · weights)`, `weights [H, W, 5]`, by all seven inputs.
     pub fn gradients(&self, rendering: Rendering, weights: &[f64]) -> [Vec<f32>; 7] {
         let [height, width, _] = rendering.image.dims();
         let values: Vec<f32> = weights.iter().map(|w| *w as f32).collect();
@@ -145,13 +145,13 @@ impl SceneLeaves {
 }
 
 /// `[H, W, 5]`: red, green, blue, alpha, depth of a rendering.
-pub fn picture_of(rendering: &Rendering) -> Vec<f32> {
+pub fn image_of(rendering: &Rendering) -> Vec<f32> {
     let (image, alpha, depth) = (values_of(&rendering.image), values_of(&rendering.alpha), values_of(&rendering.depth));
     let pixels = image.chunks_exact(3).zip(alpha).zip(depth);
     pixels.flat_map(|((rgb, alpha), depth)| [rgb[0], rgb[1], rgb[2], alpha, depth]).collect()
 }
 
-/// A camera around the origin, at a distance of about 4, with its principal point off the centre and unequal focal
+/// A camera around the origin, at a distance of about 4, with its principal point off the center and unequal focal
 /// lengths.
 pub fn random_camera(width: u32, height: u32, random: &mut Random) -> Camera {
     let direction = glam::Vec3::from_array([0; 3].map(|_| random.normal() as f32)).normalize();

@@ -1,4 +1,4 @@
-//! A slow, plain rasteriser in float64, written from `docs/design.md` (conventions) and sharing no code with the operation:
+//! A slow, plain rasterizer in float64, written from `docs/design.md` (conventions) and sharing no code with the operation:
 //! a loop over pixels, and in each one over all Gaussians by depth.
 //!
 //! It also says where float32 may decide otherwise than float64 (a threshold within rounding), so that a test can
@@ -13,7 +13,7 @@ const TILE: usize = 16;
 
 /// What the twin draws.
 #[derive(Clone, Debug)]
-pub struct TwinPicture {
+pub struct TwinImage {
     /// `[H, W, 5]`: red, green, blue, alpha, depth.
     pub values: Vec<f64>,
     /// `[H, W]`: a threshold was met within rounding.
@@ -28,7 +28,7 @@ pub struct TwinPicture {
     pub largest_alpha: f64,
     /// Smallest transmittance of a pixel at the end.
     pub smallest_transmittance: f64,
-    /// Hash of which Gaussian was blended at which pixel. Where two pictures have the same, no jump lies between them.
+    /// Hash of which Gaussian was blended at which pixel. Where two images have the same, no jump lies between them.
     pub decisions: u64,
 }
 
@@ -142,7 +142,7 @@ fn project(scene: &SplatScene, index: usize, camera: &Camera, degree: usize) -> 
 }
 
 /// Draws activated Gaussians, all of which must be finite and have an orientation.
-pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree: usize) -> TwinPicture {
+pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree: usize) -> TwinImage {
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut radii = vec![0; scene.len()];
     let mut doubtful_gaussians = vec![false; scene.len()];
@@ -160,7 +160,7 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
         }
     }
 
-    let mut picture = TwinPicture {
+    let mut image = TwinImage {
         values: Vec::with_capacity(width * height * 5),
         doubtful: Vec::with_capacity(width * height),
         radii,
@@ -177,14 +177,14 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
             let Splat { columns, rows, center, inverse, .. } = splat;
             if !(columns[0]..columns[1]).contains(&column) || !(rows[0]..rows[1]).contains(&row) {
                 // Outside of its box it is as if it were cut off: not smooth there.
-                picture.smallest_alpha = 0.0;
+                image.smallest_alpha = 0.0;
                 continue;
             }
             let (dx, dy) = (center[0] - x as f64, center[1] - y as f64);
             let exponent = 0.5 * (inverse[0] * dx * dx + inverse[2] * dy * dy) + inverse[1] * dx * dy;
             let free = splat.opacity * (-exponent).exp();
-            picture.smallest_alpha = picture.smallest_alpha.min(free);
-            picture.largest_alpha = picture.largest_alpha.max(free);
+            image.smallest_alpha = image.smallest_alpha.min(free);
+            image.largest_alpha = image.largest_alpha.max(free);
             let alpha = free.min(0.99);
             doubtful |= (alpha * 255.0 - 1.0).abs() < 1e-3;
             if alpha < 1.0 / 255.0 {
@@ -196,8 +196,8 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
                 break;
             }
             // FNV-1a over (pixel, Gaussian).
-            for word in [picture.doubtful.len(), splat.index] {
-                picture.decisions = (picture.decisions ^ word as u64).wrapping_mul(0x0000_0100_0000_01b3);
+            for word in [image.doubtful.len(), splat.index] {
+                image.decisions = (image.decisions ^ word as u64).wrapping_mul(0x0000_0100_0000_01b3);
             }
             let weight = transmittance * alpha;
             for c in 0..3 {
@@ -206,28 +206,28 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
             sums[3] += weight * splat.depth;
             transmittance = after;
         }
-        picture.smallest_transmittance = picture.smallest_transmittance.min(transmittance);
-        picture.values.extend((0..3).map(|c| sums[c] + transmittance * f64::from(background[c])));
-        picture.values.extend([1.0 - transmittance, sums[3]]);
-        picture.doubtful.push(doubtful);
+        image.smallest_transmittance = image.smallest_transmittance.min(transmittance);
+        image.values.extend((0..3).map(|c| sums[c] + transmittance * f64::from(background[c])));
+        image.values.extend([1.0 - transmittance, sums[3]]);
+        image.doubtful.push(doubtful);
     }
-    picture
+    image
 }
 
-/// A scene without the Gaussians whose tiles or order are within rounding, and its picture.
+/// A scene without the Gaussians whose tiles or order are within rounding, and its image.
 pub fn render_without_doubt(
     scene: &SplatScene,
     camera: &Camera,
     background: [f32; 3],
     degree: usize,
-) -> (SplatScene, TwinPicture) {
+) -> (SplatScene, TwinImage) {
     let mut scene = scene.clone();
     loop {
-        let picture = render(&scene, camera, background, degree);
-        if !picture.doubtful_gaussians.contains(&true) {
-            return (scene, picture);
+        let image = render(&scene, camera, background, degree);
+        if !image.doubtful_gaussians.contains(&true) {
+            return (scene, image);
         }
-        let keep: Vec<bool> = picture.doubtful_gaussians.iter().map(|doubtful| !doubtful).collect();
+        let keep: Vec<bool> = image.doubtful_gaussians.iter().map(|doubtful| !doubtful).collect();
         scene = scene.filtered(&keep);
     }
 }

@@ -1,4 +1,4 @@
-//! Every back end draws the same pictures and has the same gradients, on scenes of all sizes with odd and broken
+//! Every back end draws the same images and has the same gradients, on scenes of all sizes with odd and broken
 //! Gaussians among them.
 //!
 //! Back ends round differently, and at a threshold (alpha 1/255, transmittance 1e-4) the last bit decides. The float64
@@ -14,7 +14,7 @@ use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SCALES, SplatScene, random_camera};
 use light4gs_tests::twin;
 
-const PICTURE: f32 = 2e-4;
+const IMAGE: f32 = 2e-4;
 const GRADIENT: f32 = 1e-3;
 
 /// `keep` tells which Gaussians can be drawn. At most `doubtful` of the pixels may be left out.
@@ -46,12 +46,12 @@ fn assert_agreement(
     for (name, found) in &runs[1..] {
         assert_eq!(found.invalid, expected.invalid, "{what}: invalid on {name} and {first}");
         assert_eq!(found.radii, expected.radii, "{what}: radii on {name} and {first}");
-        let pixels = found.picture.chunks_exact(5).zip(expected.picture.chunks_exact(5)).zip(&twin.doubtful);
+        let pixels = found.image.chunks_exact(5).zip(expected.image.chunks_exact(5)).zip(&twin.doubtful);
         for (pixel, ((found, expected), _)) in pixels.enumerate().filter(|(_, (_, doubtful))| !**doubtful) {
             for c in 0..5 {
                 let error = (found[c] - expected[c]).abs() / if c == 4 { depth_scale } else { 1.0 };
                 assert!(
-                    error <= PICTURE,
+                    error <= IMAGE,
                     "{what}: pixel {pixel} channel {c} is {} on {name}, {} on {first}",
                     found[c],
                     expected[c]
@@ -183,16 +183,16 @@ fn a_million_gaussians_in_one_tile() {
             let gaussians = ActivatedGaussians { means, quats, scales, opacities, sh_dc, sh_rest };
             let splatter = Splatter::new(BACKGROUND, 0);
             let rendering = splatter.render_activated(gaussians, &camera, None);
-            let picture = values_of(&rendering.image);
+            let image = values_of(&rendering.image);
             let gradients = (rendering.image.sum() + rendering.depth.sum()).backward();
             let of_leaves = leaves.iter().map(|leaf| values_of(&leaf.grad(&gradients).expect("a gradient")));
-            (name, std::iter::once(picture).chain(of_leaves).collect())
+            (name, std::iter::once(image).chain(of_leaves).collect())
         })
         .collect();
     let (first, expected) = &runs[0];
     for (name, found) in &runs[1..] {
         for (k, (found, expected)) in found.iter().zip(expected).enumerate() {
-            let tolerance = if k == 0 { PICTURE } else { GRADIENT };
+            let tolerance = if k == 0 { IMAGE } else { GRADIENT };
             assert_close_relative(&format!("output {k} on {name} and {first}"), found, expected, tolerance);
         }
     }

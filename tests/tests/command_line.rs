@@ -185,7 +185,7 @@ fn edit(w: &Workspace, file: &str, change: impl FnOnce(&mut serde_json::Value)) 
 }
 
 #[test]
-fn a_missing_picture() {
+fn a_missing_image() {
     let w = Workspace::new(PROGRAM);
     fs::remove_file(w.path("scene/train/r_003.png")).unwrap();
     assert_scene_refused(&w, &["r_003"]);
@@ -193,7 +193,7 @@ fn a_missing_picture() {
 }
 
 #[test]
-fn a_truncated_picture() {
+fn a_truncated_image() {
     let w = Workspace::new(PROGRAM);
     let path = w.path("scene/train/r_003.png");
     let bytes = fs::read(&path).unwrap();
@@ -202,7 +202,7 @@ fn a_truncated_picture() {
 }
 
 #[test]
-fn a_picture_of_another_size() {
+fn a_image_of_another_size() {
     let w = Workspace::new(PROGRAM);
     let other = light4gs_data::RgbImage8 { width: 16, height: 8, pixels: vec![0; 16 * 8 * 3] };
     other.save_png(&w.path("scene/train/r_003.png")).unwrap();

@@ -64,7 +64,7 @@ fn modules_and_exact_executor_agree() {
             let decoded: Vec<Tensor<3>> =
                 model.quantize(&planes, &steps).into_iter().map(|plane| plane.decoded).collect();
             let latent_symbols = model
-                .hyper_symbols(&decoded, &steps)
+                .latent_symbols(&decoded, &steps)
                 .into_iter()
                 .map(|plane| plane.map_or_else(Vec::new, |plane| values_of(&plane).iter().map(|v| *v as i32).collect()))
                 .collect();
@@ -165,7 +165,7 @@ fn every_configuration_makes_a_file_that_decodes() {
         let coded = encoded.coded;
         let bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
         let (expected, found) = (coded.estimate.hexplanes, 8.0 * bytes as f64);
-        // What the sub-streams of a plane spend on whole words at their ends, and quantised weights.
+        // What the sub-streams of a plane spend on whole words at their ends, and quantized weights.
         let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
         let sh_bytes: u64 = coded.report.sh.degrees.iter().sum();

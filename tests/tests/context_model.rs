@@ -86,7 +86,7 @@ fn parameters_depend_only_on_what_is_decoded() {
     }
 }
 
-/// What the quantiser believes is what the rate says of its result.
+/// What the quantizer believes is what the rate says of its result.
 #[test]
 fn rate_of_the_quantized_planes() {
     for (name, device) in devices() {
@@ -114,13 +114,13 @@ fn rate_of_the_quantized_planes() {
 }
 
 #[test]
-fn hyper_symbols_are_integers_where_there_is_a_hyperprior() {
+fn latent_symbols_are_integers_where_there_is_a_hyperprior() {
     let device = Device::flex();
     let planes = random_planes(&device);
     for (name, config) in compositions() {
         let model = config.init(&device);
         let rates = model.rate(&planes, &steps(&device), &all_planes(), Latent::Rounded);
-        let symbols = model.hyper_symbols(&planes, &steps(&device));
+        let symbols = model.latent_symbols(&planes, &steps(&device));
         for plane in 0..PLANES {
             assert_eq!(symbols[plane].is_some(), rates[plane].hyper_bits.is_some(), "{name} plane {plane}");
             let Some(symbols) = &symbols[plane] else { continue };
@@ -170,7 +170,7 @@ fn a_start_from_statistics_is_sane() {
     let mut warm = ContextModelConfig::compact(CHANNELS).init(&device);
     warm.start_from(&planes, &steps);
     assert!(bits_each(&cold) > 15.0, "{}", bits_each(&cold));
-    // log2(0.4 / 0.02 · sqrt(2 pi e)) = 6.4, and the centres differ between the groups.
+    // log2(0.4 / 0.02 · sqrt(2 pi e)) = 6.4, and the centers differ between the groups.
     assert!((5.0..9.0).contains(&bits_each(&warm)), "{}", bits_each(&warm));
 }
 
@@ -216,7 +216,7 @@ fn steps_no_finer_than_they_began() {
     }
 }
 
-/// With Burn's own optimiser, on planes that are smooth and resemble each other across scales: the rate falls well below
+/// With Burn's own optimizer, on planes that are smooth and resemble each other across scales: the rate falls well below
 /// what statistics alone give, with noise in every step and a third of the planes. (Measured: to 0.7 of it, and to 0.5 in
 /// 1000 steps.)
 #[test]

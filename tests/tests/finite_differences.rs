@@ -18,7 +18,7 @@ use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
-use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, picture_of, random_camera};
+use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, image_of, random_camera};
 use light4gs_tests::twin;
 
 const BACKGROUND: [f32; 3] = [0.2, 0.5, 0.9];
@@ -63,7 +63,7 @@ fn check_directions(
     }
 }
 
-/// Weights `[H, W, 5]` that vary slowly over the picture, so that what the pixels say adds up, and their rounding less.
+/// Weights `[H, W, 5]` that vary slowly over the image, so that what the pixels say adds up, and their rounding less.
 fn smooth_weights(camera: &Camera, random: &mut Random) -> Vec<f64> {
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let waves: [[f64; 3]; 5] = std::array::from_fn(|_| [0; 3].map(|_| random.uniform(-3.0, 3.0)));
@@ -78,7 +78,7 @@ fn depth_of(scene: &mut SplatScene, i: usize, camera: &Camera) -> f64 {
     (camera.rotation.as_dmat3() * mean + camera.translation.as_dvec3()).z
 }
 
-/// Large, rather transparent Gaussians, so that no threshold lies in the picture, and none that a step could move
+/// Large, rather transparent Gaussians, so that no threshold lies in the image, and none that a step could move
 /// before another.
 fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
     let ranges = Ranges { half_size: 0.7, scales: [1.6, 2.6], opacities: [0.2, 0.6], sh: [0.3, 0.1], offset: 0.1 };
@@ -89,14 +89,14 @@ fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
         scene.row_mut(MEANS, 3).copy_from_slice(&[axis.x, axis.y, axis.z].map(f64::from));
         // One whose green is clamped at zero.
         scene.row_mut(SH_DC, 5)[1] = -5.0;
-        let picture = twin::render(&scene, camera, BACKGROUND, 3);
+        let image = twin::render(&scene, camera, BACKGROUND, 3);
         let mut depths: Vec<f64> = (0..scene.len()).map(|i| depth_of(&mut scene, i, camera)).collect();
         depths.sort_by(f64::total_cmp);
         let smooth = depths.windows(2).all(|pair| pair[1] - pair[0] > 0.02)
-            && picture.smallest_alpha > 2.0 / 255.0
-            && picture.largest_alpha < 0.9
-            && picture.smallest_transmittance > 1e-3
-            && picture.radii.iter().all(|radius| *radius > 0);
+            && image.smallest_alpha > 2.0 / 255.0
+            && image.largest_alpha < 0.9
+            && image.smallest_transmittance > 1e-3
+            && image.radii.iter().all(|radius| *radius > 0);
         if smooth {
             return scene;
         }
@@ -120,7 +120,7 @@ fn splat_along_random_directions() {
                     let mut scene = scene.clone();
                     scene.attributes[k] = values;
                     let rendering = scene.leaves(&tape).render(&camera, BACKGROUND, 3);
-                    dot(wide(&picture_of(&rendering)), &weights)
+                    dot(wide(&image_of(&rendering)), &weights)
                 });
             }
         }
@@ -145,8 +145,8 @@ fn splat_against_the_twin() {
                 let at = |step: f64| {
                     let mut scene = scene.clone();
                     scene.attributes[k][i] += step;
-                    let picture = twin::render(&scene, &camera, BACKGROUND, degree);
-                    (dot(picture.values, &weights), picture.decisions)
+                    let image = twin::render(&scene, &camera, BACKGROUND, degree);
+                    (dot(image.values, &weights), image.decisions)
                 };
                 // Smaller and smaller steps until none of the thresholds is crossed.
                 let difference = [1e-6, 1e-7, 1e-8].into_iter().find_map(|step| {

@@ -261,7 +261,7 @@ fn trace_of_a_space_time_plane() {
     }
 }
 
-/// Rate without any quantisation, and its gradient with respect to planes and weights.
+/// Rate without any quantization, and its gradient with respect to planes and weights.
 #[test]
 fn identity() {
     let golden = Golden::open("c06_context");
@@ -326,7 +326,7 @@ fn eval() {
     }
 }
 
-/// Our quantiser against the planes that CompressAI's decoder gave back, and what they cost.
+/// Our quantizer against the planes that CompressAI's decoder gave back, and what they cost.
 #[test]
 fn stream() {
     let golden = Golden::open("c06_context");

@@ -58,7 +58,7 @@ fn check_camera(tensors: &SafeTensors, split: &str, i: usize, camera: &Camera, t
     close(&label("full_proj"), &clip.to_cols_array(), &entry("full_proj_transform", 16));
 }
 
-/// The pose with the square picture the reference brings every one to (ours keeps the true aspect).
+/// The pose with the square image the reference brings every one to (ours keeps the true aspect).
 fn squared(camera: &Camera, size: (i32, i32)) -> Camera {
     assert_eq!(size.0, size.1);
     let focal = camera.fx * size.0 as f32 / camera.width as f32;
@@ -84,7 +84,7 @@ fn cameras_and_times() {
         for (i, frame) in frames.iter().enumerate() {
             let camera = squared(&frame.camera, (sizes[2 * i], sizes[2 * i + 1]));
             check_camera(&tensors, split.name(), i, &camera, frame.time);
-            // Our own camera keeps square pixels and the picture's size.
+            // Our own camera keeps square pixels and the image's size.
             assert_eq!(frame.camera.fx, frame.camera.fy);
             assert_eq!(frame.camera.width, frame.source_width);
         }
@@ -116,16 +116,16 @@ fn compositing_is_exact() {
     let bytes = std::fs::read(golden("c12_dnerf_")).unwrap();
     let tensors = SafeTensors::deserialize(&bytes).unwrap();
     let rgba = tensors.tensor("composite.rgba_u8").unwrap();
-    let per_picture: usize = rgba.shape()[1..].iter().product();
+    let per_image: usize = rgba.shape()[1..].iter().product();
     for (name, value) in [("white", 1.0f32), ("black", 0.0)] {
         let expected = tensors.tensor(&format!("composite.{name}_u8")).unwrap();
         assert!(composite(rgba.data(), [value; 3]) == expected.data(), "{name}");
         // The same through the files.
         let (scene, options) = open(value);
         let store = ImageStore::new(&options, 1 << 20);
-        let pictures = expected.data().chunks_exact(per_picture / 4 * 3);
-        assert_eq!(pictures.len(), scene.train.len());
-        for (frame, expected) in scene.train.iter().zip(pictures) {
+        let images = expected.data().chunks_exact(per_image / 4 * 3);
+        assert_eq!(images.len(), scene.train.len());
+        for (frame, expected) in scene.train.iter().zip(images) {
             assert!(store.get(frame).unwrap().pixels == expected, "{name} {}", frame.name);
         }
     }

@@ -1,4 +1,4 @@
-//! Golden cases c07 (spherical harmonics) and c08 (rasteriser, and its corner cases) on every back end.
+//! Golden cases c07 (spherical harmonics) and c08 (rasterizer, and its corner cases) on every back end.
 
 use burn::tensor::{Device, Tensor, s};
 use light4gs_data::Camera;
@@ -51,7 +51,7 @@ fn golden_sh(golden: &Golden, at: usize) -> f32 {
     SH.with(|sh| sh.get_or_init(|| golden.values("sh"))[at])
 }
 
-/// Pictures, radii and gradients of one camera. `grads` is the prefix of the gradients that are the judge.
+/// Images, radii and gradients of one camera. `grads` is the prefix of the gradients that are the judge.
 fn check_camera(golden: &Golden, camera_name: &str, grads_key: &str, with_depth: bool) {
     let key = |name: &str| format!("{camera_name}.{name}");
     let size = golden.integers(&key("width_height"));
@@ -156,7 +156,7 @@ fn significance_scene(case: &str) -> (Golden, Vec<Camera>) {
 }
 
 #[test]
-fn significance_of_each_picture() {
+fn significance_of_each_image() {
     for case in ["c08_raster", "c08_raster_edge"] {
         let (golden, cameras) = significance_scene(case);
         for (name, device) in devices() {

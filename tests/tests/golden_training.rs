@@ -1,4 +1,4 @@
-//! Golden cases c09 (losses, metrics, regularisers), c10 (Adam, learning rates), c11 (densification) on every back end.
+//! Golden cases c09 (losses, metrics, regularizers), c10 (Adam, learning rates), c11 (densification) on every back end.
 
 use burn::module::Param;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
@@ -14,20 +14,20 @@ use light4gs_train::loss::photometric;
 use light4gs_train::optimization::adam::{Adam, AdamState};
 use light4gs_train::optimization::schedule::ExponentialDecay;
 
-/// One picture `[H, W, 3]` of a batch `[B, 3, H, W]`.
-fn picture(batch: &Tensor<4>, index: usize) -> Tensor<3> {
+/// One image `[H, W, 3]` of a batch `[B, 3, H, W]`.
+fn image_of(batch: &Tensor<4>, index: usize) -> Tensor<3> {
     batch.clone().slice(s![index..index + 1, .., .., ..]).squeeze_dim::<3>(0).permute([1, 2, 0])
 }
 
-/// Mean over the pictures of a batch of a loss on pairs of pictures: `[1]`.
+/// Mean over the images of a batch of a loss on pairs of images: `[1]`.
 fn batch_mean(image: &Tensor<4>, truth: &Tensor<4>, loss: impl Fn(Tensor<3>, Tensor<3>) -> Tensor<1>) -> Tensor<1> {
     let count = image.dims()[0];
-    let losses: Vec<_> = (0..count).map(|i| loss(picture(image, i), picture(truth, i))).collect();
+    let losses: Vec<_> = (0..count).map(|i| loss(image_of(image, i), image_of(truth, i))).collect();
     Tensor::cat(losses, 0).mean()
 }
 
 #[test]
-fn picture_losses() {
+fn image_losses() {
     let golden = Golden::open("c09_losses");
     for (name, device) in devices() {
         let device = device.autodiff();
@@ -50,7 +50,7 @@ fn picture_losses() {
         );
 
         let similarities: Vec<f32> =
-            (0..image.dims()[0]).flat_map(|i| values_of(&ssim(picture(&image, i), picture(&truth, i)))).collect();
+            (0..image.dims()[0]).flat_map(|i| values_of(&ssim(image_of(&image, i), image_of(&truth, i)))).collect();
         assert_close(&format!("{name} ssim.per_image"), &similarities, &golden.values("ssim.per_image"), 1e-5);
     }
 }
@@ -83,7 +83,7 @@ fn peak_signal_to_noise_ratio() {
     for (name, device) in devices() {
         let (image, truth) = (golden.tensor::<4>("img", &device), golden.tensor::<4>("gt", &device));
         let found: Vec<f32> =
-            (0..image.dims()[0]).map(|i| psnr(picture(&image, i), picture(&truth, i)) as f32).collect();
+            (0..image.dims()[0]).map(|i| psnr(image_of(&image, i), image_of(&truth, i)) as f32).collect();
         assert_close(&format!("{name} psnr.per_image"), &found, &golden.values("psnr.per_image"), 1e-3);
     }
 }
@@ -123,10 +123,10 @@ fn plane_regularizers() {
     }
 }
 
-/// Gaussian rows of c10, which have ranks 2 and 3, flattened; the optimiser does not care.
+/// Gaussian rows of c10, which have ranks 2 and 3, flattened; the optimizer does not care.
 struct Group {
     key: &'static str,
-    /// Under which the optimiser knows it; the opacities by the name that [`reset_opacity`] uses.
+    /// Under which the optimizer knows it; the opacities by the name that [`reset_opacity`] uses.
     name: &'static str,
     parameter: Param<Tensor<2>>,
 }

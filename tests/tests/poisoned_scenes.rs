@@ -1,4 +1,4 @@
-//! The rasteriser on scenes that nobody would make on purpose, against a plain twin, and its reproducibility.
+//! The rasterizer on scenes that nobody would make on purpose, against a plain twin, and its reproducibility.
 
 use burn::tensor::Tensor;
 use light4gs_data::{Camera, PointCloud};
@@ -10,7 +10,7 @@ use light4gs_tests::golden::{cpu_devices, devices, values_of};
 use light4gs_tests::odd_scenes::{BACKGROUND, Run, SIZES, make_odd, point_in_view, poison, run};
 use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{
-    ATTRIBUTES, MEANS, QUATS, Ranges, SCALES, SCREEN_OFFSETS, SH_DC, SH_REST, SplatScene, WIDTHS, picture_of,
+    ATTRIBUTES, MEANS, QUATS, Ranges, SCALES, SCREEN_OFFSETS, SH_DC, SH_REST, SplatScene, WIDTHS, image_of,
     random_camera,
 };
 use light4gs_tests::twin;
@@ -26,18 +26,18 @@ fn assert_finite(what: &str, run: &Run) {
             panic!("{what}: {name}[{i}] is {}", values[i]);
         }
     };
-    finite("picture", &run.picture);
+    finite("image", &run.image);
     for (name, gradient) in ATTRIBUTES.iter().zip(&run.gradients) {
         finite(name, gradient);
     }
-    let alphas = run.picture.iter().skip(3).step_by(5);
+    let alphas = run.image.iter().skip(3).step_by(5);
     assert!(alphas.clone().all(|alpha| (0.0..=1.0).contains(alpha)), "{what}: alpha outside of [0, 1]");
 }
 
-/// Bit by bit equality of pictures, radii and gradients.
+/// Bit by bit equality of images, radii and gradients.
 #[track_caller]
 fn assert_same(what: &str, a: &Run, b: &Run) {
-    assert_eq!(bits(&a.picture), bits(&b.picture), "{what}: picture");
+    assert_eq!(bits(&a.image), bits(&b.image), "{what}: image");
     assert_eq!(a.radii, b.radii, "{what}: radii");
     for (k, name) in ATTRIBUTES.iter().enumerate() {
         assert_eq!(bits(&a.gradients[k]), bits(&b.gradients[k]), "{what}: gradient of {name}");
@@ -78,7 +78,7 @@ fn poisoned_gaussians_are_counted_and_leave_no_trace() {
             }
             let expected = run(&clean, &camera, 3, &device);
             assert_eq!(expected.invalid, 0, "{what}");
-            assert_eq!(bits(&found.picture), bits(&expected.picture), "{what}: picture");
+            assert_eq!(bits(&found.image), bits(&expected.image), "{what}: image");
             // So are the gradients of the others; the poisoned ones' are zero.
             for (k, width) in WIDTHS.into_iter().enumerate() {
                 let rows = found.gradients[k].chunks_exact(width).zip(&keep);
@@ -109,7 +109,7 @@ fn every_attribute_can_be_poisoned() {
                     let found = run(&scene, &camera, 3, &device);
                     assert_finite(&what, &found);
                     assert_eq!(found.invalid, 1, "{what}");
-                    assert_eq!(bits(&found.picture), bits(&expected.picture), "{what}");
+                    assert_eq!(bits(&found.image), bits(&expected.image), "{what}");
                 }
             }
         }
@@ -117,7 +117,7 @@ fn every_attribute_can_be_poisoned() {
 }
 
 /// Scenes half of whose Gaussians have a finite number of any size, 1e-37 to 10^`largest`, in some of the attributes.
-/// Nothing is known of their pictures but that they are finite; says which are not.
+/// Nothing is known of their images but that they are finite; says which are not.
 fn failures_at_extremes(attributes: &[usize], largest: f64) -> Vec<String> {
     let mut failures = Vec::new();
     for seed in 0..60 {
@@ -138,8 +138,7 @@ fn failures_at_extremes(attributes: &[usize], largest: f64) -> Vec<String> {
         }
         for (name, device) in devices() {
             let found = run(&scene, &camera, 3, &device);
-            let parts =
-                std::iter::once(("picture", &found.picture)).chain(ATTRIBUTES.into_iter().zip(&found.gradients));
+            let parts = std::iter::once(("image", &found.image)).chain(ATTRIBUTES.into_iter().zip(&found.gradients));
             for (part, values) in parts {
                 let bad = values.iter().filter(|v| !v.is_finite()).count();
                 if bad > 0 {
@@ -157,7 +156,7 @@ fn extreme_geometry_gives_finite_results() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// Colours beyond 1e30 are not asked for: products of several of them leave float32 in the backward pass.
+/// Colors beyond 1e30 are not asked for: products of several of them leave float32 in the backward pass.
 #[test]
 fn extreme_colors_give_finite_results() {
     let failures = failures_at_extremes(&[SH_DC, SH_REST], 30.0);
@@ -172,7 +171,7 @@ fn no_gaussians_at_all() {
             let found = run(&SplatScene::default(), &camera, 3, &device);
             let [r, g, b] = BACKGROUND;
             let expected = [r, g, b, 0.0, 0.0].repeat((width * height) as usize);
-            assert_eq!(found.picture, expected, "{name} {width}x{height}");
+            assert_eq!(found.image, expected, "{name} {width}x{height}");
             assert_eq!((found.invalid, found.radii.len()), (0, 0), "{name}");
             assert!(found.gradients.iter().all(Vec::is_empty), "{name}");
         }
@@ -193,7 +192,7 @@ fn all_behind_the_camera() {
         }
         let found = run(&scene, &camera, 3, &device);
         let [r, g, b] = BACKGROUND;
-        assert_eq!(found.picture, [r, g, b, 0.0, 0.0].repeat(40 * 30), "{name}");
+        assert_eq!(found.image, [r, g, b, 0.0, 0.0].repeat(40 * 30), "{name}");
         assert!(found.radii.iter().all(|radius| *radius == 0), "{name}: outside, yet not invalid");
         assert!(found.gradients.iter().flatten().all(|g| *g == 0.0), "{name}");
     }
@@ -223,11 +222,11 @@ fn twenty_thousand_gaussians_in_one_tile() {
 
 /// Pixels agree, but for those where a threshold is within rounding, which are at most `doubtful` of all.
 #[track_caller]
-fn assert_twin(what: &str, found: &Run, twin: &twin::TwinPicture, tolerance: f64, doubtful: f64) {
+fn assert_twin(what: &str, found: &Run, twin: &twin::TwinImage, tolerance: f64, doubtful: f64) {
     assert_eq!(found.radii, twin.radii, "{what}: radii");
     let depth_scale = twin.values.iter().skip(4).step_by(5).fold(1.0f64, |m, v| m.max(*v));
     let mut left_out = 0;
-    for (pixel, (found, expected)) in found.picture.chunks_exact(5).zip(twin.values.chunks_exact(5)).enumerate() {
+    for (pixel, (found, expected)) in found.image.chunks_exact(5).zip(twin.values.chunks_exact(5)).enumerate() {
         if twin.doubtful[pixel] {
             left_out += 1;
             continue;
@@ -321,7 +320,7 @@ fn back_ends_of_the_cpu_agree_bit_by_bit() {
 /// What is not finite after a bad raw value in one of two Gaussians.
 #[derive(Default)]
 struct RawFailures {
-    picture: Vec<String>,
+    image: Vec<String>,
     /// In gradients of the Gaussian that has the value.
     own: Vec<String>,
     /// In gradients of the other one.
@@ -357,8 +356,8 @@ fn raw_failures() -> RawFailures {
                 };
                 let rendering = Splatter::new(BACKGROUND, 3).render(gaussians, &camera, None);
                 let what = format!("{name}: {value} in {attribute}");
-                if !picture_of(&rendering).iter().all(|v| v.is_finite()) {
-                    failures.picture.push(what.clone());
+                if !image_of(&rendering).iter().all(|v| v.is_finite()) {
+                    failures.image.push(what.clone());
                 }
                 let grads = (rendering.image.sum() + rendering.depth.sum()).backward();
                 for ((key, width), leaf) in RAW_ATTRIBUTES.iter().zip(&leaves) {
@@ -378,11 +377,11 @@ fn raw_failures() -> RawFailures {
     failures
 }
 
-/// Raw attributes go through exp and sigmoid first. Whatever is in one Gaussian, the picture and the others are well.
+/// Raw attributes go through exp and sigmoid first. Whatever is in one Gaussian, the image and the others are well.
 #[test]
 fn bad_raw_attributes_do_not_reach_other_gaussians() {
-    let RawFailures { picture, other, .. } = raw_failures();
-    assert!(picture.is_empty() && other.is_empty(), "{picture:#?} {other:#?}");
+    let RawFailures { image, other, .. } = raw_failures();
+    assert!(image.is_empty() && other.is_empty(), "{image:#?} {other:#?}");
 }
 
 #[test]

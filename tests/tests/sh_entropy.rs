@@ -76,7 +76,7 @@ fn tables_agree_with_bits() {
     }
 }
 
-/// The bits of a degree may depend on the lower degrees and on itself, not on the higher ones; what the quantiser takes
+/// The bits of a degree may depend on the lower degrees and on itself, not on the higher ones; what the quantizer takes
 /// for decoded is what the rate then sees.
 #[test]
 fn a_degree_sees_only_lower_ones() {

@@ -8,7 +8,7 @@ use crate::adaptive::{AdaptiveInteger, BitCoder, BitDecoder, BitEncoder, Damaged
 
 /// The last level of an expected residual: 64 steps.
 const LAST_LEVEL: usize = 13;
-/// A residual counts for the context no more than this, so that one wild value does not spoil its neighbours'.
+/// A residual counts for the context no more than this, so that one wild value does not spoil its neighbors'.
 const LARGEST_RESIDUAL: u32 = 1 << 16;
 
 /// Writes the channels of an attribute, each with a value for every Gaussian.
@@ -27,7 +27,7 @@ pub(super) fn decode(bytes: &[u8], count: usize, neighbors: &[[u32; NEIGHBORS]])
 
 /// Codes channel after channel: mean and weights of its prediction, then what the prediction missed by.
 ///
-/// The context of a residual is how large it can be expected to be: what the prediction missed by at the neighbours,
+/// The context of a residual is how large it can be expected to be: what the prediction missed by at the neighbors,
 /// and in the channel before at the same Gaussian.
 fn code(
     coder: &mut impl BitCoder,

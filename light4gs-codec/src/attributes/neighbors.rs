@@ -7,7 +7,7 @@ const WINDOW: usize = 64;
 
 /// For each cell the indices of the nearest cells before it, nearest first; the later one where two are as near.
 ///
-/// The first cell has no neighbours and is its own, which a caller must expect; the next few repeat the nearest.
+/// The first cell has no neighbors and is its own, which a caller must expect; the next few repeat the nearest.
 /// Integers decide, so all machines agree.
 pub(super) fn nearest_before(cells: &[[i32; 3]]) -> Vec<[u32; NEIGHBORS]> {
     let mut found = Vec::with_capacity(cells.len());
@@ -33,7 +33,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn neighbours_come_before() {
+    fn neighbors_come_before() {
         let cells = [[0, 0, 0], [9, 0, 0], [1, 0, 0], [1, 0, 0], [8, 0, 0], [0, 0, 1]];
         assert_eq!(nearest_before(&cells), [[0; 4], [0; 4], [0, 1, 0, 0], [2, 0, 1, 2], [1, 3, 2, 0], [0, 3, 2, 4]]);
         assert_eq!(nearest_before(&[]), [[0; 4]; 0]);

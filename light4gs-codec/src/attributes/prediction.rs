@@ -13,12 +13,12 @@ const FEWEST: usize = 200;
 /// Added to the diagonal of the normal equations, an entry, so that channels without variation are no trouble.
 const RIDGE: f64 = 1e-3;
 
-/// A channel and what its neighbours hold, around the channel's mean.
+/// A channel and what its neighbors hold, around the channel's mean.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) values: Vec<i32>,
     mean: i32,
-    /// For each Gaussian the sum over its neighbours of value minus mean; 0 for the first, which has none.
+    /// For each Gaussian the sum over its neighbors of value minus mean; 0 for the first, which has none.
     around: Vec<i64>,
 }
 
@@ -35,7 +35,7 @@ impl Channel {
         i64::from(self.values[index]) - i64::from(self.mean)
     }
 
-    /// Adds the sum of the next Gaussian, whose neighbours come before it.
+    /// Adds the sum of the next Gaussian, whose neighbors come before it.
     #[inline]
     pub(super) fn gather(&mut self, neighbors: &[u32; NEIGHBORS]) {
         let index = self.around.len();
@@ -44,8 +44,8 @@ impl Channel {
     }
 }
 
-/// What a channel is predicted from: its neighbours' sum, its nearest neighbour, and for every channel coded before
-/// it the Gaussian's own value and its neighbours' sum. All are around the means.
+/// What a channel is predicted from: its neighbors' sum, its nearest neighbor, and for every channel coded before
+/// it the Gaussian's own value and its neighbors' sum. All are around the means.
 #[inline]
 fn inputs<'a>(
     own: &'a Channel,

@@ -5,19 +5,19 @@ use crate::{CodecError, adaptive::LARGEST_STEP};
 
 /// How finely each attribute of a Gaussian is quantized.
 ///
-/// Every step is the distance between two neighbouring levels, so an attribute is off by half of it at most. Measured
+/// Every step is the distance between two neighboring levels, so an attribute is off by half of it at most. Measured
 /// at 200 pixels, the defaults cost 0.1 dB of a scene that reaches 33 dB, and less of one that reaches 26; positions and
-/// scales are what a picture feels most. Halving a step costs one bit for each of its numbers.
+/// scales are what a image feels most. Halving a step costs one bit for each of its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttributeSteps {
     /// Step of the positions, as a fraction of the size of the typical Gaussian: the median over the Gaussians of the
-    /// geometric mean of the three scales. What a shift does to the picture depends on how large the shifted Gaussian
+    /// geometric mean of the three scales. What a shift does to the image depends on how large the shifted Gaussian
     /// is, and Gaussians are as small as the pixels that they were trained on; so this one number suits scenes of any
     /// extent and resolution. The grid never has more than 2^20 cells along an axis: beyond, the step grows.
     pub position: f32,
     /// Step of the natural logarithms of the scales: 0.1 is a size that is off by 5 % at most.
     pub log_scale: f32,
-    /// Step of the quaternions' components, which are not normalised.
+    /// Step of the quaternions' components, which are not normalized.
     pub quaternion: f32,
     /// Step of the opacities before the sigmoid; 0.4 is 5 % of opacity at most, where it is a half.
     pub opacity_logit: f32,

@@ -67,7 +67,7 @@ mod tests {
         }
     }
 
-    /// At the distance of neighbouring edges of the widest row of the table, and as far as it reaches.
+    /// At the distance of neighboring edges of the widest row of the table, and as far as it reaches.
     #[test]
     fn it_rises() {
         let values: Vec<_> = (-1550..=1550).map(|i| normal_distribution(f64::from(i) / 256.0)).collect();

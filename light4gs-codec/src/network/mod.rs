@@ -103,7 +103,7 @@ pub enum LayerKind {
     Halving,
     /// A transposed convolution with kernel 5, stride 2, padding 2, output padding 1 and one group, which doubles the size.
     Doubling,
-    /// A convolution of which only the taps at an odd distance (rows plus columns) from the centre count. Its input must
+    /// A convolution of which only the taps at an odd distance (rows plus columns) from the center count. Its input must
     /// be the anchors of a checkerboard.
     Checkerboard,
 }

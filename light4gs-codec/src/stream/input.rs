@@ -44,7 +44,7 @@ pub struct CompressionInput {
 /// How finely the weights of each kind of network are quantized.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeightPrecisions {
-    /// Of what moves the Gaussians, whose errors show in the picture.
+    /// Of what moves the Gaussians, whose errors show in the image.
     pub motion: WeightPrecision,
     /// Of the context model, whose errors only cost bits.
     pub context_model: WeightPrecision,

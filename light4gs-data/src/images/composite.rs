@@ -4,7 +4,7 @@ use super::rgb::RgbImage8;
 use crate::error::DataError;
 use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::Image};
 
-/// Colour over background as floats in `[0, 1]`.
+/// Color over background as floats in `[0, 1]`.
 ///
 /// f64, and in this order of operations, because the truncation below shows the last bit.
 fn over(color: u8, alpha: u8, background: f32) -> f64 {
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn transparent_colours_do_not_bleed() {
+    fn transparent_colors_do_not_bleed() {
         // A transparent red pixel beside a white one on white is white.
         let rgba = [255, 0, 0, 0, 255, 255, 255, 255];
         let small = composite_resized(&rgba, (2, 1), (1, 1), [1.0; 3]).unwrap();

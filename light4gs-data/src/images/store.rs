@@ -272,7 +272,7 @@ mod tests {
     use crate::camera::Camera;
     use glam::Vec3;
 
-    /// `count` grey 8×8 images; image `i` has value `i`.
+    /// `count` gray 8×8 images; image `i` has value `i`.
     fn frames(folder: &Path, count: u8) -> Vec<Frame> {
         (0..count)
             .map(|i| {
@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn a_store_too_small_for_one_picture_still_works() {
+    fn a_store_too_small_for_one_image_still_works() {
         let folder = tempfile::tempdir().unwrap();
         let frames = frames(folder.path(), 2);
         let store = ImageStore::new(&LoadOptions::default(), 10);

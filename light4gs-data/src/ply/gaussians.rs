@@ -24,7 +24,7 @@ pub struct GaussianPly {
     pub opacity_logits: Vec<f32>,
     /// `[N, 3]`, natural logarithm of world units.
     pub log_scales: Vec<[f32; 3]>,
-    /// `[N, 4]`, `(w, x, y, z)`, not necessarily normalised.
+    /// `[N, 4]`, `(w, x, y, z)`, not necessarily normalized.
     pub quats: Vec<[f32; 4]>,
 }
 

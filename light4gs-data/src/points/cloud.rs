@@ -1,4 +1,4 @@
-//! Coloured points: where the Gaussians start.
+//! Colored points: where the Gaussians start.
 
 use super::neighbors::mean_squared_distance_to_3_nearest;
 use crate::error::DataError;
@@ -7,10 +7,10 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 
-/// The constant of the spherical harmonic of degree 0: `colour = SH_C0 * dc + 0.5`.
+/// The constant of the spherical harmonic of degree 0: `color = SH_C0 * dc + 0.5`.
 pub const SH_C0: f32 = 0.282_094_8;
 
-/// Points with colours; both lists have the same length `N`.
+/// Points with colors; both lists have the same length `N`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PointCloud {
     /// `[N, 3]`, world units.
@@ -30,7 +30,7 @@ impl PointCloud {
         self.positions.is_empty()
     }
 
-    /// `count` points uniform in the cube `[-half_size, half_size]^3` (world units), almost grey:
+    /// `count` points uniform in the cube `[-half_size, half_size]^3` (world units), almost gray:
     /// the degree-0 harmonic of each channel is uniform in `(0, 1/255)`. The same seed gives the same cloud.
     pub fn random(count: usize, half_size: f32, seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -50,13 +50,13 @@ impl PointCloud {
         mean_squared_distance_to_3_nearest(&self.positions)
     }
 
-    /// The colours as degree-0 harmonic coefficients `[N, 3]`: `(colour - 0.5) / SH_C0`.
+    /// The colors as degree-0 harmonic coefficients `[N, 3]`: `(color - 0.5) / SH_C0`.
     pub fn sh_dc(&self) -> Vec<[f32; 3]> {
         self.colors.iter().map(|color| color.map(|c| (c - 0.5) / SH_C0)).collect()
     }
 
     /// Reads the vertices of a PLY file (ASCII or binary little endian): `x y z`, and `red green blue`
-    /// if all three are there (integers are divided by 255); without colours every point is mid-grey.
+    /// if all three are there (integers are divided by 255); without colors every point is mid-gray.
     ///
     /// # Errors
     /// [`DataError::Ply`] or [`DataError::Io`] when the file is damaged, has no `x y z` or no vertices,
@@ -102,8 +102,8 @@ impl PointCloud {
         if self.positions.len() != self.colors.len() {
             return Err(DataError::ply(
                 path,
-                format!("{} positions but {} colours to write", self.positions.len(), self.colors.len()),
-                "pass as many colours as positions",
+                format!("{} positions but {} colors to write", self.positions.len(), self.colors.len()),
+                "pass as many colors as positions",
             ));
         }
         let float = ["x", "y", "z", "nx", "ny", "nz"].map(|name| Property::new(name, Scalar::F32));

@@ -1,4 +1,4 @@
-//! Coloured points, and their nearest neighbours.
+//! Colored points, and their nearest neighbors.
 
 mod cloud;
 mod neighbors;

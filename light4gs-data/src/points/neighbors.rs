@@ -1,4 +1,4 @@
-//! Exact nearest neighbours: the mean squared distance to the three nearest points.
+//! Exact nearest neighbors: the mean squared distance to the three nearest points.
 //!
 //! A small k-d tree of our own: crates of the kind either need the axes to hold few equal
 //! coordinates (point clouds on a plane or with duplicates do not oblige) or want their own types.
@@ -15,7 +15,7 @@ const LEAF: usize = 16;
 /// units squared, at least [`SMALLEST_MEAN_SQUARED_DISTANCE`].
 ///
 /// `positions` is `[N, 3]`; the result has `N` values. With fewer than four points the mean is over
-/// those there are. Points that coincide are neighbours at distance 0. Non-finite positions give
+/// those there are. Points that coincide are neighbors at distance 0. Non-finite positions give
 /// unspecified (but no panicking) results.
 pub fn mean_squared_distance_to_3_nearest(positions: &[[f32; 3]]) -> Vec<f32> {
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();

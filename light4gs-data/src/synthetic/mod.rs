@@ -43,7 +43,7 @@ pub struct SyntheticOptions {
     pub test_frames: usize,
     /// Number of validation frames; 0 leaves the split out.
     pub val_frames: usize,
-    /// Seed of cameras, colours and textures.
+    /// Seed of cameras, colors and textures.
     pub seed: u64,
 }
 
@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn it_opens_as_a_scene_with_something_in_every_picture() {
+    fn it_opens_as_a_scene_with_something_in_every_image() {
         let folder = tempfile::tempdir().unwrap();
         // An empty folder may be used; its parents are made.
         let root = folder.path().join("deep/scene");
@@ -246,8 +246,8 @@ mod tests {
         assert_eq!(times, [0.0, 0.25, 0.5, 0.75, 1.0]);
         let store = ImageStore::new(&options, 1 << 20);
         for frame in scene.train.iter().chain(&scene.test).chain(&scene.val) {
-            let centre = frame.camera.center();
-            assert!((centre.length() - RADIUS).abs() < 1e-4 && centre.z > 0.0);
+            let center = frame.camera.center();
+            assert!((center.length() - RADIUS).abs() < 1e-4 && center.z > 0.0);
             let image = store.get(frame).unwrap();
             let white = image.pixels.chunks_exact(3).filter(|p| **p == [255; 3]).count();
             assert!((100..924).contains(&white), "{}: {white} of 1024 are white", frame.name);

@@ -14,7 +14,7 @@ const WORLD_RADIUS: f32 = 1.3;
 pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Vec<u8> {
     let solids = world.at(time);
     let eye = camera.center();
-    // A direction is linear in the pixel before it is normalised.
+    // A direction is linear in the pixel before it is normalized.
     let axes = camera.rotation.transpose();
     let direction = |u: f32, v: f32| {
         let in_camera = Vec3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);

@@ -65,7 +65,7 @@ impl Shape {
 /// Where a ray enters and leaves a sphere around the origin, if it does so ahead.
 pub(super) fn sphere(origin: Vec3, direction: Vec3, radius: f32) -> Option<(f32, f32)> {
     let along = -origin.dot(direction);
-    // Distance of the centre from the ray, computed without cancellation.
+    // Distance of the center from the ray, computed without cancellation.
     let aside = (origin + direction * along).length_squared();
     let half = (radius * radius - aside).max(0.0).sqrt();
     (aside < radius * radius && along - half > 0.0).then_some((along - half, along + half))

@@ -9,7 +9,7 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// Height of the ground disc, world units.
 const GROUND: f32 = -0.6;
 
-/// A smooth pattern between two colours; wavelengths are a tenth of an image or so.
+/// A smooth pattern between two colors; wavelengths are a tenth of an image or so.
 #[derive(Clone, Copy, Debug)]
 struct Texture {
     colors: [Vec3; 2],
@@ -58,7 +58,7 @@ pub(super) struct Solid {
     /// Own to world axes.
     rotation: Mat3,
     center: Vec3,
-    /// Radius of a sphere around the centre that contains it.
+    /// Radius of a sphere around the center that contains it.
     pub(super) bound: f32,
 }
 
@@ -77,7 +77,7 @@ impl Solid {
         (to_center - direction * along).length_squared() <= self.bound * self.bound
     }
 
-    /// The first meeting: distance, normal and texture colour.
+    /// The first meeting: distance, normal and texture color.
     pub(super) fn hit(&self, origin: Vec3, direction: Vec3, nearer_than: f32) -> Option<Hit> {
         let to_own = self.rotation.transpose();
         let (o, d) = (to_own * (origin - self.center), to_own * direction);
@@ -102,7 +102,7 @@ pub(super) struct World {
 }
 
 impl World {
-    /// Colours and phases by seed; shapes and motion are always the same.
+    /// Colors and phases by seed; shapes and motion are always the same.
     pub(super) fn new(seed: u64) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed ^ 0x7465_7874);
         let turn = rng.random_range(0.0f32..1.0);

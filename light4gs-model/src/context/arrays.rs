@@ -1,4 +1,4 @@
-//! The context model and the quantisation steps as the codec's plain arrays.
+//! The context model and the quantization steps as the codec's plain arrays.
 
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 use light4gs_codec::{CodecError, Condition, ContextModelArrays, FrequencyTable, LatentArrays, PerGroup, PlanePrior};

@@ -27,7 +27,7 @@ pub struct CheckerboardConfig {
 }
 
 impl CheckerboardConfig {
-    /// PyTorch's default initialisation; masked taps are zero.
+    /// PyTorch's default initialization; masked taps are zero.
     pub fn init(&self, device: &Device) -> Checkerboard {
         let conv = PlaneConvConfig::new(self.channels, 2 * self.channels, KERNEL)
             .with_groups(self.groups)

@@ -32,7 +32,7 @@ pub struct EntropyParametersConfig {
 }
 
 impl EntropyParametersConfig {
-    /// PyTorch's default initialisation but for the last layer; see [`Start`].
+    /// PyTorch's default initialization but for the last layer; see [`Start`].
     pub fn init(&self, device: &Device) -> EntropyParameters {
         let Self { channels, hidden: [first, second], .. } = *self;
         let mut parameters = EntropyParameters {

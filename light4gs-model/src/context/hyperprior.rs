@@ -23,7 +23,7 @@ pub struct HyperpriorConfig {
 }
 
 impl HyperpriorConfig {
-    /// PyTorch's default initialisation; the bottleneck as CompressAI.
+    /// PyTorch's default initialization; the bottleneck as CompressAI.
     pub fn init(&self, device: &Device) -> Hyperprior {
         let Self { channels, hyper_channels: hyper, synthesis_channels: [first, second] } = *self;
         Hyperprior {

@@ -25,7 +25,7 @@ pub struct InterPlaneConfig {
 }
 
 impl InterPlaneConfig {
-    /// PyTorch's default initialisation.
+    /// PyTorch's default initialization.
     pub fn init(&self, device: &Device) -> InterPlane {
         let conv = PlaneConvConfig::new(2 * self.channels, 2 * self.channels, self.kernel).with_groups(self.groups);
         InterPlane { conv: conv.init(device) }

@@ -26,7 +26,7 @@ pub struct InterScaleConfig {
 }
 
 impl InterScaleConfig {
-    /// PyTorch's default initialisation.
+    /// PyTorch's default initialization.
     pub fn init(&self, device: &Device) -> InterScale {
         let conv = PlaneConvConfig::new(self.channels, 2 * self.channels, self.kernel).with_groups(self.groups);
         InterScale { conv: conv.init(device) }
@@ -133,7 +133,7 @@ pub fn upsample(plane: Tensor<3>, [height, width]: [usize; 2]) -> Tensor<3> {
     down.matmul(plane)
 }
 
-/// `[to, from]`: the weights of the two neighbours of each place.
+/// `[to, from]`: the weights of the two neighbors of each place.
 fn interpolation(from: usize, to: usize, device: &Device) -> Tensor<2> {
     let mut weights = vec![0.0f32; to * from];
     let last = (from - 1) as f64;

@@ -97,7 +97,7 @@ pub struct ContextModelConfig {
 }
 
 impl ContextModelConfig {
-    /// The sizes, centres, composition and initial values of the authors' code for planes of M channels.
+    /// The sizes, centers, composition and initial values of the authors' code for planes of M channels.
     pub fn reference(channels: usize) -> Self {
         let kernel = KernelShape::new(5, 1);
         let hidden = [10 * channels / 3, 8 * channels / 3];

@@ -7,13 +7,13 @@ use light4gs_codec::{Network, PlaneSource};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::quantization_steps::PlaneSteps;
 
-/// All planes `[M, H, W]` of a hexplane, scale-major, minus their groups' centres, with their steps.
+/// All planes `[M, H, W]` of a hexplane, scale-major, minus their groups' centers, with their steps.
 ///
 /// For the planes that are coded before, these are the decoded ones, or the noisy ones that stand for them in training. Only a
 /// hyperprior looks at the plane that is being coded: it is transmitted.
 #[derive(Clone, Debug)]
 pub struct CenteredPlanes {
-    /// `[M, H, W]`, original units minus the centre.
+    /// `[M, H, W]`, original units minus the center.
     pub planes: Vec<Tensor<3>>,
     /// One for each plane.
     pub steps: PlaneSteps,

@@ -110,7 +110,7 @@ impl ContextModel {
         maps.collect()
     }
 
-    /// Means and scales of the selected planes' values, in units of their steps, relative to the centre.
+    /// Means and scales of the selected planes' values, in units of their steps, relative to the center.
     pub fn plane_parameters(
         &self,
         planes: &[Tensor<3>],
@@ -124,7 +124,7 @@ impl ContextModel {
 
     /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one. Call
     /// [`update_quantiles`](crate::EntropyBottleneck::update_quantiles) first, since they count from the medians.
-    pub fn hyper_symbols(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
+    pub fn latent_symbols(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
         let (planes, parts) = (self.centered(planes, steps), self.parts());
         let symbols = (0..planes.planes.len()).map(|plane| {
             let has_latent = prior_of(&parts, &planes, plane, Latent::Rounded).hyper_bits.is_some();
@@ -134,7 +134,7 @@ impl ContextModel {
         symbols.collect()
     }
 
-    /// Quantises all planes in coding order, each with the parameters that the decoder will have: what the codec does,
+    /// Quantizes all planes in coding order, each with the parameters that the decoder will have: what the codec does,
     /// with a back end's floats in place of its exact executor. Without gradients.
     pub fn quantize(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<QuantizedPlane> {
         self.quantize_with(&self.parts(), planes, steps)

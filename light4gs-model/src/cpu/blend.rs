@@ -37,7 +37,7 @@ pub(crate) fn group_and_lane(x: usize, y: usize) -> (usize, usize) {
 pub(crate) struct Contribution<L> {
     /// The pixels.
     pub(crate) group: usize,
-    /// Offsets from the pixels to the centre of the splat.
+    /// Offsets from the pixels to the center of the splat.
     pub(crate) dx: L,
     pub(crate) dy: L,
     /// After the clamp at [`MAX_ALPHA`], of all lanes.
@@ -64,7 +64,7 @@ pub(crate) trait TileVisitor<L: Lanes> {
 }
 
 /// Shows the visitor all splats of a tile. Returns the transmittance that is left; its sign is set where a pixel has
-/// stopped and outside the picture.
+/// stopped and outside the image.
 #[inline(always)]
 pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     lists: &TileLists,
@@ -199,7 +199,7 @@ fn consecutive<L: Lanes>(first: f32) -> [L; ACROSS] {
     vectors
 }
 
-/// Pixels outside the picture have stopped from the start.
+/// Pixels outside the image have stopped from the start.
 fn initial_transmittance(view: &View, column: usize, row: usize) -> TilePlane {
     let width = view.camera.width as usize - column * TILE;
     let height = view.camera.height as usize - row * TILE;

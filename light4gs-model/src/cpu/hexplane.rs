@@ -77,7 +77,7 @@ fn unpack(blocks: &[&[Block]], channels: usize) -> Vec<f32> {
 /// Cells of the coarse grid that points are sorted by, along each spatial axis.
 const SORT_CELLS: usize = 16;
 
-/// Points sorted by a coarse grid, so that neighbours in the order touch the same cells of the planes.
+/// Points sorted by a coarse grid, so that neighbors in the order touch the same cells of the planes.
 fn spatial_order(points: &[f32]) -> Vec<u32> {
     let key = |point: &[f32]| {
         point[..3].iter().fold(0, |key, &coordinate| {
@@ -113,7 +113,7 @@ struct AxisSample {
 }
 
 impl AxisSample {
-    /// Align-corners: -1 is the first cell's centre, 1 the last one's; border clamp.
+    /// Align-corners: -1 is the first cell's center, 1 the last one's; border clamp.
     #[inline(always)]
     fn new(coordinate: f32, cells: usize) -> Self {
         let last = (cells - 1) as f32;

@@ -1,6 +1,6 @@
 //! Eight float32 lanes: one thin type for AVX2 + FMA, one for every other processor.
 //!
-//! The rasteriser's inner loops are generic over [`Lanes`]; [`dispatch`] picks the implementation once a call, at run
+//! The rasterizer's inner loops are generic over [`Lanes`]; [`dispatch`] picks the implementation once a call, at run
 //! time, so one binary serves old and new processors. Results of the two differ in the last bits (fused against
 //! separate multiply-add), never between two runs on one machine.
 

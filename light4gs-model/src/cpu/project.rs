@@ -1,5 +1,5 @@
 //! Projection of 3D Gaussians to screen-space splats (EWA splatting, Zwicker et al. 2001, with the conventions of the
-//! original 3DGS rasteriser), forward and backward, one Gaussian at a time.
+//! original 3DGS rasterizer), forward and backward, one Gaussian at a time.
 
 use glam::{Mat3, Vec2, Vec3};
 use light4gs_data::Camera;
@@ -34,7 +34,7 @@ pub(crate) struct GaussianSlices<'a> {
     pub(crate) sh_dc: &'a [f32],
     /// `[N, K, 3]`
     pub(crate) sh_rest: &'a [f32],
-    /// `[N, 2]`: added to the position on screen, in units of half the picture
+    /// `[N, 2]`: added to the position on screen, in units of half the image
     pub(crate) screen_offsets: &'a [f32],
 }
 
@@ -86,7 +86,7 @@ pub(crate) struct Splat {
     pub(crate) reach: f32,
     /// Pixels; 0 = not on the screen, [`INVALID_RADIUS`] = cannot be drawn.
     pub(crate) radius: i32,
-    /// Bit c is set where colour channel c was clamped at 0.
+    /// Bit c is set where color channel c was clamped at 0.
     clamped: u8,
 }
 
@@ -135,7 +135,7 @@ fn geometry(gaussians: &GaussianSlices, i: usize, camera: &Camera) -> Geometry {
     Geometry { view_position, quat, quat_norm, rotation, scale, jacobian_world, factor, slope, slope_clamped }
 }
 
-/// Colour before the clamp at zero, from `SH(direction) + 0.5`.
+/// Color before the clamp at zero, from `SH(direction) + 0.5`.
 fn raw_color(gaussians: &GaussianSlices, i: usize, degree: usize, direction: Vec3) -> Vec3 {
     let rest = gaussians.rest_count();
     let b = basis(degree, direction.to_array());
@@ -148,7 +148,7 @@ fn raw_color(gaussians: &GaussianSlices, i: usize, degree: usize, direction: Vec
 }
 
 /// Projects Gaussian `i`. A Gaussian that is not finite or has no orientation comes back with [`INVALID_RADIUS`]; one
-/// that is behind the camera or outside the picture with radius 0.
+/// that is behind the camera or outside the image with radius 0.
 pub(crate) fn project(gaussians: &GaussianSlices, i: usize, view: &View) -> Splat {
     let invalid = Splat { radius: INVALID_RADIUS, ..Splat::default() };
     let mean = gaussians.mean(i);
@@ -229,7 +229,7 @@ impl TileRectangle {
 }
 
 impl Splat {
-    /// Tiles of the 3-sigma box, truncated as in the original rasteriser.
+    /// Tiles of the 3-sigma box, truncated as in the original rasterizer.
     pub(crate) fn tile_rectangle(&self, view: &View) -> TileRectangle {
         let tile = TILE as f32;
         let radius = self.radius as f32;
@@ -310,7 +310,7 @@ pub(crate) fn project_backward(
             d_view[axis] += d_slope * inverse_z;
             d_view.z -= d_slope * g.view_position[axis] * inverse_z * inverse_z;
         }
-        // The centre on the screen.
+        // The center on the screen.
         let d_pixel = gradient.position[axis] * focal[axis] * inverse_z;
         d_view[axis] += d_pixel;
         d_view.z -= d_pixel * g.view_position[axis] * inverse_z;
@@ -323,7 +323,7 @@ pub(crate) fn project_backward(
     AttributeGradient { mean, quat, scale, screen_offset: Vec2::from_array(gradient.position) * half }
 }
 
-/// From the gradient of the rotation's columns to that of the quaternion as given (before normalisation).
+/// From the gradient of the rotation's columns to that of the quaternion as given (before normalization).
 fn rotation_backward(g: &Geometry, [dx, dy, dz]: [Vec3; 3]) -> [f32; 4] {
     let [w, x, y, z] = g.quat;
     let d = [

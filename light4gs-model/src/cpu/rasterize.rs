@@ -21,7 +21,7 @@ pub(crate) struct TilePixels {
 }
 
 impl<L: Lanes> TileVisitor<L> for TilePixels {
-    /// Colour and depth.
+    /// Color and depth.
     type Splat = [L; 4];
 
     #[inline(always)]
@@ -72,13 +72,13 @@ pub(crate) fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
         .collect()
 }
 
-/// Puts tiles together: colour over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+/// Puts tiles together: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
 ///
 /// One flat array with contiguous parts, since an operation on the tape has one output and contiguous slices are cheap.
 pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
-    let mut picture = vec![0.0; width * height * CHANNELS];
-    let (image, rest) = picture.split_at_mut(3 * width * height);
+    let mut rendering = vec![0.0; width * height * CHANNELS];
+    let (image, rest) = rendering.split_at_mut(3 * width * height);
     let (alpha, depth) = rest.split_at_mut(width * height);
     image
         .par_chunks_mut(3 * width)
@@ -97,13 +97,13 @@ pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
                 depth[x] = tile.depth[group][lane];
             }
         });
-    picture
+    rendering
 }
 
-/// Reads a tile of what [`assemble`] lays out into planes; pixels outside the picture are zero.
-pub(crate) fn tile_of(picture: &[f32], view: &View, column: usize, row: usize) -> [TilePlane; CHANNELS] {
+/// Reads a tile of what [`assemble`] lays out into planes; pixels outside the image are zero.
+pub(crate) fn tile_of(rendering: &[f32], view: &View, column: usize, row: usize) -> [TilePlane; CHANNELS] {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
-    let (image, rest) = picture.split_at(3 * width * height);
+    let (image, rest) = rendering.split_at(3 * width * height);
     let (alpha, depth) = rest.split_at(width * height);
     let mut planes = [EMPTY; CHANNELS];
     for y in row * TILE..((row + 1) * TILE).min(height) {

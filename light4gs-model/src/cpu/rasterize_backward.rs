@@ -1,6 +1,6 @@
 //! Derivative of the blending by every splat, front to back like the forward pass.
 //!
-//! With `v_i` the splat's colour and depth weighed by the upstream gradient, the pixel's value is
+//! With `v_i` the splat's color and depth weighed by the upstream gradient, the pixel's value is
 //! `S = sum_i w_i v_i + T_end · v_background`, and
 //! `dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i)`.
 //! `S` is known from the forward pass, so a running prefix is all that is needed: no second, reversed traversal and
@@ -15,7 +15,7 @@ use super::project::{GaussianSlices, Splat, SplatGradient, View, project_backwar
 use super::rasterize::{CHANNELS, TilePixels, tile_of};
 use super::tiles::TileLists;
 
-/// Sums of one splat over one tile's pixels: gradients of colour and depth, then the moments of
+/// Sums of one splat over one tile's pixels: gradients of color and depth, then the moments of
 /// `p = alpha · dS/dalpha`: p, p dx, p dy, p dx², p dx dy, p dy².
 type Sums = [f32; 10];
 
@@ -148,7 +148,7 @@ pub(crate) struct GaussianGradients {
     pub(crate) screen_offsets: Vec<f32>,
 }
 
-/// Chain rule from the picture's gradient to the Gaussians.
+/// Chain rule from the image's gradient to the Gaussians.
 pub(crate) fn splat_backward(
     gaussians: &GaussianSlices,
     view: &View,

@@ -1,4 +1,4 @@
-//! What every splat contributes to one picture, without its colour: the sums behind significance pruning.
+//! What every splat contributes to one image, without its color: the sums behind significance pruning.
 //!
 //! The same traversal and the same decisions as the blending. Every (tile, Gaussian) pair writes its own sums and each
 //! Gaussian adds up its tiles in a fixed order, so that the scores do not depend on the threads.
@@ -56,7 +56,7 @@ impl<L: Lanes> TileVisitor<L> for Score<'_> {
     }
 }
 
-/// Scores `[N, 4]` of one picture; see [`SCORES`].
+/// Scores `[N, 4]` of one image; see [`SCORES`].
 pub(crate) fn significance(lists: &TileLists, view: &View) -> Vec<f32> {
     let mut sums: Vec<Sums> = vec![[0.0; 3]; lists.gaussians.len()];
     lists.split_by_tile(&mut sums).into_par_iter().enumerate().for_each(|(tile, sums)| {

@@ -26,7 +26,7 @@ pub(crate) struct TileLists {
 }
 
 /// Whether the splat's alpha reaches the threshold anywhere in the tile: the smallest exponent over the tile's pixels'
-/// bounding rectangle, found on its edges unless the centre is inside.
+/// bounding rectangle, found on its edges unless the center is inside.
 fn reaches(splat: &Splat, column: usize, row: usize) -> bool {
     let (x0, y0) = ((column * TILE) as f32 - splat.x, (row * TILE) as f32 - splat.y);
     let (x1, y1) = (x0 + (TILE - 1) as f32, y0 + (TILE - 1) as f32);

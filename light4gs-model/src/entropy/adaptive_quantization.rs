@@ -1,4 +1,4 @@
-//! Adaptive quantisation: learned steps (paper III-D; docs/design.md).
+//! Adaptive quantization: learned steps (paper III-D; docs/design.md).
 
 use burn::config::Config;
 use burn::module::{Module, Param};
@@ -43,7 +43,7 @@ impl AdaptiveQuantizationConfig {
 
 /// A learned step for the space-only planes and one for the space-time planes, optionally for each scale.
 ///
-/// The parameter is the logarithm, so a step is always positive and an optimiser's step changes it by a ratio: a step
+/// The parameter is the logarithm, so a step is always positive and an optimizer's step changes it by a ratio: a step
 /// of 0.001 is learned as easily as one of 1.
 ///
 /// ```

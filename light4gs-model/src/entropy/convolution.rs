@@ -41,7 +41,7 @@ fn pytorch_uniform<const D: usize>(shape: [usize; D], fan_in: usize, device: &De
 }
 
 impl PlaneConvConfig {
-    /// PyTorch's default initialisation; masked taps are zero.
+    /// PyTorch's default initialization; masked taps are zero.
     ///
     /// # Panics
     /// If the groups do not divide the channels, or the kernel is even.
@@ -226,7 +226,7 @@ pub struct PlaneDeconvConfig {
 }
 
 impl PlaneDeconvConfig {
-    /// PyTorch's default initialisation.
+    /// PyTorch's default initialization.
     pub fn init(&self, device: &Device) -> PlaneDeconv {
         // PyTorch takes the second axis of the weight for the fan in, of transposed convolutions too.
         let fan_in = self.outputs * DECONV_KERNEL * DECONV_KERNEL;

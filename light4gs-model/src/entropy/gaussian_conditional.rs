@@ -1,6 +1,6 @@
 //! The Gaussian conditional entropy model (Minnen et al. 2018, as in CompressAI; docs/design.md).
 //!
-//! Everything is in *y units*: a value divided by its quantisation step, so that a symbol's interval has length 1.
+//! Everything is in *y units*: a value divided by its quantization step, so that a symbol's interval has length 1.
 
 use burn::tensor::Tensor;
 

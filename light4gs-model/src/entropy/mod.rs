@@ -1,4 +1,4 @@
-//! Building blocks of entropy models: densities, what a symbol costs, quantisation steps, convolutions over planes.
+//! Building blocks of entropy models: densities, what a symbol costs, quantization steps, convolutions over planes.
 //!
 //! [`FactorizedDensity`] and [`EntropyBottleneck`] learn a density for each channel; [`gaussian_conditional`] is the cost of a
 //! value whose mean and scale are predicted; [`PlaneSteps`] and [`AdaptiveQuantization`] (paper III-D) say how finely

@@ -1,4 +1,4 @@
-//! Quantisation steps of the planes, and what they do to them.
+//! Quantization steps of the planes, and what they do to them.
 
 use burn::tensor::{Device, Distribution, Tensor};
 

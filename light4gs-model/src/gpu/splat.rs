@@ -19,7 +19,7 @@ use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 /// Values of an intersection's sums.
 const SUMS: usize = 10;
 
-/// What the stages of one picture have in common.
+/// What the stages of one image have in common.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     view: View,
@@ -108,7 +108,7 @@ pub struct GpuSplatSaved {
     shapes: [Shape; 7],
     inputs: InputBuffers,
     intersections: Intersections,
-    picture: Handle,
+    rendering: Handle,
 }
 
 fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3], GpuError> {
@@ -150,7 +150,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
         .uniform(&[gaussian_count as u32])
         .invocations(gaussian_count)?;
     let total = prefix_sum(gpu, &first_places, gaussian_count)?;
-    // The one read-back of a picture: all further buffers are made to its measure.
+    // The one read-back of a image: all further buffers are made to its measure.
     let count = match gaussian_count {
         0 => 0,
         _ => gpu.read_word("the number of intersections", &total)? as usize,
@@ -175,7 +175,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
 }
 
 fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, GpuError> {
-    let picture = gpu.allocate("picture", CHANNELS * frame.pixels())?;
+    let rendering = gpu.allocate("image", CHANNELS * frame.pixels())?;
     let parts = frame.parts(lists.count);
     for part in 0..parts {
         frame
@@ -185,14 +185,14 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
             .reads(&lists.order)
             .reads(&lists.gaussians)
             .reads(&lists.splats)
-            .updates_if(part > 0, &picture)
+            .updates_if(part > 0, &rendering)
             .uniform(&frame.uniform(part, parts))
             .groups(frame.cells())?;
     }
-    Ok(picture)
+    Ok(rendering)
 }
 
-/// A picture's Gaussians on the screen, sorted into cells: what every pass over its pixels begins with.
+/// A image's Gaussians on the screen, sorted into cells: what every pass over its pixels begins with.
 pub(super) struct Begun {
     pub(super) frame: Frame,
     shapes: [Shape; 7],
@@ -225,20 +225,20 @@ fn begin_with(gpu: &Gpu, frame: Frame, inputs: InputBuffers, shapes: [Shape; 7])
 
 fn forward(gpu: &Gpu, begun: Begun) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
     let Begun { frame, shapes, inputs, intersections, radii } = begun;
-    let picture = rasterize(gpu, &frame, &intersections)?;
-    gpu.check("the picture", &[&picture])?;
+    let rendering = rasterize(gpu, &frame, &intersections)?;
+    gpu.check("the image", &[&rendering])?;
     let values = CHANNELS * frame.pixels();
     let outputs = SplatOutputs {
-        picture: gpu.tensor(first_words(&picture, values), Shape::from([values])),
+        rendering: gpu.tensor(first_words(&rendering, values), Shape::from([values])),
         radii: gpu.int_tensor(first_words(&radii, frame.gaussians), Shape::from([frame.gaussians])),
     };
-    Ok((outputs, GpuSplatSaved { frame, shapes, inputs, intersections, picture }))
+    Ok((outputs, GpuSplatSaved { frame, shapes, inputs, intersections, rendering }))
 }
 
 fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
     let upstream = buffer_of(upstream);
-    let GpuSplatSaved { frame, shapes, inputs, intersections: lists, picture } = saved;
+    let GpuSplatSaved { frame, shapes, inputs, intersections: lists, rendering } = saved;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
     let parts = frame.parts(lists.count);
     let carried = gpu.allocate("pixels between parts", if parts > 1 { 2 * frame.pixels() } else { 0 })?;
@@ -250,7 +250,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
             .reads(&lists.order)
             .reads(&lists.gaussians)
             .reads(&lists.splats)
-            .reads(&picture)
+            .reads(&rendering)
             .reads(&upstream)
             .writes(&sums)
             .updates_if(part > 0, &carried)
@@ -273,7 +273,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
         .writes(&gradients)
         .uniform(&uniform)
         .invocations(frame.gaussians)?;
-    gpu.check("the gradients of a picture", &[&gradients])?;
+    gpu.check("the gradients of a image", &[&gradients])?;
     let mut k = 0;
     Ok(SplatInputs::from_array(shapes.map(|shape| {
         k += 1;
@@ -306,7 +306,7 @@ mod tests {
     const COUNT: usize = 300;
     const SIZE: [u32; 2] = [50, 37];
 
-    /// Picture and gradients of one scene, blended by a team.
+    /// Image and gradients of one scene, blended by a team.
     fn run(gpu: &Gpu, team: Team) -> Vec<Vec<f32>> {
         // Any numbers will do that look random.
         let mut state = 1u32;
@@ -329,9 +329,9 @@ mod tests {
         let shapes = widths.map(|width| Shape::from([COUNT, width]));
         let frame = Frame { view, team, gaussians: COUNT, rest: 15 };
         let (outputs, saved) = forward(gpu, begin_with(gpu, frame, inputs, shapes).unwrap()).unwrap();
-        let values = outputs.picture.shape().num_elements();
+        let values = outputs.rendering.shape().num_elements();
         let gradients = backward(saved, gpu.tensor(upstream, Shape::from([values]))).unwrap().into_array();
-        std::iter::once(outputs.picture)
+        std::iter::once(outputs.rendering)
             .chain(gradients)
             .map(|tensor| {
                 let bytes = gpu.client.read_one(tensor.handle).unwrap();

@@ -1,4 +1,4 @@
-//! Who blends a cell of the picture.
+//! Who blends a cell of the image.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex};
@@ -39,7 +39,7 @@ impl Team {
             _ => Self { members: 32, includes: TEAM_WITHOUT_SUBGROUPS, cell: 16 },
         };
         if cells(team.cell) > limit {
-            return Err(GpuError::Picture { width, height, limit });
+            return Err(GpuError::Image { width, height, limit });
         }
         Ok(team)
     }

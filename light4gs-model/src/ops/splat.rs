@@ -28,7 +28,7 @@ use crate::cpu::tiles::TileLists;
 pub struct SplatInputs<B: Backend> {
     /// `[N, 3]`, world units.
     pub means: FloatTensor<B>,
-    /// `[N, 4]` as (w, x, y, z), normalised inside.
+    /// `[N, 4]` as (w, x, y, z), normalized inside.
     pub quats: FloatTensor<B>,
     /// `[N, 3]`, standard deviations in world units.
     pub scales: FloatTensor<B>,
@@ -38,7 +38,7 @@ pub struct SplatInputs<B: Backend> {
     pub sh_dc: FloatTensor<B>,
     /// `[N, K, 3]`, K >= (degree + 1)^2 - 1.
     pub sh_rest: FloatTensor<B>,
-    /// `[N, 2]`, added to the screen position in units of half the picture.
+    /// `[N, 2]`, added to the screen position in units of half the image.
     pub screen_offsets: FloatTensor<B>,
 }
 
@@ -59,8 +59,8 @@ impl<B: Backend> SplatInputs<B> {
 /// What the operation returns.
 #[derive(ExtensionType)]
 pub struct SplatOutputs<B: Backend> {
-    /// `[5 · H · W]`: colour over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
-    pub picture: FloatTensor<B>,
+    /// `[5 · H · W]`: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+    pub rendering: FloatTensor<B>,
     /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
     pub radii: IntTensor<B>,
 }
@@ -70,14 +70,14 @@ pub trait SplatKernels: Backend {
     /// What the backward pass wants to see again.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// Draws the picture.
+    /// Draws the image.
     fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the picture `[5 · H · W]`.
+    /// Gradients of all inputs from that of the image `[5 · H · W]`.
     fn splat_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self>;
 }
 
-/// Camera, background and active SH degree of one picture.
+/// Camera, background and active SH degree of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct SplatView(pub(crate) View);
 
@@ -129,11 +129,11 @@ impl<B: SplatOps + SplatKernels, C: CheckpointStrategy> SplatOps for Autodiff<B,
         let nodes = inputs.each_ref().map(|input| input.node());
         let inner = SplatInputs::from_array(inputs.map(|input| input.into_primitive()));
         let (outputs, saved) = B::splat_forward(inner, view);
-        let picture = match Splat.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(saved, outputs.picture),
-            OpsKind::UnTracked(prep) => prep.finish(outputs.picture),
+        let rendering = match Splat.prepare::<C>(nodes).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => prep.finish(saved, outputs.rendering),
+            OpsKind::UnTracked(prep) => prep.finish(outputs.rendering),
         };
-        SplatOutputs { picture, radii: outputs.radii }
+        SplatOutputs { rendering, radii: outputs.radii }
     }
 }
 
@@ -159,10 +159,10 @@ fn forward_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): Splat
     let inputs = inputs.map(B::to_host);
     let lists = TileLists::build(&slices(&inputs), &view);
     let pixels = rasterize(&lists, &view);
-    let picture = assemble(&pixels, &view);
+    let rendering = assemble(&pixels, &view);
     let radii: Vec<i32> = lists.splats.iter().map(|splat| splat.radius).collect();
     let outputs = SplatOutputs {
-        picture: B::from_values(picture, [view.camera.height as usize * view.camera.width as usize * CHANNELS]),
+        rendering: B::from_values(rendering, [view.camera.height as usize * view.camera.width as usize * CHANNELS]),
         radii: B::int_from_data(TensorData::new(radii, [lists.splats.len()]), &device),
     };
     (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })
@@ -197,8 +197,8 @@ impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
     type Saved = B::Saved;
 
     fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, B::Saved) {
-        let (SplatOutputs { picture, radii }, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
-        (SplatOutputs { picture: leaf::<B>(picture), radii: int_leaf::<B>(radii) }, saved)
+        let (SplatOutputs { rendering, radii }, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
+        (SplatOutputs { rendering: leaf::<B>(rendering), radii: int_leaf::<B>(radii) }, saved)
     }
 
     fn splat_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {

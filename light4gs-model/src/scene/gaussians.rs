@@ -19,7 +19,7 @@ pub struct GaussiansConfig {
 
 impl GaussiansConfig {
     /// One Gaussian a point: isotropic, as large as the root of the mean squared distance to the three nearest
-    /// neighbours, unrotated, in the point's colour.
+    /// neighbors, unrotated, in the point's color.
     pub fn init(&self, cloud: &PointCloud, device: &Device) -> Gaussians {
         let count = cloud.positions.len();
         let log_scales: Vec<f32> = cloud.mean_squared_distances().iter().flat_map(|d2| [0.5 * d2.ln(); 3]).collect();

@@ -1,4 +1,4 @@
-//! Regularisers of the planes (4DGS: `compute_regulation`).
+//! Regularizers of the planes (4DGS: `compute_regulation`).
 
 use burn::tensor::{Tensor, s};
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};

@@ -16,7 +16,7 @@ const DC: usize = 3;
 /// Configuration of a [`ShAutoregressive`].
 #[derive(Config, Debug)]
 pub struct ShAutoregressiveConfig {
-    /// Distance between the values of neighbouring symbols.
+    /// Distance between the values of neighboring symbols.
     #[config(default = 0.02)]
     pub step: f32,
     /// Width of the hidden layers.
@@ -35,7 +35,7 @@ impl ShAutoregressiveConfig {
     }
 }
 
-/// A network for each degree: from the colour and all lower degrees of the same Gaussian to the Gaussian of each of the
+/// A network for each degree: from the color and all lower degrees of the same Gaussian to the Gaussian of each of the
 /// degree's channels.
 #[derive(Module, Debug)]
 pub struct ShAutoregressive {

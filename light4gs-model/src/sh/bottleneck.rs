@@ -13,7 +13,7 @@ use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
 /// Configuration of a [`ShBottleneck`].
 #[derive(Config, Debug)]
 pub struct ShBottleneckConfig {
-    /// Distance between the values of neighbouring symbols.
+    /// Distance between the values of neighboring symbols.
     #[config(default = 0.02)]
     pub step: f32,
     /// The density is initially about this wide on either side of zero, in the units of the values.

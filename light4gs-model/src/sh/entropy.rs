@@ -33,7 +33,7 @@ impl ShKnown {
 /// An entropy model of `sh_rest`. A model of one's own implements this; [`channels_first`], [`gaussian_bits`] and
 /// [`ShNetwork`](crate::ShNetwork) are what the built-in ones are made of.
 pub trait ShEntropy {
-    /// Distance between the values of neighbouring symbols.
+    /// Distance between the values of neighboring symbols.
     fn step(&self) -> f32;
 
     /// Bits of each value, `[N, 15, 3]`, of `values [N, 15, 3]`: noisy in training, quantized in an evaluation.

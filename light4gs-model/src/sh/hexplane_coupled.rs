@@ -15,7 +15,7 @@ use crate::scene::hexplane::query_planes;
 pub struct ShHexPlaneCoupledConfig {
     /// Channels of a plane times scales: the length of a hexplane's feature.
     pub feature_size: usize,
-    /// Distance between the values of neighbouring symbols.
+    /// Distance between the values of neighboring symbols.
     #[config(default = 0.02)]
     pub step: f32,
     /// Width of the hidden layer.

@@ -15,7 +15,7 @@ use crate::ops::lower_bound::lower_bound;
 /// Configuration of a [`ShMixture`].
 #[derive(Config, Debug)]
 pub struct ShMixtureConfig {
-    /// Distance between the values of neighbouring symbols.
+    /// Distance between the values of neighboring symbols.
     #[config(default = 0.02)]
     pub step: f32,
     /// Logistics in a channel, K.

@@ -4,7 +4,7 @@
 //! |---|---|---|
 //! | [`ShBottleneck`] | its channel: a learned monotone network | integer tables |
 //! | [`ShMixture`] | its channel: a few logistics | integer tables |
-//! | [`ShAutoregressive`] | the colour and the lower degrees of the same Gaussian | layers |
+//! | [`ShAutoregressive`] | the color and the lower degrees of the same Gaussian | layers |
 //! | [`ShHexPlaneCoupled`] | the space-only planes at the Gaussian's position | layers |
 //!
 //! Which models there are is said in this file and nowhere else: a new one is a file of its own and a line in each list here.

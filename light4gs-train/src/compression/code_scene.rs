@@ -40,7 +40,7 @@ pub struct CodingRecord {
 pub struct PlaneRecord {
     /// Scale and axes, as in `0.xy`.
     pub name: String,
-    /// Quantisation step.
+    /// Quantization step.
     pub step: f32,
     /// Values.
     pub symbols: usize,

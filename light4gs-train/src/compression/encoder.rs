@@ -171,7 +171,7 @@ impl Compression {
     fn plane_coding<F: DeformationField>(&self, scene: &DynamicScene<F>) -> Result<Option<PlaneCoding>, TrainError> {
         let (Some(models), Some(hexplane)) = (&self.planes, scene.planes()) else { return Ok(None) };
         let steps = models.quantization.steps_without_gradient();
-        let symbols = models.context.hyper_symbols(&hexplane.tensors(), &steps);
+        let symbols = models.context.latent_symbols(&hexplane.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(Some(PlaneCoding {
             model: models.context.to_arrays()?,

@@ -5,7 +5,7 @@
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: a scene and its models into the bytes of a file
 //! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
-//! - `step_search`: how coarsely the other attributes may be quantised
+//! - `step_search`: how coarsely the other attributes may be quantized
 
 mod code_scene;
 mod encoder;
@@ -108,7 +108,7 @@ fn quantization_config(config: &Config, scales: usize) -> AdaptiveQuantizationCo
 
 fn context_config(config: &ContextConfig, channels: usize) -> ContextModelConfig {
     let sizes = match config.architecture {
-        // The composition is what the switches say; the reference's centres and start belong to its sizes.
+        // The composition is what the switches say; the reference's centers and start belong to its sizes.
         ContextArchitecture::Reference => ContextModelConfig::reference(channels),
         ContextArchitecture::Compact => ContextModelConfig::compact(channels),
     };

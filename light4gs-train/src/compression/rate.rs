@@ -8,7 +8,7 @@ use rand::seq::index;
 
 use super::Compression;
 
-/// A scene with the noise of quantisation, which both the image and the rate see.
+/// A scene with the noise of quantization, which both the image and the rate see.
 #[derive(Clone, Debug)]
 pub struct NoisyScene<F: DeformationField = HexPlaneField> {
     /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the

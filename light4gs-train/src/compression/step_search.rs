@@ -1,4 +1,4 @@
-//! How coarsely positions, scales, rotations, opacities and constant colours may be quantised.
+//! How coarsely positions, scales, rotations, opacities and constant colors may be quantized.
 //!
 //! The error that an attribute's step puts into the images grows with its square, and a halved step costs a bit for
 //! each number. So for a given error in total the file is smallest when every number of every attribute brings the
@@ -7,7 +7,7 @@
 use light4gs_codec::attributes::{AttributeSteps, quantized};
 use light4gs_codec::{CodecError, SceneData};
 
-/// Numbers a Gaussian: position, scales, quaternion, opacity, colour.
+/// Numbers a Gaussian: position, scales, quaternion, opacity, color.
 const NUMBERS: [f64; 5] = [3.0, 3.0, 4.0, 1.0, 3.0];
 /// Other attributes are left almost exact, at this share of their given step, while one is looked at.
 const ALMOST_EXACT: f32 = 1.0 / 64.0;
@@ -79,7 +79,7 @@ mod tests {
         let random = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
         let triple = |i: usize| [random(3 * i), random(3 * i + 1), random(3 * i + 2)];
         let gaussians = GaussianArrays {
-            // Along the diagonal, so that quantising leaves the order as it is.
+            // Along the diagonal, so that quantizing leaves the order as it is.
             means: (0..500).map(|i| [i as f32; 3]).collect(),
             log_scales: (0..500).map(|i| triple(i).map(|v| v - 4.0)).collect(),
             quats: (0..500).map(|i| [1.0, random(i), random(i + 1), random(i + 2)]).collect(),
@@ -90,7 +90,7 @@ mod tests {
         SceneData { gaussians, ..SceneData::default() }
     }
 
-    /// "Images" that are ten times as sensitive to opacities as to colours, and to nothing else.
+    /// "Images" that are ten times as sensitive to opacities as to colors, and to nothing else.
     fn images(scene: &SceneData) -> Vec<f32> {
         let GaussianArrays { sh_dc, opacity_logits, .. } = &scene.gaussians;
         let opacities = opacity_logits.iter().map(|logit| 10.0 * logit);

@@ -22,7 +22,7 @@ pub struct CompressionConfig {
     pub rate: RateConfig,
     /// The context model of the hexplanes (MHCM).
     pub context: ContextConfig,
-    /// Quantisation steps of the hexplanes.
+    /// Quantization steps of the hexplanes.
     pub steps: StepsConfig,
     /// The entropy model of the spherical harmonics.
     pub sh: ShConfig,
@@ -119,7 +119,7 @@ choice! {
     }
 }
 
-/// Quantisation steps of the planes.
+/// Quantization steps of the planes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct StepsConfig {
@@ -145,7 +145,7 @@ pub struct StepsConfig {
 pub struct ShConfig {
     /// Which model.
     pub model: ShModel,
-    /// Quantisation step.
+    /// Quantization step.
     pub step: f64,
     /// Learning rate of the model at the first step.
     pub learning_rate_init: f64,
@@ -183,7 +183,7 @@ impl<'de> Deserialize<'de> for ShModel {
     }
 }
 
-/// Quantisation of what every Gaussian has besides spherical harmonics.
+/// Quantization of what every Gaussian has besides spherical harmonics.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct AttributesConfig {
@@ -206,7 +206,7 @@ pub(super) const LEAST_WEIGHT_BITS: u8 = 4;
 /// Bits a weight may have.
 pub(super) const MOST_WEIGHT_BITS: u8 = 16;
 
-/// Quantisation of network weights.
+/// Quantization of network weights.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct WeightsConfig {

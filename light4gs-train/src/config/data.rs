@@ -11,7 +11,7 @@ pub struct DataConfig {
     /// Images are resized to this width; `None` (0 in TOML) leaves them as they are.
     #[serde(with = "optional")]
     pub resolution: Option<u32>,
-    /// Colour behind transparent pixels, each channel in [0, 1].
+    /// Color behind transparent pixels, each channel in [0, 1].
     pub background: [f32; 3],
     /// Upper bound of the memory that decoded images may take, in MiB.
     pub memory_limit_mib: u64,

@@ -83,7 +83,7 @@ pub enum ConfigError {
     Value {
         /// Where.
         origin: Origin,
-        /// What the deserialiser says, with the key.
+        /// What the deserializer says, with the key.
         message: String,
     },
     /// A preset that does not exist.

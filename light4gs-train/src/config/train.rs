@@ -35,7 +35,7 @@ pub struct TrainConfig {
     pub densify: DensifyConfig,
     /// Dropping the least significant Gaussians.
     pub prune: PruneConfig,
-    /// Weights of the space-time regularisers, used in the fine stage.
+    /// Weights of the space-time regularizers, used in the fine stage.
     pub regularizer: RegularizerConfig,
 }
 
@@ -73,9 +73,9 @@ pub struct LearningRates {
     pub grid_init: f64,
     /// Hexplanes, at the end of the schedule.
     pub grid_final: f64,
-    /// Constant colour.
+    /// Constant color.
     pub sh_dc: f64,
-    /// View-dependent colour learns this many times slower than the constant one.
+    /// View-dependent color learns this many times slower than the constant one.
     pub sh_rest_divisor: f64,
     /// Opacity logits.
     pub opacity: f64,
@@ -83,7 +83,7 @@ pub struct LearningRates {
     pub scale: f64,
     /// Quaternions.
     pub rotation: f64,
-    /// What the rates of colours, opacities, scales and rotations have decayed to at the end of the schedule, as a
+    /// What the rates of colors, opacities, scales and rotations have decayed to at the end of the schedule, as a
     /// share of those above; 1 keeps them constant.
     pub attributes_final_share: f64,
     /// Length of the decay in iterations; `None` (0 in TOML) takes the stage's length.
@@ -129,7 +129,7 @@ pub struct DensifyConfig {
     pub opacity_reset_interval: usize,
 }
 
-/// Weights of the space-time regularisers.
+/// Weights of the space-time regularizers.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RegularizerConfig {

@@ -1,4 +1,4 @@
-//! Line and point charts in SVG. Colours are the style sheet's.
+//! Line and point charts in SVG. Colors are the style sheet's.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ const BOTTOM: f64 = 38.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mark {
     Line,
-    /// Background of the series that follows, whose colour it has.
+    /// Background of the series that follows, whose color it has.
     FaintLine,
     DottedLine,
     Dots,

@@ -58,7 +58,7 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
     Ok(html)
 }
 
-/// One scale of colours for all planes, so that they can be compared.
+/// One scale of colors for all planes, so that they can be compared.
 fn maps(html: &mut String, path: &Path, bit_maps: &[BitMap]) -> Result<(), DataError> {
     let most = bit_maps.iter().flat_map(|map| &map.bits).fold(0.0f32, |most, bits| most.max(*bits));
     if most <= 0.0 {

@@ -1,7 +1,7 @@
-//! Colours of the error maps.
+//! Colors of the error maps.
 
 /// Seventeen samples of "inferno", by Stéfan van der Walt and Nathaniel Smith for matplotlib (CC0): equal steps look
-/// equal, brighter is always more, and it survives colour blindness and grey paper.
+/// equal, brighter is always more, and it survives color blindness and gray paper.
 const INFERNO: [[u8; 3]; 17] = [
     [0, 0, 4],
     [11, 7, 36],
@@ -22,7 +22,7 @@ const INFERNO: [[u8; 3]; 17] = [
     [252, 255, 164],
 ];
 
-/// The colour of a value, 0 to 1; what lies outside takes the colour at the end.
+/// The color of a value, 0 to 1; what lies outside takes the color at the end.
 pub(super) fn inferno(value: f32) -> [u8; 3] {
     let last = INFERNO.len() - 1;
     // Written so that NaN becomes 0.

@@ -14,7 +14,7 @@ use super::color_map::{css_gradient, inferno};
 use super::format::fixed;
 use super::html::escape;
 
-/// Error that gets the brightest colour. One scale for all views, so that they can be compared; 0.2 is far more than a
+/// Error that gets the brightest color. One scale for all views, so that they can be compared; 0.2 is far more than a
 /// good render has anywhere but along an edge.
 const BRIGHTEST_ERROR: f32 = 0.2;
 
@@ -23,7 +23,7 @@ pub(super) fn section(path: &Path, views: &[ViewImages]) -> Result<String, DataE
         return Ok(String::new());
     }
     let mut html = format!(
-        "<p class=\"legend\">Error: mean difference of the colour channels, \
+        "<p class=\"legend\">Error: mean difference of the color channels, \
          <span class=\"scale\">0 <i style=\"background:{}\"></i> {BRIGHTEST_ERROR} and more</span></p>\n<div class=\"views\">\n",
         css_gradient()
     );

@@ -146,7 +146,7 @@ fn sizes_that_differ_are_refused_and_named() {
 }
 
 #[test]
-fn the_colour_map_runs_from_dark_to_bright() {
+fn the_color_map_runs_from_dark_to_bright() {
     let brightness = |value: f32| color_map::inferno(value).iter().map(|c| u32::from(*c)).sum::<u32>();
     assert_eq!(color_map::inferno(0.0), [0, 0, 4]);
     assert_eq!(color_map::inferno(7.0), [252, 255, 164]);

@@ -26,9 +26,9 @@ use crate::stage::Stage;
 pub struct Checkpoint<F: DeformationField = HexPlaneField> {
     /// The model, on the run's device.
     pub scene: DynamicScene<F>,
-    /// Entropy models and quantisation steps, where the run trains them.
+    /// Entropy models and quantization steps, where the run trains them.
     pub compression: Option<Compression>,
-    /// Optimiser state.
+    /// Optimizer state.
     pub adam: Adam,
     /// What the density strategy keeps, by name: vectors off the tape.
     pub density: BTreeMap<String, Tensor<1>>,

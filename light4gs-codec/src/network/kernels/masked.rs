@@ -69,7 +69,7 @@ impl MaskedConvolution {
         Self { groups, inputs_per_group: inputs, taps }
     }
 
-    /// The outputs at eight neighbouring non-anchors of row `y`, the first of which is number `first` of its row.
+    /// The outputs at eight neighboring non-anchors of row `y`, the first of which is number `first` of its row.
     pub(crate) fn apply(
         &self,
         anchors: &AnchorMap,
