@@ -6,12 +6,12 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// A transforms file is kilobytes; whatever is larger than this is not one.
+/// A file of cameras is kilobytes; whatever is larger than this is not one.
 const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads a JSON file. The words `NaN`, `Infinity` and `-Infinity`, which Python writes though JSON
 /// has no such numbers, come back as strings, so that the check of the field can name it.
-pub(crate) fn read(path: &Path) -> Result<Value, DataError> {
+pub(in crate::layouts) fn read(path: &Path) -> Result<Value, DataError> {
     let mut text = String::new();
     File::open(path)
         .and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text))
@@ -21,7 +21,7 @@ pub(crate) fn read(path: &Path) -> Result<Value, DataError> {
             path,
             "(whole file)",
             format!("it is larger than {} MiB", MAX_BYTES >> 20),
-            "this is not a transforms file: check the folder",
+            "this is not a file of cameras: check the folder",
         ));
     }
     serde_json::from_str(&text).or_else(|source| {
@@ -56,17 +56,17 @@ fn quote_non_finite(text: &str) -> String {
 }
 
 /// A short word for what a field holds, for messages.
-pub(crate) fn describe(value: Option<&Value>) -> String {
+pub(in crate::layouts) fn describe(value: Option<&Value>) -> String {
     match value {
         None => "missing".into(),
         Some(Value::Array(items)) => format!("a list of {}", items.len()),
         Some(Value::Object(_)) => "an object".into(),
-        Some(other) => other.to_string().chars().take(60).collect(),
+        Some(other) => super::files::shorten(&other.to_string()),
     }
 }
 
 /// A finite number, or an error that names the field and what was expected.
-pub(crate) fn finite(
+pub(in crate::layouts) fn finite(
     path: &Path,
     field: &str,
     value: Option<&Value>,
@@ -77,6 +77,70 @@ pub(crate) fn finite(
         let found = describe(value);
         DataError::field(path, field, format!("{found}, expected {expected}"), remedy)
     })
+}
+
+/// As [`finite`], for a field that may be absent: then it is `default`.
+pub(in crate::layouts) fn finite_or(
+    path: &Path,
+    field: &str,
+    value: Option<&Value>,
+    default: f64,
+    remedy: &str,
+) -> Result<f64, DataError> {
+    value.map_or(Ok(default), |value| finite(path, field, Some(value), "a finite number", remedy))
+}
+
+/// A list of `N` finite numbers.
+pub(in crate::layouts) fn numbers<const N: usize>(
+    path: &Path,
+    field: &str,
+    value: Option<&Value>,
+    remedy: &str,
+) -> Result<[f64; N], DataError> {
+    let list = value.and_then(Value::as_array).filter(|list| list.len() == N).ok_or_else(|| {
+        DataError::field(path, field, format!("{}, expected a list of {N} numbers", describe(value)), remedy)
+    })?;
+    let mut out = [0.0; N];
+    for (i, value) in list.iter().enumerate() {
+        out[i] = finite(path, &format!("{field}[{i}]"), Some(value), "a finite number", remedy)?;
+    }
+    Ok(out)
+}
+
+/// Rows of `N` finite numbers: at least `M` of them; more are passed over.
+pub(in crate::layouts) fn rows<const M: usize, const N: usize>(
+    path: &Path,
+    field: &str,
+    value: Option<&Value>,
+    remedy: &str,
+) -> Result<[[f64; N]; M], DataError> {
+    let list = value.and_then(Value::as_array).filter(|list| list.len() >= M).ok_or_else(|| {
+        let found = describe(value);
+        DataError::field(path, field, format!("{found}, expected {M} rows of {N} numbers"), remedy)
+    })?;
+    let mut out = [[0.0; N]; M];
+    for (i, row) in out.iter_mut().enumerate() {
+        *row = numbers(path, &format!("{field}[{i}]"), list.get(i), remedy)?;
+    }
+    Ok(out)
+}
+
+/// A list of words.
+pub(in crate::layouts) fn words(
+    path: &Path,
+    field: &str,
+    value: Option<&Value>,
+    remedy: &str,
+) -> Result<Vec<String>, DataError> {
+    let expected = |what: String| DataError::field(path, field, format!("{what}, expected a list of names"), remedy);
+    let list = value.and_then(Value::as_array).ok_or_else(|| expected(describe(value)))?;
+    list.iter()
+        .enumerate()
+        .map(|(i, word)| {
+            let found = || DataError::field(path, format!("{field}[{i}]"), format!("{}, expected a name", describe(Some(word))), remedy);
+            word.as_str().map(str::to_owned).ok_or_else(found)
+        })
+        .collect()
 }
 
 #[cfg(test)]
