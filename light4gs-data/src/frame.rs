@@ -49,12 +49,7 @@ impl Frame {
     /// A frame with an image of `source` = (width, height) pixels in the file `path`, taken by camera 0 through a
     /// pinhole, without a mask.
     pub fn new(name: impl Into<String>, camera: Camera, time: f32, path: PathBuf, source: (u32, u32)) -> Self {
-        Self {
-            path,
-            source_width: source.0,
-            source_height: source.1,
-            ..Self::without_image(name, camera, time)
-        }
+        Self { path, source_width: source.0, source_height: source.1, ..Self::without_image(name, camera, time) }
     }
 
     /// A frame that is only ever rendered: no image belongs to it.

@@ -133,7 +133,20 @@ impl Scene {
         }
         let (camera_mean, extent) = mean_and_extent(&train);
         let (name, root) = (folder_name(root), root.to_path_buf());
-        Ok(Self { name, root, layout, train, test, val, video, background, points, camera_mean, extent, notes: Vec::new() })
+        Ok(Self {
+            name,
+            root,
+            layout,
+            train,
+            test,
+            val,
+            video,
+            background,
+            points,
+            camera_mean,
+            extent,
+            notes: Vec::new(),
+        })
     }
 
     /// The frames of a split.
@@ -163,7 +176,8 @@ fn make_names_unique(frames: &mut [Frame]) {
     for frame in frames.iter() {
         *uses.entry(folded(&frame.name)).or_default() += 1;
     }
-    let mut taken: HashSet<String> = uses.iter().filter(|(_, count)| **count == 1).map(|(name, _)| name.clone()).collect();
+    let mut taken: HashSet<String> =
+        uses.iter().filter(|(_, count)| **count == 1).map(|(name, _)| name.clone()).collect();
     for frame in frames.iter_mut().filter(|frame| uses[&folded(&frame.name)] > 1) {
         let folder = frame.path.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
         let base = folder.map_or_else(|| frame.name.clone(), |folder| format!("{folder}_{}", frame.name));

@@ -2,15 +2,21 @@
 //!
 //! To add one to this crate: its own file in this folder, its `mod` line and its place in [`Layouts::default`].
 
+pub(crate) mod colmap;
 mod dnerf;
 mod layout;
 mod nerfies;
+mod nerfstudio;
 mod neu3d;
 mod shared;
+#[cfg(test)]
+mod written;
 
+pub use colmap::Colmap;
 pub use dnerf::DNerf;
 pub use layout::DatasetLayout;
 pub use nerfies::{HyperNerf, NerfDs};
+pub use nerfstudio::Nerfstudio;
 pub use neu3d::Neu3d;
 
 use crate::error::DataError;
@@ -25,7 +31,7 @@ use std::sync::Arc;
 /// ```
 /// use light4gs_data::Layouts;
 ///
-/// assert_eq!(Layouts::default().names(), ["dnerf", "neu3d", "nerfds", "hypernerf"]);
+/// assert_eq!(Layouts::default().names(), ["dnerf", "neu3d", "nerfds", "hypernerf", "nerfstudio", "colmap"]);
 /// ```
 #[derive(Clone)]
 pub struct Layouts {
@@ -35,7 +41,16 @@ pub struct Layouts {
 impl Default for Layouts {
     /// The layouts of this crate. Where two might match one folder, the more specific one stands first.
     fn default() -> Self {
-        Self { list: vec![Arc::new(DNerf), Arc::new(Neu3d), Arc::new(NerfDs), Arc::new(HyperNerf)] }
+        Self {
+            list: vec![
+                Arc::new(DNerf),
+                Arc::new(Neu3d),
+                Arc::new(NerfDs),
+                Arc::new(HyperNerf),
+                Arc::new(Nerfstudio),
+                Arc::new(Colmap),
+            ],
+        }
     }
 }
 

@@ -187,7 +187,12 @@ fn image_folder(root: &Path) -> Result<PathBuf, DataError> {
     let rgb = root.join("rgb");
     SCALES.iter().map(|scale| rgb.join(scale)).find(|folder| folder.is_dir()).ok_or_else(|| {
         let expected = SCALES.map(|scale| format!("rgb/{scale}")).join(", ");
-        DataError::field(root, "rgb", format!("no folder of images, expected one of {expected}"), "copy the images there")
+        DataError::field(
+            root,
+            "rgb",
+            format!("no folder of images, expected one of {expected}"),
+            "copy the images there",
+        )
     })
 }
 
@@ -227,14 +232,7 @@ fn read_camera(root: &Path, entry: &Entry, image: PathBuf) -> Result<PosedImage,
         path: image,
         rotation: DMat3::from_cols(x.into(), y.into(), z.into()).transpose(),
         center: DVec3::from(position),
-        intrinsics: Intrinsics {
-            width: width as u32,
-            height: height as u32,
-            fx: focal,
-            fy: focal * aspect,
-            cx,
-            cy,
-        },
+        intrinsics: Intrinsics { width: width as u32, height: height as u32, fx: focal, fy: focal * aspect, cx, cy },
         lens: Lens::new(distortion, skew),
         camera_id: entry.camera_id,
         time: entry.time,

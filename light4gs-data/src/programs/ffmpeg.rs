@@ -1,10 +1,11 @@
 //! Frames of videos, through the program `ffmpeg`.
 
 use super::{Program, argument};
-use crate::atomic::sibling;
+use crate::atomic::make_folder_atomically;
 use crate::error::DataError;
 use std::fs;
 use std::path::Path;
+use std::process::Command;
 
 /// The program.
 pub(crate) const FFMPEG: Program = Program {
@@ -40,11 +41,19 @@ pub(crate) fn extract_frames(video: &Path, folder: &Path, wanted: &Wanted) -> Re
     if let Some(parent) = folder.parent() {
         fs::create_dir_all(parent).map_err(DataError::io("create", parent))?;
     }
-    let part = sibling(folder);
-    fs::create_dir(&part).map_err(DataError::io("create", &part))?;
+    make_folder_atomically(folder, |part| {
+        let attempt = format!("extracting frames of {}", video.display());
+        let remedy = "check that the video plays; convert it to MP4 with H.264";
+        FFMPEG.run(&mut extraction(version, &video, part, wanted), &attempt, remedy)?;
+        at_least_one(part, &video)
+    })
+}
+
+/// The command that writes the frames into a folder.
+fn extraction(version: (u32, u32), video: &Path, folder: &Path, wanted: &Wanted) -> Command {
     let mut command = FFMPEG.command();
     // The pattern of names stands alone: a `%` in a folder's name would be taken for a part of it.
-    command.current_dir(&part).args(["-hide_banner", "-loglevel", "error", "-nostdin", "-i"]).arg(&video);
+    command.current_dir(folder).args(["-hide_banner", "-loglevel", "error", "-nostdin", "-i"]).arg(video);
     command.args(["-map", "0:v:0"]);
     let mut filters = Vec::new();
     match wanted.rate {
@@ -62,17 +71,7 @@ pub(crate) fn extract_frames(video: &Path, folder: &Path, wanted: &Wanted) -> Re
         command.arg("-frames:v").arg(argument(count));
     }
     command.args(["-start_number", "0", "%04d.png"]);
-    let attempt = format!("extracting frames of {}", video.display());
-    let done = FFMPEG
-        .run(&mut command, &attempt, "check that the video plays; convert it to MP4 with H.264")
-        .and_then(|_| at_least_one(&part, &video))
-        .and_then(|()| fs::rename(&part, folder).map_err(DataError::io("create", folder)));
-    if done.is_err() {
-        // The first error is the one to report; a leftover is all that could go wrong here.
-        let _ = fs::remove_dir_all(&part);
-    }
-    // Another process may have made the same folder meanwhile.
-    if folder.is_dir() { Ok(()) } else { done }
+    command
 }
 
 fn at_least_one(folder: &Path, video: &Path) -> Result<(), DataError> {

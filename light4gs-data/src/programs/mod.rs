@@ -48,7 +48,8 @@ impl Program {
         let version = version_in(&String::from_utf8_lossy(&text)).unwrap_or((u32::MAX, 0));
         if version < self.oldest {
             let ((major, minor), (least_major, least_minor)) = (version, self.oldest);
-            let problem = format!("version {major}.{minor} is installed, expected {least_major}.{least_minor} or newer");
+            let problem =
+                format!("version {major}.{minor} is installed, expected {least_major}.{least_minor} or newer");
             return Err(self.error(problem, self.install));
         }
         Ok(version)

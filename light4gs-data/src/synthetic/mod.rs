@@ -9,7 +9,7 @@ mod render;
 mod shapes;
 mod world;
 
-use crate::atomic::{sibling, write_atomically};
+use crate::atomic::{make_folder_atomically, write_atomically};
 use crate::camera::Camera;
 use crate::error::DataError;
 use crate::images::save_png;
@@ -101,18 +101,31 @@ pub fn write_synthetic(root: &Path, options: &SyntheticOptions) -> Result<(), Da
     if let Some(parent) = root.parent().filter(|p| !p.as_os_str().is_empty()) {
         fs::create_dir_all(parent).map_err(DataError::io("create", parent))?;
     }
-    let part = sibling(root);
-    let result = write_folder(&part, options).and_then(|()| {
-        if root.is_dir() {
-            fs::remove_dir(root).map_err(DataError::io("replace", root))?;
-        }
-        fs::rename(&part, root).map_err(DataError::io("create", root))
-    });
-    if result.is_err() {
-        // The first error is the one to report; a leftover is all that could go wrong here.
-        let _ = fs::remove_dir_all(&part);
+    make_folder_atomically(root, |part| write_folder(part, options))
+}
+
+/// The procedural scene, for tests that photograph it with cameras of their own.
+#[cfg(test)]
+pub(crate) struct Stage(World);
+
+#[cfg(test)]
+impl Stage {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(World::new(seed))
     }
-    result
+
+    /// `[H, W, 3]` bytes on black, see [`render::render_rays`].
+    pub(crate) fn photograph(
+        &self,
+        eye: Vec3,
+        size: (u32, u32),
+        time: f32,
+        direction: impl Fn(f32, f32) -> Vec3,
+    ) -> crate::images::RgbImage8 {
+        let rgba = render::render_rays(&self.0, eye, size, time, direction);
+        let pixels = crate::images::composite(&rgba, [0.0; 3]);
+        crate::images::RgbImage8 { width: size.0, height: size.1, pixels }
+    }
 }
 
 fn write_folder(folder: &Path, options: &SyntheticOptions) -> Result<(), DataError> {

@@ -82,7 +82,8 @@ pub(super) fn rows(table: &Path, cameras: &[CameraFrames], rows: usize) -> Resul
 }
 
 fn number_of(name: &str) -> Option<usize> {
-    let start = name.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |i| i + name[i..].chars().next().map_or(1, char::len_utf8));
+    let start =
+        name.rfind(|c: char| !c.is_ascii_digit()).map_or(0, |i| i + name[i..].chars().next().map_or(1, char::len_utf8));
     name[start..].parse().ok()
 }
 
@@ -112,8 +113,9 @@ pub(super) fn frames(
         ));
     }
     let instants = |camera: usize, i: usize| counted.as_ref().map_or(i, |numbers| numbers[camera][i] - first);
-    let with_instants =
-        |(camera, list): (usize, Vec<PathBuf>)| list.into_iter().enumerate().map(|(i, path)| (instants(camera, i), path)).collect();
+    let with_instants = |(camera, list): (usize, Vec<PathBuf>)| {
+        list.into_iter().enumerate().map(|(i, path)| (instants(camera, i), path)).collect()
+    };
     Ok(lists.into_iter().enumerate().map(with_instants).collect())
 }
 
@@ -126,36 +128,30 @@ fn extracted(root: &Path, camera: &CameraFrames, length: Option<usize>) -> Resul
         return Err(DataError::field(root, camera.name.clone(), "no frames and no video", "put one of them there"));
     };
     let wanted = Wanted { max_width: Some(EXTRACTED_WIDTH), rate: None, count: length };
-    let folder = extraction_folder(root, camera, video, &wanted)?;
+    // Beside the video, where the reference puts them too. A part of the sequence is not for others to find.
+    let beside = root.join(&camera.name).join("images");
+    let metadata = root.metadata().map_err(DataError::io("read", root))?;
+    if !metadata.permissions().readonly() && wanted.count.is_none() {
+        match extract_frames(video, &beside, &wanted) {
+            // The folder cannot be written after all.
+            Err(DataError::Io { .. }) => {}
+            done => return done.map(|()| beside),
+        }
+    }
+    let folder = cache_folder(camera, video, &wanted)?;
     if !folder.is_dir() {
         extract_frames(video, &folder, &wanted)?;
     }
     Ok(folder)
 }
 
-/// Beside the video, where the reference puts them too; elsewhere if the dataset is read-only.
-fn extraction_folder(
-    root: &Path,
-    camera: &CameraFrames,
-    video: &Path,
-    wanted: &Wanted,
-) -> Result<PathBuf, DataError> {
-    let metadata = root.metadata().map_err(DataError::io("read", root))?;
-    // A part of the sequence is not for others to find: it goes to the cache.
-    if !metadata.permissions().readonly() && wanted.count.is_none() && tempfile_works(root) {
-        return Ok(root.join(&camera.name).join("images"));
-    }
-    let video_metadata = video.metadata().map_err(DataError::io("read", video))?;
+/// A folder for the frames of this very video, where the dataset is read-only.
+fn cache_folder(camera: &CameraFrames, video: &Path, wanted: &Wanted) -> Result<PathBuf, DataError> {
+    let metadata = video.metadata().map_err(DataError::io("read", video))?;
     let mut hasher = DefaultHasher::new();
     let place = video.canonicalize().map_err(DataError::io("read", video))?;
-    (place, video_metadata.len(), video_metadata.modified().ok(), wanted.count).hash(&mut hasher);
+    (place, metadata.len(), metadata.modified().ok(), wanted.count).hash(&mut hasher);
     Ok(cache().join("frames").join(format!("{}-{:016x}", camera.name, hasher.finish())))
-}
-
-/// Whether a folder can be written to, whatever its permissions say.
-fn tempfile_works(root: &Path) -> bool {
-    let probe = crate::atomic::sibling(&root.join("probe"));
-    std::fs::write(&probe, b"").and_then(|()| std::fs::remove_file(&probe)).is_ok()
 }
 
 /// The user's cache: `LIGHT4GS_CACHE`, `XDG_CACHE_HOME/light4gs`, `HOME/.cache/light4gs`, or the folder for temporary

@@ -54,7 +54,8 @@ impl DatasetLayout for Neu3d {
             if frame.camera_id == 0 { splits.test.push(frame) } else { splits.train.push(frame) }
         }
         if splits.train.is_empty() {
-            let problem = format!("{} camera and {instants} instants found, expected at least 2 cameras", cameras.len());
+            let problem =
+                format!("{} camera and {instants} instants found, expected at least 2 cameras", cameras.len());
             return Err(DataError::field(root, "camXX", problem, "the first camera is for testing: add another"));
         }
         splits.video = video(&poses, &splits.test[0].camera);

@@ -21,10 +21,7 @@ pub(in crate::layouts) fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
 
 /// The entries of a folder that are wanted, in natural order. Hidden ones are passed over: editors and file managers
 /// leave them.
-pub(in crate::layouts) fn entries(
-    folder: &Path,
-    wanted: impl Fn(&Path) -> bool,
-) -> Result<Vec<PathBuf>, DataError> {
+pub(in crate::layouts) fn entries(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, DataError> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(DataError::io("read", folder))? {
         let path = entry.map_err(DataError::io("read", folder))?.path();

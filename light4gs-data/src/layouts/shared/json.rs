@@ -1,9 +1,8 @@
 //! JSON files whose every bad field can be named.
 
 use crate::error::DataError;
+use crate::regular_file::read_regular_text;
 use serde_json::Value;
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 /// A file of cameras is kilobytes; whatever is larger than this is not one.
@@ -12,18 +11,7 @@ const MAX_BYTES: u64 = 256 << 20;
 /// Reads a JSON file. The words `NaN`, `Infinity` and `-Infinity`, which Python writes though JSON
 /// has no such numbers, come back as strings, so that the check of the field can name it.
 pub(in crate::layouts) fn read(path: &Path) -> Result<Value, DataError> {
-    let mut text = String::new();
-    File::open(path)
-        .and_then(|file| file.take(MAX_BYTES + 1).read_to_string(&mut text))
-        .map_err(DataError::io("read", path))?;
-    if text.len() as u64 > MAX_BYTES {
-        return Err(DataError::field(
-            path,
-            "(whole file)",
-            format!("it is larger than {} MiB", MAX_BYTES >> 20),
-            "this is not a file of cameras: check the folder",
-        ));
-    }
+    let text = read_regular_text(path, MAX_BYTES).map_err(DataError::io("read", path))?;
     serde_json::from_str(&text).or_else(|source| {
         serde_json::from_str(&quote_non_finite(&text)).map_err(|_| DataError::Json { path: path.to_path_buf(), source })
     })
@@ -137,7 +125,14 @@ pub(in crate::layouts) fn words(
     list.iter()
         .enumerate()
         .map(|(i, word)| {
-            let found = || DataError::field(path, format!("{field}[{i}]"), format!("{}, expected a name", describe(Some(word))), remedy);
+            let found = || {
+                DataError::field(
+                    path,
+                    format!("{field}[{i}]"),
+                    format!("{}, expected a name", describe(Some(word))),
+                    remedy,
+                )
+            };
             word.as_str().map(str::to_owned).ok_or_else(found)
         })
         .collect()

@@ -1,8 +1,7 @@
 //! NumPy's `.npy` files: one array of numbers.
 
 use crate::error::DataError;
-use std::fs::File;
-use std::io::Read;
+use crate::regular_file::read_regular_file;
 use std::path::Path;
 
 /// Poses and points are megabytes; whatever is larger than this is neither.
@@ -28,18 +27,13 @@ impl Array2 {
 /// # Errors
 /// [`DataError::Field`] naming the part of the header that is not as expected, or the first number that is not finite.
 pub(in crate::layouts) fn read(path: &Path, columns: usize, what: &str) -> Result<Array2, DataError> {
-    let mut bytes = Vec::new();
-    File::open(path)
-        .and_then(|file| file.take(MAX_BYTES + 1).read_to_end(&mut bytes))
-        .map_err(DataError::io("read", path))?;
+    let bytes = read_regular_file(path, MAX_BYTES).map_err(DataError::io("read", path))?;
     let bad = |field: &str, problem: String| {
         let remedy = format!("save it again with numpy.save as an array of {what}");
         DataError::field(path, field, problem, remedy)
     };
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(bad("(whole file)", format!("it is larger than {} MiB", MAX_BYTES >> 20)));
-    }
-    let (header, data) = split(&bytes).ok_or_else(|| bad("header", "this is no .npy file, or it is truncated".into()))?;
+    let (header, data) =
+        split(&bytes).ok_or_else(|| bad("header", "this is no .npy file, or it is truncated".into()))?;
     let field = |name: &str| value_of(header, name).ok_or_else(|| bad(name, "missing in the header".into()));
     let kind = field("descr")?.trim_matches(['\'', '"']);
     let number = Number::parse(kind).ok_or_else(|| {
@@ -61,7 +55,9 @@ pub(in crate::layouts) fn read(path: &Path, columns: usize, what: &str) -> Resul
     let fortran = match field("fortran_order")? {
         "True" => true,
         "False" => false,
-        other => return Err(bad("fortran_order", format!("`{}`, expected True or False", super::files::shorten(other)))),
+        other => {
+            return Err(bad("fortran_order", format!("`{}`, expected True or False", super::files::shorten(other))));
+        }
     };
     let needed = rows.checked_mul(columns).and_then(|count| count.checked_mul(number.size));
     if needed != Some(data.len()) {
@@ -197,7 +193,8 @@ mod tests {
         refuses(&file(&good.replace("(2, 3)", "(3, 2)"), &data), &["shape", "(N, 3)"]);
         refuses(&file(&good.replace("(2, 3)", "(6,)"), &data), &["shape"]);
         refuses(&file(&good.replace("(2, 3)", "(0, 3)"), &[]), &["shape"]);
-        refuses(&file(&good.replace("(2, 3)", "(9999999999999999999, 3)"), &data), &["shape"]);
+        refuses(&file(&good.replace("(2, 3)", "(9999999999999999999, 3)"), &data), &["data"]);
+        refuses(&file(&good.replace("(2, 3)", "(99999999999999999999, 3)"), &data), &["shape"]);
         refuses(&file(&good.replace("(2, 3)", "(6148914691236517205, 3)"), &data), &["data"]);
         refuses(&file(&good.replace("False", "perhaps"), &data), &["fortran_order"]);
         refuses(&file(&good.replace("'shape'", "'size'"), &data), &["shape", "missing"]);

@@ -84,8 +84,8 @@ pub(in crate::layouts) fn used_size(
 fn upright_size(image: &PosedImage, header: ImageHeader) -> Result<(u32, u32), DataError> {
     let (width, height) = header.size;
     let (expected_width, expected_height) = (image.intrinsics.width, image.intrinsics.height);
-    let sideways = (width > height && expected_width < expected_height)
-        || (width < height && expected_width > expected_height);
+    let sideways =
+        (width > height && expected_width < expected_height) || (width < height && expected_width > expected_height);
     if !sideways {
         return Ok((width, height));
     }

@@ -68,7 +68,9 @@ fn camera_and_number(name: &str) -> Option<(String, u64)> {
     let path = Path::new(name);
     let stem = stem_of(path);
     let end = stem.rfind(|c: char| c.is_ascii_digit())? + 1;
-    let start = stem[..end].rfind(|c: char| !c.is_ascii_digit()).map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
+    let start = stem[..end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |i| i + stem[i..].chars().next().map_or(1, char::len_utf8));
     let number = stem[start..end].parse().ok()?;
     let folder = path.parent().map(|parent| parent.to_string_lossy().into_owned()).unwrap_or_default();
     Some((format!("{folder}/{}|{}", &stem[..start], &stem[end..]), number))
@@ -111,12 +113,10 @@ mod tests {
         let expected = [(1, 0.0), (0, 1.0), (0, 0.0), (1, 1.0)];
         assert_eq!(read(&["cam10/00.png", "cam2/01.png", "cam2/00.png", "cam10/01.png"]), expected);
         assert_eq!(read(&["c10_00.png", "c2_01.png", "c2_00.png", "c10_01.png"]), expected);
-        assert_eq!(read(&["0_left.png", "1_left.png", "0_right.png", "1_right.png"]), [
-            (0, 0.0),
-            (0, 1.0),
-            (1, 0.0),
-            (1, 1.0)
-        ]);
+        assert_eq!(
+            read(&["0_left.png", "1_left.png", "0_right.png", "1_right.png"]),
+            [(0, 0.0), (0, 1.0), (1, 0.0), (1, 1.0)]
+        );
     }
 
     #[test]
