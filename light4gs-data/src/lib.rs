@@ -20,6 +20,7 @@ mod options;
 mod orbit;
 pub mod ply;
 mod points;
+mod pytorch;
 mod scene;
 mod synthetic;
 
@@ -33,5 +34,6 @@ pub use options::{LoadOptions, Resolution};
 pub use orbit::orbit_path;
 pub use ply::GaussianPly;
 pub use points::{PointCloud, SH_C0, SMALLEST_MEAN_SQUARED_DISTANCE, mean_squared_distance_to_3_nearest};
+pub use pytorch::{PlainTensor, read_pytorch};
 pub use scene::{Scene, Split, SplitFrames};
 pub use synthetic::{SyntheticOptions, write_synthetic};
