@@ -3,10 +3,10 @@
 // One invocation owns one cell of one plane, with all its channels. A sample reaches its low cell and the next ones along
 // width and height, so a cell looks at the samples that begin in it and in three neighbors. Samples come sorted by low
 // cell (`order`, ranges in `starts`), and equal ones in the order of points, so the four are two ranges; every sum has one
-// order, and no atomics. Writes the planes' gradients, each [C, H · W], from the places in `parts`; a launch takes so many
+// order, and no atomics. Writes the planes' gradients, each [C, H · W], from the places in `places`; a launch takes so many
 // samples of a cell that no loop gets too long, and later launches add the rest.
 
-struct Parts {
+struct Places {
     // Where the gradients of xy, xz, xt, yz begin.
     a: vec4<u32>,
     // Those of yt and zt; the first sample of every cell that this launch takes, and how many.
@@ -15,7 +15,7 @@ struct Parts {
 
 struct Parameters {
     planes: Planes,
-    parts: Parts,
+    places: Places,
 }
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
@@ -54,17 +54,17 @@ fn main(
     }
     let level = vec3<u32>(starts[select(own - 1u, own, at_left)], starts[own], starts[own + 1u]);
     let count_above = above.z - above.x;
-    let begin = parameters.parts.b.z;
-    let end = min(begin + parameters.parts.b.w, count_above + level.z - level.x);
+    let begin = parameters.places.b.z;
+    let end = min(begin + parameters.places.b.w, count_above + level.z - level.x);
     if (begin > 0u && begin >= end) {
         return;
     }
 
     let cells = select(planes.first_cells_b.z, first_cell(planes, min(plane + 1u, 5u)), plane < 5u)
         - first_cell(planes, plane);
-    var first = parameters.parts.a[plane % 4u];
+    var first = parameters.places.a[plane % 4u];
     if (plane >= 4u) {
-        first = parameters.parts.b[plane - 4u];
+        first = parameters.places.b[plane - 4u];
     }
     // One loop over samples within vectors of channels: Mesa's software driver runs the body of an inner loop once even
     // where there is nothing to do, as in most cells.

@@ -3,9 +3,9 @@
 // One invocation owns one Gaussian. Reads its attributes, its splat, and the sums of its intersections, which lie next to
 // each other from ten times `first_of_gaussian`; adds them in that order, so that the result does not depend on the order
 // of anything. Writes every gradient once: `gradients` holds those of means [N, 3], quats [N, 4], scales [N, 3],
-// opacities [N], sh_dc [N, 3], sh_rest [N, K, 3] and screen offsets [N, 2], from the places in `parts`.
+// opacities [N], sh_dc [N, 3], sh_rest [N, K, 3] and screen offsets [N, 2], from the places in `places`.
 
-struct Parts {
+struct Places {
     // means, quats, scales, opacities
     a: vec4<u32>,
     // sh_dc, sh_rest, screen offsets
@@ -14,7 +14,7 @@ struct Parts {
 
 struct Parameters {
     view: View,
-    parts: Parts,
+    places: Places,
 }
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
@@ -43,7 +43,7 @@ fn color_backward(i: u32, mean: vec3<f32>, upstream: vec3<f32>, state: u32) -> v
     let basis = harmonics(direction);
     let clamped = (vec3<u32>(state) & vec3<u32>(1u, 2u, 4u)) != vec3<u32>(0u);
     let d_color = select(upstream, vec3<f32>(0.0), clamped);
-    write3(parameters.parts.b.x + 3u * i, basis[0] * d_color);
+    write3(parameters.places.b.x + 3u * i, basis[0] * d_color);
     let slopes = harmonics_gradient(direction);
     let used = coefficient_count(view.counts.y);
     let rest = view.counts.z;
@@ -51,12 +51,12 @@ fn color_backward(i: u32, mean: vec3<f32>, upstream: vec3<f32>, state: u32) -> v
     for (var k = 1u; k < 16u; k++) {
         let at = 3u * (rest * i + k - 1u);
         if (k < used) {
-            write3(parameters.parts.b.y + at, basis[k] * d_color);
+            write3(parameters.places.b.y + at, basis[k] * d_color);
             d_direction += slopes[k] * dot3(d_color, vec3<f32>(sh_rest[at], sh_rest[at + 1u], sh_rest[at + 2u]));
         }
     }
     for (var k = used; k <= rest; k++) {
-        write3(parameters.parts.b.y + 3u * (rest * i + k - 1u), vec3<f32>(0.0));
+        write3(parameters.places.b.y + 3u * (rest * i + k - 1u), vec3<f32>(0.0));
     }
     if (view.counts.y == 0u || distance == 0.0) {
         return vec3<f32>(0.0);
@@ -65,18 +65,18 @@ fn color_backward(i: u32, mean: vec3<f32>, upstream: vec3<f32>, state: u32) -> v
 }
 
 fn write_nothing(i: u32) {
-    write3(parameters.parts.a.x + 3u * i, vec3<f32>(0.0));
+    write3(parameters.places.a.x + 3u * i, vec3<f32>(0.0));
     for (var k = 0u; k < 4u; k++) {
-        gradients[parameters.parts.a.y + 4u * i + k] = 0.0;
+        gradients[parameters.places.a.y + 4u * i + k] = 0.0;
     }
-    write3(parameters.parts.a.z + 3u * i, vec3<f32>(0.0));
-    gradients[parameters.parts.a.w + i] = 0.0;
-    write3(parameters.parts.b.x + 3u * i, vec3<f32>(0.0));
+    write3(parameters.places.a.z + 3u * i, vec3<f32>(0.0));
+    gradients[parameters.places.a.w + i] = 0.0;
+    write3(parameters.places.b.x + 3u * i, vec3<f32>(0.0));
     for (var k = 0u; k < 3u * view.counts.z; k++) {
-        gradients[parameters.parts.b.y + 3u * view.counts.z * i + k] = 0.0;
+        gradients[parameters.places.b.y + 3u * view.counts.z * i + k] = 0.0;
     }
-    gradients[parameters.parts.b.z + 2u * i] = 0.0;
-    gradients[parameters.parts.b.z + 2u * i + 1u] = 0.0;
+    gradients[parameters.places.b.z + 2u * i] = 0.0;
+    gradients[parameters.places.b.z + 2u * i + 1u] = 0.0;
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -113,10 +113,10 @@ fn main(
         -conic.y * moments.y - conic.z * moments.z,
     );
     let d_conic = vec3<f32>(-0.5 * moments.w, -moments_y.x, -0.5 * moments_y.y);
-    gradients[parameters.parts.a.w + i] = moments.x / opacity;
+    gradients[parameters.places.a.w + i] = moments.x / opacity;
     let d_offset = d_position * view.limits.zw;
-    gradients[parameters.parts.b.z + 2u * i] = d_offset.x;
-    gradients[parameters.parts.b.z + 2u * i + 1u] = d_offset.y;
+    gradients[parameters.places.b.z + 2u * i] = d_offset.x;
+    gradients[parameters.places.b.z + 2u * i + 1u] = d_offset.y;
 
     let mean = vec3<f32>(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
     let scale = vec3<f32>(scales[3u * i], scales[3u * i + 1u], scales[3u * i + 2u]);
@@ -141,13 +141,13 @@ fn main(
     let d_rs_y = g.row_x * d_factor_x.y + g.row_y * d_factor_y.y;
     let d_rs_z = g.row_x * d_factor_x.z + g.row_y * d_factor_y.z;
     write3(
-        parameters.parts.a.z + 3u * i,
+        parameters.places.a.z + 3u * i,
         vec3<f32>(dot3(d_rs_x, g.rotation.axis_x), dot3(d_rs_y, g.rotation.axis_y), dot3(d_rs_z, g.rotation.axis_z)),
     );
     let d_quat =
         rotation_backward(g.quat, g.quat_norm, d_rs_x * g.scale.x, d_rs_y * g.scale.y, d_rs_z * g.scale.z);
     for (var k = 0u; k < 4u; k++) {
-        gradients[parameters.parts.a.y + 4u * i + k] = d_quat[k];
+        gradients[parameters.places.a.y + 4u * i + k] = d_quat[k];
     }
     // d(J W) = dV (R S)^T
     let scaled_x = d_factor_x * g.scale;
@@ -173,5 +173,5 @@ fn main(
     let d_view = vec3<f32>(d_view_xy, d_view_z.x + d_view_z.y + linear.w);
     var d_mean = world_row(0u) * d_view.x + world_row(1u) * d_view.y + world_row(2u) * d_view.z;
     d_mean += color_backward(i, mean, linear.xyz, u32(splats[4u * i + 2u].w));
-    write3(parameters.parts.a.x + 3u * i, d_mean);
+    write3(parameters.places.a.x + 3u * i, d_mean);
 }

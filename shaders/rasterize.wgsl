@@ -8,8 +8,8 @@
 //   color += T · alpha · color_i,  depth += T · alpha · z_i,  T *= 1 - alpha
 //
 // Reads the cell's range in `order`, the numbers of intersections by cell, and `gaussians`, their Gaussians. Writes
-// `rendering`: color over the background [H, W, 3], then alpha [H, W], then depth [H, W]. Between two parts of a list
-// (see PART) the image holds the sums so far, and T, negative where the pixel has stopped, in the place of alpha.
+// `rendering`: color over the background [H, W, 3], then alpha [H, W], then depth [H, W]. Between two chunks of a list
+// (see CHUNK) the image holds the sums so far, and T, negative where the pixel has stopped, in the place of alpha.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
@@ -29,7 +29,7 @@ fn main(
         return;
     }
     let own = own_pixels(cell, lane);
-    let part = part_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
+    let chunk = chunk_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
     let pixel_count = view.size.x * view.size.y;
     let x = f32(own.x);
 
@@ -52,7 +52,7 @@ fn main(
         }
     }
 
-    for (var batch = part.x; batch < part.y; batch += TEAM) {
+    for (var batch = chunk.x; batch < chunk.y; batch += TEAM) {
         var open = transmittance[0] > vec4<f32>(0.0);
         for (var quad = 1u; quad < QUADS; quad++) {
             open = open | (transmittance[quad] > vec4<f32>(0.0));
@@ -60,9 +60,9 @@ fn main(
         if (!team_any(any(open), lane)) {
             break;
         }
-        let mine = 4u * gaussians[order[min(batch + lane, part.y - 1u)]];
+        let mine = 4u * gaussians[order[min(batch + lane, chunk.y - 1u)]];
         team_share(splats[mine], splats[mine + 1u], splats[mine + 2u], lane);
-        let size = min(TEAM, part.y - batch);
+        let size = min(TEAM, chunk.y - batch);
         for (var member = 0u; member < size; member++) {
             let center = team_read(0u, member);
             let conic = team_read(1u, member).xyz;

@@ -8,7 +8,7 @@
 // same layout. Writes ten sums over the cell's pixels for each of its intersections, at ten times its number: gradients
 // of red, green, blue and depth, then the moments of p = alpha · dS/dalpha: p, p dx, p dy, p dx², p dx dy, p dy².
 // Nobody else writes there, so that the sums do not depend on any order. `carried` holds T and the remainder of every
-// pixel between two parts of a list.
+// pixel between two chunks of a list.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
@@ -35,7 +35,7 @@ fn main(
         return;
     }
     let own = own_pixels(cell, lane);
-    let part = part_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
+    let chunk = chunk_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
     let pixel_count = view.size.x * view.size.y;
     let x = f32(own.x);
 
@@ -48,35 +48,35 @@ fn main(
     var up_depth: array<vec4<f32>, QUADS>;
     for (var k = 0u; k < PIXELS; k++) {
         let quad = k / 4u;
-        let part_of_quad = k % 4u;
-        transmittance[quad][part_of_quad] = -1.0;
+        let place_in_quad = k % 4u;
+        transmittance[quad][place_in_quad] = -1.0;
         if (in_image(own, k)) {
             let at = pixel_index(own, k);
             let rgb = vec3<f32>(upstream[3u * at], upstream[3u * at + 1u], upstream[3u * at + 2u]);
             let up_z = upstream[4u * pixel_count + at];
-            up_red[quad][part_of_quad] = rgb.x;
-            up_green[quad][part_of_quad] = rgb.y;
-            up_blue[quad][part_of_quad] = rgb.z;
-            up_depth[quad][part_of_quad] = up_z;
+            up_red[quad][place_in_quad] = rgb.x;
+            up_green[quad][place_in_quad] = rgb.y;
+            up_blue[quad][place_in_quad] = rgb.z;
+            up_depth[quad][place_in_quad] = up_z;
             if (view.cells.z > 0u) {
-                transmittance[quad][part_of_quad] = carried[at];
-                left[quad][part_of_quad] = carried[pixel_count + at];
+                transmittance[quad][place_in_quad] = carried[at];
+                left[quad][place_in_quad] = carried[pixel_count + at];
             } else {
-                transmittance[quad][part_of_quad] = 1.0;
+                transmittance[quad][place_in_quad] = 1.0;
                 let color = vec3<f32>(rendering[3u * at], rendering[3u * at + 1u], rendering[3u * at + 2u]);
                 // The background's value; alpha is 1 - T, hence the minus.
-                left[quad][part_of_quad] = dot3(color, rgb) + rendering[4u * pixel_count + at] * up_z
+                left[quad][place_in_quad] = dot3(color, rgb) + rendering[4u * pixel_count + at] * up_z
                     - (1.0 - rendering[3u * pixel_count + at]) * upstream[3u * pixel_count + at];
             }
         }
     }
 
-    for (var batch = part.x; batch < part.y; batch += TEAM) {
+    for (var batch = chunk.x; batch < chunk.y; batch += TEAM) {
         var open = transmittance[0] > vec4<f32>(0.0);
         for (var quad = 1u; quad < QUADS; quad++) {
             open = open | (transmittance[quad] > vec4<f32>(0.0));
         }
-        let size = min(TEAM, part.y - batch);
+        let size = min(TEAM, chunk.y - batch);
         let number = order[batch + min(lane, size - 1u)];
         // What the member's own splat gets: red, green, blue, depth; p, p dx, p dy, p dx²; p dx dy, p dy².
         var linear = vec4<f32>(0.0);

@@ -3,7 +3,7 @@
 // Teams, cells, pixels and decisions as in `rasterize.wgsl`. Writes three sums over the cell's pixels for each of its
 // intersections, at three times its number: the pixels that blend the splat, T · alpha, and T, with T the transmittance
 // before the splat. Nobody else writes there, so that the sums do not depend on any order. `carried` holds T of every
-// pixel, negative where it has stopped, between two parts of a list.
+// pixel, negative where it has stopped, between two chunks of a list.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
@@ -28,7 +28,7 @@ fn main(
         return;
     }
     let own = own_pixels(cell, lane);
-    let part = part_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
+    let chunk = chunk_of(team_uniform(starts[cell], lane), team_uniform(starts[cell + 1u], lane));
     let x = f32(own.x);
 
     // T, negative once the pixel has stopped.
@@ -44,12 +44,12 @@ fn main(
         transmittance[k / 4u][k % 4u] = before;
     }
 
-    for (var batch = part.x; batch < part.y; batch += TEAM) {
+    for (var batch = chunk.x; batch < chunk.y; batch += TEAM) {
         var open = transmittance[0] > vec4<f32>(0.0);
         for (var quad = 1u; quad < QUADS; quad++) {
             open = open | (transmittance[quad] > vec4<f32>(0.0));
         }
-        let size = min(TEAM, part.y - batch);
+        let size = min(TEAM, chunk.y - batch);
         let number = order[batch + min(lane, size - 1u)];
         // What the member's own splat gets.
         var own_sums = vec4<f32>(0.0);

@@ -14,7 +14,7 @@ struct View {
     limits: vec4<f32>,
     // Width and height in pixels, then in tiles.
     size: vec4<u32>,
-    // Columns and rows of cells, then: which part of the lists is blended, and whether it is the last one.
+    // Columns and rows of cells, then: which chunk of the lists is blended, and whether it is the last one.
     cells: vec4<u32>,
     // Gaussians, active SH degree, coefficients of `sh_rest` a Gaussian.
     counts: vec4<u32>,

@@ -10,8 +10,8 @@ use cubecl::server::Handle;
 use super::kernel::first_lines;
 use crate::gpu_error::GpuError;
 
-/// Parts of a buffer begin at multiples of this many values: every adapter can bind there.
-pub(super) const PART_ALIGNMENT: usize = 64;
+/// Tensors within a buffer begin at multiples of this many values: every adapter can bind there.
+pub(super) const PLACE_ALIGNMENT: usize = 64;
 
 /// A wgpu device.
 pub(super) struct Gpu {
@@ -36,7 +36,7 @@ impl Gpu {
 
     /// Room for `count` values of four bytes, at least one.
     pub(super) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
-        let bytes = 4 * count.max(PART_ALIGNMENT) as u64;
+        let bytes = 4 * count.max(PLACE_ALIGNMENT) as u64;
         let limit = self.client.properties().memory.max_page_size;
         if bytes > limit {
             return Err(GpuError::TooLarge { buffer, bytes, limit });
@@ -44,7 +44,7 @@ impl Gpu {
         Ok(self.client.empty(bytes as usize))
     }
 
-    /// A float32 tensor over a buffer or a part of it.
+    /// A float32 tensor over a buffer or a piece of it.
     pub(super) fn tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
         CubeTensor::new_contiguous(self.client.clone(), self.device.clone(), shape, handle, DType::F32)
     }
@@ -74,7 +74,7 @@ fn failed(operation: &'static str, error: &impl std::fmt::Display) -> GpuError {
 pub(super) fn buffer_of(tensor: CubeTensor) -> Handle {
     assert_eq!(tensor.dtype, DType::F32, "the custom operations take float32 tensors");
     if tensor.meta.shape().num_elements() == 0 {
-        return tensor.client.empty(4 * PART_ALIGNMENT);
+        return tensor.client.empty(4 * PLACE_ALIGNMENT);
     }
     into_contiguous(tensor).handle
 }
@@ -86,27 +86,27 @@ pub(super) fn first_words(buffer: &Handle, count: usize) -> Handle {
 }
 
 /// Several arrays in one buffer, each beginning where it may be bound.
-pub(super) struct Parts {
+pub(super) struct Places {
     pub(super) starts: Vec<usize>,
     lengths: Vec<usize>,
     pub(super) total: usize,
 }
 
-impl Parts {
+impl Places {
     pub(super) fn new(lengths: &[usize]) -> Self {
         let mut total = 0;
         let starts = lengths
             .iter()
             .map(|length| {
                 let start = total;
-                total += length.next_multiple_of(PART_ALIGNMENT).max(PART_ALIGNMENT);
+                total += length.next_multiple_of(PLACE_ALIGNMENT).max(PLACE_ALIGNMENT);
                 start
             })
             .collect();
         Self { starts, lengths: lengths.to_vec(), total }
     }
 
-    /// Part `k` of the buffer that holds them all.
+    /// Array `k` of the buffer that holds them all.
     pub(super) fn of(&self, buffer: &Handle, k: usize) -> Handle {
         let start = 4 * self.starts[k] as u64;
         let end = start + 4 * self.lengths[k].max(1) as u64;

@@ -6,7 +6,7 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 
-use super::context::{Gpu, Parts, buffer_of, first_words};
+use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
 use super::stages::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
@@ -99,7 +99,7 @@ fn backward(
     let handed = gpu.allocate("gradients of samples", 4 * layout.quads() * samples)?;
     let cells = gpu.allocate("cells of samples", samples)?;
     let fractions = gpu.allocate("fractions of samples", 2 * samples)?;
-    let of_points = Parts::new(&[4 * layout.points]);
+    let of_points = Places::new(&[4 * layout.points]);
     let point_gradients = gpu.allocate("gradients of points", of_points.total)?;
     Launch::new(&gpu.client, HEXPLANE_QUERY_BACKWARD)
         .reads(&points)
@@ -114,13 +114,13 @@ fn backward(
 
     let sorted = sort(&gpu, &cells, samples, bits_for(layout.cells()))?;
     let starts = ranges(&gpu, &sorted.keys, samples, layout.cells())?;
-    let parts = Parts::new(&layout.planes.each_ref().map(|shape| shape.num_elements()));
-    let gradients = gpu.allocate("gradients of planes", parts.total)?;
+    let places = Places::new(&layout.planes.each_ref().map(|shape| shape.num_elements()));
+    let gradients = gpu.allocate("gradients of planes", places.total)?;
     // No cell has more samples than there are points, and each takes a round of a loop a vector.
     let at_most = (gpu.longest_loop() / layout.quads()).clamp(1, layout.points.max(1));
     for begin in (0..layout.points.max(1)).step_by(at_most) {
         let mut uniform = layout.uniform();
-        uniform.extend(parts.starts.iter().chain(&[begin, at_most]).map(|value| *value as u32));
+        uniform.extend(places.starts.iter().chain(&[begin, at_most]).map(|value| *value as u32));
         Launch::new(&gpu.client, HEXPLANE_GATHER)
             .reads(&starts)
             .reads(&sorted.order)
@@ -136,7 +136,7 @@ fn backward(
     let mut k = 0;
     let planes = layout.planes.map(|shape| {
         k += 1;
-        gpu.tensor(parts.of(&gradients, k - 1), shape)
+        gpu.tensor(places.of(&gradients, k - 1), shape)
     });
     Ok(QueryGradients { points, planes })
 }

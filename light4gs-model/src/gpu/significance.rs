@@ -20,9 +20,9 @@ fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, Gp
     let gpu = Gpu::of(&inputs.means)?;
     let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, view)?;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
-    let parts = frame.parts(lists.count);
-    let carried = gpu.allocate("pixels between parts", if parts > 1 { frame.pixels() } else { 0 })?;
-    for part in 0..parts {
+    let chunks = frame.chunks(lists.count);
+    let carried = gpu.allocate("pixels between chunks", if chunks > 1 { frame.pixels() } else { 0 })?;
+    for chunk in 0..chunks {
         frame
             .team
             .launch(&gpu, SIGNIFICANCE)
@@ -30,9 +30,9 @@ fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, Gp
             .reads(&lists.order)
             .reads(&lists.gaussians)
             .reads(&lists.splats)
-            .updates_if(part > 0, &sums)
-            .updates_if(part > 0, &carried)
-            .uniform(&frame.uniform(part, parts))
+            .updates_if(chunk > 0, &sums)
+            .updates_if(chunk > 0, &carried)
+            .uniform(&frame.uniform(chunk, chunks))
             .groups(frame.cells())?;
     }
 

@@ -6,11 +6,11 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 
-use super::context::{Gpu, Parts, buffer_of, first_words};
+use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
 use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
-use super::team::{PART, Team};
+use super::team::{CHUNK, Team};
 use crate::cpu::project::{FRUSTUM_MARGIN, TILE, View};
 use crate::cpu::rasterize::CHANNELS;
 use crate::gpu_error::GpuError;
@@ -42,8 +42,8 @@ impl Frame {
         self.size().iter().map(|side| side.div_ceil(self.team.cell) as usize).product()
     }
 
-    /// `View` of `shaders/include/view.wgsl`. `part` of the cells' lists, of `parts`.
-    pub(super) fn uniform(&self, part: usize, parts: usize) -> Vec<u32> {
+    /// `View` of `shaders/include/view.wgsl`. `chunk` of the cells' lists, of `chunks`.
+    pub(super) fn uniform(&self, chunk: usize, chunks: usize) -> Vec<u32> {
         let camera = &self.view.camera;
         let [width, height] = self.size();
         let (tan_x, tan_y) = camera.tan_half_fov();
@@ -61,15 +61,15 @@ impl Frame {
         let side = self.team.cell;
         let words = [
             [width, height, width.div_ceil(TILE as u32), height.div_ceil(TILE as u32)],
-            [width.div_ceil(side), height.div_ceil(side), part as u32, u32::from(part + 1 == parts)],
+            [width.div_ceil(side), height.div_ceil(side), chunk as u32, u32::from(chunk + 1 == chunks)],
             [self.gaussians as u32, self.view.sh_degree as u32, self.rest as u32, 0],
         ];
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
 
     /// Launches that the longest possible list takes: no Gaussian is in a cell's list twice.
-    pub(super) fn parts(&self, intersections: usize) -> usize {
-        intersections.min(self.gaussians).div_ceil(PART).max(1)
+    pub(super) fn chunks(&self, intersections: usize) -> usize {
+        intersections.min(self.gaussians).div_ceil(CHUNK).max(1)
     }
 }
 
@@ -176,8 +176,8 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
 
 fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, GpuError> {
     let rendering = gpu.allocate("image", CHANNELS * frame.pixels())?;
-    let parts = frame.parts(lists.count);
-    for part in 0..parts {
+    let chunks = frame.chunks(lists.count);
+    for chunk in 0..chunks {
         frame
             .team
             .launch(gpu, RASTERIZE)
@@ -185,8 +185,8 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
             .reads(&lists.order)
             .reads(&lists.gaussians)
             .reads(&lists.splats)
-            .updates_if(part > 0, &rendering)
-            .uniform(&frame.uniform(part, parts))
+            .updates_if(chunk > 0, &rendering)
+            .uniform(&frame.uniform(chunk, chunks))
             .groups(frame.cells())?;
     }
     Ok(rendering)
@@ -240,9 +240,9 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
     let upstream = buffer_of(upstream);
     let GpuSplatSaved { frame, shapes, inputs, intersections: lists, rendering } = saved;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
-    let parts = frame.parts(lists.count);
-    let carried = gpu.allocate("pixels between parts", if parts > 1 { 2 * frame.pixels() } else { 0 })?;
-    for part in 0..parts {
+    let chunks = frame.chunks(lists.count);
+    let carried = gpu.allocate("pixels between chunks", if chunks > 1 { 2 * frame.pixels() } else { 0 })?;
+    for chunk in 0..chunks {
         frame
             .team
             .launch(&gpu, RASTERIZE_BACKWARD)
@@ -253,12 +253,12 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
             .reads(&rendering)
             .reads(&upstream)
             .writes(&sums)
-            .updates_if(part > 0, &carried)
-            .uniform(&frame.uniform(part, parts))
+            .updates_if(chunk > 0, &carried)
+            .uniform(&frame.uniform(chunk, chunks))
             .groups(frame.cells())?;
     }
 
-    let layout = Parts::new(&shapes.each_ref().map(|shape| shape.num_elements()));
+    let layout = Places::new(&shapes.each_ref().map(|shape| shape.num_elements()));
     let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
     let mut uniform = frame.uniform(0, 1);
     uniform.extend(layout.starts.iter().map(|start| *start as u32));

@@ -12,7 +12,7 @@ use crate::gpu_error::GpuError;
 
 /// Intersections of a cell that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
 /// graphics driver may stop a launch that runs for seconds.
-pub(super) const PART: usize = 32768;
+pub(super) const CHUNK: usize = 32768;
 
 /// Who blends a cell: a team of invocations, and how its members meet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Team {
         Launch::new(&gpu.client, stage)
             .team(self.members, self.includes)
             .constant("CELL", self.cell)
-            .constant("PART", PART as u32)
+            .constant("CHUNK", CHUNK as u32)
     }
 }
 
