@@ -1,18 +1,100 @@
 //! Files that are either complete or absent: write beside, flush to the disk, then rename.
+//!
+//! What is being written is locked by its writer, and the lock ends with the process: a temporary file that nobody has
+//! locked was left by a write that was killed, and is swept.
 
 use crate::error::DataError;
+use std::collections::BTreeSet;
 use std::fs::{self, File};
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+
+/// How names of temporary files begin.
+const PREFIX: &str = ".light4gs-";
 
 /// A name in the folder of `path` that no other call of this process uses.
 ///
 /// It does not contain the name of `path`, so that a name of the longest legal length still works.
-pub(crate) fn sibling(path: &Path) -> PathBuf {
+fn sibling(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let count = COUNTER.fetch_add(1, Ordering::Relaxed);
-    path.with_file_name(format!(".light4gs-{}-{count}.part", std::process::id()))
+    path.with_file_name(format!("{PREFIX}{}-{count}.part", std::process::id()))
+}
+
+/// The folder that `path` lies in.
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Whether a file or a folder of this name is one that [`write_atomically`] writes before it gets its name.
+pub fn is_temporary_name(name: &str) -> bool {
+    name.starts_with(PREFIX) && (name.ends_with(".part") || name.ends_with(".tmp"))
+}
+
+/// Removes what writes that were killed have left in a folder: temporary files and folders that no process has locked.
+/// What cannot be read or removed stays; a folder that is not there has nothing to sweep.
+pub fn sweep_leftovers(folder: &Path) {
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if entry.file_name().to_str().is_some_and(is_temporary_name) {
+            remove_unless_locked(&entry.path());
+        }
+    }
+}
+
+/// Removes a file or folder that no process has locked.
+fn remove_unless_locked(path: &Path) {
+    // Nothing else than a file or a folder: opening a pipe would wait for its other end.
+    let Ok(kind) = fs::symlink_metadata(path).map(|metadata| metadata.file_type()) else { return };
+    if !(kind.is_file() || kind.is_dir()) {
+        return;
+    }
+    let Ok(file) = File::open(path) else { return };
+    if file.try_lock().is_ok() {
+        let _ = if kind.is_dir() { fs::remove_dir_all(path) } else { fs::remove_file(path) };
+    }
+}
+
+/// Sweeps a folder before this process first writes into it.
+fn sweep_once(folder: &Path) {
+    static SWEPT: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+    let first = SWEPT.lock().is_ok_and(|mut swept| swept.insert(folder.to_owned()));
+    if first {
+        sweep_leftovers(folder);
+    }
+}
+
+/// Locks a new temporary file. False if a sweep was faster: between its making and its locking it looks left behind.
+fn claim(part: &Path, file: &File) -> bool {
+    match file.lock() {
+        Ok(()) => part.symlink_metadata().is_ok(),
+        // A file system without locks: sweeps cannot lock it either, and leave it alone.
+        Err(_) => true,
+    }
+}
+
+/// Makes a folder under a temporary name beside `path`, lets `fill` fill it, and gives it its name when that is done.
+/// `path` must not exist, or be an empty folder.
+pub(crate) fn make_folder_atomically(
+    path: &Path,
+    fill: impl FnOnce(&Path) -> Result<(), DataError>,
+) -> Result<(), DataError> {
+    sweep_once(folder_of(path));
+    let part = sibling(path);
+    fs::create_dir_all(&part).map_err(DataError::io("create", &part))?;
+    // Where a folder cannot be opened and locked, it is not swept either.
+    let _locked = File::open(&part).map(|folder| claim(&part, &folder).then_some(folder));
+    let made = fill(&part).and_then(|()| {
+        if path.is_dir() {
+            fs::remove_dir(path).map_err(DataError::io("replace", path))?;
+        }
+        fs::rename(&part, path).map_err(DataError::io("create", path))
+    });
+    if made.is_err() {
+        let _ = fs::remove_dir_all(&part);
+    }
+    made
 }
 
 /// Writes a file so that a reader sees the old content or the new, never a part.
@@ -54,10 +136,12 @@ pub fn write_atomically(
 
 /// A new, empty file beside `path`. A name that is taken (a leftover of a process of the same number) is passed over.
 fn create_sibling(path: &Path) -> io::Result<(PathBuf, File)> {
+    sweep_once(folder_of(path));
     loop {
         let part = sibling(path);
         match File::create_new(&part) {
             Err(error) if error.kind() == io::ErrorKind::AlreadyExists => {}
+            Ok(file) if !claim(&part, &file) => {}
             created => return created.map(|file| (part, file)),
         }
     }
@@ -75,7 +159,7 @@ fn flush_folder(path: &Path) -> io::Result<()> {
     if !cfg!(unix) {
         return Ok(());
     }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = folder_of(path);
     let harmless = [io::ErrorKind::Unsupported, io::ErrorKind::InvalidInput, io::ErrorKind::PermissionDenied];
     match File::open(folder).and_then(|folder| folder.sync_all()) {
         Err(error) if !harmless.contains(&error.kind()) => Err(error),
@@ -113,6 +197,26 @@ mod tests {
         let message = write_atomically(&taken, |_| Ok(())).unwrap_err().to_string();
         assert!(message.contains("a folder"), "{message}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn what_killed_writes_left_is_swept_and_what_is_being_written_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let left = folder.path().join(".light4gs-1-0.part");
+        let left_folder = folder.path().join(".light4gs-1-1.part");
+        let theirs = folder.path().join(".light4gs-notes.md");
+        fs::write(&left, b"half").unwrap();
+        fs::create_dir_all(left_folder.join("train")).unwrap();
+        fs::write(&theirs, b"mine").unwrap();
+        write_atomically(&folder.path().join("a.bin"), |out| {
+            assert!(!left.exists() && !left_folder.exists() && theirs.exists());
+            // A sweep of somebody else meanwhile.
+            sweep_leftovers(folder.path());
+            out.write_all(b"whole")
+        })
+        .unwrap();
+        assert_eq!(fs::read(folder.path().join("a.bin")).unwrap(), b"whole");
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[test]

@@ -7,6 +7,7 @@ use light4gs_data::DataError;
 use light4gs_model::{GpuError, ModelError};
 
 use crate::config::ConfigError;
+use crate::trainer::Divergence;
 
 /// An error of training, evaluation or the command line.
 #[derive(Debug, thiserror::Error)]
@@ -32,29 +33,28 @@ pub enum TrainError {
     /// A folder holds a run already.
     #[error("{} holds a run already; give --overwrite to replace it, or `light4gs resume` to continue it", .0.display())]
     RunExists(PathBuf),
-    /// A checkpoint that cannot be read.
-    #[error("checkpoint {}: {problem}; resume from another one, or train anew", path.display())]
+    /// Another process writes into a run's folder.
+    #[error("{} is in use by {holder}: wait until that is over, or name another folder", root.display())]
+    RunInUse {
+        /// The folder.
+        root: PathBuf,
+        /// Who holds it, as far as is known.
+        holder: String,
+    },
+    /// A checkpoint that cannot be gone on from.
+    #[error(
+        "checkpoint {}: {problem}. Remove the file, and `light4gs resume` goes on from the checkpoint before it",
+        path.display()
+    )]
     Checkpoint {
         /// The file.
         path: PathBuf,
-        /// What was found and expected.
+        /// What was found and expected, with the tensor.
         problem: String,
     },
-    /// The loss is not finite.
-    #[error(
-        "the loss became {loss} in the {stage} stage at iteration {iteration}; last good checkpoint: {checkpoint}. \
-         Lower the learning rates and resume from it"
-    )]
-    NotFinite {
-        /// Stage by name.
-        stage: &'static str,
-        /// Iteration, from 1.
-        iteration: usize,
-        /// As found.
-        loss: f32,
-        /// Path, or `none`.
-        checkpoint: String,
-    },
+    /// Numbers of the training are no longer finite.
+    #[error(transparent)]
+    Diverged(Box<Divergence>),
 }
 
 impl TrainError {
@@ -62,7 +62,7 @@ impl TrainError {
     pub fn is_internal(&self) -> bool {
         match self {
             Self::Codec(error) => error.is_internal(),
-            Self::NotFinite { .. } | Self::Gpu(_) => true,
+            Self::Gpu(_) => true,
             _ => false,
         }
     }

@@ -9,7 +9,7 @@ mod render;
 mod shapes;
 mod world;
 
-use crate::atomic::{sibling, write_atomically};
+use crate::atomic::{make_folder_atomically, write_atomically};
 use crate::camera::Camera;
 use crate::error::DataError;
 use crate::images::save_png;
@@ -101,18 +101,7 @@ pub fn write_synthetic(root: &Path, options: &SyntheticOptions) -> Result<(), Da
     if let Some(parent) = root.parent().filter(|p| !p.as_os_str().is_empty()) {
         fs::create_dir_all(parent).map_err(DataError::io("create", parent))?;
     }
-    let part = sibling(root);
-    let result = write_folder(&part, options).and_then(|()| {
-        if root.is_dir() {
-            fs::remove_dir(root).map_err(DataError::io("replace", root))?;
-        }
-        fs::rename(&part, root).map_err(DataError::io("create", root))
-    });
-    if result.is_err() {
-        // The first error is the one to report; a leftover is all that could go wrong here.
-        let _ = fs::remove_dir_all(&part);
-    }
-    result
+    make_folder_atomically(root, |part| write_folder(part, options))
 }
 
 fn write_folder(folder: &Path, options: &SyntheticOptions) -> Result<(), DataError> {

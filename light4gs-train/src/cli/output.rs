@@ -1,5 +1,6 @@
 //! What a command prints.
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
@@ -7,7 +8,7 @@ use crate::error::TrainError;
 
 /// Prints a line, or a table. A reader that went away, such as `head`, is no error: the work goes on without it.
 pub(super) fn say(text: impl Display) -> Result<(), TrainError> {
-    match writeln!(std::io::stdout().lock(), "{text}") {
+    match writeln!(std::io::stdout().lock(), "{}", printable(&text.to_string())) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(TrainError::Input(format!(
             "cannot write to standard output: {error}; redirect it to where there is room"
         ))),
@@ -17,10 +18,36 @@ pub(super) fn say(text: impl Display) -> Result<(), TrainError> {
 
 /// Prints a line, or a table, on standard error. Where even that takes nothing there is nobody left to tell.
 pub(super) fn tell(text: impl Display) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
 }
 
 /// Prints a value as pretty JSON.
 pub(super) fn say_json(value: &impl serde::Serialize) -> Result<(), TrainError> {
     say(serde_json::to_string_pretty(value).expect("plain data has a JSON form"))
+}
+
+/// Text for a terminal. Names come from files of strangers and could hold what a terminal obeys: control characters, and
+/// marks that turn the direction of writing, are written as JSON escapes.
+fn printable(text: &str) -> Cow<'_, str> {
+    let obeyed = |c: char| {
+        let turns =
+            matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}' | '\u{61c}');
+        turns || (c.is_control() && c != '\n' && c != '\t')
+    };
+    if !text.contains(obeyed) {
+        return Cow::Borrowed(text);
+    }
+    let escape = |c: char| if obeyed(c) { format!("\\u{:04x}", u32::from(c)) } else { c.to_string() };
+    Cow::Owned(text.chars().map(escape).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::printable;
+
+    #[test]
+    fn a_terminal_gets_nothing_that_it_obeys() {
+        assert_eq!(printable("a\tb\n█ ×"), "a\tb\n█ ×");
+        assert_eq!(printable("\u{1b}]0;x\u{7}\r\u{9b}2J\u{202e}"), "\\u001b]0;x\\u0007\\u000d\\u009b2J\\u202e");
+    }
 }

@@ -2,6 +2,7 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
+use super::output::tell;
 use crate::Stage;
 use crate::error::TrainError;
 use crate::observers::metrics_log::MetricsRecord;
@@ -40,6 +41,11 @@ impl Observer for ProgressBars {
         if let Some(psnr) = record.psnr {
             self.stage.set_message(format!("{psnr:.2} dB  {} Gaussians", record.gaussians));
         }
+        Ok(())
+    }
+
+    fn on_warning(&mut self, warning: &str) -> Result<(), TrainError> {
+        self.stage.suspend(|| tell(format_args!("warning: {warning}")));
         Ok(())
     }
 

@@ -77,7 +77,7 @@ pub(super) fn train(
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
     Scene::open(scene, &load_options(&config))?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
-    let (folder, record, config) = RunFolder::open(folder.root())?;
+    let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;
     finish(trainer, &folder, &config, output)
 }
@@ -102,8 +102,10 @@ pub(super) fn train_to_evaluation(
         if let Some(like) = like {
             folder.adopt(&RunFolder::open(like)?.0)?;
         }
+        // Dropped here: the folder is locked again below.
     }
-    let (folder, record, found) = RunFolder::open(out)?;
+    let (mut folder, record, found) = RunFolder::open(out)?;
+    folder.lock()?;
     if found != config || record.scene != std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned()) {
         let out = out.display();
         return Err(TrainError::Input(format!(
@@ -156,6 +158,10 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &Ru
 pub(super) struct Resume {
     /// Folder of the run.
     run: PathBuf,
+    /// Changes one key of the run's configuration from here on, such as a learning rate that was too high; may be given
+    /// more than once. What has been trained must still fit.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
     /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
@@ -165,9 +171,16 @@ pub(super) struct Resume {
 
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let (folder, record, mut config) = RunFolder::open(&self.run)?;
+        let (mut folder, record, found) = RunFolder::open(&self.run)?;
+        folder.lock()?;
+        let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
+        let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
         let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
+        if changed != found {
+            // Only now that the checkpoint has been found to fit. The next `resume` goes on with it as well.
+            folder.write("config.toml", changed.to_toml().as_bytes())?;
+        }
         finish(trainer, &folder, &config, &self.output)
     }
 }
@@ -192,7 +205,8 @@ impl Eval {
         if self.run.is_file() {
             return self.eval_file();
         }
-        let (folder, mut record, mut config) = RunFolder::open(&self.run)?;
+        let (mut folder, mut record, mut config) = RunFolder::open(&self.run)?;
+        folder.lock()?;
         if !folder.stream().exists() {
             let run = self.run.display();
             return Err(TrainError::Input(format!(
@@ -261,12 +275,9 @@ pub(super) fn coding_table(record: &CodingRecord) -> Table {
         ("bits in the file", Align::Right),
         ("difference", Align::Right),
     ]);
-    let (expected, coded) = (record.estimated_bits, record.coded_bits);
-    for (part, expected, coded) in
-        [("hexplanes", expected.hexplanes, coded.hexplanes), ("spherical harmonics", expected.sh, coded.sh)]
-    {
-        let difference = if coded > 0.0 { (expected - coded) / coded * 100.0 } else { 0.0 };
-        table.row([part.to_owned(), format!("{expected:.0}"), format!("{coded:.0}"), format!("{difference:+.2} %")]);
+    for part in record.parts() {
+        let (expected, coded) = (format!("{:.0}", part.expected), format!("{:.0}", part.coded));
+        table.row([part.name.to_owned(), expected, coded, part.difference()]);
     }
     table
 }

@@ -35,6 +35,39 @@ pub struct CodingRecord {
     pub planes: Vec<PlaneRecord>,
 }
 
+/// A part of a file with trained models: the bits expected of it, and those that it took.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CodedPart {
+    /// What it is.
+    pub name: &'static str,
+    /// Bits that the models of the training give.
+    pub expected: f64,
+    /// Bits in the file.
+    pub coded: f64,
+}
+
+impl CodedPart {
+    /// By how much the expectation was off, as a share of the real bits. Where there are none, no share can be given.
+    pub fn difference(&self) -> String {
+        match (self.coded > 0.0, self.expected.round() > 0.0) {
+            (true, _) => format!("{:+.2} %", (self.expected - self.coded) / self.coded * 100.0),
+            (false, true) => "nothing coded".to_owned(),
+            (false, false) => "-".to_owned(),
+        }
+    }
+}
+
+impl CodingRecord {
+    /// The parts that have trained models.
+    pub fn parts(&self) -> [CodedPart; 2] {
+        let (expected, coded) = (self.estimated_bits, self.coded_bits);
+        [
+            CodedPart { name: "hexplanes", expected: expected.hexplanes, coded: coded.hexplanes },
+            CodedPart { name: "spherical harmonics", expected: expected.sh, coded: coded.sh },
+        ]
+    }
+}
+
 /// How a plane was coded.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlaneRecord {
@@ -163,4 +196,17 @@ fn mean_squared_error(pixels: &[f32], views: &[&Frame], images: &dyn ImageSource
         rest = others;
     }
     Ok(sum / pixels.len().max(1) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::CodedPart;
+
+    #[test]
+    fn a_share_of_nothing_is_no_share() {
+        let difference = |expected, coded| CodedPart { name: "planes", expected, coded }.difference();
+        assert_eq!(difference(101.0, 100.0), "+1.00 %");
+        assert_eq!(difference(108_299.0, 0.0), "nothing coded");
+        assert_eq!(difference(0.0, 0.0), "-");
+    }
 }

@@ -13,7 +13,7 @@ mod fit;
 mod rate;
 mod step_search;
 
-pub use code_scene::{CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
+pub use code_scene::{CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
 pub use encoder::{
     BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, freeze_planes,
 };

@@ -44,12 +44,14 @@ pub enum ConfigError {
         /// Why.
         source: std::io::Error,
     },
-    /// Text that is not TOML.
-    #[error("{origin}: not valid TOML: {message}")]
+    /// Text that is not TOML. What stands there is not quoted: the file may be any that `extends` names.
+    #[error("{origin}{}: not valid TOML: {message}", at_line(*line))]
     Syntax {
         /// Where.
         origin: Origin,
-        /// What the parser says, with line and column.
+        /// Line, from 1, where known.
+        line: Option<usize>,
+        /// What the parser says.
         message: String,
     },
     /// A key that does not exist.

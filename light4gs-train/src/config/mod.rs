@@ -49,6 +49,9 @@ pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use prune::{PruneConfig, PruneScore, PruneVolume};
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
 
+/// Files of configurations are far shorter.
+pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;
+
 /// The complete configuration of a run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]

@@ -130,10 +130,15 @@ impl DensityStrategy for AdaptiveDensityControl {
 
     fn restore(&mut self, mut state: BTreeMap<String, Tensor<1>>, count: usize) -> Result<(), String> {
         let mut take = |name: &str| {
-            let tensor = state.remove(name).ok_or_else(|| format!("density statistic `{name}`: nothing found"))?;
+            let wrong = |what: String| format!("tensor `density.{name}` {what}");
+            let tensor = state.remove(name).ok_or_else(|| wrong("is missing".to_owned()))?;
             match tensor.dims() {
-                [found] if found == count => Ok(tensor),
-                [found] => Err(format!("density statistic `{name}`: expected {count} values, found {found}")),
+                [found] if found == count => {}
+                [found] => return Err(wrong(format!("has {found} values, expected {count}, one a Gaussian"))),
+            }
+            match tensor.to_data().iter::<f32>().find(|value| *value < 0.0) {
+                Some(value) => Err(wrong(format!("has the value {value}, expected none below 0"))),
+                None => Ok(tensor),
             }
         };
         self.statistics = Some(DensityStatistics {
@@ -141,6 +146,9 @@ impl DensityStrategy for AdaptiveDensityControl {
             views: take("views")?,
             largest_radius: take("largest_radius")?,
         });
-        Ok(())
+        match state.keys().next() {
+            Some(name) => Err(format!("tensor `density.{name}` belongs to no statistic of the density control")),
+            None => Ok(()),
+        }
     }
 }

@@ -4,12 +4,11 @@
 //! that it was writing. A run that resumes from a checkpoint first drops what came after it.
 
 use std::collections::BTreeMap;
-use std::fs::{self, File, OpenOptions};
+use std::fs::{File, OpenOptions};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use light4gs_data::DataError;
-use light4gs_data::write_atomically;
+use light4gs_data::{DataError, read_regular_file, write_atomically};
 use serde::{Deserialize, Serialize};
 
 use super::Observer;
@@ -141,7 +140,7 @@ struct Lines {
 
 fn read_lines(path: &Path) -> Result<Lines, DataError> {
     // The unfinished line may end within a character.
-    let bytes = fs::read(path).map_err(failed("read", path))?;
+    let bytes = read_regular_file(path, u64::MAX).map_err(failed("read", path))?;
     let text = String::from_utf8_lossy(&bytes);
     let finished = text.is_empty() || text.ends_with('\n');
     let count = text.lines().count();
@@ -188,6 +187,8 @@ fn failed(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> D
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
 
     fn record(stage: Stage, iteration: usize) -> MetricsRecord {

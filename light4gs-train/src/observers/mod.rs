@@ -78,6 +78,12 @@ pub trait Observer: Send {
         Ok(())
     }
 
+    /// Something that the user should know about the training, in words.
+    fn on_warning(&mut self, warning: &str) -> Result<(), TrainError> {
+        let _ = warning;
+        Ok(())
+    }
+
     /// Entropy models are fitted to a finished scene that was trained without them, and `done` of `iterations` are over.
     fn on_fit(&mut self, done: usize, iterations: usize) -> Result<(), TrainError> {
         let _ = (done, iterations);

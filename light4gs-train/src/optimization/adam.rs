@@ -101,6 +101,8 @@ impl<R: Fn(ParameterGroup) -> Option<f64>> ParameterMapper for Step<'_, R> {
         let joined = if self.prefix.is_empty() { path.to_owned() } else { format!("{}.{path}", self.prefix) };
         if let Some(rate) = ParameterGroup::of(&joined).and_then(&self.rate)
             && let Some(gradient) = self.gradients.remove(parameter.id)
+            // Spherical harmonics of degree 0 have no others: nothing to step, and no kernel takes nothing.
+            && parameter.shape().num_elements() > 0
         {
             let gradient = gradient.reshape(parameter.dims());
             self.adam.step(&joined, &mut parameter, gradient, rate);

@@ -50,6 +50,21 @@ const GROUPS: [(&str, &str, ParameterGroup); 11] = [
 ];
 
 impl ParameterGroup {
+    /// All of them.
+    pub const ALL: [Self; 11] = [
+        Self::Means,
+        Self::LogScales,
+        Self::Quats,
+        Self::Opacity,
+        Self::ShDc,
+        Self::ShRest,
+        Self::Grid,
+        Self::Deformation,
+        Self::Context,
+        Self::ShModel,
+        Self::Steps,
+    ];
+
     /// The group of a parameter. None for constants.
     pub fn of(path: &str) -> Option<Self> {
         let fits = |(beginning, name, _): &&(&str, &str, Self)| {

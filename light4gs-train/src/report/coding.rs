@@ -19,18 +19,15 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
         "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Part</th><th scope=\"col\" class=\"number\">Bits expected</th>\
          <th scope=\"col\" class=\"number\">Bits in the file</th><th scope=\"col\" class=\"number\">Difference</th></tr></thead>\n<tbody>\n",
     );
-    let (expected, coded) = (record.estimated_bits, record.coded_bits);
-    for (part, expected, coded) in
-        [("Hexplanes", expected.hexplanes, coded.hexplanes), ("Spherical harmonics", expected.sh, coded.sh)]
-    {
-        let difference = if coded > 0.0 { (expected - coded) / coded * 100.0 } else { 0.0 };
+    for part in record.parts() {
         let _ = writeln!(
             html,
-            "<tr><th scope=\"row\">{part}</th><td class=\"number\">{}</td><td class=\"number\">{}</td>\
-             <td class=\"number\">{}&nbsp;%</td></tr>",
-            count(expected.round() as u64),
-            count(coded as u64),
-            fixed(difference, 2)
+            "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td><td class=\"number\">{}</td>\
+             <td class=\"number\">{}</td></tr>",
+            sentence_case(part.name),
+            count(part.expected.round() as u64),
+            count(part.coded as u64),
+            part.difference().replace(' ', "&nbsp;")
         );
     }
     html.push_str(
@@ -56,6 +53,12 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
     html.push_str("</tbody>\n</table></div></details>\n");
     maps(&mut html, path, bit_maps)?;
     Ok(html)
+}
+
+/// With a capital at its beginning.
+fn sentence_case(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// One scale of colors for all planes, so that they can be compared.

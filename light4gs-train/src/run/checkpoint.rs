@@ -9,16 +9,16 @@ use std::path::{Path, PathBuf};
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_data::{DataError, PointCloud, write_atomically};
+use light4gs_data::{DataError, PointCloud, read_regular_file, write_atomically};
 use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField};
-use safetensors::{Dtype, SafeTensors};
 
+use super::stored_tensors::{self, Entry, StoredTensors, floats, not_finite};
 use crate::compression::Compression;
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::optimization::adam::{Adam, AdamState};
-use crate::optimization::parameters::{COMPRESSION, GaussianAttribute};
+use crate::optimization::parameters::{COMPRESSION, GaussianAttribute, ParameterGroup};
 use crate::stage::Stage;
 
 /// A run's state after an iteration.
@@ -40,9 +40,6 @@ pub struct Checkpoint<F: DeformationField = HexPlaneField> {
     pub seconds: f64,
 }
 
-/// A stored tensor: shape and little-endian float32 bytes.
-type Entry = (Vec<usize>, Vec<u8>);
-
 fn entry<const D: usize>(tensor: Tensor<D>) -> Entry {
     let shape = tensor.dims().to_vec();
     (shape, tensor.into_data().iter::<f32>().flat_map(f32::to_le_bytes).collect())
@@ -60,8 +57,14 @@ impl ParameterVisitor for Collect<'_> {
     }
 }
 
-/// Names of the stored parameters: those of the scene, and those of the entropy models, begin like this.
+/// Names of the scene's stored parameters begin like this; those of the entropy models with [`COMPRESSION`].
 const SCENE: &str = "scene";
+/// In front of a parameter's name: the optimizer's first moment, its second one, and the steps it has taken.
+const FIRST: &str = "first.";
+const SECOND: &str = "second.";
+const TIME: &str = "time.";
+/// In front of the names of the density strategy's statistics.
+const DENSITY: &str = "density.";
 
 impl<F: DeformationField> Checkpoint<F> {
     /// File name of a checkpoint.
@@ -69,12 +72,34 @@ impl<F: DeformationField> Checkpoint<F> {
         format!("{}_{iteration:06}.safetensors", stage.name())
     }
 
-    /// Writes the file whole or not at all.
-    pub fn save(&self, path: &Path) -> Result<(), TrainError> {
+    /// Everything that is stored, by name.
+    fn entries(&self) -> BTreeMap<String, Entry> {
         let mut entries = BTreeMap::new();
         visit_parameters(&self.scene, &mut Collect { prefix: SCENE, entries: &mut entries });
         if let Some(compression) = &self.compression {
             visit_parameters(compression, &mut Collect { prefix: COMPRESSION, entries: &mut entries });
+        }
+        for (name, state) in &self.adam.states {
+            entries.insert(format!("{FIRST}{name}"), entry(state.first.clone()));
+            entries.insert(format!("{SECOND}{name}"), entry(state.second.clone()));
+        }
+        for (name, tensor) in &self.density {
+            entries.insert(format!("{DENSITY}{name}"), entry(tensor.clone()));
+        }
+        entries
+    }
+
+    /// Writes the file whole or not at all: a checkpoint whose numbers are not all finite is not written, so that the last
+    /// one that was is one to go on from.
+    ///
+    /// # Errors
+    /// [`SaveError::NotFinite`] with the tensor; what the system refuses.
+    pub fn save(&self, path: &Path) -> Result<(), SaveError> {
+        let entries = self.entries();
+        for (name, (_, bytes)) in &entries {
+            if let Some((index, value)) = not_finite(floats(bytes)) {
+                return Err(SaveError::NotFinite { tensor: name.clone(), index, value });
+            }
         }
         let mut metadata = HashMap::from([
             ("field".to_owned(), F::KIND.to_owned()),
@@ -83,151 +108,206 @@ impl<F: DeformationField> Checkpoint<F> {
             ("seconds".to_owned(), self.seconds.to_string()),
         ]);
         for (name, state) in &self.adam.states {
-            entries.insert(format!("first.{name}"), entry(state.first.clone()));
-            entries.insert(format!("second.{name}"), entry(state.second.clone()));
-            metadata.insert(format!("time.{name}"), state.time.to_string());
+            metadata.insert(format!("{TIME}{name}"), state.time.to_string());
         }
-        for (name, tensor) in &self.density {
-            entries.insert(format!("density.{name}"), entry(tensor.clone()));
-        }
-
-        let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
-        let views = entries
-            .iter()
-            .map(|(name, (shape, bytes))| {
-                Ok((name, safetensors::tensor::TensorView::new(Dtype::F32, shape.clone(), bytes)?))
-            })
-            .collect::<Result<Vec<_>, safetensors::SafeTensorError>>()
-            .map_err(|error| failed(error.to_string()))?;
-        let bytes = safetensors::serialize(views, Some(metadata)).map_err(|error| failed(error.to_string()))?;
-        Ok(write_atomically(path, |file| file.write_all(&bytes))?)
+        let bytes = stored_tensors::serialize(&entries, metadata)
+            .map_err(|error| TrainError::Checkpoint { path: path.to_owned(), problem: error.to_string() })?;
+        Ok(write_atomically(path, |file| file.write_all(&bytes)).map_err(TrainError::from)?)
     }
 
     /// Reads a checkpoint of a run with this configuration and this deformation field onto an autodiff device.
     ///
+    /// Nothing in the file is believed: every tensor must be there, of the shape that the configuration and the number of
+    /// Gaussians give it, with finite values that training can have led to, and no other; the place in the run must be on
+    /// its schedule.
+    ///
     /// # Errors
-    /// [`TrainError::Checkpoint`] naming the tensor that is missing or of another shape, or the other kind of field.
+    /// [`TrainError::Checkpoint`] naming the tensor or the entry, or the other kind of field.
     pub fn load(path: &Path, config: &Config, field: &F::Config, device: &Device) -> Result<Self, TrainError> {
-        let bytes =
-            std::fs::read(path).map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
+        let bytes = read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
         let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
-        let file = SafeTensors::deserialize(&bytes).map_err(|error| failed(error.to_string()))?;
-        let (_, header) = SafeTensors::read_metadata(&bytes).map_err(|error| failed(error.to_string()))?;
-        let metadata = header.metadata().clone().unwrap_or_default();
-        let text = |key: &str| metadata.get(key).ok_or_else(|| failed(format!("`{key}` is missing")));
-        fn number<T: std::str::FromStr>(text: &str) -> Result<T, String> {
-            text.parse().map_err(|_| format!("`{text}` is not a number"))
-        }
-        let stage = match text("stage")?.as_str() {
-            "coarse" => Stage::Coarse,
-            "fine" => Stage::Fine,
-            other => return Err(failed(format!("unknown stage `{other}`"))),
-        };
-        let kind = text("field")?;
+        let mut file = StoredTensors::new(&bytes).map_err(failed)?;
+        let kind = file.text("field").map_err(failed)?;
         if kind != F::KIND {
             return Err(failed(format!("it has a deformation field of the kind `{kind}`, not `{}`", F::KIND)));
+        }
+        let (stage, iteration) = place(&file, path, config).map_err(failed)?;
+        let seconds = file.number::<f64>("seconds").map_err(failed)?;
+        if !(seconds.is_finite() && seconds >= 0.0) {
+            return Err(failed(format!("metadata `seconds` is {seconds}, expected a duration")));
         }
 
         // A model of the right structure, whose tensors are then replaced.
         let cloud = PointCloud { positions: vec![[0.0; 3]], colors: vec![[0.5; 3]] };
         let mut scene = config.model.scene::<F>(field.clone()).init(&cloud, device);
         let mut compression = Compression::of_run(config, scene.planes(), device)?;
-        let mut load = Load { prefix: SCENE, file: &file, device, problem: None };
+        let means = format!("{SCENE}.{}", GaussianAttribute::Means.path());
+        let count = file.rows(&means).unwrap_or(0);
+        if count == 0 {
+            return Err(failed(format!("tensor `{means}` has no rows, expected at least one Gaussian")));
+        }
+        let mut load = Load { prefix: SCENE, count, file: &mut file, device, sizes: BTreeMap::new(), problem: None };
         scene = map_parameters(scene, &mut load);
         load.prefix = COMPRESSION;
         compression = compression.map(|compression| map_parameters(compression, &mut load));
-        let inner = device.clone().inner();
-        let vector = |values: Vec<f32>| {
-            let shape = [values.len()];
-            Tensor::<1>::from_data(TensorData::new(values, shape), &inner)
-        };
-        let mut adam = Adam::default();
-        for (key, time) in metadata.iter().filter_map(|(key, value)| Some((key.strip_prefix("time.")?, value))) {
-            let (first, second) =
-                (load.values(&format!("first.{key}"), None), load.values(&format!("second.{key}"), None));
-            let time = number(time).map_err(failed)?;
-            adam.states.insert(key.to_owned(), AdamState { first: vector(first), second: vector(second), time });
-        }
-        let mut density = BTreeMap::new();
-        for name in file.names().into_iter().filter_map(|name| name.strip_prefix("density.")) {
-            density.insert(name.to_owned(), vector(load.values(&format!("density.{name}"), None)));
-        }
-        if let Some(problem) = load.problem {
+        let Load { sizes, problem, .. } = load;
+        if let Some(problem) = problem {
             return Err(failed(problem));
         }
-        Ok(Self {
-            scene,
-            compression,
-            adam,
-            density,
-            stage,
-            iteration: number(text("iteration")?).map_err(failed)?,
-            seconds: number(text("seconds")?).map_err(failed)?,
-        })
+        let inner = device.clone().inner();
+        let adam = load_adam(&mut file, &sizes, iteration, &inner).map_err(failed)?;
+        let mut density = BTreeMap::new();
+        for name in file.names_after(DENSITY) {
+            let stored = format!("{DENSITY}{name}");
+            let values = file.take(&stored, &[file.rows(&stored).unwrap_or(0)]).map_err(failed)?;
+            density.insert(name, vector(values, &inner));
+        }
+        file.finish().map_err(failed)?;
+        Ok(Self { scene, compression, adam, density, stage, iteration, seconds })
     }
 }
 
-struct Load<'a> {
+/// Why a checkpoint was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum SaveError {
+    /// A number is not finite.
+    #[error("tensor `{tensor}` has {value} at index {index}")]
+    NotFinite {
+        /// Its name in the file.
+        tensor: String,
+        /// Of the flattened tensor.
+        index: usize,
+        /// NaN or an infinity.
+        value: f32,
+    },
+    /// The file cannot be written.
+    #[error(transparent)]
+    Other(#[from] TrainError),
+}
+
+fn vector(values: Vec<f32>, device: &Device) -> Tensor<1> {
+    let shape = [values.len()];
+    Tensor::from_data(TensorData::new(values, shape), device)
+}
+
+/// Where in its run a checkpoint is: on the schedule, and what the file's name says.
+fn place(file: &StoredTensors, path: &Path, config: &Config) -> Result<(Stage, usize), String> {
+    let stage = match file.text("stage")? {
+        "coarse" => Stage::Coarse,
+        "fine" => Stage::Fine,
+        other => return Err(format!("metadata `stage` is `{other}`, expected `coarse` or `fine`")),
+    };
+    let iteration = file.number("iteration")?;
+    let iterations = config.train.iterations(stage);
+    if iteration > iterations {
+        return Err(format!(
+            "metadata `iteration` is {iteration}, but the {stage} stage of this run has {iterations} \
+             (`train.{stage}_iterations`)"
+        ));
+    }
+    match place_by_name(path) {
+        Some(named) if named != (stage, iteration) => Err(format!(
+            "its name is not that of the {stage} stage's iteration {iteration}, where its metadata says it is"
+        )),
+        _ => Ok((stage, iteration)),
+    }
+}
+
+/// The optimizer's state. `sizes` are the numbers of values of all parameters.
+fn load_adam(
+    file: &mut StoredTensors,
+    sizes: &BTreeMap<String, usize>,
+    iteration: usize,
+    device: &Device,
+) -> Result<Adam, String> {
+    let mut adam = Adam::default();
+    for name in file.keys_after(TIME) {
+        let size = match sizes.get(&name) {
+            Some(size) if ParameterGroup::of(&name).is_some() => *size,
+            _ => return Err(format!("metadata `{TIME}{name}` belongs to no parameter that is trained")),
+        };
+        let time: u32 = file.number(&format!("{TIME}{name}"))?;
+        if time == 0 || time as usize > iteration {
+            return Err(format!("metadata `{TIME}{name}` is {time}, expected 1 to {iteration}, the iterations done"));
+        }
+        let first = file.take(&format!("{FIRST}{name}"), &[size])?;
+        let second = file.take(&format!("{SECOND}{name}"), &[size])?;
+        if let Some(index) = second.iter().position(|value| *value < 0.0) {
+            let value = second[index];
+            return Err(format!("tensor `{SECOND}{name}` has {value} at index {index}, expected a mean of squares"));
+        }
+        adam.states.insert(name, AdamState { first: vector(first, device), second: vector(second, device), time });
+    }
+    Ok(adam)
+}
+
+struct Load<'a, 'f> {
     prefix: &'static str,
-    file: &'a SafeTensors<'a>,
+    /// Gaussians.
+    count: usize,
+    file: &'a mut StoredTensors<'f>,
     device: &'a Device,
+    /// Values of each parameter, by the name that its moments have.
+    sizes: BTreeMap<String, usize>,
+    /// The first that was found.
     problem: Option<String>,
 }
 
-impl Load<'_> {
-    /// Values of a float32 tensor; the first problem is remembered and zeros are returned for it.
-    fn values(&mut self, name: &str, expected: Option<usize>) -> Vec<f32> {
-        let found = self.file.tensor(name).ok().filter(|view| view.dtype() == Dtype::F32);
-        let values: Option<Vec<f32>> =
-            found.map(|view| view.data().as_chunks().0.iter().map(|b| f32::from_le_bytes(*b)).collect());
-        match values {
-            Some(values) if expected.is_none_or(|expected| expected == values.len()) => values,
-            found => {
-                let found = found.map_or("nothing".to_owned(), |values| format!("{} values", values.len()));
-                let wanted = expected.map_or("float32 values".to_owned(), |n| format!("{n} float32 values"));
-                self.problem.get_or_insert(format!("tensor `{name}`: expected {wanted}, found {found}"));
-                vec![0.0; expected.unwrap_or(0)]
-            }
-        }
-    }
-}
-
-impl ParameterMapper for Load<'_> {
+impl ParameterMapper for Load<'_, '_> {
     fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let key = format!("{}.{path}", self.prefix);
-        // The shape is what the configuration says, but for the number of Gaussians.
-        let mut shape = parameter.dims();
-        if GaussianAttribute::has_path(path)
-            && let Ok(view) = self.file.tensor(&key)
-        {
-            shape[0] = view.shape().first().copied().unwrap_or(0);
-        }
-        let values = self.values(&key, Some(shape.iter().product()));
         if self.problem.is_some() {
             return parameter;
         }
+        // The shape is what the configuration says, but for the number of Gaussians.
+        let mut shape = parameter.dims();
+        if GaussianAttribute::has_path(path) {
+            shape[0] = self.count;
+        }
+        let key = format!("{}.{path}", self.prefix);
+        let values = self.file.take(&key, &shape).and_then(|values| {
+            check_range(path, &values).map_err(|problem| format!("tensor `{key}` {problem}"))?;
+            Ok(values)
+        });
+        let values = match values {
+            Ok(values) => values,
+            Err(problem) => {
+                self.problem = Some(problem);
+                return parameter;
+            }
+        };
+        self.sizes.insert(if self.prefix == SCENE { path.to_owned() } else { key }, values.len());
         let trains = parameter.is_require_grad();
         let tensor = Tensor::<D>::from_data(TensorData::new(values, shape), self.device);
         Param::initialized(parameter.id, tensor.set_require_grad(trains))
     }
 }
 
+/// What finite values may not be, by the path of their parameter.
+fn check_range(path: &str, values: &[f32]) -> Result<(), String> {
+    let bad = |unit: usize, holds: &dyn Fn(&[f32]) -> bool| values.chunks(unit).position(|row| !holds(row));
+    let length = |row: &[f32]| row.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
+    let (row, expected) = match path {
+        "gaussians.quats" => (bad(4, &|row| length(row) > 0.0), "a quaternion that is not zero"),
+        "coordinates.std" => (bad(1, &|row| row[0] > 0.0), "a standard deviation above 0"),
+        "coordinates.axes" => (bad(3, &|row| (length(row) - 1.0).abs() < 1e-3), "an axis of length 1"),
+        _ => (None, ""),
+    };
+    row.map_or(Ok(()), |row| Err(format!("has, in row {row}, something else than {expected}")))
+}
+
+/// Stage and iteration, as a checkpoint's name has them.
+fn place_by_name(path: &Path) -> Option<(Stage, usize)> {
+    let (stage, iteration) = path.file_stem()?.to_str()?.split_once('_')?;
+    let stage = [Stage::Coarse, Stage::Fine].into_iter().find(|known| known.name() == stage)?;
+    Some((stage, iteration.parse().ok()?))
+}
+
 /// Checkpoints in a folder, oldest first.
 pub fn list_checkpoints(folder: &Path) -> Vec<PathBuf> {
-    let position = |path: &PathBuf| {
-        let name = path.file_stem()?.to_str()?;
-        let (stage, iteration) = name.split_once('_')?;
-        let stage = match stage {
-            "coarse" => Stage::Coarse,
-            "fine" => Stage::Fine,
-            _ => return None,
-        };
-        Some((stage, iteration.parse::<usize>().ok()?))
-    };
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     let mut found: Vec<_> = entries
         .filter(|path| path.extension().is_some_and(|e| e == "safetensors"))
-        .filter_map(|path| Some((position(&path)?, path)))
+        .filter_map(|path| Some((place_by_name(&path)?, path)))
         .collect();
     found.sort();
     found.into_iter().map(|(_, path)| path).collect()

@@ -1,7 +1,10 @@
 //! A run on disk: its folder and its checkpoints.
 
 mod checkpoint;
+mod contents;
+mod lock;
 mod run_folder;
+mod stored_tensors;
 
-pub use checkpoint::{Checkpoint, list_checkpoints};
+pub use checkpoint::{Checkpoint, SaveError, list_checkpoints};
 pub use run_folder::{RunFolder, RunRecord};

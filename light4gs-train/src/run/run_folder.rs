@@ -1,28 +1,24 @@
 //! The folder of a run: `config.toml`, `run.json`, `metrics.jsonl`, `events/`, `checkpoints/`, `scene.l4gs`,
 //! `eval.json`, `renders/`, `report.html`.
+//!
+//! `run.json` is written last when a run is made, and removed first when it is replaced: where it is, the rest is whole.
+//! Whatever a process that was killed leaves can be gone on from, or begun anew (see [`contents`](super::contents)).
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use light4gs_data::{DataError, write_atomically};
+use light4gs_data::{DataError, read_regular_file, write_atomically};
 use serde::{Deserialize, Serialize};
 
+use super::contents::{self, Contents, FILES, FOLDERS, RECORD};
 use super::list_checkpoints;
+use super::lock::RunLock;
 use crate::config::Config;
 use crate::error::TrainError;
 
-/// Files of a run; `--overwrite` removes them.
-const FILES: [&str; 8] = [
-    "run.json",
-    "config.toml",
-    "metrics.jsonl",
-    "scene.l4gs",
-    "coding.json",
-    "bit_maps.json",
-    "eval.json",
-    "report.html",
-];
+/// JSON files of a run are far shorter.
+const MAX_JSON_BYTES: u64 = 1 << 30;
 
 /// Where a run's scene is; kept beside the configuration so that `resume` and `eval` need no arguments.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -34,67 +30,131 @@ pub struct RunRecord {
     pub version: String,
 }
 
-/// Paths of a run.
+impl RunRecord {
+    /// Of a dataset that is there.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] if the path is not Unicode, which JSON cannot hold.
+    pub fn new(scene: &Path) -> Result<Self, TrainError> {
+        let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
+        if scene.to_str().is_none() {
+            return Err(TrainError::Input(format!(
+                "the dataset's path {} is not valid Unicode, so that {RECORD} cannot hold it; rename the folder, or link to it",
+                scene.display()
+            )));
+        }
+        Ok(Self { scene, version: env!("CARGO_PKG_VERSION").to_owned() })
+    }
+}
+
+/// Paths of a run. A folder that is written to is locked: by [`RunFolder::create`], or by [`RunFolder::lock`]. The lock is
+/// held until the last copy is dropped.
 #[derive(Clone, Debug)]
 pub struct RunFolder {
     root: PathBuf,
-}
-
-fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> DataError {
-    move |source| DataError::Io { action, path: path.to_owned(), source }
+    lock: Option<RunLock>,
 }
 
 impl RunFolder {
-    /// Makes a folder for a new run.
+    /// Makes a folder for a new run, and locks it.
     ///
     /// # Errors
-    /// [`TrainError::RunExists`] if it holds anything and `overwrite` is not set.
+    /// [`TrainError::RunExists`] if it holds a run and `overwrite` is not set; [`TrainError::RunInUse`] if another process
+    /// writes into it; [`TrainError::Input`] if it holds anything else.
     pub fn create(root: &Path, scene: &Path, config: &Config, overwrite: bool) -> Result<Self, TrainError> {
-        let folder = Self { root: root.to_owned() };
-        let occupied = fs::read_dir(root).is_ok_and(|mut entries| entries.next().is_some());
-        if occupied {
-            if !overwrite {
-                return Err(TrainError::RunExists(root.to_owned()));
-            }
-            if !folder.path("run.json").exists() {
-                let root = root.display();
-                return Err(TrainError::Input(format!(
-                    "{root} holds files but no run; --overwrite replaces runs only"
-                )));
-            }
-            for name in FILES {
-                remove(&folder.path(name), |path| fs::remove_file(path))?;
-            }
-            for name in ["events", "checkpoints", "renders"] {
-                remove(&folder.path(name), |path| fs::remove_dir_all(path))?;
-            }
+        let record = RunRecord::new(scene)?;
+        let mut folder = Self { root: root.to_owned(), lock: None };
+        // Before the lock, whose file says that the folder is one of ours.
+        folder.allow_new_run(overwrite)?;
+        fs::create_dir_all(root).map_err(DataError::io("create", root))?;
+        folder.lock()?;
+        // Again behind the lock: meanwhile another process may have begun a run here.
+        if folder.allow_new_run(overwrite)? != Contents::Nothing {
+            folder.clear()?;
         }
         let checkpoints = folder.checkpoints();
-        fs::create_dir_all(&checkpoints).map_err(io("create", &checkpoints))?;
-        let scene = fs::canonicalize(scene).map_err(io("read", scene))?;
-        let record = RunRecord { scene, version: env!("CARGO_PKG_VERSION").to_owned() };
+        fs::create_dir_all(&checkpoints).map_err(DataError::io("create", &checkpoints))?;
         folder.write("config.toml", config.to_toml().as_bytes())?;
-        folder.write_json("run.json", &record)?;
+        folder.write_json(RECORD, &record)?;
         Ok(folder)
     }
 
-    /// Opens the folder of a run.
+    /// Whether a new run may be made here; returns what is there.
+    fn allow_new_run(&self, overwrite: bool) -> Result<Contents, TrainError> {
+        let root = self.root.display();
+        let found = contents::of(&self.root)?;
+        match found {
+            Contents::Nothing | Contents::AbandonedStart => Ok(found),
+            Contents::Run | Contents::Remains if overwrite => Ok(found),
+            Contents::Run => Err(TrainError::RunExists(self.root.clone())),
+            Contents::Remains => Err(TrainError::Input(format!(
+                "{root} holds what is left of a run whose {RECORD} is gone; give --overwrite to replace it"
+            ))),
+            Contents::Foreign(name) => Err(TrainError::Input(format!(
+                "{root} holds files but no run, among them `{name}`; name another folder (--overwrite replaces runs only)"
+            ))),
+        }
+    }
+
+    /// Removes what a run consists of, and nothing else.
+    fn clear(&self) -> Result<(), TrainError> {
+        for name in FILES {
+            remove(&self.path(name), |path| fs::remove_file(path))?;
+        }
+        for name in FOLDERS {
+            remove(&self.path(name), |path| fs::remove_dir_all(path))?;
+        }
+        Ok(())
+    }
+
+    /// Opens the folder of a run to read it; see [`RunFolder::lock`].
     ///
     /// # Errors
-    /// [`TrainError::Input`] if there is none.
+    /// [`TrainError::Input`] if there is none, or what describes it is damaged.
     pub fn open(root: &Path) -> Result<(Self, RunRecord, Config), TrainError> {
-        let folder = Self { root: root.to_owned() };
-        let path = folder.path("run.json");
-        if !path.exists() {
-            return Err(TrainError::Input(format!(
-                "{} is not the folder of a run: it has no run.json",
-                root.display()
-            )));
+        let folder = Self { root: root.to_owned(), lock: None };
+        let path = folder.path(RECORD);
+        let shown = root.display();
+        let anew = format!("`light4gs train DATASET --out {shown}`");
+        match contents::of(root)? {
+            Contents::Run => {}
+            Contents::AbandonedStart => {
+                return Err(TrainError::Input(format!(
+                    "{shown} has no {RECORD}: the run was stopped before it began. Begin it with {anew}"
+                )));
+            }
+            Contents::Remains => {
+                return Err(TrainError::Input(format!(
+                    "{shown} has no {RECORD}: it holds what is left of a run. Replace it with {anew} --overwrite"
+                )));
+            }
+            Contents::Nothing | Contents::Foreign(_) => {
+                return Err(TrainError::Input(format!("{shown} is not the folder of a run: it has no {RECORD}")));
+            }
         }
-        let text = fs::read_to_string(&path).map_err(io("read", &path))?;
-        let record = serde_json::from_str(&text).map_err(|source| DataError::Json { path, source })?;
+        let record = read_json(&path).map_err(|error| match error {
+            DataError::Json { source, .. } => TrainError::Input(format!(
+                "{} is damaged: {source}. It holds \"scene\", the dataset's absolute path, and \"version\": write it anew, \
+                 or replace the run with {anew} --overwrite",
+                path.display()
+            )),
+            other => other.into(),
+        })?;
         let config = Config::from_file(folder.path("config.toml"))?;
         Ok((folder, record, config))
+    }
+
+    /// Makes sure that this process is the only one that writes into the folder, and sweeps what killed writes have left
+    /// in it. Nothing happens where the folder is locked by this value already.
+    ///
+    /// # Errors
+    /// [`TrainError::RunInUse`] with the process that holds it.
+    pub fn lock(&mut self) -> Result<(), TrainError> {
+        if self.lock.is_none() {
+            self.lock = Some(RunLock::take(&self.root)?);
+            contents::sweep(&self.root);
+        }
+        Ok(())
     }
 
     /// A path inside the folder.
@@ -121,7 +181,7 @@ impl RunFolder {
         });
         for (from, to) in checkpoint.into_iter().chain([(log, self.path("metrics.jsonl"))]) {
             // Whole or not at all: half a checkpoint would stop the run from being resumed.
-            let bytes = fs::read(&from).map_err(io("read", &from))?;
+            let bytes = read_regular_file(&from, u64::MAX).map_err(DataError::io("read", &from))?;
             write_atomically(&to, |file| file.write_all(&bytes))?;
         }
         Ok(())
@@ -146,12 +206,16 @@ impl RunFolder {
     /// Reads a JSON file of the run; nothing if it is not there.
     pub fn read_json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<Option<T>, TrainError> {
         let path = self.path(name);
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-            Err(error) => return Err(io("read", &path)(error).into()),
-        };
-        Ok(Some(serde_json::from_str(&text).map_err(|source| DataError::Json { path, source })?))
+        match read_json(&path) {
+            Ok(value) => Ok(Some(value)),
+            Err(DataError::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
+            Err(DataError::Json { source, .. }) => Err(TrainError::Input(format!(
+                "{} is damaged: {source}. `light4gs resume {}` writes it anew",
+                path.display(),
+                self.root.display()
+            ))),
+            Err(error) => Err(error.into()),
+        }
     }
 
     /// Writes pretty JSON.
@@ -162,6 +226,15 @@ impl RunFolder {
     }
 }
 
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, DataError> {
+    let bytes = read_regular_file(path, MAX_JSON_BYTES).map_err(DataError::io("read", path))?;
+    serde_json::from_slice(&bytes).map_err(|source| DataError::Json { path: path.to_owned(), source })
+}
+
 fn remove(path: &Path, remove: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), TrainError> {
-    if path.exists() { remove(path).map_err(io("remove", path)).map_err(Into::into) } else { Ok(()) }
+    // A link that leads nowhere is to be removed as well.
+    if path.symlink_metadata().is_err() {
+        return Ok(());
+    }
+    Ok(remove(path).map_err(DataError::io("remove", path))?)
 }

@@ -7,6 +7,7 @@ use light4gs_data::Scene;
 use light4gs_model::{DeformationField, HexPlaneField};
 
 use super::Trainer;
+use super::divergence::EmptyImageWatch;
 use super::profile::Profile;
 use super::views::ViewPools;
 use crate::compression::Compression;
@@ -100,8 +101,9 @@ impl<F: DeformationField> TrainerBuilder<F> {
     /// Begins a run.
     ///
     /// # Errors
-    /// A configuration out of range; a device that there is not; a dataset without frames; logs that cannot be opened.
-    pub fn build(self) -> Result<Trainer<F>, TrainError> {
+    /// A configuration out of range; a device that there is not; a dataset without frames; logs that cannot be opened; a
+    /// folder that another process writes into.
+    pub fn build(mut self) -> Result<Trainer<F>, TrainError> {
         let device = self.open_device()?;
         self.begin(device)
     }
@@ -111,7 +113,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
     ///
     /// # Errors
     /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration.
-    pub fn resume(self) -> Result<Trainer<F>, TrainError> {
+    pub fn resume(mut self) -> Result<Trainer<F>, TrainError> {
         let device = self.open_device()?;
         match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
             None => self.begin(device),
@@ -122,8 +124,11 @@ impl<F: DeformationField> TrainerBuilder<F> {
         }
     }
 
-    fn open_device(&self) -> Result<Device, TrainError> {
+    fn open_device(&mut self) -> Result<Device, TrainError> {
         self.config.validate()?;
+        if let Some(folder) = &mut self.folder {
+            folder.lock()?;
+        }
         if self.data.train.is_empty() {
             return Err(TrainError::Input(format!("the dataset `{}` has no training frames", self.data.name)));
         }
@@ -197,6 +202,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             profile: Profile::off(),
             view_pools,
             lap: None,
+            empty_images: EmptyImageWatch::default(),
         })
     }
 }

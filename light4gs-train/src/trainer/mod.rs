@@ -6,12 +6,14 @@
 //! - `views`: the views of an iteration, each with a tape of its own
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `pruning`: pruning by significance
+//! - `divergence`: numbers that are no longer finite, renderings that are no better than nothing
 //!
 //! What a researcher may want to replace are traits: [`Loss`],
 //! [`DensityStrategy`], [`SignificanceScore`],
 //! [`Observer`] and [`ImageSource`].
 
 mod builder;
+pub(crate) mod divergence;
 pub mod profile;
 mod pruning;
 mod rate;
@@ -21,11 +23,12 @@ mod views;
 use std::time::Instant;
 
 use burn::module::Module;
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor};
 use light4gs_data::{Scene, Split};
 use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneField, Splatter};
 
 pub use builder::TrainerBuilder;
+pub use divergence::{Divergence, NotFinite};
 
 use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
 use crate::config::Config;
@@ -38,8 +41,9 @@ use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
 use crate::randomness::FrameOrder;
-use crate::run::{Checkpoint, RunFolder, list_checkpoints};
+use crate::run::{Checkpoint, RunFolder, SaveError, list_checkpoints};
 use crate::stage::Stage;
+use divergence::{EmptyImageWatch, not_finite_in, remedy};
 use profile::Profile;
 use views::ViewPools;
 
@@ -107,6 +111,7 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,
+    empty_images: EmptyImageWatch,
 }
 
 /// Since when the speed is measured; there is none before a stage has begun.
@@ -213,7 +218,7 @@ impl<F: DeformationField> Trainer<F> {
     /// nothing once training is over.
     ///
     /// # Errors
-    /// [`TrainError::NotFinite`] if the loss is not finite; an image that cannot be read; a log or a checkpoint that cannot be
+    /// [`TrainError::Diverged`] if the loss or a parameter is not finite; an image that cannot be read; a log or a checkpoint that cannot be
     /// written; an observer's own.
     pub fn step(&mut self) -> Result<Option<StepReport>, TrainError> {
         let Some(iterations) = self.begin_iteration()? else { return Ok(None) };
@@ -266,6 +271,7 @@ impl<F: DeformationField> Trainer<F> {
         self.state.stage = Stage::Fine;
         self.state.iteration = 0;
         self.state.adam = Adam::default();
+        self.empty_images.reset();
         self.density.begin_stage(self.state.scene.gaussians.len(), &self.device.clone().inner());
     }
 
@@ -275,11 +281,22 @@ impl<F: DeformationField> Trainer<F> {
 
     fn log(&mut self, report: &StepReport, is_last: bool) -> Result<(), TrainError> {
         let StepReport { stage, iteration, .. } = *report;
+        if let Some(found) = not_finite_in(&self.state.scene, self.state.compression.as_ref()) {
+            return Err(self.diverged(stage, iteration, found));
+        }
         let rate = self.lap.map(|lap| (iteration - lap.iteration) as f64 / lap.begin.elapsed().as_secs_f64());
         self.restart_lap();
         let mut record = MetricsRecord::new(stage, iteration, report.seconds, report.gaussians);
         record.loss = Some(f64::from(report.loss));
-        record.psnr = Some(psnr(report.image.clone(), report.truth.clone()));
+        let training_psnr = psnr(report.image.clone(), report.truth.clone());
+        record.psnr = Some(training_psnr);
+        let background = Tensor::<1>::from_floats(self.data.background, &report.truth.device());
+        let empty = background.reshape([1, 1, 3]).expand(report.truth.dims());
+        if let Some(warning) = self.empty_images.log(training_psnr, psnr(empty, report.truth.clone()), is_last) {
+            let (key, value) = remedy(&NotFinite::Loss(report.loss), &self.config);
+            let warning = format!("{stage} stage, iteration {iteration}: {warning}. Try `--set {key}={value:e}`");
+            self.observers.iter_mut().try_for_each(|observer| observer.on_warning(&warning))?;
+        }
         record.iterations_per_second = rate;
         record.test_psnr = self.test_psnr(stage, iteration, is_last)?;
         self.observers.iter_mut().try_for_each(|observer| observer.on_log(&record))
@@ -289,7 +306,13 @@ impl<F: DeformationField> Trainer<F> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let path = folder.checkpoints().join(Checkpoint::<F>::file_name(self.state.stage, self.state.iteration));
         self.state.density = self.density.state();
-        self.state.save(&path)?;
+        self.state.save(&path).map_err(|error| match error {
+            SaveError::NotFinite { tensor: name, index, value } => {
+                let found = NotFinite::Parameter { name, index, value };
+                self.diverged(self.state.stage, self.state.iteration, found)
+            }
+            SaveError::Other(error) => error,
+        })?;
         let all = list_checkpoints(&folder.checkpoints());
         for old in &all[..all.len().saturating_sub(self.config.train.keep_checkpoints.max(1))] {
             // A checkpoint too many does no harm.
@@ -297,6 +320,18 @@ impl<F: DeformationField> Trainer<F> {
         }
         self.restart_lap();
         self.observers.iter_mut().try_for_each(|observer| observer.on_checkpoint(&path))
+    }
+
+    /// The error for numbers that are not finite.
+    fn diverged(&self, stage: Stage, iteration: usize, found: NotFinite) -> TrainError {
+        TrainError::Diverged(Box::new(Divergence {
+            stage,
+            iteration,
+            checkpoint: self.folder.as_ref().and_then(RunFolder::last_checkpoint),
+            run: self.folder.as_ref().map(|folder| folder.root().to_owned()),
+            remedy: remedy(&found, &self.config),
+            found,
+        }))
     }
 
     fn splatter(&self, stage: Stage, iteration: usize) -> Splatter {

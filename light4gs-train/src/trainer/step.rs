@@ -5,6 +5,7 @@ use light4gs_data::Frame;
 use light4gs_model::{DeformationField, HexPlane};
 
 use super::Trainer;
+use super::divergence::{NotFinite, not_finite_in};
 use super::views::ViewPass;
 use crate::density::{GaussianEditor, Moment, ViewStatistics};
 use crate::error::TrainError;
@@ -47,9 +48,8 @@ impl<F: DeformationField> Trainer<F> {
         // What an iteration reads back from the device: this number.
         let loss: f32 = loss.into_scalar();
         if !loss.is_finite() {
-            let last = self.folder.as_ref().and_then(|folder| folder.last_checkpoint());
-            let checkpoint = last.map_or("none".into(), |path| path.display().to_string());
-            return Err(TrainError::NotFinite { stage: stage.name(), iteration, loss, checkpoint });
+            let parameter = not_finite_in(&self.state.scene, self.state.compression.as_ref());
+            return Err(self.diverged(stage, iteration, parameter.unwrap_or(NotFinite::Loss(loss))));
         }
         let last = views.last().expect("a batch has at least one view");
         let (image, truth) = (last.image.clone(), last.truth.clone());

@@ -3,9 +3,11 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use light4gs_data::read_regular_text;
 use toml::{Table, Value};
 
-use super::super::{Config, ConfigError, Origin};
+use super::super::{Config, ConfigError, MAX_CONFIG_BYTES, Origin};
+use super::schema::line_at;
 use super::{overrides, presets, schema};
 
 /// The key by which a layer names the one below it.
@@ -101,7 +103,7 @@ fn read(origin: &Origin, by: Option<&Origin>) -> Result<(Origin, String), Config
         Origin::File(path) => {
             let failed = |source| ConfigError::Read { path: path.clone(), source };
             let identity: PathBuf = fs::canonicalize(path).map_err(failed)?;
-            let text = fs::read_to_string(path).map_err(failed)?;
+            let text = read_regular_text(path, MAX_CONFIG_BYTES).map_err(failed)?;
             Ok((Origin::File(identity), text))
         }
         Origin::Text(text) => Ok((origin.clone(), text.clone())),
@@ -110,8 +112,10 @@ fn read(origin: &Origin, by: Option<&Origin>) -> Result<(Origin, String), Config
 
 /// Parses and checks one layer; returns it without `extends`, and what that says.
 fn parse(text: &str, origin: &Origin) -> Result<(Table, Option<String>), ConfigError> {
-    let mut layer: Table = toml::from_str(text)
-        .map_err(|error| ConfigError::Syntax { origin: origin.clone(), message: error.to_string() })?;
+    let mut layer: Table = toml::from_str(text).map_err(|error| {
+        let line = error.span().map(|span| line_at(text, span.start));
+        ConfigError::Syntax { origin: origin.clone(), line, message: one_line(error.message()) }
+    })?;
     let extends = match layer.remove(EXTENDS) {
         None => None,
         Some(Value::String(name)) => Some(name),

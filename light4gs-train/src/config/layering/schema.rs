@@ -125,6 +125,11 @@ fn collect(table: &Table, path: &mut Vec<String>, into: &mut Vec<Vec<String>>) {
     }
 }
 
+/// The line, from 1, of a byte of the text.
+pub(super) fn line_at(text: &str, start: usize) -> usize {
+    text.bytes().take(start).filter(|byte| *byte == b'\n').count() + 1
+}
+
 /// The line, from 1, on which the key at `path` stands.
 fn line_of(text: &str, path: &[String]) -> Option<usize> {
     let root = DeTable::parse(text).ok()?;
@@ -132,8 +137,7 @@ fn line_of(text: &str, path: &[String]) -> Option<usize> {
     for (depth, name) in path.iter().enumerate() {
         let (key, value) = table.iter().find(|(key, _)| key.get_ref().as_ref() == name.as_str())?;
         if depth + 1 == path.len() {
-            let start = key.span().start.min(text.len());
-            return Some(text.as_bytes()[..start].iter().filter(|byte| **byte == b'\n').count() + 1);
+            return Some(line_at(text, key.span().start));
         }
         match value.get_ref() {
             DeValue::Table(inner) => table = inner,

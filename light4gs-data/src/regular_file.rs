@@ -1,0 +1,55 @@
+//! Reading whole files that somebody else wrote: regular files only, up to a size.
+
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::Path;
+
+/// Reads a file of at most `limit` bytes.
+///
+/// A pipe, a device or a folder is refused before it is opened: a pipe would wait for its other end, and a device may
+/// never end.
+///
+/// # Errors
+/// As the system says; [`io::ErrorKind::InvalidInput`] for what is no regular file, [`io::ErrorKind::FileTooLarge`] for one
+/// that is longer than `limit`.
+pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+    let kind = fs::metadata(path)?.file_type();
+    if !kind.is_file() {
+        let what = if kind.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}, expected a regular file")));
+    }
+    let mut bytes = Vec::new();
+    File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > limit {
+        return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("it is longer than {limit} bytes")));
+    }
+    Ok(bytes)
+}
+
+/// The same for text.
+///
+/// # Errors
+/// As [`read_regular_file`]; [`io::ErrorKind::InvalidData`] for what is not UTF-8.
+pub fn read_regular_text(path: &Path, limit: u64) -> io::Result<String> {
+    String::from_utf8(read_regular_file(path, limit)?)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_regular_files_up_to_a_size() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        fs::write(&path, "abc").unwrap();
+        assert_eq!(read_regular_text(&path, 3).unwrap(), "abc");
+        assert_eq!(read_regular_text(&path, 2).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
+        assert_eq!(read_regular_file(folder.path(), 9).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        fs::write(&path, [0xff]).unwrap();
+        assert_eq!(read_regular_text(&path, 3).unwrap_err().kind(), io::ErrorKind::InvalidData);
+        #[cfg(target_os = "linux")]
+        assert_eq!(read_regular_file(Path::new("/dev/zero"), 9).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+    }
+}

@@ -1,0 +1,274 @@
+//! Training that went wrong: numbers that are no longer finite, and renderings no better than an empty image.
+
+use std::collections::VecDeque;
+use std::fmt;
+use std::path::PathBuf;
+
+use burn::module::{Module, Param};
+use burn::tensor::Tensor;
+use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
+
+use crate::config::Config;
+use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
+use crate::stage::Stage;
+
+/// Numbers of a training that are no longer finite, and how to go on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Divergence {
+    /// The stage.
+    pub stage: Stage,
+    /// Its iteration, from 1.
+    pub iteration: usize,
+    /// What is not finite.
+    pub found: NotFinite,
+    /// The newest checkpoint: none that has such numbers is ever written.
+    pub checkpoint: Option<PathBuf>,
+    /// Folder of the run, if it has one.
+    pub run: Option<PathBuf>,
+    /// A key of the configuration to change, and a value for it.
+    pub remedy: (String, f64),
+}
+
+/// What is not finite.
+#[derive(Clone, Debug, PartialEq)]
+pub enum NotFinite {
+    /// The loss, while all parameters are finite.
+    Loss(f32),
+    /// A parameter, or a moment of one.
+    Parameter {
+        /// Its name, as in checkpoints.
+        name: String,
+        /// Of the flattened tensor.
+        index: usize,
+        /// NaN or an infinity.
+        value: f32,
+    },
+}
+
+impl std::error::Error for Divergence {}
+
+impl fmt::Display for Divergence {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { stage, iteration, found, checkpoint, run, remedy: (key, value) } = self;
+        write!(formatter, "training diverged in the {stage} stage at iteration {iteration}: ")?;
+        match found {
+            NotFinite::Loss(loss) => write!(formatter, "the loss is {loss}")?,
+            NotFinite::Parameter { name, index, value } => {
+                write!(formatter, "the parameter `{name}` has {value} at index {index}")?;
+            }
+        }
+        match checkpoint {
+            Some(path) => write!(formatter, ". The last good checkpoint is {}; go on from it", path.display())?,
+            None => write!(formatter, ". There is no checkpoint yet; begin anew")?,
+        }
+        match run {
+            Some(run) => write!(formatter, " with `light4gs resume {} --set {key}={value:e}`", run.display()),
+            None => write!(formatter, " with `{key}` at {value:e}"),
+        }
+    }
+}
+
+/// The learning rate of a group: its key and its value.
+fn learning_rate(group: ParameterGroup, config: &Config) -> (&'static str, f64) {
+    let (rates, compression) = (&config.train.learning_rate, &config.compression);
+    match group {
+        ParameterGroup::Means => ("train.learning_rate.means_init", rates.means_init),
+        ParameterGroup::LogScales => ("train.learning_rate.scale", rates.scale),
+        ParameterGroup::Quats => ("train.learning_rate.rotation", rates.rotation),
+        ParameterGroup::Opacity => ("train.learning_rate.opacity", rates.opacity),
+        ParameterGroup::ShDc | ParameterGroup::ShRest => ("train.learning_rate.sh_dc", rates.sh_dc),
+        ParameterGroup::Grid => ("train.learning_rate.grid_init", rates.grid_init),
+        ParameterGroup::Deformation => ("train.learning_rate.deformation_init", rates.deformation_init),
+        ParameterGroup::Context => ("compression.context.learning_rate_init", compression.context.learning_rate_init),
+        ParameterGroup::ShModel => ("compression.sh.learning_rate_init", compression.sh.learning_rate_init),
+        ParameterGroup::Steps => ("compression.steps.learning_rate", compression.steps.learning_rate),
+    }
+}
+
+/// Weights of the loss besides the images': key and value.
+fn loss_weights(config: &Config) -> [(&'static str, f64); 4] {
+    let weights = &config.train.regularizer;
+    [
+        ("train.regularizer.plane_tv", weights.plane_tv.into()),
+        ("train.regularizer.time_smoothness", weights.time_smoothness.into()),
+        ("train.regularizer.time_l1", weights.time_l1.into()),
+        ("compression.rate.lambda", config.compression.rate.lambda),
+    ]
+}
+
+/// What to change, and to which value, so that it does not happen again: of the learning rates and the weights of the loss
+/// the one that is furthest above its default. Where none is, a tenth of the learning rate of what is not finite.
+pub(crate) fn remedy(found: &NotFinite, config: &Config) -> (String, f64) {
+    let keys = |config: &Config| -> Vec<(&'static str, f64)> {
+        let rates = ParameterGroup::ALL.into_iter().map(|group| learning_rate(group, config));
+        rates.chain(loss_weights(config)).collect()
+    };
+    // Where the default is 0, the least that a weight is worth writing.
+    let usual = keys(&Config::default()).into_iter().map(|(_, value)| value.max(1e-3));
+    let ratios = keys(config).into_iter().zip(usual).map(|((key, value), usual)| (key, usual, value / usual));
+    let highest = ratios.max_by(|a, b| a.2.total_cmp(&b.2));
+    if let Some((key, usual, ratio)) = highest
+        && ratio > 3.0
+    {
+        return (key.to_owned(), usual);
+    }
+    let group = match found {
+        NotFinite::Parameter { name, .. } => group_of(name),
+        NotFinite::Loss(_) => None,
+    };
+    let (key, value) = learning_rate(group.unwrap_or(ParameterGroup::Means), config);
+    (key.to_owned(), value / 10.0)
+}
+
+/// The group of a tensor of a checkpoint: a parameter, or a moment of one.
+fn group_of(name: &str) -> Option<ParameterGroup> {
+    let path = ["scene.", "first.", "second."].iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
+    ParameterGroup::of(path)
+}
+
+/// The first parameter of a module that has a number which is not finite. `prefix` stands in front of its name.
+pub(crate) fn not_finite_parameter<M: Module>(module: &M, prefix: &str) -> Option<NotFinite> {
+    let mut sums = Sums::default();
+    visit_parameters(module, &mut sums);
+    if sums.0.is_empty() {
+        return None;
+    }
+    // One number is read back from the device where all is well.
+    let sum: f32 = Tensor::cat(sums.0, 0).sum().into_scalar();
+    if sum.is_finite() {
+        return None;
+    }
+    // The sum of finite numbers can be infinite too.
+    let mut search = Search { prefix, found: None };
+    visit_parameters(module, &mut search);
+    search.found
+}
+
+/// Of scene and entropy models.
+pub(crate) fn not_finite_in<S: Module, C: Module>(scene: &S, compression: Option<&C>) -> Option<NotFinite> {
+    not_finite_parameter(scene, "scene")
+        .or_else(|| compression.and_then(|models| not_finite_parameter(models, COMPRESSION)))
+}
+
+/// The sum of every parameter, `[1]` each.
+#[derive(Default)]
+struct Sums(Vec<Tensor<1>>);
+
+fn off_the_tape<const D: usize>(parameter: &Param<Tensor<D>>) -> Tensor<D> {
+    let value = parameter.val();
+    if value.device().is_autodiff() { value.inner() } else { value }
+}
+
+impl ParameterVisitor for Sums {
+    fn visit<const D: usize>(&mut self, _: &str, parameter: &Param<Tensor<D>>) {
+        if parameter.val().shape().num_elements() > 0 {
+            self.0.push(off_the_tape(parameter).sum());
+        }
+    }
+}
+
+struct Search<'a> {
+    prefix: &'a str,
+    found: Option<NotFinite>,
+}
+
+impl ParameterVisitor for Search<'_> {
+    fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>) {
+        if self.found.is_some() {
+            return;
+        }
+        let values = off_the_tape(parameter).into_data();
+        let bad = values.iter::<f32>().enumerate().find(|(_, value)| !value.is_finite());
+        self.found =
+            bad.map(|(index, value)| NotFinite::Parameter { name: format!("{}.{path}", self.prefix), index, value });
+    }
+}
+
+/// Logged images over which renderings are compared with an empty image.
+const WINDOW: usize = 10;
+
+/// Notices when renderings are no better than an image that shows the background alone.
+#[derive(Debug, Default)]
+pub(super) struct EmptyImageWatch {
+    /// Mean squared errors of the rendering and of the empty image, the newest last.
+    window: VecDeque<[f64; 2]>,
+    /// Whether the whole window has been better than empty images.
+    was_better: bool,
+    told: bool,
+}
+
+impl EmptyImageWatch {
+    /// Takes an image that was logged: PSNR of the rendering and of the empty image, both against the training image.
+    /// Returns what to tell, where renderings have fallen to empty images, or where a stage ends with such.
+    pub(super) fn log(&mut self, psnr: f64, empty_psnr: f64, stage_ends: bool) -> Option<String> {
+        if self.window.len() == WINDOW {
+            self.window.pop_front();
+        }
+        self.window.push_back([psnr, empty_psnr].map(|psnr| 10f64.powf(-psnr / 10.0)));
+        let [error, empty] = [0, 1].map(|i| self.window.iter().map(|pair| pair[i]).sum::<f64>());
+        let is_empty = error >= empty || error.is_nan();
+        let full = self.window.len() == WINDOW;
+        self.was_better |= full && !is_empty;
+        self.told &= is_empty;
+        let due = is_empty && !self.told && ((full && self.was_better) || stage_ends);
+        if !due {
+            return None;
+        }
+        self.told = true;
+        let count = self.window.len() as f64;
+        let [psnr, empty] = [error, empty].map(|sum| -10.0 * (sum / count).log10());
+        Some(format!(
+            "training PSNR is {psnr:.2} dB, and an empty image of the background alone has {empty:.2} dB: nothing is learned"
+        ))
+    }
+
+    /// Begins anew: another stage.
+    pub(super) fn reset(&mut self) {
+        *self = Self::default();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use burn::tensor::{Device, TensorData};
+    use light4gs_data::PointCloud;
+
+    use super::*;
+
+    #[test]
+    fn a_parameter_that_is_not_finite_is_named() {
+        let device = Device::flex().autodiff();
+        let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
+        let mut config = Config::default();
+        config.model.hexplane.channels = 2;
+        config.model.hexplane.resolution = [8, 8, 8, 4];
+        let mut scene = config.model.build().init(&cloud, &device);
+        assert_eq!(not_finite_parameter(&scene, "scene"), None);
+        let with = |value: f32| {
+            Tensor::<2>::from_data(TensorData::new(vec![0.0, value, 0.0, f32::MAX, 0.0, f32::MAX], [2, 3]), &device)
+        };
+        // The sum is infinite, but no number is.
+        scene.gaussians.means = Param::from_tensor(with(1.0));
+        assert_eq!(not_finite_parameter(&scene, "scene"), None);
+        scene.gaussians.means = Param::from_tensor(with(f32::INFINITY));
+        let found = not_finite_parameter(&scene, "scene").unwrap();
+        let name = "scene.gaussians.means".to_owned();
+        assert_eq!(found, NotFinite::Parameter { name, index: 1, value: f32::INFINITY });
+        assert_eq!(remedy(&found, &config).0, "train.learning_rate.means_init");
+        config.train.learning_rate.opacity *= 100.0;
+        assert_eq!(remedy(&found, &config), ("train.learning_rate.opacity".to_owned(), 0.05));
+    }
+
+    #[test]
+    fn renderings_that_fall_to_empty_images_are_noticed_once() {
+        let mut watch = EmptyImageWatch::default();
+        // The first images are worse than nothing; that is no news.
+        assert!((0..5).all(|_| watch.log(8.0, 12.0, false).is_none()));
+        assert!((0..30).all(|_| watch.log(20.0, 12.0, false).is_none()));
+        let told: Vec<_> = (0..40).filter_map(|_| watch.log(12.0, 12.0, false)).collect();
+        assert_eq!(told.len(), 1, "{told:?}");
+        watch.reset();
+        assert!((0..30).all(|_| watch.log(8.0, 12.0, false).is_none()));
+        assert!(watch.log(8.0, 12.0, true).unwrap().contains("8.00 dB"));
+    }
+}
