@@ -15,6 +15,7 @@ use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
+use crate::evaluation::measure::Scores;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
@@ -208,6 +209,9 @@ pub(super) struct Eval {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
+    /// Weights of LPIPS (see docs/metrics.md), in place of the configuration's `eval.lpips`; may be given more than once.
+    #[arg(long, value_name = "FILE")]
+    lpips: Vec<PathBuf>,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -227,6 +231,9 @@ impl Eval {
             )));
         }
         config.device = self.device.unwrap_or(config.device);
+        if !self.lpips.is_empty() {
+            config.eval.lpips = self.lpips;
+        }
         record.scene = self.scene.unwrap_or(record.scene);
         let scene = Scene::open(&record.scene, &load_options(&config))?;
         print_evaluation(&evaluate_run::<HexPlaneField>(&folder, &config, &scene)?, self.json)
@@ -242,6 +249,7 @@ impl Eval {
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
+        config.eval.lpips = self.lpips;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
         let images = image_store(&config);
@@ -254,17 +262,7 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
     if json {
         return say_json(evaluation);
     }
-    let mut quality = Table::new([
-        ("split", Align::Left),
-        ("views", Align::Right),
-        ("PSNR dB", Align::Right),
-        ("SSIM", Align::Right),
-    ]);
-    for split in &evaluation.splits {
-        let (psnr, ssim) = (format!("{:.2}", split.psnr), format!("{:.4}", split.ssim));
-        quality.row([split.split.clone(), split.views.len().to_string(), psnr, ssim]);
-    }
-    say(quality)?;
+    say(quality_table(evaluation))?;
     say(sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes))?;
     if let Some(coding) = &evaluation.coding {
         say(coding_table(coding))?;
@@ -278,6 +276,18 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
         say(format_args!("trained for {:.1} min", seconds / 60.0))?;
     }
     Ok(())
+}
+
+/// Quality by split.
+fn quality_table(evaluation: &Evaluation) -> Table {
+    let columns = Scores::columns(evaluation.splits.iter().map(|split| &split.scores));
+    let names = [("split", Align::Left), ("views", Align::Right)];
+    let mut table = Table::new(names.into_iter().chain(columns.iter().map(|column| (column.label(), Align::Right))));
+    for split in &evaluation.splits {
+        let begin = [split.split.clone(), split.views.len().to_string()];
+        table.row(begin.into_iter().chain(columns.iter().map(|column| column.format(split.scores.get(*column)))));
+    }
+    table
 }
 
 /// Expected and real bits of what is entropy coded with trained models.
