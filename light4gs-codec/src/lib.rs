@@ -67,6 +67,7 @@
 
 mod adaptive;
 pub mod attributes;
+pub mod checks;
 mod entropy;
 mod error;
 mod fields;
@@ -89,15 +90,16 @@ pub use limits::Limits;
 pub use network::{Network, weights as network_weights};
 pub use planes::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, section::PlaneBytes};
 pub use scene::{
-    GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Plane,
-    SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
+    GaussianArrays, HexPlaneArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource,
+    NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use stream::{
     CompressionInput, CompressionReport, Distributions, Encoded, OpenStream, PerGroup, PlaneCoding, Profile,
     SectionInfo, StreamInfo, WeightPrecisions,
     container::{MAGIC, VERSION},
-    decode, decode_with_limits, encode, encode_compressed, encode_planes, encode_sh, info, plane_distributions,
+    decode, decode_with_limits, encode, encode_compressed, encode_compressed_with_limits, encode_planes, encode_sh,
+    info, plane_distributions,
     sections::{Encoding, Kind},
     sh_distributions,
 };
