@@ -8,6 +8,7 @@ use light4gs_model::HexPlaneField;
 
 use super::output::{say, say_json, tell};
 use super::progress::ProgressBars;
+use super::signals::stop_flag;
 use crate::compression::CodingRecord;
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
@@ -30,7 +31,7 @@ pub(super) struct RunOutput {
     pub(super) quiet: bool,
     /// Print the time of every stage of a training step. The run itself gets slower, since each stage is waited for.
     #[arg(long)]
-    profile: bool,
+    pub(super) profile: bool,
 }
 
 #[derive(Debug, Args)]
@@ -112,7 +113,9 @@ pub(super) fn train_to_evaluation(
             "{out} holds a run of another configuration or scene; name another folder, or remove that one"
         )));
     }
-    if !folder.stream().exists() {
+    let coded = config.compression.profile.coded().is_some();
+    // `bit_maps.json` is the last of what encoding writes.
+    if !folder.stream().exists() || (coded && !folder.path("bit_maps.json").exists()) {
         run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
@@ -128,7 +131,7 @@ fn trainer(
 ) -> Result<TrainerBuilder, TrainError> {
     let data = Scene::open(&record.scene, &load_options(config))?;
     let bars = ProgressBars::new(output.quiet);
-    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars))
+    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars).stop_flag(stop_flag()))
 }
 
 /// Trains to the end, and prints what the stages took if that is asked for.

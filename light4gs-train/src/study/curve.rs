@@ -90,7 +90,8 @@ struct Hermite {
 impl Hermite {
     fn new(points: Vec<(f64, f64)>) -> Self {
         let widths: Vec<f64> = points.windows(2).map(|pair| pair[1].0 - pair[0].0).collect();
-        let secants: Vec<f64> = points.windows(2).zip(&widths).map(|(pair, width)| (pair[1].1 - pair[0].1) / width).collect();
+        let secants: Vec<f64> =
+            points.windows(2).zip(&widths).map(|(pair, width)| (pair[1].1 - pair[0].1) / width).collect();
         let last = secants.len() - 1;
         let slopes = (0..points.len())
             .map(|i| match i {
