@@ -74,6 +74,8 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
+    // From here on a request to stop is heard.
+    stop_flag();
     device::open(config.device)?;
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
     Scene::open(scene, &load_options(&config))?;
@@ -174,6 +176,7 @@ pub(super) struct Resume {
 
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
+        stop_flag();
         let (mut folder, record, found) = RunFolder::open(&self.run)?;
         folder.lock()?;
         let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
