@@ -250,7 +250,9 @@ pub fn legend(manifest: &Manifest) -> String {
              that of its row or of the reference."
         ),
     };
-    format!("Differences (Δ) are to \"{reference}\". {seeds} Quality and size are those of the decoded file.")
+    let has_differences = manifest.study.columns.iter().any(|column| column.form != Form::Value);
+    let differences = if has_differences { format!("Differences (Δ) are to \"{reference}\". ") } else { String::new() };
+    format!("{differences}{seeds} Quality and size are those of the decoded file.")
 }
 
 #[cfg(test)]

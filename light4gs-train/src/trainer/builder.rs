@@ -211,6 +211,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             observers: all,
             stop,
             order: FrameOrder::default(),
+            order_ahead: FrameOrder::default(),
             profile: Profile::off(),
             view_pools,
             lap: None,

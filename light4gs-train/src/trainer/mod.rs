@@ -111,6 +111,8 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     observers: Vec<Box<dyn Observer>>,
     stop: Arc<AtomicBool>,
     order: FrameOrder,
+    /// The same order, asked for what comes later.
+    order_ahead: FrameOrder,
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,

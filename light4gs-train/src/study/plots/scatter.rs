@@ -4,15 +4,20 @@ use std::error::Error;
 use std::ops::Range;
 
 use plotters::backend::DrawingBackend;
-use plotters::chart::{ChartBuilder, SeriesLabelPosition};
+use plotters::chart::ChartBuilder;
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint, Ranged};
-use plotters::element::{Circle, PathElement};
+use plotters::element::{Circle, PathElement, Text};
 use plotters::prelude::DrawingArea;
 use plotters::series::{DashedLineSeries, LineSeries};
 use plotters::style::{BLACK, Color, IntoFont, ShapeStyle, WHITE};
 
 use super::{FONT, Plot, color, pale};
+
+/// Pixels for the legend.
+const LEGEND: i32 = 250;
+/// Longer labels are cut.
+const MOST_LETTERS: usize = 30;
 
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +80,8 @@ impl Plot for ScatterPlot {
         let x = range(all.iter().map(|(x, _)| *x));
         let y = range(all.iter().map(|(_, y)| *y).chain(levels.iter().map(|(_, y)| *y)));
         let ticks = if self.logarithmic { logarithmic_ticks(x) } else { linear_ticks(x) };
-        let mut builder = ChartBuilder::on(area);
+        let (plot, legend) = area.split_horizontally(area.dim_in_pixel().0 as i32 - LEGEND);
+        let mut builder = ChartBuilder::on(&plot);
         builder.caption(&self.title, (FONT, 20).into_font()).margin(12).x_label_area_size(44).y_label_area_size(64);
         let mut chart = builder.build_cartesian_2d(TickedAxis { range: x, ticks }, y.0..y.1)?;
         let label = |x: &f64| short(if self.logarithmic { x.exp() } else { *x });
@@ -91,46 +97,60 @@ impl Plot for ScatterPlot {
             .draw()?;
         for (index, series) in self.series.iter().enumerate() {
             let points = self.points(series);
-            let style = ShapeStyle::from(color(index)).stroke_width(2);
-            let key = move |(x, y): (i32, i32)| PathElement::new(vec![(x, y), (x + 18, y)], style);
+            let line = LineSeries::new(points.clone(), stroke(series.mark, index));
             match series.mark {
-                Mark::Line | Mark::LinePoints => {
-                    chart.draw_series(LineSeries::new(points.clone(), style))?.label(&series.label).legend(key);
-                }
-                Mark::Dashed => {
-                    let style = ShapeStyle::from(pale(index)).stroke_width(2);
-                    chart
-                        .draw_series(DashedLineSeries::new(points.clone(), 6, 4, style))?
-                        .label(&series.label)
-                        .legend(key);
-                }
+                Mark::Line | Mark::LinePoints => drop(chart.draw_series(line)?),
+                Mark::Dashed => drop(chart.draw_series(DashedLineSeries::new(points.clone(), 6, 4, stroke(series.mark, index)))?),
                 Mark::Points => {}
             }
             if matches!(series.mark, Mark::Points | Mark::LinePoints) {
-                let drawn =
-                    chart.draw_series(points.iter().map(|point| Circle::new(*point, 4, color(index).filled())))?;
-                if series.mark == Mark::Points {
-                    drawn.label(&series.label).legend(move |(x, y)| Circle::new((x + 9, y), 4, color(index).filled()));
-                }
+                chart.draw_series(points.iter().map(|point| Circle::new(*point, 4, color(index).filled())))?;
             }
         }
-        for (index, (label, level)) in levels.into_iter().enumerate() {
-            let style = ShapeStyle::from(pale(index)).stroke_width(1);
-            let line = DashedLineSeries::new([(x.0, *level), (x.1, *level)], 2, 4, style);
-            let key = move |(x, y): (i32, i32)| PathElement::new(vec![(x, y), (x + 18, y)], style);
-            chart.draw_series(line)?.label(label).legend(key);
+        for (index, (_, level)) in levels.iter().enumerate() {
+            let ends = [(x.0, *level), (x.1, *level)];
+            chart.draw_series(DashedLineSeries::new(ends, 2, 4, stroke(Mark::Dashed, index)))?;
         }
-        if !self.series.is_empty() {
-            chart
-                .configure_series_labels()
-                .position(SeriesLabelPosition::LowerRight)
-                .background_style(WHITE.mix(0.85))
-                .border_style(BLACK.mix(0.2))
-                .label_font((FONT, 13))
-                .draw()?;
-        }
-        Ok(())
+        let series = self.series.iter().enumerate().map(|(index, series)| (&series.label, series.mark, index));
+        let levels = levels.iter().enumerate().map(|(index, (label, _))| (label, Mark::Dashed, index));
+        draw_legend(&legend, series.chain(levels))
     }
+}
+
+/// The line of a series, or of a level.
+fn stroke(mark: Mark, index: usize) -> ShapeStyle {
+    let style = if mark == Mark::Dashed { ShapeStyle::from(pale(index)) } else { ShapeStyle::from(color(index)) };
+    style.stroke_width(2)
+}
+
+/// Beside the plot, where it hides nothing.
+fn draw_legend<'a, B: DrawingBackend>(
+    area: &DrawingArea<B, Shift>,
+    entries: impl Iterator<Item = (&'a String, Mark, usize)>,
+) -> Result<(), Box<dyn Error>>
+where
+    B::ErrorType: 'static,
+{
+    for (row, (label, mark, index)) in entries.enumerate() {
+        let y = 50 + 22 * row as i32;
+        match mark {
+            Mark::Points => area.draw(&Circle::new((12, y), 4, color(index).filled()))?,
+            Mark::Dashed => {
+                for x in [0, 10, 20] {
+                    area.draw(&PathElement::new(vec![(x, y), (x + 5, y)], stroke(mark, index)))?;
+                }
+            }
+            Mark::Line | Mark::LinePoints => {
+                area.draw(&PathElement::new(vec![(0, y), (24, y)], stroke(mark, index)))?;
+            }
+        }
+        let mut text: String = label.chars().take(MOST_LETTERS).collect();
+        if text.len() < label.len() {
+            text.push_str("...");
+        }
+        area.draw(&Text::new(text, (32, y - 7), (FONT, 13).into_font().color(&BLACK)))?;
+    }
+    Ok(())
 }
 
 /// A linear axis with ticks of our choice.
