@@ -251,7 +251,8 @@ pub fn legend(manifest: &Manifest) -> String {
         ),
     };
     let has_differences = manifest.study.columns.iter().any(|column| column.form != Form::Value);
-    let differences = if has_differences { format!("Differences (Δ) are to \"{reference}\". ") } else { String::new() };
+    let differences =
+        if has_differences { format!("Differences (Δ) are to \"{reference}\". ") } else { String::new() };
     format!("{differences}{seeds} Quality and size are those of the decoded file.")
 }
 

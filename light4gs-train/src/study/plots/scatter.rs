@@ -100,7 +100,9 @@ impl Plot for ScatterPlot {
             let line = LineSeries::new(points.clone(), stroke(series.mark, index));
             match series.mark {
                 Mark::Line | Mark::LinePoints => drop(chart.draw_series(line)?),
-                Mark::Dashed => drop(chart.draw_series(DashedLineSeries::new(points.clone(), 6, 4, stroke(series.mark, index)))?),
+                Mark::Dashed => {
+                    drop(chart.draw_series(DashedLineSeries::new(points.clone(), 6, 4, stroke(series.mark, index)))?)
+                }
                 Mark::Points => {}
             }
             if matches!(series.mark, Mark::Points | Mark::LinePoints) {
