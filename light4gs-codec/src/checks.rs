@@ -23,6 +23,9 @@ use crate::{
 /// fit into the 2^22 steps that a symbol can count.
 pub const LEAST_STEP: f32 = 1e-5;
 
+/// The smallest step that a decoder takes: a value is never a subnormal number, which takes long.
+pub(crate) const LEAST_STEP_IN_STREAM: f32 = 1.0 / (1u64 << 60) as f32;
+
 /// Refuses a hexplane that no stream can hold, or whose planes cannot be coded: channels, resolution, and multipliers of it.
 ///
 /// # Errors
