@@ -71,7 +71,7 @@ impl Default for Limits {
             extras: 1 << 10,
             frames: 100_000,
             image_side: 1 << 14,
-            image_pixels: 1 << 26,
+            image_pixels: 1 << 25,
             gaussians: 1 << 26,
             channels: 1 << 12,
             resolution: 1 << 16,
@@ -90,6 +90,7 @@ impl Limits {
     /// For files that are trusted, such as one's own; what the encoder keeps to. A file may take 64 GiB and half an hour.
     pub fn large() -> Self {
         Self {
+            image_pixels: 1 << 28,
             layer_width: 1 << 19,
             layer_weights: 1 << 28,
             gaussians: 1 << 28,
