@@ -31,7 +31,8 @@ pub(super) struct Export {
 
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let decoded: DecodedScene = DecodedScene::open(&self.file, &self.limits.get(), &device::open(self.device)?)?;
+        let decoded: DecodedScene =
+            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
         std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
             action: "create",
             path: self.out.clone(),

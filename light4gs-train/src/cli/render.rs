@@ -74,7 +74,8 @@ impl Render {
             return Err(TrainError::Input("--radius must be positive and --elevation finite".into()));
         }
         check_output(&self.out)?;
-        let decoded: DecodedScene = DecodedScene::open(&self.file, &self.limits.get(), &device::open(self.device)?)?;
+        let decoded: DecodedScene =
+            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
         let frames = self.camera_frames(&decoded)?;
         let images = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
         if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {

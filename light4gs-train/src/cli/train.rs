@@ -255,7 +255,7 @@ impl Eval {
         };
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;
-        let decoded: DecodedScene = DecodedScene::open(&self.run, &self.limits.get(), &device)?;
+        let decoded: DecodedScene = DecodedScene::open_with_limits(&self.run, &self.limits.get(), &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;

@@ -25,7 +25,7 @@ pub fn evaluate_run<F: DeformationField>(
     scene: &Scene,
 ) -> Result<Evaluation, TrainError> {
     let device = device::open(config.device)?;
-    let decoded = DecodedScene::<F>::open(&folder.stream(), &Limits::large(), &device)?;
+    let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
     let images = image_store(config);
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;

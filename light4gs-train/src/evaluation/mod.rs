@@ -111,8 +111,13 @@ pub struct DecodedScene<F: DeformationField = HexPlaneField> {
 }
 
 impl<F: DeformationField> DecodedScene<F> {
-    /// Reads a file onto a device. A file of one's own may have [`Limits::large`].
-    pub fn open(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
+    /// Reads a file onto a device, within the default [`Limits`].
+    pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
+        Self::open_with_limits(path, &Limits::default(), device)
+    }
+
+    /// As [`DecodedScene::open`]; a file of one's own may have [`Limits::large`].
+    pub fn open_with_limits(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
         let data = light4gs_codec::read_file_with_limits(path, limits)?;
         let decode_seconds = begin.elapsed().as_secs_f64();
