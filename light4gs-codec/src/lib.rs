@@ -57,7 +57,8 @@
 //! # Hostile bytes, other platforms
 //!
 //! A reader trusts nothing: every length and every count is checked against the bytes that are there and against
-//! [`Limits`] before memory is taken, so hostile input gets a [`CodecError`], never a panic.
+//! [`Limits`] before memory or time is taken, so hostile input gets a [`CodecError`], never a panic. `SECURITY.md` has the
+//! promises. What the encoder refuses can be asked before: see [`checks`].
 //!
 //! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`,
 //! where `read_file` and `read_info` are absent and work is done by one thread. Elsewhere
