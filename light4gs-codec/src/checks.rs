@@ -47,7 +47,8 @@ pub fn plane_step(step: f32) -> Result<(), CodecError> {
 
 /// The nearest steps that [`plane_step`] takes: learned steps are not bounded by anything else.
 pub fn nearest_plane_steps(steps: PerGroup) -> PerGroup {
-    let nearest = |step: f32| step.max(LEAST_STEP).min(LARGEST_STEP);
+    // NaN becomes the smallest, which `clamp` would keep.
+    let nearest = |step: f32| if step > LEAST_STEP { step.min(LARGEST_STEP) } else { LEAST_STEP };
     PerGroup { space_only: nearest(steps.space_only), space_time: nearest(steps.space_time) }
 }
 
