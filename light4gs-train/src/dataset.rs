@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use light4gs_codec::SceneMeta;
+use light4gs_codec::{SceneMeta, legal_name};
 use light4gs_data::{DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene};
 
 use crate::config::Config;
@@ -96,7 +96,8 @@ pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
     times.sort_by(f32::total_cmp);
     times.dedup();
     SceneMeta {
-        name: data.name.clone(),
+        // A folder may be called anything.
+        name: legal_name(&data.name),
         frame_count: times.len() as u32,
         // Times are a share of the whole; nobody says how long it lasts.
         fps: 0.0,

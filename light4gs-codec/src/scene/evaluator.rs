@@ -65,7 +65,7 @@ impl MotionEvaluator {
         let Some(MotionNetwork { network, sources, outputs }) = &scene.motion.network else {
             return Ok(Self { motion: None });
         };
-        let limits = Limits::default();
+        let limits = Limits::large();
         scene.motion.check(&limits)?;
         crate::planes::head::check(&scene.hexplane, &limits)?;
         scene.motion.check_features(scene.hexplane.features())?;

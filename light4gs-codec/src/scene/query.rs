@@ -3,7 +3,7 @@
 //! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
 //! hexplane-coupled harmonics are coded by these numbers.
 
-use crate::{Plane, SceneFrameArrays};
+use crate::{Plane, SceneFrameArrays, network::kernels::kept};
 
 /// Coordinates in [-1, 1]: standardized along the principal axes, contracted into the ball of radius 2, halved (paper
 /// III-A).
@@ -53,8 +53,8 @@ pub(crate) fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product:
     for (product, channel) in product.iter_mut().zip(plane.values.chunks_exact(width * plane.height as usize)) {
         let row = |y: usize| {
             let row = &channel[y * width..(y + 1) * width];
-            x.between(row[x.low], row[x.high])
+            x.between(kept(row[x.low]), kept(row[x.high]))
         };
-        *product *= y.between(row(y.low), row(y.high));
+        *product = kept(*product * kept(y.between(row(y.low), row(y.high))));
     }
 }

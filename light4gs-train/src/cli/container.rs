@@ -6,13 +6,14 @@ use std::path::PathBuf;
 
 use clap::Args;
 use light4gs_codec::plane_layout::plane_name;
-use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info};
+use light4gs_codec::{Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
 use super::check_output;
+use super::limits::LimitsArgument;
 use super::output::{say, say_json};
 use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
@@ -81,7 +82,7 @@ impl Encode {
             Ok(())
         })?;
         write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
-        print_info(&read_info(&self.out)?, self.json)?;
+        print_info(&read_info_with_limits(&self.out, &Limits::large())?, self.json)?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
@@ -99,11 +100,13 @@ pub(super) struct Info {
     /// Print as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Info {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        print_info(&read_info(&self.file)?, self.json)
+        print_info(&read_info_with_limits(&self.file, &self.limits.get())?, self.json)
     }
 }
 
@@ -168,12 +171,14 @@ pub(super) struct Decode {
     /// The safetensors file to write.
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), TrainError> {
         check_output(&self.out)?;
-        let data = read_file(&self.file)?;
+        let data = read_file_with_limits(&self.file, &self.limits.get())?;
         let tensors = plain_tensors(&data);
         let views = tensors.iter().map(|(name, (shape, bytes))| {
             (name, TensorView::new(Dtype::F32, shape.clone(), bytes).expect("shapes match their values"))

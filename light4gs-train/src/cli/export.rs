@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use light4gs_data::{DataError, GaussianPly};
 
+use super::limits::LimitsArgument;
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
@@ -24,11 +25,14 @@ pub(super) struct Export {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
+        let decoded: DecodedScene =
+            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
         std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
             action: "create",
             path: self.out.clone(),

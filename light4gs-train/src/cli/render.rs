@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
 
 use super::check_output;
+use super::limits::LimitsArgument;
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
@@ -60,6 +61,8 @@ pub(super) struct Render {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Render {
@@ -71,7 +74,8 @@ impl Render {
             return Err(TrainError::Input("--radius must be positive and --elevation finite".into()));
         }
         check_output(&self.out)?;
-        let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
+        let decoded: DecodedScene =
+            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
         let frames = self.camera_frames(&decoded)?;
         let images = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
         if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
@@ -88,7 +92,12 @@ impl Render {
         let meta = &decoded.data.meta;
         let (width, height) = (meta.width.max(1), meta.height.max(1));
         let new_width = self.width.unwrap_or(width);
-        let new_height = ((u64::from(height) * u64::from(new_width)).div_ceil(u64::from(width)) as u32).max(1);
+        let new_height = (u64::from(height) * u64::from(new_width)).div_ceil(u64::from(width));
+        let new_height = u32::try_from(new_height).unwrap_or(u32::MAX).max(1);
+        self.limits.get().check_image(new_width, new_height).map_err(|error| {
+            let (file, asked) = (self.file.display(), format!("{new_width}×{new_height} pixels"));
+            TrainError::Input(format!("cannot render {file} at {asked}: {error}; or give a smaller --width"))
+        })?;
         if let Some(scene) = &self.scene {
             let resolution = Resolution::Exact { width: new_width, height: new_height };
             let options = LoadOptions { resolution, background: meta.background, ..LoadOptions::default() };

@@ -7,6 +7,7 @@ use clap::builder::PossibleValuesParser;
 use light4gs_data::{Layouts, Scene};
 use light4gs_model::HexPlaneField;
 
+use super::limits::LimitsArgument;
 use super::output::{say, say_json, tell};
 use super::progress::ProgressBars;
 use super::signals::stop_flag;
@@ -221,6 +222,9 @@ pub(super) struct Eval {
     /// Print as JSON.
     #[arg(long)]
     json: bool,
+    /// Where a file is measured and not a run.
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Eval {
@@ -251,7 +255,7 @@ impl Eval {
         };
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;
-        let decoded: DecodedScene = DecodedScene::open(&self.run, &device)?;
+        let decoded: DecodedScene = DecodedScene::open_with_limits(&self.run, &self.limits.get(), &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use light4gs_codec::Limits;
 use light4gs_data::{DataError, Scene};
 use light4gs_model::DeformationField;
 
@@ -24,7 +25,7 @@ pub fn evaluate_run<F: DeformationField>(
     scene: &Scene,
 ) -> Result<Evaluation, TrainError> {
     let device = device::open(config.device)?;
-    let decoded = DecodedScene::<F>::open(&folder.stream(), &device)?;
+    let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
     let images = image_store(config);
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;

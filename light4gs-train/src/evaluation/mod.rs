@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use burn::tensor::Device;
-use light4gs_codec::{SceneData, StreamInfo};
+use light4gs_codec::{Limits, SceneData, StreamInfo};
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::Serialize;
@@ -111,12 +111,17 @@ pub struct DecodedScene<F: DeformationField = HexPlaneField> {
 }
 
 impl<F: DeformationField> DecodedScene<F> {
-    /// Reads a file onto a device.
+    /// Reads a file onto a device, within the default [`Limits`].
     pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
+        Self::open_with_limits(path, &Limits::default(), device)
+    }
+
+    /// As [`DecodedScene::open`]; a file of one's own may have [`Limits::large`].
+    pub fn open_with_limits(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
-        let data = light4gs_codec::read_file(path)?;
+        let data = light4gs_codec::read_file_with_limits(path, limits)?;
         let decode_seconds = begin.elapsed().as_secs_f64();
-        let info = light4gs_codec::read_info(path)?;
+        let info = light4gs_codec::read_info_with_limits(path, limits)?;
         let model = DynamicScene::from_arrays(&data, device)?;
         Ok(Self { model, data, info, decode_seconds, device: device.clone() })
     }

@@ -4,7 +4,9 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use burn::module::Module;
 use burn::tensor::Device;
+use light4gs_codec::checks;
 use light4gs_data::Scene;
 use light4gs_model::{DeformationField, HexPlaneField};
 
@@ -12,9 +14,9 @@ use super::Trainer;
 use super::divergence::EmptyImageWatch;
 use super::profile::Profile;
 use super::views::ViewPools;
-use crate::compression::Compression;
+use crate::compression::{Compression, compression_input};
 use crate::config::Config;
-use crate::dataset::{ImageSource, image_store};
+use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{AdaptiveDensityControl, DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
 use crate::error::TrainError;
@@ -162,7 +164,23 @@ impl<F: DeformationField> TrainerBuilder<F> {
             iteration: 0,
             seconds: 0.0,
         };
+        self.check_encodable(&state)?;
         self.assemble(device, state, None)
+    }
+
+    /// Refuses now what the encoder would refuse in the end: it is asked about the scene and the models to start from.
+    fn check_encodable(&self, state: &Checkpoint<F>) -> Result<(), TrainError> {
+        let scene = state.scene.valid();
+        let arrays = scene.to_arrays(scene_meta(&self.config, &self.data));
+        let settings = &self.config.compression;
+        match (&state.compression, settings.profile.coded()) {
+            (Some(compression), Some(profile)) => {
+                let input = compression_input(&mut compression.valid(), &scene, &arrays, settings, profile)?;
+                checks::coding(&arrays, &input)?;
+            }
+            _ => checks::scene(&arrays)?,
+        }
+        Ok(())
     }
 
     /// `checkpoint` is the file that `state` is from.
