@@ -67,6 +67,7 @@
 
 mod adaptive;
 pub mod attributes;
+pub mod checks;
 mod entropy;
 mod error;
 mod fields;
@@ -97,7 +98,8 @@ pub use stream::{
     CompressionInput, CompressionReport, Distributions, Encoded, OpenStream, PerGroup, PlaneCoding, Profile,
     SectionInfo, StreamInfo, WeightPrecisions,
     container::{MAGIC, VERSION},
-    decode, decode_with_limits, encode, encode_compressed, encode_planes, encode_sh, info, plane_distributions,
+    decode, decode_with_limits, encode, encode_compressed, encode_compressed_with_limits, encode_planes, encode_sh,
+    info, plane_distributions,
     sections::{Encoding, Kind},
     sh_distributions,
 };

@@ -75,6 +75,27 @@ impl Default for Limits {
 }
 
 impl Limits {
+    /// What the encoder keeps to, for files that are trusted: they may take minutes and gigabytes.
+    pub const fn large() -> Self {
+        Self {
+            file_bytes: 1 << 40,
+            meta_bytes: 1 << 20,
+            sections: 64,
+            string_bytes: 1 << 16,
+            extras: 1 << 10,
+            gaussians: 1 << 28,
+            channels: 1 << 12,
+            resolution: 1 << 16,
+            scales: 16,
+            networks: 32,
+            nodes: 256,
+            layer_width: 1 << 19,
+            layer_weights: 1 << 28,
+            coded_values: 1 << 30,
+            multiplications: 1 << 44,
+        }
+    }
+
     /// These limits for a stream of some length, which raises what it may hold.
     pub(crate) fn for_stream(&self, bytes: usize) -> Self {
         Self { coded_values: self.coded_values.max(64 * bytes as u64), ..*self }

@@ -12,7 +12,7 @@ use common::compression::{
 };
 use light4gs_codec::{
     CodecError, CompressionInput, Condition, ContextModelArrays, LatentArrays, Limits, Network, PlanePrior,
-    PlaneSource, Profile, decode, decode_with_limits, encode_compressed, info,
+    PlaneSource, Profile, decode, decode_with_limits, encode_compressed, encode_compressed_with_limits, info,
     network::{Layer, LayerKind, Node, Operation, Value},
 };
 use proptest::prelude::*;
@@ -152,7 +152,7 @@ fn refusal(network: Network, sources: &[PlaneSource]) -> CodecError {
     let model = model(network, sources.to_vec(), &mut random);
     let others = input(&scene, Profile::Paper, compact_shape(M, ALL_PARTS));
     let planes = Some(plane_coding(&scene.hexplane, model, step(0.1)));
-    encode_compressed(&scene, &CompressionInput { planes, ..others }).unwrap_err()
+    encode_compressed_with_limits(&scene, &CompressionInput { planes, ..others }, &Limits::default()).unwrap_err()
 }
 
 #[test]

@@ -3,7 +3,10 @@
 mod common;
 
 use common::sample;
-use light4gs_codec::{CodecError, MotionNetwork, MotionOutput, SceneData, encode, network::Layer};
+use light4gs_codec::{
+    CodecError, MotionNetwork, MotionOutput, PerGroup, SceneData, attributes::AttributeSteps, checks, encode,
+    network::Layer,
+};
 
 fn network(scene: &mut SceneData) -> &mut MotionNetwork {
     scene.motion.network.as_mut().unwrap()
@@ -87,4 +90,33 @@ fn numbers_beyond_the_limits() {
     over(|scene| scene.hexplane.resolution[2] = u32::MAX);
     over(|scene| scene.motion.tensors[0].shape = vec![u32::MAX; 5]);
     over(|scene| layer(scene).outputs = u32::MAX);
+}
+
+/// What a configuration may ask before anything is trained; the encoder asks the same.
+#[test]
+fn what_is_refused_before_training() {
+    let hexplane = |multipliers: &[u32]| checks::hexplane(32, [64, 64, 64, 24], multipliers);
+    assert!(hexplane(&[1, 2, 4]).is_ok());
+    assert!(hexplane(&[1; 16]).is_ok());
+    assert!(hexplane(&[1; 17]).unwrap_err().to_string().contains("number of scales is 17, at most 16"));
+    assert!(hexplane(&[1, 2000]).unwrap_err().to_string().contains("width is 128000, at most 65536"));
+    assert!(checks::hexplane(5000, [64; 4], &[1]).unwrap_err().to_string().contains("channels is 5000"));
+    assert!(checks::hexplane(8, [64, 64, 63, 24], &[1]).unwrap_err().to_string().contains("63 along z"));
+
+    for step in [1e-45, 0.0, -0.1, 0.99e-5, 2e30, f32::NAN, f32::INFINITY] {
+        assert!(checks::plane_step(step).is_err(), "{step}");
+        assert!(checks::sh_step(step).is_err(), "{step}");
+        let steps = AttributeSteps { quaternion: step, ..Default::default() };
+        assert!(steps.check().unwrap_err().to_string().starts_with("gaussians: step of quaternion is"), "{step}");
+        assert!(steps.clamped().check().is_ok(), "{step}");
+        let steps = checks::nearest_plane_steps(PerGroup { space_only: step, space_time: 0.1 });
+        assert!(checks::plane_step(steps.space_only).is_ok() && steps.space_time == 0.1, "{step}");
+    }
+    assert!(checks::plane_step(checks::LEAST_STEP).is_ok());
+
+    assert!(checks::positions(&[[0.0; 3], [1e30, -1e30, 0.0]]).is_ok());
+    for bad in [3e38, -3e38, f32::NAN, f32::INFINITY] {
+        assert!(checks::positions(&[[0.0; 3], [0.0, bad, 0.0]]).unwrap_err().to_string().contains("in value 4"));
+    }
+    assert!(checks::scene(&sample()).is_ok());
 }

@@ -43,6 +43,7 @@ mod prediction;
 mod steps;
 
 use neighbors::{NEIGHBORS, nearest_before};
+pub(crate) use position_grid::check_positions;
 use position_grid::{PositionGrid, morton_cell, morton_code};
 pub use steps::AttributeSteps;
 use steps::check_step;

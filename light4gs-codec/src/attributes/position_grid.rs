@@ -31,12 +31,9 @@ impl PositionGrid {
         let Some(&first) = means.first() else {
             return Ok(Self { origin: [0.0; 3], step: 1.0, bits: 0 });
         };
+        check_positions(means)?;
         let (mut least, mut most) = (first, first);
         for (index, &value) in means.as_flattened().iter().enumerate() {
-            if value.abs() > LARGEST_POSITION {
-                let expected = format!("at most {LARGEST_POSITION:e} on either side of 0");
-                return Err(CodecError::invalid(SECTION, "means", format!("{value:e} in value {index}"), expected));
-            }
             let axis = index % 3;
             least[axis] = least[axis].min(value);
             most[axis] = most[axis].max(value);
@@ -85,6 +82,19 @@ impl PositionGrid {
             return Err(CodecError::invalid(SECTION, "bits of a position", bits, format!("at most {MOST_BITS}")));
         }
         Ok(Self { origin, step, bits })
+    }
+}
+
+/// Refuses positions that no grid can hold.
+pub(crate) fn check_positions(means: &[[f32; 3]]) -> Result<(), CodecError> {
+    // NaN is in no range.
+    let legal = |value: &f32| (-LARGEST_POSITION..=LARGEST_POSITION).contains(value);
+    match means.as_flattened().iter().enumerate().find(|(_, value)| !legal(value)) {
+        None => Ok(()),
+        Some((index, value)) => {
+            let expected = format!("at most {LARGEST_POSITION:e} on either side of 0");
+            Err(CodecError::invalid(SECTION, "means", format!("{value:e} in value {index}"), expected))
+        }
     }
 }
 

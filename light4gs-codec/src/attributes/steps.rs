@@ -1,7 +1,7 @@
 //! How finely the attributes are quantized.
 
 use super::SECTION;
-use crate::{CodecError, adaptive::LARGEST_STEP};
+use crate::{CodecError, adaptive::LARGEST_STEP, checks};
 
 /// How finely each attribute of a Gaussian is quantized.
 ///
@@ -33,22 +33,41 @@ impl Default for AttributeSteps {
 }
 
 impl AttributeSteps {
-    /// Refuses steps that are not positive or are absurdly large.
-    pub(super) fn check(&self) -> Result<(), CodecError> {
+    /// Refuses steps below [`checks::LEAST_STEP`] (a position's only where it is not positive) or above 1e30.
+    ///
+    /// # Errors
+    /// Names the first one.
+    pub fn check(&self) -> Result<(), CodecError> {
+        self.named().into_iter().try_for_each(|(attribute, step)| checks::attribute_step(attribute, step))
+    }
+
+    /// The nearest steps that [`AttributeSteps::check`] takes; NaN becomes the smallest.
+    pub fn clamped(&self) -> Self {
+        let nearest = |step: f32, least: f32| step.max(least).min(LARGEST_STEP);
+        let step = |step: f32| nearest(step, checks::LEAST_STEP);
+        Self {
+            position: nearest(self.position, f32::MIN_POSITIVE),
+            log_scale: step(self.log_scale),
+            quaternion: step(self.quaternion),
+            opacity_logit: step(self.opacity_logit),
+            sh_dc: step(self.sh_dc),
+        }
+    }
+
+    /// The steps with their names, which are those of the fields.
+    pub fn named(&self) -> [(&'static str, f32); 5] {
         let Self { position, log_scale, quaternion, opacity_logit, sh_dc } = *self;
-        check_step("position", position)?;
-        check_step("log_scale", log_scale)?;
-        check_step("quaternion", quaternion)?;
-        check_step("opacity_logit", opacity_logit)?;
-        check_step("sh_dc", sh_dc)
+        [
+            ("position", position),
+            ("log_scale", log_scale),
+            ("quaternion", quaternion),
+            ("opacity_logit", opacity_logit),
+            ("sh_dc", sh_dc),
+        ]
     }
 }
 
-/// Refuses a step under which a decoded number could be infinite.
+/// Refuses a step of a stream under which a decoded number could be infinite.
 pub(super) fn check_step(attribute: &str, step: f32) -> Result<(), CodecError> {
-    if (f32::MIN_POSITIVE..=LARGEST_STEP).contains(&step) {
-        return Ok(());
-    }
-    let field = format!("step of {attribute}");
-    Err(CodecError::invalid(SECTION, field, step, format!("a positive number, at most {LARGEST_STEP:e}")))
+    checks::check_step(SECTION, format!("step of {attribute}"), step, f32::MIN_POSITIVE)
 }

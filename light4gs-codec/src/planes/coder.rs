@@ -74,6 +74,15 @@ pub(crate) fn decode(
     )
 }
 
+/// Refuses planes that ask for more than the limits allow.
+pub(crate) fn check_cost(
+    hexplane: &HexPlaneArrays,
+    model: &ContextModelArrays,
+    limits: &Limits,
+) -> Result<(), CodecError> {
+    PlaneCoder::new(model, hexplane, &[], limits).map(drop)
+}
+
 struct PlaneCoder<'a> {
     model: ExactModel<'a>,
     stages: Vec<Vec<usize>>,

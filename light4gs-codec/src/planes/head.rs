@@ -33,6 +33,18 @@ impl Head {
         }
     }
 
+    /// Of planes whose time axis is not multiplied.
+    pub(crate) fn from_shape(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> Self {
+        let side = |axis: usize, multiplier: u32| match axis {
+            TIME_AXIS => resolution[axis],
+            _ => resolution[axis].saturating_mul(multiplier),
+        };
+        let sizes = multipliers
+            .iter()
+            .flat_map(|&multiplier| PLANE_AXES.map(|[a, b]| [side(b, multiplier), side(a, multiplier)]));
+        Self { channels, resolution, multipliers: multipliers.to_vec(), sizes: sizes.collect() }
+    }
+
     pub(crate) fn plane_count(&self) -> usize {
         self.sizes.len()
     }

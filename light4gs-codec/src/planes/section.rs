@@ -6,7 +6,7 @@ use super::{
     plan::{stream_order, sub_streams},
 };
 use crate::{
-    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane,
+    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane, PlaneCoding, checks,
     limits::at_most,
     plane_layout::SIZE_MULTIPLE,
     stream::{reader::Reader, writer::Writer},
@@ -32,16 +32,15 @@ impl PlaneBytes {
     }
 }
 
-/// Refuses what cannot be coded: planes, steps and latents that contradict the model or each other.
-pub(crate) fn check(
-    hexplane: &HexPlaneArrays,
-    model: &ContextModelArrays,
-    steps: &[PerGroup],
-    latent_symbols: &[Vec<i32>],
-) -> Result<(), CodecError> {
+/// Refuses what cannot be coded: a model that is unsound or asks for too much, planes, steps and latents that contradict
+/// it or each other.
+pub(crate) fn check(hexplane: &HexPlaneArrays, coding: &PlaneCoding, limits: &Limits) -> Result<(), CodecError> {
+    let PlaneCoding { model, steps, latent_symbols } = coding;
+    model.check(limits)?;
     check_model(&Head::of(hexplane), model)?;
     let scales = hexplane.multipliers.len();
     check_steps(steps, scales)?;
+    steps.iter().flat_map(|step| [step.space_only, step.space_time]).try_for_each(checks::plane_step)?;
     if latent_symbols.len() != hexplane.planes.len() {
         let expected = format!("{}, one list a plane", hexplane.planes.len());
         return Err(CodecError::invalid(SECTION, "lists of latent symbols", latent_symbols.len(), expected));
@@ -55,7 +54,7 @@ pub(crate) fn check(
             return Err(CodecError::invalid(SECTION, field, symbols.len(), expected.to_string()));
         }
     }
-    Ok(())
+    coder::check_cost(hexplane, model, limits)
 }
 
 /// Refuses channels other than the model's, and sizes that a latent or a checkerboard cannot have.

@@ -103,14 +103,14 @@ impl Conditions<'_> {
 }
 
 impl ShCoding {
-    pub(super) fn step(&self) -> f32 {
+    pub(crate) fn step(&self) -> f32 {
         match self {
             Self::Tables { step, .. } | Self::Networks { step, .. } => *step,
         }
     }
 
     /// Refuses a step, tables or networks that do not fit the degree and the features of the hexplane.
-    pub(super) fn check(&self, degree: u8, features: u64, limits: &Limits) -> Result<(), CodecError> {
+    pub(crate) fn check(&self, degree: u8, features: u64, limits: &Limits) -> Result<(), CodecError> {
         let step = self.step();
         if !(step.is_normal() && step > 0.0) {
             return Err(CodecError::invalid(SECTION, "step", step, "a positive normal number"));

@@ -1,9 +1,8 @@
 //! A scene into a compressed stream.
 
 use super::{
-    check,
     container::{self, NewSection},
-    decode, gaussians, motion, scene_frame,
+    decode_with_limits, gaussians, motion, scene_frame,
     sections::{Encoding, Kind},
     writer::Writer,
 };
@@ -11,7 +10,7 @@ use crate::{
     CodecError, CompressionInput, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, Profile, SceneData,
     ShBytes,
     attributes::{self, EncodedAttributes},
-    fields,
+    checks, fields,
     network_weights::WeightPrecision,
     planes,
     sh::{self, coding::Conditions},
@@ -50,8 +49,19 @@ pub struct CompressionReport {
 /// What [`crate::encode`] refuses; a model, tables or layers that contradict themselves or the scene; values beyond
 /// ±2^22 steps. The message names the section and the field.
 pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<Encoded, CodecError> {
-    let limits = Limits::default();
-    check(scene, &limits)?;
+    encode_compressed_with_limits(scene, input, &Limits::large())
+}
+
+/// As [`encode_compressed`], within limits of the caller's: those of the readers that the stream is for.
+///
+/// # Errors
+/// As [`encode_compressed`].
+pub fn encode_compressed_with_limits(
+    scene: &SceneData,
+    input: &CompressionInput,
+    limits: &Limits,
+) -> Result<Encoded, CodecError> {
+    checks::coding_within(scene, input, limits)?;
     let compact = |precision| (input.profile == Profile::Compact).then_some(precision);
 
     let mut sections = Vec::new();
@@ -63,14 +73,14 @@ pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<
     scene_frame::write(&scene.frame, &mut writer);
     push(&mut sections, Kind::SceneFramePrincipalAxes, Encoding::Float32, writer);
     let precision = compact(input.weights.context_model);
-    let (hexplane, planes) = write_planes(&scene.hexplane, input.planes.as_ref(), precision, &limits, &mut sections)?;
+    let (hexplane, planes) = write_planes(&scene.hexplane, input.planes.as_ref(), precision, limits, &mut sections)?;
 
     let conditions = Conditions { gaussians: &attributes, frame: &scene.frame, hexplane: &hexplane };
     let rest = reordered(&scene.gaussians, &order);
     let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
     let mut writer = Writer::default();
     let precision = compact(input.weights.sh);
-    let (sh_rest, sh) = sh::section::write(&with_rest, &input.sh, precision, conditions, &limits, &mut writer)?;
+    let (sh_rest, sh) = sh::section::write(&with_rest, &input.sh, precision, conditions, limits, &mut writer)?;
     let kind = input.sh.kind();
     // Tables are coded in either profile.
     let encoding = if kind == Kind::ShTables { Encoding::Quantized } else { encoding_of(precision) };
@@ -84,9 +94,9 @@ pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<
         motion,
     };
     sections.sort_by_key(|section| section.kind.place().0.id());
-    let bytes = container::write(&scene.meta, &sections, &limits)?;
+    let bytes = container::write(&scene.meta, &sections, limits)?;
 
-    let decoded = decode(&bytes)?;
+    let decoded = decode_with_limits(&bytes, limits)?;
     fields::check_same_bits(&expected, &decoded)?;
     let size = |section: NewSection| {
         let NewSection { kind, encoding, payload } = section;
@@ -137,8 +147,6 @@ fn write_planes(
         push(sections, Kind::HexPlanesExplicit, Encoding::Float32, writer);
         return Ok((hexplane.clone(), Vec::new()));
     };
-    model.check(limits)?;
-    planes::section::check(hexplane, model, steps, latent_symbols)?;
     let model = planes::context_section::write(model, precision, &mut writer)?;
     push(sections, Kind::ContextModelNetworks, encoding_of(precision), writer);
 

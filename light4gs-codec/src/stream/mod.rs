@@ -21,7 +21,7 @@ mod scene_frame;
 pub(crate) mod sections;
 pub(crate) mod writer;
 
-pub use compressor::{CompressionReport, Encoded, encode_compressed};
+pub use compressor::{CompressionReport, Encoded, encode_compressed, encode_compressed_with_limits};
 pub use info::{SectionInfo, StreamInfo, info};
 pub use input::{CompressionInput, PerGroup, PlaneCoding, Profile, WeightPrecisions};
 pub use open::OpenStream;
@@ -31,18 +31,18 @@ use container::NewSection;
 use sections::{Encoding, Kind};
 use writer::Writer;
 
-use crate::{CodecError, Limits, SceneData, fields, planes, sh};
+use crate::{CodecError, Limits, SceneData, checks, fields, planes, sh};
 
 /// Turns a scene into a `.l4gs` stream without loss: all numbers float32.
 ///
 /// The stream is decoded again and compared with `scene`, bit by bit, before it is returned.
 ///
 /// # Errors
-/// An array whose length disagrees with the others, a NaN or an infinity, a number beyond the default [`Limits`]; the
+/// An array whose length disagrees with the others, a NaN or an infinity, a number beyond [`Limits::large`]; the
 /// message names the section and the field.
 pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
-    let limits = Limits::default();
-    check(scene, &limits)?;
+    let limits = Limits::large();
+    checks::scene(scene)?;
     let section = |kind: Kind, write: &dyn Fn(&mut Writer)| {
         let mut writer = Writer::default();
         write(&mut writer);

@@ -16,7 +16,7 @@ pub fn encode_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<
     check_planes(hexplane, coding)?;
     let mut writer = Writer::default();
     let PlaneCoding { model, steps, latent_symbols } = coding;
-    planes::section::write(hexplane, model, steps, latent_symbols, &Limits::default(), &mut writer)?;
+    planes::section::write(hexplane, model, steps, latent_symbols, &Limits::large(), &mut writer)?;
     Ok(writer.bytes)
 }
 
@@ -31,7 +31,7 @@ pub fn encode_sh(
     frame: &SceneFrameArrays,
     hexplane: &HexPlaneArrays,
 ) -> Result<Vec<u8>, CodecError> {
-    let limits = Limits::default();
+    let limits = Limits::large();
     gaussians::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(hexplane, &limits)?;
@@ -66,7 +66,7 @@ pub fn plane_distributions(
         return Err(CodecError::invalid(Section::HexPlanes.name(), "plane", plane, expected));
     }
     let symbols = &coding.latent_symbols[plane];
-    let (scales, means) = planes::parameters(hexplane, &coding.model, symbols, plane, &Limits::default())?;
+    let (scales, means) = planes::parameters(hexplane, &coding.model, symbols, plane, &Limits::large())?;
     Ok(Distributions { scales, means })
 }
 
@@ -80,7 +80,7 @@ pub fn sh_distributions(
     frame: &SceneFrameArrays,
     hexplane: &HexPlaneArrays,
 ) -> Result<Distributions, CodecError> {
-    let limits = Limits::default();
+    let limits = Limits::large();
     gaussians::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(hexplane, &limits)?;
@@ -88,8 +88,7 @@ pub fn sh_distributions(
 }
 
 fn check_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<(), CodecError> {
-    let limits = Limits::default();
+    let limits = Limits::large();
     planes::head::check(hexplane, &limits)?;
-    coding.model.check(&limits)?;
-    planes::section::check(hexplane, &coding.model, &coding.steps, &coding.latent_symbols)
+    planes::section::check(hexplane, coding, &limits)
 }

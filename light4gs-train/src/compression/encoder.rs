@@ -2,19 +2,18 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
-    ShCoding, WeightPrecisions, encode_compressed, sh_rest_coefficients,
+    ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
 };
 use light4gs_model::{DeformationField, DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
 use super::{Compression, step_search};
-use crate::config::{AttributesConfig, CompressionConfig};
+use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
 /// A file in memory.
@@ -152,18 +151,13 @@ pub fn compression_input<F: DeformationField>(
         profile,
         planes: compression.plane_coding(scene)?,
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
-        attributes: attribute_steps(&config.attributes),
+        attributes: config.attributes.steps(),
         weights: WeightPrecisions {
             motion: WeightPrecision::Bits(config.weights.deformation_bits),
             context_model: WeightPrecision::Bits(config.weights.context_bits),
             sh: WeightPrecision::Bits(config.weights.context_bits),
         },
     })
-}
-
-fn attribute_steps(config: &AttributesConfig) -> AttributeSteps {
-    let AttributesConfig { position, log_scale, quaternion, opacity_logit, sh_dc, .. } = *config;
-    AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }
 }
 
 impl Compression {
@@ -175,7 +169,7 @@ impl Compression {
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(Some(PlaneCoding {
             model: models.context.to_arrays()?,
-            steps: steps.to_groups(),
+            steps: steps.to_groups().into_iter().map(checks::nearest_plane_steps).collect(),
             latent_symbols: symbols.into_iter().map(|plane| plane.map_or_else(Vec::new, integers)).collect(),
         }))
     }

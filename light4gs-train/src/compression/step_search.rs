@@ -24,7 +24,8 @@ fn to_array(steps: &AttributeSteps) -> [f32; 5] {
 }
 
 fn from_array([position, log_scale, quaternion, opacity_logit, sh_dc]: [f32; 5]) -> AttributeSteps {
-    AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }
+    // What the search tries must be something that the encoder takes.
+    AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }.clamped()
 }
 
 /// Steps that cost at most about `tolerance` dB on the images that `render` makes, starting from `given`.

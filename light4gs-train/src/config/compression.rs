@@ -201,6 +201,14 @@ pub struct AttributesConfig {
     pub search_tolerance: f64,
 }
 
+impl AttributesConfig {
+    /// The steps, as the codec has them.
+    pub fn steps(&self) -> AttributeSteps {
+        let Self { position, log_scale, quaternion, opacity_logit, sh_dc, search_tolerance: _ } = *self;
+        AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }
+    }
+}
+
 /// Bits a weight may have.
 pub(super) const LEAST_WEIGHT_BITS: u8 = 4;
 /// Bits a weight may have.

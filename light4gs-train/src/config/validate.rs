@@ -1,6 +1,7 @@
 //! Ranges: what the types alone let through.
 
 use light4gs_codec::plane_layout::check_resolution;
+use light4gs_codec::{CodecError, checks};
 
 use super::compression::{LEAST_WEIGHT_BITS, MOST_WEIGHT_BITS};
 use super::{
@@ -65,6 +66,13 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     check.that("model.hexplane.multipliers", ascending && multipliers.first().is_some_and(|first| *first > 0), || {
         format!("is {multipliers:?}; it must hold at least one number, all above 0, each above the one before")
     });
+    if illegal.is_none() {
+        let narrow =
+            |sizes: &[usize]| -> Vec<u32> { sizes.iter().map(|&s| u32::try_from(s).unwrap_or(u32::MAX)).collect() };
+        let [x, y, z, t] = planes.resolution.map(|size| u32::try_from(size).unwrap_or(u32::MAX));
+        let (channels, multipliers) = (u32::try_from(planes.channels).unwrap_or(u32::MAX), narrow(multipliers));
+        check.encodable("model.hexplane.multipliers", checks::hexplane(channels, [x, y, z, t], &multipliers));
+    }
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {
@@ -193,19 +201,17 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     for (name, value) in [
         ("context.learning_rate_init", context.learning_rate_init),
         ("context.learning_rate_final", context.learning_rate_final),
-        ("steps.space_only", steps.space_only),
-        ("steps.space_time", steps.space_time),
         ("steps.learning_rate", steps.learning_rate),
-        ("sh.step", sh.step),
         ("sh.learning_rate_init", sh.learning_rate_init),
         ("sh.learning_rate_final", sh.learning_rate_final),
-        ("attributes.position", attributes.position.into()),
-        ("attributes.log_scale", attributes.log_scale.into()),
-        ("attributes.quaternion", attributes.quaternion.into()),
-        ("attributes.opacity_logit", attributes.opacity_logit.into()),
-        ("attributes.sh_dc", attributes.sh_dc.into()),
     ] {
         check.positive(&format!("compression.{name}"), value);
+    }
+    check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
+    check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
+    check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));
+    for (name, step) in attributes.steps().named() {
+        check.encodable(&format!("compression.attributes.{name}"), checks::attribute_step(name, step));
     }
     let tolerance = attributes.search_tolerance;
     check.that("compression.attributes.search_tolerance", tolerance.is_finite() && tolerance >= 0.0, || {
@@ -250,6 +256,13 @@ impl Check {
 
     fn positive(&mut self, key: &str, value: f64) {
         self.that(key, value.is_finite() && value > 0.0, || format!("is {value}; it must be finite and above 0"));
+    }
+
+    /// What the encoder says, so that nothing is trained that it would refuse.
+    fn encodable(&mut self, key: &str, answer: Result<(), CodecError>) {
+        if let Err(error) = answer {
+            self.that(key, false, || format!("is nothing that the encoder takes: {error}"));
+        }
     }
 
     fn share(&mut self, key: &str, value: f32) {
