@@ -12,6 +12,7 @@
 //! fine_iterations = 2000
 //! ```
 
+mod bounds;
 mod choice;
 mod compression;
 mod data;
@@ -35,6 +36,7 @@ use sha2::{Digest, Sha256};
 
 use layering::layers;
 
+pub use bounds::{BOUNDS, Bounds};
 pub use choice::UnknownChoice;
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
