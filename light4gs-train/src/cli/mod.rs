@@ -5,6 +5,7 @@ mod bench;
 mod container;
 mod export;
 mod gpu_errors;
+mod limits;
 mod output;
 mod progress;
 mod quickstart;

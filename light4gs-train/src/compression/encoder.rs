@@ -51,6 +51,19 @@ pub struct BitMap {
     pub bits: Vec<f32>,
 }
 
+impl BitMap {
+    /// What keeps it from being drawn, if it comes from a file: as many numbers as places, none below 0.
+    pub fn problem(&self) -> Option<String> {
+        let Self { name, width, height, bits } = self;
+        let places = u64::from(*width) * u64::from(*height);
+        if bits.is_empty() || bits.len() as u64 != places {
+            return Some(format!("the map of plane `{name}` is {width}×{height}, but has {} numbers", bits.len()));
+        }
+        let bad = bits.iter().find(|bits| !(bits.is_finite() && **bits >= 0.0))?;
+        Some(format!("the map of plane `{name}` has the number {bad}, expected bits"))
+    }
+}
+
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BitEstimate {

@@ -132,6 +132,8 @@ impl<F: DeformationField> TrainerBuilder<F> {
         if self.data.train.is_empty() {
             return Err(TrainError::Input(format!("the dataset `{}` has no training frames", self.data.name)));
         }
+        // What the encoder would refuse in the end is refused now.
+        light4gs_codec::checks::positions(&self.data.points.positions)?;
         let device = match &self.device {
             Some(device) => device.clone(),
             None => device::open(self.config.device)?,
