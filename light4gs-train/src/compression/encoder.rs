@@ -101,7 +101,10 @@ pub fn encode<F: DeformationField>(
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
-        input.attributes = step_search::search(&data, &input.attributes, tolerance, images.error, images.render)?;
+        // The search tries steps much finer than those given. Values too far out for them, as a training that has gone
+        // wrong leaves them, may still fit the given ones.
+        let found = step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
+        input.attributes = found.unwrap_or(input.attributes);
     }
     let encoded = encode_compressed(&data, &input)?;
     let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;
