@@ -1,16 +1,7 @@
 //! How the Gaussians move, as data; and where they are at a time.
 
-use super::query::{multiply_by_sample, normalized};
-use crate::{
-    CodecError, Limits, Network, SceneData,
-    limits::at_most,
-    network::{
-        Program,
-        kernels::{LANES, Lanes},
-    },
-    plane_layout::PLANE_AXES,
-    stream::sections::Section,
-};
+use super::MotionEvaluator;
+use crate::{CodecError, Limits, Network, SceneData, limits::at_most, stream::sections::Section};
 
 const SECTION: &str = Section::Motion.name();
 /// The longest name of a kind.
@@ -202,58 +193,18 @@ impl SceneData {
     /// The centers of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves, or where
     /// what moves them is no [`MotionNetwork`].
     ///
-    /// For tools that want to look into a file without a back end. It runs any network, follows the model's conventions
-    /// (docs/design.md) to float tolerance, takes some microseconds a Gaussian, and uses one thread.
+    /// For tools that want to look into a file without a back end; see [`MotionEvaluator`], which is made anew for each
+    /// call.
     ///
     /// # Errors
     /// A network that contradicts itself or the hexplane.
     pub fn positions_at(&self, time: f32) -> Result<Vec<[f32; 3]>, CodecError> {
-        let means = &self.gaussians.means;
-        let Some(motion) = &self.motion.network else { return Ok(means.clone()) };
-        let Some(output) = motion.outputs.iter().position(|output| *output == MotionOutput::Position) else {
-            return Ok(means.clone());
-        };
-        let limits = Limits::default();
-        self.motion.check(&limits)?;
-        crate::planes::head::check(&self.hexplane, &limits)?;
-        self.motion.check_features(self.hexplane.features())?;
-        let program = Program::pointwise(&motion.network, &vec![true; motion.sources.len()]);
-        let mut workspace = program.workspace();
-        let mut moved = Vec::with_capacity(means.len());
-        for means in means.chunks(LANES) {
-            for (input, source) in motion.sources.iter().enumerate() {
-                let inputs = program.input_lanes(&mut workspace, input);
-                for (lane, &mean) in means.iter().enumerate() {
-                    match source {
-                        MotionSource::Features => set_lane(inputs, lane, &self.features(mean, time)),
-                        MotionSource::Point => set_lane(inputs, lane, &normalized(&self.frame, mean)),
-                        MotionSource::Time => set_lane(inputs, lane, &[time]),
-                    }
-                }
-            }
-            program.run(&mut workspace);
-            let [x, y, z] = program.output_lanes(&workspace, output) else { unreachable!("`check` has counted them") };
-            let shifted = |(lane, mean): (usize, &[f32; 3])| [mean[0] + x[lane], mean[1] + y[lane], mean[2] + z[lane]];
-            moved.extend(means.iter().enumerate().map(shifted));
+        let motion = self.motion.network.as_ref();
+        if !motion.is_some_and(|motion| motion.outputs.contains(&MotionOutput::Position)) {
+            return Ok(self.gaussians.means.clone());
         }
-        Ok(moved)
+        let mut moved = self.gaussians.clone();
+        MotionEvaluator::new(self)?.apply(&self.gaussians, time, 0..moved.len(), &mut moved);
+        Ok(moved.means)
     }
-
-    /// Products of the six samples of each scale, `[channels · scales]`.
-    fn features(&self, point: [f32; 3], time: f32) -> Vec<f32> {
-        let [x, y, z] = normalized(&self.frame, point);
-        let coordinates = [x, y, z, 2.0 * time - 1.0];
-        let channels = self.hexplane.channels as usize;
-        let mut features = vec![1.0; channels * self.hexplane.multipliers.len()];
-        for (product, planes) in features.chunks_exact_mut(channels).zip(self.hexplane.planes.chunks_exact(6)) {
-            for (plane, [across, down]) in planes.iter().zip(PLANE_AXES) {
-                multiply_by_sample(plane, coordinates[across], coordinates[down], product);
-            }
-        }
-        features
-    }
-}
-
-fn set_lane(inputs: &mut [Lanes], lane: usize, values: &[f32]) {
-    inputs.iter_mut().zip(values).for_each(|(input, &value)| input[lane] = value);
 }

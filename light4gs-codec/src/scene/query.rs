@@ -21,16 +21,16 @@ pub(crate) fn normalized(frame: &SceneFrameArrays, point: [f32; 3]) -> [f32; 3] 
 
 /// Two samples of an axis and the share of the second.
 #[derive(Clone, Copy, Debug)]
-struct Between {
-    low: usize,
-    high: usize,
+pub(crate) struct Between {
+    pub(crate) low: usize,
+    pub(crate) high: usize,
     share: f32,
 }
 
 impl Between {
     /// Where a coordinate in [-1, 1] falls among `samples`, the first at -1 and the last at 1; outside counts as the
     /// border.
-    fn of(coordinate: f32, samples: u32) -> Self {
+    pub(crate) fn of(coordinate: f32, samples: u32) -> Self {
         let last = samples as usize - 1;
         let position = (coordinate + 1.0) * 0.5 * last as f32;
         // NaN goes the way of 0.
@@ -38,6 +38,11 @@ impl Between {
         let low = (position as usize).min(last);
         let share = position - low as f32;
         Self { low, high: (low + 1).min(last), share: if share < 1.0 { share } else { 1.0 } }
+    }
+
+    /// The value there, from those of the two samples.
+    pub(crate) fn between(self, low: f32, high: f32) -> f32 {
+        low * (1.0 - self.share) + high * self.share
     }
 }
 
@@ -48,8 +53,8 @@ pub(crate) fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product:
     for (product, channel) in product.iter_mut().zip(plane.values.chunks_exact(width * plane.height as usize)) {
         let row = |y: usize| {
             let row = &channel[y * width..(y + 1) * width];
-            row[x.low] * (1.0 - x.share) + row[x.high] * x.share
+            x.between(row[x.low], row[x.high])
         };
-        *product *= row(y.low) * (1.0 - y.share) + row(y.high) * y.share;
+        *product *= y.between(row(y.low), row(y.high));
     }
 }

@@ -292,6 +292,41 @@ mod tests {
         }
     }
 
+    /// The outcome of every operation on some pairs and triples of values, as bits; of the fused one rounded.
+    struct EveryOperation;
+    impl LaneKernel for EveryOperation {
+        type Output = Vec<u32>;
+        fn run<L: Lanes>(self) -> Vec<u32> {
+            let a = [0.0, -0.0, 1.5, -2.25, 1e-30, 3e8, 7.0, -126.0];
+            let b = [1.0, -1.0, 1.5, 0.75, 2e-30, -3e8, 0.1, 5.0];
+            let c = [-1.0, 4.0, 0.5, 0.0, 1.0, 2.0, -7.0, 9.0];
+            let mut found = Vec::new();
+            let mut keep = |vector: L| {
+                let mut out = [0.0; LANES];
+                vector.store(&mut out);
+                found.extend(out.map(f32::to_bits));
+            };
+            let (x, y, z) = (L::load(&a), L::load(&b), L::load(&c));
+            let mask = x.at_least(y);
+            for vector in [x.add(y), x.sub(y), x.mul(y), x.div(y), x.min(y), x.max(y), x.max(z).sqrt()] {
+                keep(vector);
+            }
+            for vector in [mask, mask.and(y), mask.or(z), mask.and_not(x), mask.select(y, z), y.exp2_of_rounded()] {
+                keep(vector);
+            }
+            // Products of few bits, so that fused and separate rounding agree.
+            keep(L::splat(1.5).mul_add(L::load(&c), L::splat(0.25)));
+            found.push(mask.signs());
+            found.push(L::load(&c).sum().to_bits());
+            found
+        }
+    }
+
+    #[test]
+    fn every_operation_is_the_same_on_every_vector_type() {
+        assert_eq!(dispatch(EveryOperation), EveryOperation.run::<Portable>());
+    }
+
     #[test]
     fn exp2_is_accurate_on_every_vector_type() {
         for error in [dispatch(Exp2Error), Exp2Error.run::<Portable>()] {

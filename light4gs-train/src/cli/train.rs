@@ -14,6 +14,8 @@ use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
+use crate::evaluation::metrics::lpips::Lpips;
+use crate::evaluation::measure::Scores;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
@@ -73,9 +75,7 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
-    device::open(config.device)?;
-    // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
-    Scene::open(scene, &load_options(&config))?;
+    check_inputs(&config, scene)?;
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;
@@ -94,10 +94,9 @@ pub(super) fn train_to_evaluation(
     like: Option<&Path>,
     output: &RunOutput,
 ) -> Result<Evaluation, TrainError> {
-    device::open(config.device)?;
     let fresh = !out.join("run.json").exists();
     if fresh {
-        Scene::open(scene, &load_options(&config))?;
+        check_inputs(&config, scene)?;
         let folder = RunFolder::create(out, scene, &config, false)?;
         if let Some(like) = like {
             folder.adopt(&RunFolder::open(like)?.0)?;
@@ -117,6 +116,15 @@ pub(super) fn train_to_evaluation(
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
     evaluate_run::<HexPlaneField>(&folder, &config, &scene)
+}
+
+/// Checks what a run needs from its first iteration to its evaluation, before its folder is made or emptied, so that a
+/// wrong path leaves nothing behind and nothing is lost: the device, the dataset, files that metrics need.
+fn check_inputs(config: &Config, scene: &Path) -> Result<(), TrainError> {
+    let device = device::open(config.device)?;
+    Lpips::load(&config.eval.lpips, &device)?;
+    Scene::open(scene, &load_options(config))?;
+    Ok(())
 }
 
 /// A trainer of a run's folder, with progress bars.
@@ -176,6 +184,7 @@ impl Resume {
         let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
         let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
+        check_inputs(&config, &record.scene)?;
         let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
         if changed != found {
             // Only now that the checkpoint has been found to fit. The next `resume` goes on with it as well.
@@ -195,6 +204,9 @@ pub(super) struct Eval {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
+    /// Weights of LPIPS (see docs/metrics.md), in place of the configuration's `eval.lpips`; may be given more than once.
+    #[arg(long, value_name = "FILE")]
+    lpips: Vec<PathBuf>,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -214,6 +226,9 @@ impl Eval {
             )));
         }
         config.device = self.device.unwrap_or(config.device);
+        if !self.lpips.is_empty() {
+            config.eval.lpips = self.lpips;
+        }
         record.scene = self.scene.unwrap_or(record.scene);
         let scene = Scene::open(&record.scene, &load_options(&config))?;
         print_evaluation(&evaluate_run::<HexPlaneField>(&folder, &config, &scene)?, self.json)
@@ -229,6 +244,7 @@ impl Eval {
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
+        config.eval.lpips = self.lpips;
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
         let images = image_store(&config);
@@ -241,17 +257,7 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
     if json {
         return say_json(evaluation);
     }
-    let mut quality = Table::new([
-        ("split", Align::Left),
-        ("views", Align::Right),
-        ("PSNR dB", Align::Right),
-        ("SSIM", Align::Right),
-    ]);
-    for split in &evaluation.splits {
-        let (psnr, ssim) = (format!("{:.2}", split.psnr), format!("{:.4}", split.ssim));
-        quality.row([split.split.clone(), split.views.len().to_string(), psnr, ssim]);
-    }
-    say(quality)?;
+    say(quality_table(evaluation))?;
     say(sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes))?;
     if let Some(coding) = &evaluation.coding {
         say(coding_table(coding))?;
@@ -265,6 +271,18 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
         say(format_args!("trained for {:.1} min", seconds / 60.0))?;
     }
     Ok(())
+}
+
+/// Quality by split.
+fn quality_table(evaluation: &Evaluation) -> Table {
+    let columns = Scores::columns(evaluation.splits.iter().map(|split| &split.scores));
+    let names = [("split", Align::Left), ("views", Align::Right)];
+    let mut table = Table::new(names.into_iter().chain(columns.iter().map(|column| (column.label(), Align::Right))));
+    for split in &evaluation.splits {
+        let begin = [split.split.clone(), split.views.len().to_string()];
+        table.row(begin.into_iter().chain(columns.iter().map(|column| column.format(split.scores.get(*column)))));
+    }
+    table
 }
 
 /// Expected and real bits of what is entropy coded with trained models.

@@ -17,6 +17,8 @@ use super::{
 pub enum Bounds {
     /// True or false.
     Flag,
+    /// Any text, such as a path.
+    Text,
     /// One of these words.
     Word(&'static [&'static str]),
     /// The name of a back end: [`DEVICES`], `wgpu` also with an adapter.
@@ -51,7 +53,7 @@ pub enum Bounds {
     },
 }
 
-use Bounds::{Device, Flag, List, Number, Whole, WholeOrNone, Word};
+use Bounds::{Device, Flag, List, Number, Text, Whole, WholeOrNone, Word};
 
 /// Iterations, and intervals of them.
 const MOST_ITERATIONS: u64 = 100_000_000;
@@ -186,12 +188,14 @@ pub const BOUNDS: &[(&str, Bounds)] = &[
     ("eval.fps_frames", Whole { least: 1, most: 1_000_000 }),
     ("eval.interval", ITERATION),
     ("eval.views", ITERATION),
+    ("eval.lpips", List { element: &Text, length: None }),
 ];
 
 impl fmt::Display for Bounds {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Flag => write!(formatter, "true or false"),
+            Text => write!(formatter, "any text"),
             Word(words) => write!(formatter, "one of {}", words.join(", ")),
             Device => write!(formatter, "one of {}; wgpu also with an adapter", DEVICES.join(", ")),
             Whole { least, most: MOST_INTEGER } => write!(formatter, "{least} or more"),

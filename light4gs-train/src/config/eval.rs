@@ -1,5 +1,7 @@
 //! `[eval]`: how it is measured.
 
+use std::path::PathBuf;
+
 use light4gs_data::Split;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +23,8 @@ pub struct EvalConfig {
     pub interval: usize,
     /// The number of test views for that.
     pub views: usize,
+    /// Files with the weights of LPIPS; without any, the column says that there are none.
+    pub lpips: Vec<PathBuf>,
 }
 
 choice! {
@@ -54,6 +58,7 @@ impl Default for EvalConfig {
             fps_frames: 50,
             interval: 1000,
             views: 4,
+            lpips: Vec::new(),
         }
     }
 }

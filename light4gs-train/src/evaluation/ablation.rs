@@ -118,8 +118,8 @@ impl AblationRow {
         let split = evaluation.splits.iter().find(|split| split.split == "test").or(evaluation.splits.first());
         Self {
             name: name.to_owned(),
-            psnr: split.map_or(f64::NAN, |split| split.psnr),
-            ssim: split.map_or(f64::NAN, |split| split.ssim),
+            psnr: split.map_or(f64::NAN, |split| split.scores.psnr()),
+            ssim: split.map_or(f64::NAN, |split| split.scores.ssim()),
             bytes: evaluation.bytes,
             sections: evaluation.sections.iter().map(|section| (section.name.clone(), section.bytes)).collect(),
             gaussians: evaluation.gaussians,

@@ -90,8 +90,8 @@ fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {
     let mut tiles = Vec::new();
     for split in &evaluation.splits {
         let views = format!("mean over {} views of the decoded file", split.views.len());
-        tiles.push(tile(&format!("{} PSNR", split.split), format!("{:.2} dB", split.psnr), &views));
-        tiles.push(tile(&format!("{} SSIM", split.split), format!("{:.4}", split.ssim), &views));
+        tiles.push(tile(&format!("{} PSNR", split.split), format!("{:.2} dB", split.scores.psnr()), &views));
+        tiles.push(tile(&format!("{} SSIM", split.split), format!("{:.4}", split.scores.ssim()), &views));
     }
     tiles.push(tile("File", format!("{:.2} MB", evaluation.bytes as f64 / 1e6), "bytes on disk / 10^6"));
     tiles.push(tile("Gaussians", evaluation.gaussians.to_string(), "in the file"));

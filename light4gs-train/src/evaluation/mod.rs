@@ -2,6 +2,7 @@
 
 pub mod ablation;
 pub mod finish;
+pub mod measure;
 pub mod metrics;
 
 use std::path::Path;
@@ -17,8 +18,9 @@ use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
+use crate::evaluation::measure::Scores;
 use crate::evaluation::metrics::image_tensor;
-use crate::evaluation::metrics::{psnr, ssim};
+use crate::evaluation::metrics::lpips::Lpips;
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
@@ -28,10 +30,9 @@ pub struct ViewScore {
     pub name: String,
     /// In [0, 1].
     pub time: f32,
-    /// dB over the whole image.
-    pub psnr: f64,
-    /// Structural similarity.
-    pub ssim: f64,
+    /// What was measured.
+    #[serde(flatten)]
+    pub scores: Scores,
 }
 
 /// Quality of a split.
@@ -39,10 +40,9 @@ pub struct ViewScore {
 pub struct SplitScore {
     /// `test`, `val`...
     pub split: String,
-    /// Mean over the views.
-    pub psnr: f64,
-    /// Mean over the views.
-    pub ssim: f64,
+    /// Means over the views.
+    #[serde(flatten)]
+    pub scores: Scores,
     /// Every view.
     pub views: Vec<ViewScore>,
 }
@@ -163,6 +163,7 @@ impl<F: DeformationField> DecodedScene<F> {
         eval: &EvalConfig,
         device_name: &str,
     ) -> Result<(Evaluation, Vec<RenderedView>), TrainError> {
+        let lpips = Lpips::load(&eval.lpips, &self.device)?;
         let mut splits = Vec::new();
         let mut rendered = Vec::new();
         for name in &eval.splits {
@@ -177,15 +178,14 @@ impl<F: DeformationField> DecodedScene<F> {
                 let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
-                let psnr = psnr(image.clone(), truth_tensor.clone());
-                let ssim = f64::from(ssim(image, truth_tensor).into_scalar::<f32>());
-                views.push(ViewScore { name: frame.name.clone(), time: frame.time, psnr, ssim });
-                let (name, time) = (frame.name.clone(), frame.time);
+                let scores = Scores::measure(&image, &truth_tensor, None, &lpips);
+                let (name, time, psnr) = (frame.name.clone(), frame.time, scores.psnr());
+                views.push(ViewScore { name: name.clone(), time, scores });
                 let (truth, render) = ((*truth).clone(), render.to_u8());
                 rendered.push(RenderedView { split, name, time, psnr, truth, render });
             }
-            let mean = |value: fn(&ViewScore) -> f64| views.iter().map(value).sum::<f64>() / views.len() as f64;
-            splits.push(SplitScore { split: name.to_string(), psnr: mean(|v| v.psnr), ssim: mean(|v| v.ssim), views });
+            let scores = Scores::mean(views.iter().map(|view| &view.scores));
+            splits.push(SplitScore { split: name.to_string(), scores, views });
         }
         let frames = if scene.test.is_empty() { &scene.train } else { &scene.test };
         let camera = frames[0].camera;
@@ -215,14 +215,12 @@ pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
 impl Evaluation {
     /// The part of a report that shows splits.
     pub fn report_splits(&self) -> Vec<SplitQuality> {
-        let view = |v: &ViewScore| ViewQuality { name: v.name.clone(), time: v.time, psnr: v.psnr, ssim: v.ssim };
+        let view = |v: &ViewScore| ViewQuality { name: v.name.clone(), time: v.time, scores: v.scores.clone() };
         self.splits
             .iter()
             .map(|split| SplitQuality {
                 name: split.split.clone(),
-                psnr: split.psnr,
-                ssim: split.ssim,
-                extra: Vec::new(),
+                scores: split.scores.clone(),
                 views: split.views.iter().map(view).collect(),
             })
             .collect()

@@ -22,6 +22,7 @@ use light4gs_data::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
 
 use crate::compression::{BitMap, CodingRecord};
+use crate::evaluation::measure::Scores;
 use crate::observers::metrics_log::MetricsRecord;
 use html::{escape, fill};
 
@@ -88,12 +89,8 @@ pub struct SectionBytes {
 pub struct SplitQuality {
     /// `test`, `val`...
     pub name: String,
-    /// Mean PSNR, dB.
-    pub psnr: f64,
-    /// Mean SSIM.
-    pub ssim: f64,
-    /// Other measures, by name; splits may have different ones.
-    pub extra: Vec<(String, f64)>,
+    /// Means over the views.
+    pub scores: Scores,
     /// The views.
     pub views: Vec<ViewQuality>,
 }
@@ -105,10 +102,8 @@ pub struct ViewQuality {
     pub name: String,
     /// Its time, 0 to 1.
     pub time: f32,
-    /// PSNR over the whole image, dB.
-    pub psnr: f64,
-    /// SSIM.
-    pub ssim: f64,
+    /// What was measured.
+    pub scores: Scores,
 }
 
 /// A rendered view beside its ground truth; both must have the same size.

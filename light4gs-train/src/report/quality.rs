@@ -6,6 +6,7 @@ use super::SplitQuality;
 use super::chart::{Chart, Mark, Series};
 use super::format::{count, fixed};
 use super::html::escape;
+use crate::evaluation::measure::{Measure, Scores};
 
 pub(super) fn section(splits: &[SplitQuality]) -> String {
     if splits.is_empty() {
@@ -20,54 +21,59 @@ pub(super) fn section(splits: &[SplitQuality]) -> String {
     html
 }
 
-fn summary(html: &mut String, splits: &[SplitQuality]) {
-    let mut names: Vec<&str> = Vec::new();
-    for (name, _) in splits.iter().flat_map(|split| &split.extra) {
-        if !names.contains(&name.as_str()) {
-            names.push(name);
-        }
+/// What the columns mean, for those who compare with other tables.
+const LEGEND: &str = "<p class=\"legend\">SSIM has zeros around the image, as 3DGS; SSIM valid counts windows inside it, as \
+    TensorFlow and scikit-image with Gaussian weights. D-SSIM is (1 - MS-SSIM) / 2. LPIPS needs weights from a file: \
+    <code>light4gs eval --lpips FILE</code>. Measures with an m count the pixels of the dataset's masks.</p>\n";
+
+fn heads(html: &mut String, names: &[&str], columns: &[Measure]) {
+    html.push_str("<thead><tr>");
+    for name in names {
+        let _ = write!(html, "<th scope=\"col\">{name}</th>");
     }
-    html.push_str("<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Split</th>");
-    for name in ["Views", "PSNR, dB", "SSIM"].iter().chain(&names) {
-        let _ = write!(html, "<th scope=\"col\" class=\"number\">{}</th>", escape(name));
+    for column in columns {
+        let _ = write!(html, "<th scope=\"col\" class=\"number\">{}</th>", column.label());
     }
     html.push_str("</tr></thead>\n<tbody>\n");
+}
+
+fn cells(html: &mut String, scores: &Scores, columns: &[Measure]) {
+    for column in columns {
+        let _ = write!(html, "<td class=\"number\">{}</td>", column.format(scores.get(*column)));
+    }
+    html.push_str("</tr>\n");
+}
+
+fn summary(html: &mut String, splits: &[SplitQuality]) {
+    let columns = Scores::columns(splits.iter().map(|split| &split.scores));
+    html.push_str("<div class=\"scroll\"><table>\n");
+    heads(html, &["Split", "Views"], &columns);
     for split in splits {
-        let _ = write!(html, "<tr><th scope=\"row\">{}</th>", escape(&split.name));
-        let mut cells = vec![count(split.views.len() as u64), fixed(split.psnr, 2), fixed(split.ssim, 4)];
-        cells.extend(names.iter().map(|name| {
-            let value = split.extra.iter().find(|(known, _)| known == name).map_or(f64::NAN, |(_, value)| *value);
-            fixed(value, 4)
-        }));
-        for cell in cells {
-            let _ = write!(html, "<td class=\"number\">{cell}</td>");
-        }
-        html.push_str("</tr>\n");
+        let (name, views) = (escape(&split.name), count(split.views.len() as u64));
+        let _ = write!(html, "<tr><th scope=\"row\">{name}</th><td class=\"number\">{views}</td>");
+        cells(html, &split.scores, &columns);
     }
     html.push_str("</tbody>\n</table></div>\n");
+    html.push_str(LEGEND);
 }
 
 fn views(html: &mut String, splits: &[SplitQuality]) {
     if splits.iter().all(|split| split.views.is_empty()) {
         return;
     }
-    html.push_str(
-        "<details><summary>View by view</summary>\n<div class=\"scroll tall\" tabindex=\"0\"><table>\n<thead><tr>\
-         <th scope=\"col\">View</th><th scope=\"col\">Split</th><th scope=\"col\" class=\"number\">Time</th>\
-         <th scope=\"col\" class=\"number\">PSNR, dB</th><th scope=\"col\" class=\"number\">SSIM</th></tr></thead>\n<tbody>\n",
-    );
+    let columns = Scores::columns(splits.iter().map(|split| &split.scores));
+    html.push_str("<details><summary>View by view</summary>\n<div class=\"scroll tall\" tabindex=\"0\"><table>\n");
+    heads(html, &["View", "Split", "Time"], &columns);
     for split in splits {
         for view in &split.views {
-            let _ = writeln!(
+            let _ = write!(
                 html,
-                "<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
-                 <td class=\"number\">{}</td></tr>",
+                "<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"number\">{}</td>",
                 escape(&view.name),
                 escape(&split.name),
                 fixed(view.time.into(), 3),
-                fixed(view.psnr, 2),
-                fixed(view.ssim, 4)
             );
+            cells(html, &view.scores, &columns);
         }
     }
     html.push_str("</tbody>\n</table></div></details>\n");
@@ -82,7 +88,7 @@ fn over_time(splits: &[SplitQuality]) -> Chart {
             .map(|split| Series {
                 label: split.name.clone(),
                 mark: Mark::Dots,
-                points: split.views.iter().map(|view| (f64::from(view.time), view.psnr)).collect(),
+                points: split.views.iter().map(|view| (f64::from(view.time), view.scores.psnr())).collect(),
             })
             .collect(),
         logarithmic: false,

@@ -1,5 +1,7 @@
 use super::*;
 use crate::compression::{BitEstimate, PlaneRecord};
+use crate::evaluation::measure::Measure;
+use crate::evaluation::metrics::lpips::LpipsNetwork;
 use crate::stage::Stage;
 
 fn image(width: u32, height: u32, shift: u8) -> RgbImage8 {
@@ -23,7 +25,9 @@ fn sample() -> Report {
         record.iterations_per_second = Some(20.0);
         metrics.push(record);
     }
-    let view = |name: &str| ViewQuality { name: name.into(), time: 0.5, psnr: 31.0, ssim: 0.95 };
+    let measured = [(Measure::Psnr, 31.0), (Measure::Ssim, 0.95), (Measure::Lpips(LpipsNetwork::Alex), 0.05)];
+    let scores = Scores::from_values(measured);
+    let view = |name: &str| ViewQuality { name: name.into(), time: 0.5, scores: scores.clone() };
     Report {
         title: "<b>bouncing</b> & \"more\" {{style}}".into(),
         created: "today".into(),
@@ -36,9 +40,7 @@ fn sample() -> Report {
         coding: Some(CodingReport { record: coding_record(), bit_maps: vec![bit_map()] }),
         splits: vec![SplitQuality {
             name: "test".into(),
-            psnr: 31.0,
-            ssim: 0.95,
-            extra: vec![("LPIPS".into(), 0.05)],
+            scores: scores.clone(),
             views: vec![view("r_000"), view("r_001")],
         }],
         images: vec![ViewImages {
@@ -129,8 +131,8 @@ fn odd_values_do_no_harm() {
     report.metrics.truncate(1);
     report.metrics[0].loss = Some(f64::NAN);
     report.metrics[0].psnr = Some(f64::INFINITY);
-    report.splits[0].psnr = f64::NAN;
-    report.splits[0].views[0].psnr = f64::INFINITY;
+    report.splits[0].scores = Scores::from_values([(Measure::Psnr, f64::NAN)]);
+    report.splits[0].views[0].scores = Scores::from_values([(Measure::Psnr, f64::INFINITY)]);
     report.sections.iter_mut().for_each(|section| section.bytes = 0);
     let html = page(Path::new("report.html"), &report).expect("a page");
     assert_balanced(&html);

@@ -47,11 +47,14 @@ fn merge(base: &mut toml::Table, top: toml::Table) {
 pub fn ends(bounds: &Bounds) -> Vec<String> {
     match bounds {
         Bounds::Flag => ["true", "false"].map(str::to_owned).to_vec(),
+        Bounds::Text => vec!["\"\"".to_owned()],
         Bounds::Word(words) => words.iter().map(|word| format!("\"{word}\"")).collect(),
         Bounds::Device => ["\"ndarray\"", "\"flex\""].map(str::to_owned).to_vec(),
         Bounds::Whole { least, most } => vec![least.to_string(), most.to_string()],
         Bounds::WholeOrNone { least, most } => vec!["0".to_owned(), least.to_string(), most.to_string()],
         Bounds::Number { least, most } => [least, most].map(|value| format!("{value:e}")).to_vec(),
+        // Files have to be there.
+        Bounds::List { element: Bounds::Text, .. } => vec!["[]".to_owned()],
         Bounds::List { element, length } => ends(element)
             .into_iter()
             .map(|value| format!("[{}]", vec![value; length.unwrap_or(1)].join(", ")))

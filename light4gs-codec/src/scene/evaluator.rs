@@ -1,0 +1,236 @@
+//! The Gaussians of a scene at any time: what a player runs for each frame.
+
+use super::{
+    GaussianArrays, MotionNetwork, MotionOutput, MotionSource, SceneData,
+    query::{Between, multiply_by_sample, normalized},
+    sh_rest_coefficients,
+};
+use crate::{
+    CodecError, Limits, Plane,
+    network::{
+        Program,
+        kernels::{LANES, Lanes},
+    },
+    plane_layout::{PLANE_AXES, PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES},
+};
+
+/// A scene's motion, ready to be run at one time after the other.
+///
+/// What does not depend on the time is computed once: the product of the space-only samples of each Gaussian, which takes
+/// `4 · features` bytes a Gaussian. It runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to
+/// float tolerance, takes about a microsecond a Gaussian, and uses one thread.
+///
+/// ```
+/// use light4gs_codec::{GaussianArrays, MotionEvaluator, SceneData};
+///
+/// let scene = SceneData::default();
+/// let evaluator = MotionEvaluator::new(&scene)?;
+/// let mut moved = scene.gaussians.clone();
+/// evaluator.apply(&scene.gaussians, 0.5, 0..moved.len(), &mut moved);
+/// assert_eq!(moved, scene.gaussians); // nothing moves here
+/// # Ok::<(), light4gs_codec::CodecError>(())
+/// ```
+#[derive(Debug)]
+pub struct MotionEvaluator {
+    motion: Option<Motion>,
+}
+
+#[derive(Debug)]
+struct Motion {
+    program: Program,
+    sources: Vec<MotionSource>,
+    outputs: Vec<MotionOutput>,
+    channels: usize,
+    features: usize,
+    /// Coordinates of the canonical centers along x, y, z, eight Gaussians at a time.
+    points: Vec<[Lanes; 3]>,
+    /// `[blocks, features]`: products of the samples of the planes without time; empty where no source is features.
+    space_features: Vec<Lanes>,
+    /// Planes xt, yt, zt of each scale.
+    time_planes: Vec<Plane>,
+}
+
+/// A plane over an axis and time at one time: `[samples, channels]`.
+struct Line {
+    samples: u32,
+    values: Vec<f32>,
+}
+
+impl MotionEvaluator {
+    /// Prepares the motion of a scene.
+    ///
+    /// # Errors
+    /// A network that contradicts itself or the hexplane.
+    pub fn new(scene: &SceneData) -> Result<Self, CodecError> {
+        let Some(MotionNetwork { network, sources, outputs }) = &scene.motion.network else {
+            return Ok(Self { motion: None });
+        };
+        let limits = Limits::default();
+        scene.motion.check(&limits)?;
+        crate::planes::head::check(&scene.hexplane, &limits)?;
+        scene.motion.check_features(scene.hexplane.features())?;
+        let channels = scene.hexplane.channels as usize;
+        let features = scene.hexplane.features() as usize;
+        let mut motion = Motion {
+            program: Program::pointwise(network, &vec![true; sources.len()]),
+            sources: sources.clone(),
+            outputs: outputs.clone(),
+            channels,
+            features,
+            points: Vec::with_capacity(scene.gaussians.len().div_ceil(LANES)),
+            space_features: Vec::new(),
+            time_planes: Vec::new(),
+        };
+        for means in scene.gaussians.means.chunks(LANES) {
+            let mut points = [[0.0; LANES]; 3];
+            for (lane, &mean) in means.iter().enumerate() {
+                let point = normalized(&scene.frame, mean);
+                points.iter_mut().zip(point).for_each(|(lanes, coordinate)| lanes[lane] = coordinate);
+            }
+            motion.points.push(points);
+        }
+        if features > 0 && sources.contains(&MotionSource::Features) {
+            let scales = scene.hexplane.planes.chunks_exact(PLANES_PER_SCALE);
+            motion.time_planes =
+                scales.flat_map(|planes| SPACE_TIME_PLANES.map(|position| planes[position].clone())).collect();
+            motion.space_features = motion.products_over_space(&scene.hexplane.planes);
+        }
+        Ok(Self { motion: Some(motion) })
+    }
+
+    /// Whether anything but the harmonics beyond degree 0 may change with time.
+    pub fn moves(&self) -> bool {
+        self.motion.is_some()
+    }
+
+    /// Whether the spherical harmonics change with time.
+    pub fn changes_harmonics(&self) -> bool {
+        self.motion.as_ref().is_some_and(|motion| motion.outputs.contains(&MotionOutput::Sh))
+    }
+
+    /// Writes the Gaussians of a `range` at a `time` in [0, 1] into `moved`: attributes before their activations. Both
+    /// arrays are as long as those of the scene that the evaluator was made of. A long scene can be done in parts, so that
+    /// a player answers in between; parts that begin at a multiple of 8 cost the least.
+    ///
+    /// # Panics
+    /// If the arrays have other lengths than the scene's, or the range goes beyond them.
+    pub fn apply(
+        &self,
+        canonical: &GaussianArrays,
+        time: f32,
+        range: std::ops::Range<usize>,
+        moved: &mut GaussianArrays,
+    ) {
+        moved.means[range.clone()].copy_from_slice(&canonical.means[range.clone()]);
+        moved.log_scales[range.clone()].copy_from_slice(&canonical.log_scales[range.clone()]);
+        moved.quats[range.clone()].copy_from_slice(&canonical.quats[range.clone()]);
+        moved.opacity_logits[range.clone()].copy_from_slice(&canonical.opacity_logits[range.clone()]);
+        let Some(motion) = &self.motion else { return };
+        if self.changes_harmonics() {
+            let rest = 3 * sh_rest_coefficients(canonical.sh_degree);
+            let rest = rest * range.start..rest * range.end;
+            moved.sh_dc[range.clone()].copy_from_slice(&canonical.sh_dc[range.clone()]);
+            moved.sh_rest[rest.clone()].copy_from_slice(&canonical.sh_rest[rest]);
+        }
+        let lines = motion.lines_at(time);
+        let mut workspace = motion.program.workspace();
+        let mut product = vec![0.0; motion.features];
+        for block in range.start / LANES..range.end.div_ceil(LANES) {
+            for (input, source) in motion.sources.iter().enumerate() {
+                let inputs = motion.program.input_lanes(&mut workspace, input);
+                match source {
+                    MotionSource::Features if motion.features == 0 => {}
+                    MotionSource::Features => motion.set_features(block, &lines, &mut product, inputs),
+                    MotionSource::Point => inputs.copy_from_slice(&motion.points[block]),
+                    MotionSource::Time => inputs[0] = [time; LANES],
+                }
+            }
+            motion.program.run(&mut workspace);
+            let lanes = range.start.max(block * LANES)..range.end.min((block + 1) * LANES);
+            for (index, output) in motion.outputs.iter().enumerate() {
+                let offsets = motion.program.output_lanes(&workspace, index);
+                lanes.clone().for_each(|gaussian| add(*output, offsets, gaussian, moved));
+            }
+        }
+    }
+}
+
+impl Motion {
+    /// `[blocks, features]`: the product of the samples of xy, xz and yz.
+    fn products_over_space(&self, planes: &[Plane]) -> Vec<Lanes> {
+        let mut products = vec![[1.0; LANES]; self.points.len() * self.features];
+        let mut product = vec![0.0; self.channels];
+        for (points, block) in self.points.iter().zip(products.chunks_exact_mut(self.features.max(1))) {
+            for lane in 0..LANES {
+                let scales = planes.chunks_exact(PLANES_PER_SCALE).zip(block.chunks_exact_mut(self.channels));
+                for (planes, features) in scales {
+                    product.fill(1.0);
+                    for position in SPACE_ONLY_PLANES {
+                        let [across, down] = PLANE_AXES[position];
+                        multiply_by_sample(&planes[position], points[across][lane], points[down][lane], &mut product);
+                    }
+                    features.iter_mut().zip(&product).for_each(|(feature, &product)| feature[lane] = product);
+                }
+            }
+        }
+        products
+    }
+
+    /// The space-time planes at a time.
+    fn lines_at(&self, time: f32) -> Vec<Line> {
+        let line = |plane: &Plane| {
+            let row = Between::of(2.0 * time - 1.0, plane.height);
+            let width = plane.width as usize;
+            let mut values = vec![0.0; width * self.channels];
+            for (channel, map) in plane.values.chunks_exact(width * plane.height as usize).enumerate() {
+                let (low, high) = (&map[row.low * width..], &map[row.high * width..]);
+                for x in 0..width {
+                    values[x * self.channels + channel] = row.between(low[x], high[x]);
+                }
+            }
+            Line { samples: plane.width, values }
+        };
+        self.time_planes.iter().map(line).collect()
+    }
+
+    /// Features of eight Gaussians, `[features]`. `product` is memory.
+    fn set_features(&self, block: usize, lines: &[Line], product: &mut [f32], inputs: &mut [Lanes]) {
+        inputs.copy_from_slice(&self.space_features[block * self.features..][..self.features]);
+        let channels = self.channels;
+        for lane in 0..LANES {
+            for (lines, product) in lines.chunks_exact(3).zip(product.chunks_exact_mut(channels)) {
+                let place = |axis: usize| {
+                    let line: &Line = &lines[axis];
+                    let x = Between::of(self.points[block][axis][lane], line.samples);
+                    (&line.values[x.low * channels..][..channels], &line.values[x.high * channels..][..channels], x)
+                };
+                let ((x0, x1, x), (y0, y1, y), (z0, z1, z)) = (place(0), place(1), place(2));
+                for channel in 0..channels {
+                    product[channel] = x.between(x0[channel], x1[channel])
+                        * y.between(y0[channel], y1[channel])
+                        * z.between(z0[channel], z1[channel]);
+                }
+            }
+            inputs.iter_mut().zip(&*product).for_each(|(input, &product)| input[lane] *= product);
+        }
+    }
+}
+
+/// Adds what a network says of a Gaussian.
+fn add(output: MotionOutput, offsets: &[Lanes], gaussian: usize, moved: &mut GaussianArrays) {
+    let lane = gaussian % LANES;
+    let add_to = |values: &mut [f32], offsets: &[Lanes]| {
+        values.iter_mut().zip(offsets).for_each(|(value, offset)| *value += offset[lane]);
+    };
+    match output {
+        MotionOutput::Position => add_to(&mut moved.means[gaussian], offsets),
+        MotionOutput::LogScale => add_to(&mut moved.log_scales[gaussian], offsets),
+        MotionOutput::Quaternion => add_to(&mut moved.quats[gaussian], offsets),
+        MotionOutput::OpacityLogit => moved.opacity_logits[gaussian] += offsets[0][lane],
+        MotionOutput::Sh => {
+            add_to(&mut moved.sh_dc[gaussian], offsets);
+            let rest = 3 * sh_rest_coefficients(moved.sh_degree);
+            add_to(&mut moved.sh_rest[gaussian * rest..][..rest], &offsets[3..]);
+        }
+    }
+}

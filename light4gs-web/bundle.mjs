@@ -1,0 +1,35 @@
+// Puts the player into one ES module: the decoder as compressed WebAssembly, the worker as text.
+// usage: node bundle.mjs DECODER.wasm FOLDER
+
+import { build } from "esbuild";
+import { readFileSync, writeFileSync } from "node:fs";
+import { gzipSync } from "node:zlib";
+
+const [wasm, folder] = process.argv.slice(2);
+const common = { bundle: true, minify: true, target: ["chrome100", "firefox113", "safari16.4"], legalComments: "none", write: false };
+
+const worker = await build({ ...common, entryPoints: ["player/worker.js"], format: "iife" });
+const packed = gzipSync(readFileSync(wasm), { level: 9 });
+packed[9] = 255; // the operating system: none
+const parts = {
+  "virtual:worker": worker.outputFiles[0].text,
+  "virtual:decoder": packed.toString("base64"),
+  "virtual:style": (await build({ ...common, entryPoints: ["player/style.css"] })).outputFiles[0].text,
+};
+const virtual = {
+  name: "virtual",
+  setup(build) {
+    build.onResolve({ filter: /^virtual:/ }, ({ path }) => ({ path, namespace: "virtual" }));
+    build.onLoad({ filter: /.*/, namespace: "virtual" }, ({ path }) => ({ contents: parts[path], loader: "text" }));
+  },
+};
+const main = await build({ ...common, entryPoints: ["player/index.js"], format: "esm", plugins: [virtual], charset: "utf8" });
+const code = main.outputFiles[0].text;
+// The module also stands inside of pages.
+if (/<\/script|<!--/i.test(code)) throw new Error("the bundle would end the script element that holds it");
+writeFileSync(`${folder}/light4gs-player.js`, code);
+
+const size = (text) => `${Buffer.byteLength(text)} bytes, ${gzipSync(text, { level: 9 }).length} compressed`;
+console.log(`light4gs-player.js: ${size(code)}`);
+console.log(`  of which the decoder: ${readFileSync(wasm).length} bytes, ${packed.length} compressed`);
+console.log(`  worker: ${size(parts["virtual:worker"])}; style: ${size(parts["virtual:style"])}`);

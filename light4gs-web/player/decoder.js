@@ -1,0 +1,126 @@
+// The WebAssembly module behind plain functions. Everything here runs in the worker.
+
+/** Gaussians of a texture row. */
+const ROW = 256;
+/** Gaussians that are computed before the worker looks for messages. */
+const SLICE = 8192;
+
+/**
+ * @typedef {object} Exports  what light4gs-web/src/abi.rs exports
+ * @property {WebAssembly.Memory} memory
+ * @property {(bytes: number) => number} reserve_input
+ * @property {() => number} open
+ * @property {() => number} text
+ * @property {() => number} text_length
+ * @property {() => bigint} digest
+ * @property {(time: number, first: number, last: number) => void} evaluate
+ * @property {() => number} present
+ * @property {() => number} changes_harmonics
+ * @property {() => number} harmonics
+ * @property {(time: number) => number} attributes_at
+ * @property {() => number} numbers_length
+ * @property {() => void} forget_numbers
+ * @property {(x: number, y: number, z: number, offset: number) => number} sort
+ * @property {() => number} order_length
+ */
+
+/** A scene that was refused; `kind` is one of `not-l4gs`, `newer`, `too-large`, `damaged`, `memory`. */
+export class SceneError extends Error {
+  /** @param {string} kind @param {string} message */
+  constructor(kind, message) {
+    super(message);
+    this.name = "SceneError";
+    this.kind = kind;
+  }
+}
+
+/** One decoded scene in one instance of the module. */
+export class Decoder {
+  /** @param {WebAssembly.Module} module */
+  constructor(module) {
+    this.wasm = /** @type {Exports} */ (/** @type {unknown} */ (new WebAssembly.Instance(module, {}).exports));
+    /** @type {import("./scene.js").SceneInfo | null} */
+    this.info = null;
+  }
+
+  /**
+   * Decodes a file and returns its description.
+   * @param {Uint8Array} bytes
+   * @returns {import("./scene.js").SceneInfo}
+   */
+  open(bytes) {
+    const { wasm } = this;
+    let opened;
+    try {
+      const at = wasm.reserve_input(bytes.length);
+      new Uint8Array(wasm.memory.buffer, at, bytes.length).set(bytes);
+      opened = wasm.open();
+    } catch (error) {
+      // The module stops itself where memory runs out: there is nothing to unwind to.
+      throw new SceneError("memory", `the decoder stopped (${error instanceof Error ? error.message : error})`);
+    }
+    const text = new Uint8Array(wasm.memory.buffer, wasm.text(), wasm.text_length());
+    // Notes in a file may be any text.
+    const description = JSON.parse(new TextDecoder().decode(text));
+    if (!opened) throw new SceneError(description.error, description.message);
+    description.changesHarmonics = wasm.changes_harmonics() === 1;
+    this.info = description;
+    return description;
+  }
+
+  /** Number of Gaussians. */
+  get count() {
+    return this.info ? this.info.count : 0;
+  }
+
+  /**
+   * The Gaussians at a time, for the texture. Pauses between slices, so that the worker can answer others.
+   * @param {number} time
+   * @param {() => Promise<void>} pause
+   * @param {Float32Array | null} into
+   */
+  async evaluate(time, pause, into) {
+    for (let first = 0; first < this.count; first += SLICE) {
+      if (first > 0) await pause();
+      this.wasm.evaluate(time, first, first + SLICE);
+    }
+    const length = 12 * Math.ceil(this.count / ROW) * ROW;
+    const numbers = new Float32Array(this.wasm.memory.buffer, this.wasm.present(), length);
+    if (!into || into.length !== length) return numbers.slice();
+    into.set(numbers);
+    return into;
+  }
+
+  /** The harmonics of what was computed last, for the texture. */
+  harmonics() {
+    const at = this.wasm.harmonics();
+    const numbers = new Float32Array(this.wasm.memory.buffer, at, this.wasm.numbers_length()).slice();
+    this.wasm.forget_numbers();
+    return numbers;
+  }
+
+  /**
+   * All attributes at a time, one behind the other.
+   * @param {number} time
+   */
+  attributesAt(time) {
+    const at = this.wasm.attributes_at(time);
+    const numbers = new Float32Array(this.wasm.memory.buffer, at, this.wasm.numbers_length()).slice();
+    this.wasm.forget_numbers();
+    return numbers;
+  }
+
+  /**
+   * The order to draw the Gaussians of the last evaluation in: back to front.
+   * @param {ArrayLike<number>} row  four numbers: the depth of a point is `row · (x, y, z, 1)`
+   */
+  sort(row) {
+    const at = this.wasm.sort(row[0], row[1], row[2], row[3]);
+    return new Uint32Array(this.wasm.memory.buffer, at, this.wasm.order_length()).slice();
+  }
+
+  /** One number for all bits of the decoded scene, as 16 hexadecimal digits. */
+  digest() {
+    return BigInt.asUintN(64, this.wasm.digest()).toString(16).padStart(16, "0");
+  }
+}

@@ -1,0 +1,1 @@
+export class L4gsPlayer extends HTMLElement {}

@@ -1,0 +1,7 @@
+// The player of .l4gs scenes, as a library and as the element <l4gs-player>. See docs/player.md.
+
+export { Camera } from "./camera.js";
+export { L4gsPlayer } from "./element.js";
+export { Player } from "./player.js";
+export { Scene, SceneError, load } from "./scene.js";
+export { GraphicsError, SplatRenderer } from "./splat_renderer.js";

@@ -1,0 +1,196 @@
+// A scene: bytes in, Gaussians at a time out. The work is done by a worker of its own.
+
+import wasmBase64 from "virtual:decoder";
+import workerSource from "virtual:worker";
+import { SceneError } from "./decoder.js";
+
+export { SceneError };
+
+/**
+ * @typedef {object} SceneInfo  what a file says of itself
+ * @property {string} name  for people
+ * @property {number} frameCount  frames of the source
+ * @property {number} fps  frames a second of the source, 0 where it is not known
+ * @property {[number[], number[]]} bounds  smallest and largest corner, world units
+ * @property {[number, number, number]} background  red, green, blue in [0, 1]
+ * @property {number} width  of the source's default camera, pixels
+ * @property {number} height  of the source's default camera, pixels
+ * @property {number} fovX  its horizontal field of view, radians
+ * @property {number} version  of the format
+ * @property {number} bytes  of the file
+ * @property {number} count  Gaussians
+ * @property {number} shDegree  of the spherical harmonics, 0 to 3
+ * @property {boolean} moves  whether anything changes with time
+ * @property {boolean} changesHarmonics  whether the spherical harmonics change with time
+ * @property {[string, number][]} sections  name and bytes of each part of the file
+ * @property {Record<string, string>} extra  free notes
+ */
+
+/**
+ * @typedef {object} GaussiansAt  activated attributes of N Gaussians
+ * @property {number} count  N
+ * @property {Float32Array} means  `[N, 3]`: centers, world units
+ * @property {Float32Array} scales  `[N, 3]`: standard deviations, world units
+ * @property {Float32Array} quaternions  `[N, 4]`: `(w, x, y, z)` of unit length
+ * @property {Float32Array} opacities  `[N]` in [0, 1]
+ * @property {number} shDegree  d
+ * @property {Float32Array} sh  `[N, (d + 1)², 3]`: a color is `max(0, 0.5 + Σ basis · coefficient)`
+ */
+
+/**
+ * @typedef {object} Frame  what the renderer draws
+ * @property {Float32Array} data  12 numbers a Gaussian, whole texture rows
+ * @property {Uint32Array} order  back to front
+ * @property {Float32Array | null} colors  harmonics, where they changed
+ * @property {number} evaluateMs  what the motion took
+ * @property {number} sortMs  what the order took
+ */
+
+/** @type {Promise<WebAssembly.Module> | null} */
+let module = null;
+
+/** The decoder, compiled once a page. */
+function decoderModule() {
+  const unpack = async () => {
+    const packed = Uint8Array.from(atob(wasmBase64), (character) => character.charCodeAt(0));
+    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return WebAssembly.compile(await new Response(stream).arrayBuffer());
+  };
+  return (module ??= unpack());
+}
+
+/** A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. */
+export class Scene {
+  /** @type {Map<number, { resolve: (answer: any) => void, reject: (error: Error) => void }>} */
+  #waiting = new Map();
+  #worker;
+  #url;
+  #next = 0;
+
+  /** Use {@link load}. */
+  constructor() {
+    this.#url = URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" }));
+    this.#worker = new Worker(this.#url);
+    this.#worker.onmessage = ({ data: answer }) => {
+      const waiting = this.#waiting.get(answer.id);
+      this.#waiting.delete(answer.id);
+      if (answer.error) waiting?.reject(new SceneError(answer.error, answer.message));
+      else waiting?.resolve(answer);
+    };
+    this.#worker.onerror = (event) => {
+      event.preventDefault();
+      this.#fail(new SceneError("fault", event.message || "the worker did not start"));
+    };
+    /** @type {SceneInfo} */
+    this.info = /** @type {any} */ (null);
+    /** What decoding took, in milliseconds. */
+    this.decodeMs = 0;
+  }
+
+  /** @param {Error} error */
+  #fail(error) {
+    for (const { reject } of this.#waiting.values()) reject(error);
+    this.#waiting.clear();
+  }
+
+  /**
+   * @param {any} request
+   * @param {Transferable[]} [transfer]
+   * @returns {Promise<any>}
+   */
+  #ask(request, transfer = []) {
+    if (!this.#url) return Promise.reject(new SceneError("closed", "the scene was closed"));
+    return new Promise((resolve, reject) => {
+      const id = this.#next++;
+      this.#waiting.set(id, { resolve, reject });
+      this.#worker.postMessage({ id, ...request }, transfer);
+    });
+  }
+
+  /** @param {ArrayBuffer} bytes */
+  async open(bytes) {
+    const { info, milliseconds } = await this.#ask({ type: "open", module: await decoderModule(), bytes });
+    this.info = info;
+    this.decodeMs = milliseconds;
+  }
+
+  /** Number of Gaussians. */
+  get count() {
+    return this.info.count;
+  }
+
+  /** Length in seconds: the source's where it is known, else at 30 frames a second. */
+  get duration() {
+    return Math.max(this.info.frameCount, 1) / (this.info.fps || 30);
+  }
+
+  /**
+   * The Gaussians at a time in [0, 1], activated, for a renderer of your own.
+   * @param {number} time
+   * @returns {Promise<GaussiansAt>}
+   */
+  async gaussiansAt(time) {
+    /** @type {{ numbers: Float32Array }} */
+    const { numbers } = await this.#ask({ type: "attributes", time });
+    const { count, shDegree } = this.info;
+    let at = 0;
+    const take = (/** @type {number} */ each) => numbers.subarray(at, (at += each * count));
+    const means = take(3);
+    const scales = take(3);
+    const quaternions = take(4);
+    const opacities = take(1);
+    return { count, means, scales, quaternions, opacities, shDegree, sh: take(3 * (shDegree + 1) ** 2) };
+  }
+
+  /**
+   * What the renderer draws at a time, seen along a row of the view matrix.
+   * @param {number} time
+   * @param {ArrayLike<number>} row
+   * @param {{ buffer?: ArrayBuffer | null, harmonics?: boolean }} [options]  memory to be used again; whether the
+   *   harmonics are wanted though they did not change
+   * @returns {Promise<Frame>}
+   */
+  frame(time, row, { buffer = null, harmonics = false } = {}) {
+    return this.#ask({ type: "frame", time, row, buffer, harmonics }, buffer ? [buffer] : []);
+  }
+
+  /**
+   * The order of the last frame's Gaussians from elsewhere.
+   * @param {ArrayLike<number>} row
+   * @returns {Promise<{ order: Uint32Array, sortMs: number }>}
+   */
+  sort(row) {
+    return this.#ask({ type: "sort", row });
+  }
+
+  /** One number for all bits of the decoded scene, as 16 hexadecimal digits. */
+  async digest() {
+    return (await this.#ask({ type: "digest" })).digest;
+  }
+
+  /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
+  close() {
+    if (!this.#url) return;
+    this.#worker.terminate();
+    URL.revokeObjectURL(this.#url);
+    this.#url = "";
+    this.#fail(new SceneError("closed", "the scene was closed"));
+  }
+}
+
+/**
+ * Decodes a `.l4gs` file.
+ * @param {ArrayBuffer | Uint8Array} bytes
+ * @returns {Promise<Scene>}
+ * @throws {SceneError} whose `kind` says what is wrong with the file
+ */
+export async function load(bytes) {
+  const scene = new Scene();
+  try {
+    await scene.open(bytes instanceof Uint8Array ? bytes.slice().buffer : bytes);
+    return scene;
+  } catch (error) {
+    scene.close();
+    throw error;
+  }
+}

@@ -1,0 +1,74 @@
+// The worker: one scene, decoded, moved and sorted off the main thread.
+
+import { Decoder, SceneError } from "./decoder.js";
+
+/** @type {Decoder | null} */
+let decoder = null;
+
+// A message to oneself comes after those that are waiting.
+const channel = new MessageChannel();
+/** @type {(() => void)[]} */
+const paused = [];
+channel.port1.onmessage = () => paused.shift()?.();
+const pause = () =>
+  new Promise((/** @type {(value: void) => void} */ resolve) => {
+    paused.push(resolve);
+    channel.port2.postMessage(0);
+  });
+
+/**
+ * @param {any} answer
+ * @param {ArrayBufferLike[]} transfer
+ */
+const send = (answer, transfer = []) => /** @type {any} */ (self).postMessage(answer, transfer);
+
+/** @type {Record<string, (request: any) => void | Promise<void>>} */
+const answers = {
+  open({ id, module, bytes }) {
+    const start = performance.now();
+    decoder = new Decoder(module);
+    const info = decoder.open(new Uint8Array(bytes));
+    send({ id, info, milliseconds: performance.now() - start });
+  },
+
+  async frame({ id, time, row, buffer, harmonics }) {
+    if (!decoder) throw new Error("no scene is open");
+    const start = performance.now();
+    const data = await decoder.evaluate(time, pause, buffer ? new Float32Array(buffer) : null);
+    const evaluated = performance.now();
+    const order = decoder.sort(row);
+    const sorted = performance.now();
+    const colors = harmonics || decoder.info?.changesHarmonics ? decoder.harmonics() : null;
+    send(
+      { id, data, order, colors, evaluateMs: evaluated - start, sortMs: sorted - evaluated },
+      [data.buffer, order.buffer, ...(colors ? [colors.buffer] : [])],
+    );
+  },
+
+  sort({ id, row }) {
+    if (!decoder) throw new Error("no scene is open");
+    const start = performance.now();
+    const order = decoder.sort(row);
+    send({ id, order, sortMs: performance.now() - start }, [order.buffer]);
+  },
+
+  attributes({ id, time }) {
+    if (!decoder) throw new Error("no scene is open");
+    const numbers = decoder.attributesAt(time);
+    send({ id, numbers }, [numbers.buffer]);
+  },
+
+  digest({ id }) {
+    if (!decoder) throw new Error("no scene is open");
+    send({ id, digest: decoder.digest() });
+  },
+};
+
+self.onmessage = async ({ data: request }) => {
+  try {
+    await answers[request.type](request);
+  } catch (error) {
+    const kind = error instanceof SceneError ? error.kind : "fault";
+    send({ id: request.id, error: kind, message: error instanceof Error ? error.message : String(error) });
+  }
+};

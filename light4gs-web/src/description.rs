@@ -1,0 +1,78 @@
+//! What a file holds, and what is wrong with one, as JSON for the page.
+
+use std::fmt::{Display, Write as _};
+
+use light4gs_codec::{CodecError, SceneData, SceneMeta, StreamInfo};
+
+/// The description of a scene: `{"name": ..., "sections": [...]}`.
+pub(crate) fn describe(scene: &SceneData, info: &StreamInfo) -> String {
+    let SceneMeta { name, frame_count, fps, bounds, background, width, height, fov_x, extra, .. } = &scene.meta;
+    let sections = info.sections.iter().map(|section| format!("[{},{}]", text(section.name), section.bytes));
+    let extra = extra.iter().map(|(key, value)| format!("{}:{}", text(key), text(value)));
+    format!(
+        "{{\"name\":{},\"frameCount\":{frame_count},\"fps\":{fps},\"bounds\":[{},{}],\"background\":{},\"width\":{width},\
+         \"height\":{height},\"fovX\":{fov_x},\"version\":{},\"bytes\":{},\"count\":{},\"shDegree\":{},\"moves\":{},\
+         \"sections\":{},\"extra\":{{{}}}}}",
+        text(name),
+        list(bounds[0]),
+        list(bounds[1]),
+        list(*background),
+        info.version,
+        info.bytes,
+        scene.gaussians.len(),
+        scene.gaussians.sh_degree,
+        scene.motion.network.is_some(),
+        list(sections),
+        extra.collect::<Vec<_>>().join(","),
+    )
+}
+
+/// An error: `{"error": kind, "message": ...}`, where the kind is for the page to choose its words by.
+pub(crate) fn describe_error(error: &CodecError) -> String {
+    let kind = match error {
+        CodecError::NotL4gs { .. } => "not-l4gs",
+        CodecError::NewerVersion { .. } | CodecError::UnknownKind { .. } | CodecError::UnknownEncoding { .. } => {
+            "newer"
+        }
+        CodecError::OverLimit { .. } => "too-large",
+        _ => "damaged",
+    };
+    format!("{{\"error\":{},\"message\":{}}}", text(kind), text(&error.to_string()))
+}
+
+fn list(items: impl IntoIterator<Item = impl Display>) -> String {
+    let items: Vec<String> = items.into_iter().map(|item| item.to_string()).collect();
+    format!("[{}]", items.join(","))
+}
+
+/// A JSON string.
+fn text(value: &str) -> String {
+    let mut quoted = String::from('"');
+    for character in value.chars() {
+        match character {
+            '"' | '\\' => quoted.extend(['\\', character]),
+            control if control < ' ' => {
+                let _ = write!(quoted, "\\u{:04x}", u32::from(control));
+            }
+            other => quoted.push(other),
+        }
+    }
+    quoted.push('"');
+    quoted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strings_are_escaped() {
+        assert_eq!(text("a\"b\\c\n<ü>"), r#""a\"b\\c\u000a<ü>""#);
+    }
+
+    #[test]
+    fn errors_have_a_kind() {
+        let newer = describe_error(&CodecError::NewerVersion { found: 9 });
+        assert!(newer.starts_with(r#"{"error":"newer","message":"the stream has version 9"#), "{newer}");
+    }
+}

@@ -1,0 +1,55 @@
+//! One number for all bits of a decoded scene.
+
+use light4gs_codec::SceneData;
+
+/// FNV-1a over everything that was decoded, bit by bit: two scenes with the same digest are the same for all purposes of a
+/// test. Native code and WebAssembly must agree.
+pub fn digest(scene: &SceneData) -> u64 {
+    let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
+    let SceneData { gaussians, frame, hexplane, motion, .. } = scene;
+    hash.bytes(&[gaussians.sh_degree]);
+    hash.floats(gaussians.means.as_flattened());
+    hash.floats(gaussians.log_scales.as_flattened());
+    hash.floats(gaussians.quats.as_flattened());
+    hash.floats(&gaussians.opacity_logits);
+    hash.floats(gaussians.sh_dc.as_flattened());
+    hash.floats(&gaussians.sh_rest);
+    hash.floats(&frame.mean);
+    hash.floats(frame.axes.as_flattened());
+    hash.floats(&frame.std);
+    for plane in &hexplane.planes {
+        hash.integers(&[plane.height, plane.width]);
+        hash.floats(&plane.values);
+    }
+    hash.bytes(motion.kind.as_bytes());
+    for layer in motion.network.iter().flat_map(|motion| motion.network.layers()) {
+        hash.floats(&layer.weight);
+        hash.floats(&layer.bias);
+    }
+    for tensor in &motion.tensors {
+        hash.bytes(tensor.name.as_bytes());
+        hash.floats(&tensor.values);
+    }
+    hash.0
+}
+
+struct Fnv(u64);
+
+impl Fnv {
+    fn bytes(&mut self, bytes: &[u8]) {
+        for &byte in bytes {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+
+    /// The number of values, then each.
+    fn integers(&mut self, values: &[u32]) {
+        self.bytes(&(values.len() as u32).to_le_bytes());
+        values.iter().for_each(|value| self.bytes(&value.to_le_bytes()));
+    }
+
+    fn floats(&mut self, values: &[f32]) {
+        self.bytes(&(values.len() as u32).to_le_bytes());
+        values.iter().for_each(|value| self.bytes(&value.to_bits().to_le_bytes()));
+    }
+}

@@ -1,0 +1,121 @@
+//! Activated Gaussians, and how the vertex shader reads them.
+
+use light4gs_codec::GaussianArrays;
+
+/// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz, and two that
+/// fill up the third texel.
+pub const FLOATS: usize = 12;
+/// A texture row holds this many Gaussians; arrays for textures are filled up to whole rows.
+pub const PADDING: usize = 256;
+
+/// The largest logarithm of a scale, as in the renderer of the program.
+const MAX_LOG_SCALE: f32 = 40.0;
+/// A quaternion that is shorter has no direction.
+const SHORTEST_QUATERNION: f32 = 1e-12;
+
+/// Standard deviations from their logarithms.
+pub(crate) fn scales(log_scales: [f32; 3]) -> [f32; 3] {
+    log_scales.map(|scale| scale.min(MAX_LOG_SCALE).exp())
+}
+
+/// Opacity in [0, 1] from its logit.
+pub(crate) fn opacity(logit: f32) -> f32 {
+    1.0 / (1.0 + (-logit).exp())
+}
+
+/// The quaternion of unit length; nothing where it has no direction.
+pub(crate) fn rotation(quaternion: [f32; 4]) -> Option<[f32; 4]> {
+    let length = quaternion.iter().map(|q| q * q).sum::<f32>().sqrt();
+    (length.is_finite() && length > SHORTEST_QUATERNION).then(|| quaternion.map(|q| q / length))
+}
+
+/// Upper triangle of `R S Sᵀ Rᵀ`: xx, xy, xz, yy, yz, zz.
+fn covariance([w, x, y, z]: [f32; 4], scales: [f32; 3]) -> [f32; 6] {
+    let rows = [
+        [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
+        [2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)],
+        [2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)],
+    ];
+    let scaled = rows.map(|row| std::array::from_fn::<f32, 3, _>(|j| row[j] * scales[j]));
+    let product = |a: usize, b: usize| (0..3).map(|j| scaled[a][j] * scaled[b][j]).sum();
+    [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)]
+}
+
+/// Packs a range of Gaussians for the texture, [`FLOATS`] numbers each. What cannot be drawn gets opacity 0.
+pub(crate) fn pack(gaussians: &GaussianArrays, range: std::ops::Range<usize>, packed: &mut [f32]) {
+    for (gaussian, packed) in range.clone().zip(packed[FLOATS * range.start..].chunks_exact_mut(FLOATS)) {
+        let scales = scales(gaussians.log_scales[gaussian]);
+        packed[..3].copy_from_slice(&gaussians.means[gaussian]);
+        packed[3] = opacity(gaussians.opacity_logits[gaussian]);
+        packed[4..].fill(0.0);
+        if let Some(rotation) = rotation(gaussians.quats[gaussian]) {
+            packed[4..10].copy_from_slice(&covariance(rotation, scales));
+        }
+        if !packed[4..10].iter().any(|value| *value != 0.0) || packed.iter().any(|value| !value.is_finite()) {
+            packed.fill(0.0);
+        }
+    }
+}
+
+/// Numbers of one Gaussian's harmonics in the texture: three colors a coefficient, filled up to whole texels.
+pub(crate) fn harmonics_floats(degree: u8) -> usize {
+    let side = usize::from(degree) + 1;
+    (3 * side * side).next_multiple_of(4)
+}
+
+/// Harmonics of all Gaussians for the texture, [`harmonics_floats`] numbers each.
+pub(crate) fn pack_harmonics(gaussians: &GaussianArrays) -> Vec<f32> {
+    let floats = harmonics_floats(gaussians.sh_degree);
+    let rest = gaussians.sh_rest.len() / gaussians.len().max(1);
+    let mut packed = vec![0.0; floats * gaussians.len().next_multiple_of(PADDING)];
+    for (gaussian, packed) in packed.chunks_exact_mut(floats).take(gaussians.len()).enumerate() {
+        packed[..3].copy_from_slice(&gaussians.sh_dc[gaussian]);
+        packed[3..3 + rest].copy_from_slice(&gaussians.sh_rest[rest * gaussian..][..rest]);
+    }
+    packed
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn one(log_scales: [f32; 3], quaternion: [f32; 4]) -> Vec<f32> {
+        let gaussians = GaussianArrays {
+            means: vec![[1.0, 2.0, 3.0]],
+            log_scales: vec![log_scales],
+            quats: vec![quaternion],
+            opacity_logits: vec![0.0],
+            sh_dc: vec![[0.0; 3]],
+            sh_degree: 0,
+            sh_rest: Vec::new(),
+        };
+        let mut packed = vec![-1.0; FLOATS];
+        pack(&gaussians, 0..1, &mut packed);
+        packed
+    }
+
+    #[test]
+    fn a_quarter_turn_around_z_exchanges_x_and_y() {
+        let half = std::f32::consts::FRAC_1_SQRT_2;
+        let packed = one([2.0_f32.ln(), 3.0_f32.ln(), 0.0], [half * 5.0, 0.0, 0.0, half * 5.0]);
+        let expected = [1.0, 2.0, 3.0, 0.5, 9.0, 0.0, 0.0, 4.0, 0.0, 1.0, 0.0, 0.0];
+        for (found, expected) in packed.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-5, "{packed:?}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_transparent() {
+        assert_eq!(one([0.0; 3], [0.0; 4]), [0.0; FLOATS]);
+        assert_eq!(one([0.0; 3], [f32::MAX; 4]), [0.0; FLOATS]);
+        assert_eq!(one([-80.0; 3], [1.0, 0.0, 0.0, 0.0]), [0.0; FLOATS]);
+        // The covariance overflows.
+        assert_eq!(one([60.0; 3], [1.0, 0.0, 0.0, 0.0])[3], 0.5);
+        assert!(one([1e30; 3], [1.0, 0.0, 0.0, 0.0]).iter().all(|value| value.is_finite()));
+    }
+
+    #[test]
+    fn harmonics_fill_whole_texels() {
+        assert_eq!([0, 1, 2, 3].map(harmonics_floats), [4, 12, 28, 48]);
+    }
+}

@@ -1,0 +1,25 @@
+//! The decoder of `.l4gs` scenes for the browser.
+//!
+//! Compiled to WebAssembly this is a handful of functions that take and give numbers ([`abi`]): bytes in, Gaussians at a
+//! time and an order to draw them out. A web worker calls them; `player/` has the JavaScript around it, `build` makes the
+//! bundle. Nothing here is bound to the browser, so the tests run natively too.
+//!
+//! | file | what |
+//! |---|---|
+//! | `scene.rs` | a decoded scene that is asked for one time after the other |
+//! | `gaussians.rs` | activations, and what the vertex shader reads |
+//! | `depth_order.rs` | back to front |
+//! | `description.rs` | what the panel of the player shows, as JSON |
+//! | `digest.rs` | one number for all bits of a decoded scene |
+//! | `abi.rs` | the functions that JavaScript calls |
+
+pub mod abi;
+mod depth_order;
+mod description;
+mod digest;
+mod gaussians;
+mod scene;
+
+pub use digest::digest;
+pub use gaussians::{FLOATS, PADDING};
+pub use scene::OpenScene;

@@ -1,0 +1,111 @@
+//! A decoded scene that is asked for one time after the other.
+
+use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, info};
+
+use crate::depth_order::DepthOrder;
+use crate::description::describe;
+use crate::digest::digest;
+use crate::gaussians::{FLOATS, PADDING, opacity, pack, pack_harmonics, rotation, scales};
+
+/// A decoded scene.
+#[derive(Debug)]
+pub struct OpenScene {
+    canonical: GaussianArrays,
+    moved: GaussianArrays,
+    evaluator: MotionEvaluator,
+    description: String,
+    digest: u64,
+    /// What is drawn: [`FLOATS`] numbers a Gaussian, whole texture rows.
+    packed: Vec<f32>,
+    /// The next of it, while that is being computed.
+    pending: Vec<f32>,
+    order: DepthOrder,
+}
+
+impl OpenScene {
+    /// Decodes a stream.
+    ///
+    /// # Errors
+    /// As [`light4gs_codec::decode`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
+        let info = info(bytes)?;
+        let scene = OpenStream::new(bytes)?.scene()?;
+        let evaluator = MotionEvaluator::new(&scene)?;
+        let (description, digest) = (describe(&scene, &info), digest(&scene));
+        let canonical = scene.gaussians;
+        let floats = FLOATS * canonical.len().next_multiple_of(PADDING);
+        Ok(Self {
+            moved: canonical.clone(),
+            canonical,
+            evaluator,
+            description,
+            digest,
+            packed: vec![0.0; floats],
+            pending: vec![0.0; floats],
+            order: DepthOrder::default(),
+        })
+    }
+
+    /// Number of Gaussians.
+    pub fn count(&self) -> usize {
+        self.canonical.len()
+    }
+
+    /// The scene as JSON: name, sizes, sections.
+    pub fn description(&self) -> &str {
+        &self.description
+    }
+
+    /// [`digest()`] of what was decoded.
+    pub fn digest(&self) -> u64 {
+        self.digest
+    }
+
+    /// Computes the Gaussians `first` to `last` at a time, and whether harmonics move along. [`OpenScene::present`] shows
+    /// them when all are done.
+    pub fn evaluate(&mut self, time: f32, first: usize, last: usize) {
+        let last = last.min(self.count());
+        let range = first.min(last)..last;
+        self.evaluator.apply(&self.canonical, time, range.clone(), &mut self.moved);
+        pack(&self.moved, range, &mut self.pending);
+    }
+
+    /// The Gaussians that were computed last, for the texture: [`FLOATS`] numbers each, in whole rows.
+    pub fn present(&mut self) -> &[f32] {
+        std::mem::swap(&mut self.packed, &mut self.pending);
+        &self.packed
+    }
+
+    /// Whether harmonics change with time.
+    pub fn changes_harmonics(&self) -> bool {
+        self.evaluator.changes_harmonics()
+    }
+
+    /// The harmonics at the time that was computed last, for the texture.
+    pub fn harmonics(&self) -> Vec<f32> {
+        pack_harmonics(&self.moved)
+    }
+
+    /// The Gaussians that are shown, back to front, by a row of the view matrix.
+    pub fn sort(&mut self, row: [f32; 4]) -> &[u32] {
+        self.order.sort(&self.packed, row)
+    }
+
+    /// All attributes at a time, activated: centers `[N, 3]`, standard deviations `[N, 3]`, unit quaternions `(w, x, y, z)
+    /// [N, 4]` (zeros where there is no direction), opacities `[N]`, harmonics `[N, (degree + 1)², 3]`, one behind the other.
+    pub fn attributes_at(&self, time: f32) -> Vec<f32> {
+        let mut moved = self.canonical.clone();
+        self.evaluator.apply(&self.canonical, time, 0..self.count(), &mut moved);
+        let rest = moved.sh_rest.len() / moved.len().max(1);
+        let mut attributes = Vec::with_capacity(moved.len() * (14 + rest));
+        attributes.extend(moved.means.iter().flatten());
+        attributes.extend(moved.log_scales.iter().flat_map(|&log_scales| scales(log_scales)));
+        attributes.extend(moved.quats.iter().flat_map(|&quaternion| rotation(quaternion).unwrap_or_default()));
+        attributes.extend(moved.opacity_logits.iter().map(|&logit| opacity(logit)));
+        for gaussian in 0..moved.len() {
+            attributes.extend_from_slice(&moved.sh_dc[gaussian]);
+            attributes.extend_from_slice(&moved.sh_rest[rest * gaussian..][..rest]);
+        }
+        attributes
+    }
+}

@@ -1,0 +1,6 @@
+//! The vectors of `light4gs-model`, in which all of its unsafe code stands, with their own tests.
+
+#![allow(dead_code, reason = "the kernels that use them are not here")]
+
+#[path = "../../../light4gs-model/src/cpu/lanes.rs"]
+mod lanes;

@@ -1,0 +1,186 @@
+//! Golden cases c09 (MS-SSIM, D-SSIM on 8-bit images) and c13 (LPIPS) on every back end, and what the metrics have in common.
+
+use std::path::PathBuf;
+
+use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_tests::golden::{Golden, assert_close, cpu_devices, devices, values_of};
+use light4gs_train::evaluation::measure::{Measure, Scores};
+use light4gs_train::evaluation::metrics::lpips::{Lpips, LpipsNetwork};
+use light4gs_train::evaluation::metrics::{
+    MS_SSIM_LEAST_SIDE, d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid,
+};
+
+/// An image of bytes as `[H, W, 3]` in [0, 1]; `channels_first` says how the file has it.
+fn bytes_image(golden: &Golden, key: &str, channels_first: bool, device: &Device) -> Tensor<3> {
+    let shape: [usize; 3] = golden.shape(key).try_into().unwrap();
+    let image = Tensor::<3>::from_data(TensorData::new(golden.values(key), shape), device) / 255.0;
+    if channels_first { image.permute([1, 2, 0]) } else { image }
+}
+
+#[test]
+fn multiscale_similarity() {
+    let golden = Golden::open("c09_losses");
+    for (name, device) in devices() {
+        let [image, truth] = ["msssim.img_u8", "msssim.gt_u8"].map(|key| bytes_image(&golden, key, true, &device));
+        let check = |key: &str, found: f64, tolerance: f32| {
+            let key = format!("msssim.{key}");
+            assert_close(&format!("{name} {key}"), &[found as f32], &golden.values(&key), tolerance);
+        };
+        let multiscale = ms_ssim(image.clone(), truth.clone()).unwrap().into_scalar::<f64>();
+        let plain = ssim(image.clone(), truth.clone()).into_scalar::<f64>();
+        check("ms_ssim", multiscale, 2e-5);
+        check("d_ssim_4dgs", d_ssim(multiscale), 2e-5);
+        check("d_ssim_from_ssim", d_ssim(plain), 1e-5);
+        check("ssim", plain, 1e-5);
+        check("psnr", psnr(image, truth), 1e-3);
+    }
+}
+
+/// A file with the weights, which are not ours to spread: `LIGHT4GS_LPIPS`, or the place they have on our own machines.
+fn published_weights() -> Option<PathBuf> {
+    let named = std::env::var_os("LIGHT4GS_LPIPS").map(PathBuf::from);
+    let beside = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/lpips/alex_v0.1.safetensors"));
+    let above = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/lpips/alex_v0.1.safetensors"));
+    [named, Some(beside), Some(above)].into_iter().flatten().find(|path| path.exists())
+}
+
+#[test]
+fn learned_distance() {
+    let Some(path) = published_weights() else {
+        eprintln!("skipped: name the weights of LPIPS with LIGHT4GS_LPIPS");
+        return;
+    };
+    let golden = Golden::open("c13_lpips");
+    for (name, device) in devices() {
+        let [lpips] = &Lpips::load(std::slice::from_ref(&path), &device).unwrap()[..] else { panic!("one network") };
+        assert_eq!(lpips.network(), LpipsNetwork::Alex);
+        for pair in (0..).take_while(|pair| golden.has(&format!("pair{pair}.a"))) {
+            let [a, b] = ["a", "b"].map(|side| bytes_image(&golden, &format!("pair{pair}.{side}"), false, &device));
+            let layers = values_of(&lpips.layer_distances(a.clone(), b.clone()).unwrap());
+            assert_close(&format!("{name} {pair}"), &layers, &golden.values(&format!("pair{pair}.per_layer")), 1e-4);
+            let distance = values_of(&lpips.distance(a.clone(), b.clone()).unwrap());
+            assert_close(&format!("{name} {pair}"), &distance, &golden.values(&format!("pair{pair}.lpips")), 1e-4);
+            let itself = values_of(&lpips.distance(a.clone(), a.clone()).unwrap());
+            assert_eq!(itself, [0.0]);
+            let [height, width, _] = a.dims();
+            let everything = Tensor::ones([height, width], &device);
+            let masked = values_of(&lpips.masked_distance(a, b, everything).unwrap());
+            // Bilinear enlargement counts the border more, so this is near the distance and not equal to it.
+            assert_close(&format!("{name} {pair} masked"), &masked, &distance, 0.05);
+        }
+    }
+}
+
+/// Random weights of VGG-16 in the layouts of torchvision and of the `lpips` package, and of the two together.
+#[test]
+fn weights_in_two_files_are_put_together() {
+    let folder = tempfile::tempdir().unwrap();
+    let write = |name: &str, tensors: &[(String, Vec<usize>)]| {
+        let data: Vec<(String, Vec<usize>, Vec<u8>)> = tensors
+            .iter()
+            .map(|(name, shape)| {
+                let count = shape.iter().product::<usize>();
+                let value = |i: usize| ((i as f32 * 12.9898).sin() * 0.1).to_le_bytes();
+                (name.clone(), shape.clone(), (0..count).flat_map(value).collect())
+            })
+            .collect();
+        let views = data.iter().map(|(name, shape, bytes)| {
+            (name, safetensors::tensor::TensorView::new(safetensors::Dtype::F32, shape.clone(), bytes).unwrap())
+        });
+        let path = folder.path().join(name);
+        std::fs::write(&path, safetensors::serialize(views, None).unwrap()).unwrap();
+        path
+    };
+    let sizes = [3, 64, 64, 128, 128, 256, 256, 256, 512, 512, 512, 512, 512, 512];
+    let places = [0, 2, 5, 7, 10, 12, 14, 17, 19, 21, 24, 26, 28];
+    let mut network = Vec::new();
+    for (layer, place) in places.iter().enumerate() {
+        network.push((format!("features.{place}.weight"), vec![sizes[layer + 1], sizes[layer], 3, 3]));
+        network.push((format!("features.{place}.bias"), vec![sizes[layer + 1]]));
+    }
+    let heads: Vec<_> = [64, 128, 256, 512, 512].into_iter().enumerate().collect();
+    let heads: Vec<_> =
+        heads.into_iter().map(|(tap, c)| (format!("lin{tap}.model.1.weight"), vec![1, c, 1, 1])).collect();
+    let device = Device::flex();
+    let (network_file, head_file) = (write("vgg16.safetensors", &network), write("vgg.safetensors", &heads));
+    let found = Lpips::load(&[head_file.clone(), network_file.clone()], &device).unwrap();
+    assert_eq!(found.iter().map(Lpips::network).collect::<Vec<_>>(), [LpipsNetwork::Vgg]);
+    let image = |shift: f32| (Tensor::<3>::ones([20, 24, 3], &device) * 0.5) + shift;
+    assert!(found[0].distance(image(0.0), image(0.1)).unwrap().into_scalar::<f32>().is_finite());
+    let small = Tensor::<3>::ones([15, 40, 3], &device);
+    assert!(found[0].distance(small.clone(), small).is_none());
+
+    let message = |files: &[PathBuf]| Lpips::load(files, &device).unwrap_err().to_string();
+    let alone = message(std::slice::from_ref(&head_file));
+    assert!(alone.contains("vgg.safetensors") && alone.contains("convolutions"), "{alone}");
+    let alone = message(std::slice::from_ref(&network_file));
+    assert!(alone.contains("vgg16.safetensors") && alone.contains("heads"), "{alone}");
+    network[6].1[1] = 63;
+    let wrong = message(&[write("wrong.safetensors", &network), head_file]);
+    assert!(wrong.contains("features.7.weight") && wrong.contains("[128, 63, 3, 3]"), "{wrong}");
+    let other = message(&[write("other.safetensors", &[("weight".into(), vec![2, 2])])]);
+    assert!(other.contains("other.safetensors") && other.contains("docs/metrics.md"), "{other}");
+    let text = folder.path().join("text.pth");
+    std::fs::write(&text, "not a model").unwrap();
+    assert!(message(&[text]).contains("text.pth"));
+}
+
+fn pattern(height: usize, width: usize, shift: f32, device: &Device) -> Tensor<3> {
+    let value = |i: usize| ((i as f32 * 0.7 + shift).sin() + 1.0) / 2.0;
+    Tensor::from_data(TensorData::new((0..height * width * 3).map(value).collect(), [height, width, 3]), device)
+}
+
+#[test]
+fn images_that_are_too_small_have_no_multiscale_similarity() {
+    for (name, device) in cpu_devices() {
+        let measure = |height, width| {
+            let (image, truth) = (pattern(height, width, 0.0, &device), pattern(height, width, 0.1, &device));
+            Scores::measure(&image, &truth, None, &[])
+        };
+        let least = MS_SSIM_LEAST_SIDE;
+        assert!(measure(least, least + 4).get(Measure::MsSsim).is_some(), "{name}");
+        let small = measure(least - 1, least + 4);
+        assert!(small.get(Measure::MsSsim).is_none() && small.get(Measure::SsimValid).is_some(), "{name}");
+        assert_eq!(Measure::DSsim.format(small.get(Measure::DSsim)), "image too small");
+        let tiny = measure(10, 30);
+        assert!(tiny.get(Measure::SsimValid).is_none() && tiny.ssim().is_finite(), "{name}");
+        let alex = Measure::Lpips(LpipsNetwork::Alex);
+        assert_eq!(alex.format(tiny.get(alex)), "no weights");
+    }
+}
+
+#[test]
+fn valid_windows_are_the_inner_ones() {
+    let device = Device::flex();
+    // Windows of the padded convention at least five pixels from the border are those that lie inside.
+    let (image, truth) = (pattern(24, 31, 0.0, &device), pattern(24, 31, 0.4, &device));
+    let mut inner = vec![0.0f32; 24 * 31];
+    for row in 5..24 - 5 {
+        inner[row * 31 + 5..row * 31 + 31 - 5].fill(1.0);
+    }
+    let mask = Tensor::<2>::from_data(TensorData::new(inner, [24, 31]), &device);
+    let inside = masked_ssim(image.clone(), truth.clone(), mask).into_scalar::<f32>();
+    let valid = ssim_valid(image, truth).unwrap().into_scalar::<f32>();
+    assert!((inside - valid).abs() < 1e-6, "{inside} against {valid}");
+}
+
+#[test]
+fn masks_choose_the_pixels_that_count() {
+    for (name, device) in cpu_devices() {
+        let truth = pattern(40, 40, 0.0, &device);
+        // The left half is off by 0.1, the right half by nothing.
+        let columns = |left: f32, right: f32| {
+            let value = |i: usize| if i % 40 < 20 { left } else { right };
+            Tensor::<2>::from_data(TensorData::new((0..1600).map(value).collect::<Vec<_>>(), [40, 40]), &device)
+        };
+        let image = truth.clone() + columns(0.1, 0.0).unsqueeze_dim::<3>(2);
+        let left = masked_psnr(image.clone(), truth.clone(), columns(1.0, 0.0));
+        assert!((left - 20.0).abs() < 1e-3, "{name}: {left}");
+        assert!((psnr(image.clone(), truth.clone()) - 23.0103).abs() < 1e-3, "{name}");
+        let scores = Scores::measure(&image, &truth, Some(&columns(0.0, 1.0)), &[]);
+        assert_eq!(scores.get(Measure::MaskedPsnr), Some(f64::INFINITY), "{name}");
+        assert!(scores.get(Measure::MaskedSsim).unwrap() > scores.ssim(), "{name}");
+        let empty = Scores::measure(&image, &truth, Some(&columns(0.0, 0.0)), &[]);
+        assert_eq!(empty.get(Measure::MaskedPsnr), None, "{name}: an empty mask has no mean");
+    }
+}
