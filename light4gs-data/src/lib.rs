@@ -12,25 +12,30 @@
 
 mod atomic;
 mod camera;
+mod digest;
 mod error;
 mod frame;
 mod images;
 mod layouts;
+mod lens;
 mod options;
 mod orbit;
 pub mod ply;
 mod points;
+mod programs;
 mod pytorch;
 mod regular_file;
 mod scene;
 mod synthetic;
 
 pub use atomic::{is_temporary_name, sweep_leftovers, write_atomically};
-pub use camera::{Camera, PoseError};
+pub use camera::{Camera, Intrinsics, PoseError};
+pub use digest::DatasetDigest;
 pub use error::DataError;
-pub use frame::Frame;
+pub use frame::{Frame, Mask, MaskMeaning};
 pub use images::{ImageStore, RgbImage8, RgbImage32, composite, composite_resized, image_size};
-pub use layouts::{DNerf, DatasetLayout, Layouts};
+pub use layouts::{Colmap, DNerf, DatasetLayout, HyperNerf, Layouts, NerfDs, Nerfstudio, Neu3d};
+pub use lens::{Distortion, Lens};
 pub use options::{LoadOptions, Resolution};
 pub use orbit::orbit_path;
 pub use ply::GaussianPly;

@@ -55,12 +55,13 @@ impl ImageSource for MemoryImages {
 /// How a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
     LoadOptions {
+        layout: config.data.layout.clone(),
+        frames: config.data.frames,
         resolution: config.data.resolution.map_or(Resolution::Native, Resolution::MaxSide),
         background: config.data.background,
         seed: config.seed,
         random_points: config.data.initial_points,
         random_half_size: config.data.initial_box,
-        ..LoadOptions::default()
     }
 }
 

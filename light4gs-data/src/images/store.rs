@@ -1,19 +1,15 @@
 //! Images in memory: decoded when needed, composited, resized, kept within a bound.
 
-use super::composite::composite_resized;
+use super::decode::decode;
 use super::rgb::RgbImage8;
 use crate::error::DataError;
 use crate::frame::Frame;
 use crate::options::LoadOptions;
-use image::ImageReader;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-
-/// Decoding a single image may take at most this much memory.
-const MAX_DECODED_BYTES: u64 = 1 << 30;
 
 /// An image file at a size.
 type Key = (PathBuf, u32, u32);
@@ -75,7 +71,7 @@ impl ImageStore {
     ///
     /// # Errors
     /// [`DataError::Image`] when the frame has no image, or it is missing, damaged, or of
-    /// another size than its split's first one.
+    /// another size than when the dataset was opened.
     pub fn get(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
         let key = key(frame);
         let mut state = self.inner.lock();
@@ -207,70 +203,12 @@ impl State {
     }
 }
 
-/// Opens an image file far enough to know its format.
-fn open(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>, DataError> {
-    ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|e| DataError::image(path, format!("cannot be read: {e}"), "restore the file or remove its frame"))
-}
-
-/// Size (width, height) of an image, from its header alone.
-///
-/// # Errors
-/// [`DataError::Image`] when the file is missing or its header is damaged.
-pub fn image_size(path: &Path) -> Result<(u32, u32), DataError> {
-    open(path)?.into_dimensions().map_err(|e| {
-        DataError::image(
-            path,
-            format!("its header cannot be read ({e}), expected a PNG or JPEG image"),
-            "restore the file or remove its frame",
-        )
-    })
-}
-
-/// Decodes, composites and resizes the image of a frame.
-fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, DataError> {
-    let path = &frame.path;
-    if !frame.has_image() {
-        return Err(DataError::image(
-            Path::new(&frame.name),
-            "this frame has no image, it belongs to a camera path",
-            "use a frame of the train, test or val split",
-        ));
-    }
-    let mut reader = open(path)?;
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(MAX_DECODED_BYTES);
-    reader.limits(limits);
-    let image = reader.decode().map_err(|e| {
-        DataError::image(
-            path,
-            format!("cannot be decoded ({e}): it is truncated or damaged"),
-            "restore the file or remove its frame",
-        )
-    })?;
-    let found = (image.width(), image.height());
-    let expected = (frame.source_width, frame.source_height);
-    if found != expected {
-        return Err(DataError::image(
-            path,
-            format!(
-                "it is {} x {} pixels, expected {} x {} as the first image of its split",
-                found.0, found.1, expected.0, expected.1
-            ),
-            "make all images of a split the same size",
-        ));
-    }
-    let rgba = image.into_rgba8();
-    let target = (frame.camera.width, frame.camera.height);
-    composite_resized(rgba.as_raw(), found, target, background)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::camera::Camera;
     use glam::Vec3;
+    use std::path::Path;
 
     /// `count` gray 8×8 images; image `i` has value `i`.
     fn frames(folder: &Path, count: u8) -> Vec<Frame> {
@@ -279,14 +217,8 @@ mod tests {
                 let path = folder.join(format!("{i}.png"));
                 let image = RgbImage8 { width: 8, height: 8, pixels: vec![i; 192] };
                 image.save_png(&path).unwrap();
-                Frame {
-                    name: i.to_string(),
-                    camera: Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 8, 8),
-                    time: 0.0,
-                    path,
-                    source_width: 8,
-                    source_height: 8,
-                }
+                let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 8, 8);
+                Frame::new(i.to_string(), camera, 0.0, path, (8, 8))
             })
             .collect()
     }

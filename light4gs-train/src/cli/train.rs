@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_data::Scene;
+use clap::builder::PossibleValuesParser;
+use light4gs_data::{Layouts, Scene};
 use light4gs_model::HexPlaneField;
 
 use super::output::{say, say_json, tell};
@@ -14,8 +15,8 @@ use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
-use crate::evaluation::metrics::lpips::Lpips;
 use crate::evaluation::measure::Scores;
+use crate::evaluation::metrics::lpips::Lpips;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
@@ -39,9 +40,13 @@ pub(super) struct RunOutput {
 pub(super) struct Train {
     /// Folder of the dataset.
     scene: PathBuf,
-    /// A preset (see docs/configuration.md) or a TOML file.
-    #[arg(long, default_value = "dnerf-small", value_name = "PRESET|FILE")]
-    config: String,
+    /// A preset (see docs/configuration.md) or a TOML file. Without it: the small preset of the dataset's layout, such as
+    /// dnerf-small.
+    #[arg(long, value_name = "PRESET|FILE")]
+    config: Option<String>,
+    /// Layout of the dataset; without it, it is found by content (see docs/data.md).
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Layouts::default().names()))]
+    format: Option<String>,
     /// Folder of the run.
     #[arg(long)]
     out: PathBuf,
@@ -62,7 +67,13 @@ impl Train {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
-        let config = Config::load(&self.config, &overrides)?;
+        overrides.extend(self.format.as_ref().map(|layout| format!("data.layout={layout}")));
+        let preset = match (self.config, self.format) {
+            (Some(config), _) => config,
+            (None, Some(layout)) => format!("{layout}-small"),
+            (None, None) => format!("{}-small", Layouts::default().detect(&self.scene)?.name()),
+        };
+        let config = Config::load(&preset, &overrides)?;
         train(config, &self.scene, &self.out, self.overwrite, &self.output)
     }
 }
@@ -75,7 +86,9 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
-    check_inputs(&config, scene)?;
+    for note in check_inputs(&config, scene)?.notes {
+        tell(format_args!("note: {note}"));
+    }
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;
@@ -120,11 +133,10 @@ pub(super) fn train_to_evaluation(
 
 /// Checks what a run needs from its first iteration to its evaluation, before its folder is made or emptied, so that a
 /// wrong path leaves nothing behind and nothing is lost: the device, the dataset, files that metrics need.
-fn check_inputs(config: &Config, scene: &Path) -> Result<(), TrainError> {
+fn check_inputs(config: &Config, scene: &Path) -> Result<Scene, TrainError> {
     let device = device::open(config.device)?;
     Lpips::load(&config.eval.lpips, &device)?;
-    Scene::open(scene, &load_options(config))?;
-    Ok(())
+    Ok(Scene::open(scene, &load_options(config))?)
 }
 
 /// A trainer of a run's folder, with progress bars.
@@ -173,6 +185,9 @@ pub(super) struct Resume {
     /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
+    /// Go on although the dataset is not what it was when the run began.
+    #[arg(long)]
+    accept_changed_dataset: bool,
     #[command(flatten)]
     output: RunOutput,
 }
@@ -185,7 +200,11 @@ impl Resume {
         let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
         check_inputs(&config, &record.scene)?;
-        let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
+        let mut builder = trainer(&config, &folder, &record, &self.output)?;
+        if self.accept_changed_dataset {
+            builder = builder.accept_changed_dataset();
+        }
+        let trainer = builder.resume()?;
         if changed != found {
             // Only now that the checkpoint has been found to fit. The next `resume` goes on with it as well.
             folder.write("config.toml", changed.to_toml().as_bytes())?;

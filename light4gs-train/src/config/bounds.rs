@@ -80,6 +80,8 @@ const WEIGHT_BITS: Bounds = Whole { least: LEAST_WEIGHT_BITS as u64, most: MOST_
 pub const BOUNDS: &[(&str, Bounds)] = &[
     ("seed", Whole { least: 0, most: MOST_INTEGER }),
     ("device", Device),
+    ("data.layout", Text),
+    ("data.frames", WholeOrNone { least: 1, most: 1_000_000 }),
     ("data.resolution", WholeOrNone { least: 8, most: 16_384 }),
     ("data.background", List { element: &SHARE, length: Some(3) }),
     ("data.memory_limit_mib", Whole { least: 16, most: 1 << 24 }),
@@ -239,7 +241,9 @@ impl Bounds {
             }
             (Number { least, most }, Value::Number(number)) => {
                 let float = number.as_f64()?;
-                if (*least..=*most).contains(&float) { None } else { outside(&Short(float)) }
+                // As float32, which all numbers become: some keys hold no more, and their 1e-6 is a little below ours.
+                let holds = (*least as f32..=*most as f32).contains(&(float as f32));
+                if holds { None } else { outside(&Short(float)) }
             }
             // JSON has no NaN and no infinities.
             (Number { .. }, Value::Null) => outside(&"no finite number"),

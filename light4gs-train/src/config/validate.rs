@@ -2,20 +2,31 @@
 
 use light4gs_codec::plane_layout::check_resolution;
 use light4gs_codec::{CodecError, checks};
+use light4gs_data::Layouts;
 
 use super::bounds::{self, MOST_PLANE_RESOLUTION};
 use super::{
-    CompressionConfig, Config, ConfigError, DensifyConfig, EvalConfig, HexPlaneConfig, Problem, PruneConfig,
-    TrainConfig,
+    CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, Problem,
+    PruneConfig, TrainConfig,
 };
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check { problems: bounds::problems(config) };
+    data(&mut check, &config.data);
     hexplane(&mut check, &config.model.hexplane);
     train(&mut check, &config.train);
     compression(&mut check, &config.compression);
     eval(&mut check, &config.eval);
     if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
+}
+
+fn data(check: &mut Check, data: &DataConfig) {
+    if let Some(name) = &data.layout {
+        let known = Layouts::default().names();
+        check.that("data.layout", known.contains(&name.as_str()), || {
+            format!("is `{name}`; it must be empty (found by content) or one of {}", known.join(", "))
+        });
+    }
 }
 
 fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
