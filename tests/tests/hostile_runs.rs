@@ -11,9 +11,11 @@ use light4gs_tests::hostile::checkpoints::{self, Parts};
 use light4gs_tests::hostile::configurations::{is_cheap, odd, tiny_with};
 use light4gs_tests::hostile::{assert_bearable, bytes, cases, generator, json, run_within, train, without_panic};
 use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, assert_success};
+use light4gs_train::Stage;
 use light4gs_train::config::Config;
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
+use light4gs_train::loss::LossInput;
 use light4gs_train::run::{Checkpoint, RunFolder};
 use light4gs_train::trainer::Trainer;
 use rand::Rng;
@@ -96,6 +98,42 @@ fn a_checkpoint_with_a_number_that_is_not_finite_is_not_written() {
     let text = state.save(&path).unwrap_err().to_string();
     assert!(text.contains("second.") && text.contains("inf"), "{text}");
     assert!(!path.exists());
+}
+
+/// A loss, or only its gradient, that is no number: the run stops, says where, and leaves a checkpoint to go on from.
+#[test]
+fn numbers_that_are_not_finite_stop_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = scene(folder.path());
+    let overrides = [("train.fine_iterations", "6"), ("train.checkpoint_interval", "2"), ("train.log_interval", "1")];
+    let config = Config::from_toml(&tiny_with(&overrides), "tiny").unwrap();
+    for (name, of_the_gradient) in [("loss", false), ("gradient", true)] {
+        let run = RunFolder::create(&folder.path().join(name), &scene, &config, false).unwrap();
+        let data = Scene::open(&scene, &load_options(&config)).unwrap();
+        let loss = move |view: LossInput| {
+            let error = view.image - view.truth;
+            match (view.stage == Stage::Fine && view.iteration == 4, of_the_gradient) {
+                (false, _) => error.powi_scalar(2).mean(),
+                (true, false) => (error * f32::NAN).mean(),
+                // The root of 0 has no slope.
+                (true, true) => (error * 0.0).sqrt().mean(),
+            }
+        };
+        let mut trainer = Trainer::builder(config.clone(), data).run_folder(run.clone()).loss(loss).build().unwrap();
+        let error = loop {
+            if let Err(error) = trainer.step() {
+                break error;
+            }
+        };
+        let TrainError::Diverged(divergence) = &error else { panic!("{error}") };
+        assert_eq!((divergence.stage, divergence.iteration), (Stage::Fine, 4));
+        let checkpoint = divergence.checkpoint.clone().unwrap();
+        assert!(checkpoint.ends_with("fine_000002.safetensors"), "{}", checkpoint.display());
+        load(&checkpoint, &config).unwrap();
+        let text = error.to_string();
+        assert!(!error.is_internal() && text.contains("light4gs resume") && text.contains("--set train."), "{text}");
+        assert_eq!(text.contains("parameter `scene."), of_the_gradient, "{text}");
+    }
 }
 
 #[test]

@@ -98,13 +98,7 @@ impl RunFolder {
 
     /// Removes what a run consists of, and nothing else.
     fn clear(&self) -> Result<(), TrainError> {
-        for name in FILES {
-            remove(&self.path(name), |path| fs::remove_file(path))?;
-        }
-        for name in FOLDERS {
-            remove(&self.path(name), |path| fs::remove_dir_all(path))?;
-        }
-        Ok(())
+        FILES.iter().chain(&FOLDERS).try_for_each(|name| remove(&self.path(name)))
     }
 
     /// Opens the folder of a run to read it; see [`RunFolder::lock`].
@@ -115,17 +109,17 @@ impl RunFolder {
         let folder = Self { root: root.to_owned(), lock: None };
         let path = folder.path(RECORD);
         let shown = root.display();
-        let anew = format!("`light4gs train DATASET --out {shown}`");
+        let anew = format!("light4gs train DATASET --out {shown}");
         match contents::of(root)? {
             Contents::Run => {}
             Contents::AbandonedStart => {
                 return Err(TrainError::Input(format!(
-                    "{shown} has no {RECORD}: the run was stopped before it began. Begin it with {anew}"
+                    "{shown} has no {RECORD}: the run was stopped before it began. Begin it with `{anew}`"
                 )));
             }
             Contents::Remains => {
                 return Err(TrainError::Input(format!(
-                    "{shown} has no {RECORD}: it holds what is left of a run. Replace it with {anew} --overwrite"
+                    "{shown} has no {RECORD}: it holds what is left of a run. Replace it with `{anew} --overwrite`"
                 )));
             }
             Contents::Nothing | Contents::Foreign(_) => {
@@ -135,7 +129,7 @@ impl RunFolder {
         let record = read_json(&path).map_err(|error| match error {
             DataError::Json { source, .. } => TrainError::Input(format!(
                 "{} is damaged: {source}. It holds \"scene\", the dataset's absolute path, and \"version\": write it anew, \
-                 or replace the run with {anew} --overwrite",
+                 or replace the run with `{anew} --overwrite`",
                 path.display()
             )),
             other => other.into(),
@@ -261,10 +255,13 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, DataError
     serde_json::from_slice(&bytes).map_err(|source| DataError::Json { path: path.to_owned(), source })
 }
 
-fn remove(path: &Path, remove: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), TrainError> {
-    // A link that leads nowhere is to be removed as well.
-    if path.symlink_metadata().is_err() {
-        return Ok(());
-    }
-    Ok(remove(path).map_err(DataError::io("remove", path))?)
+/// Removes a file or a folder, if it is there.
+fn remove(path: &Path) -> Result<(), TrainError> {
+    // A link is removed, not what it leads to; one that leads nowhere as well.
+    let removed = match path.symlink_metadata() {
+        Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
+        Ok(_) => fs::remove_file(path),
+        Err(_) => Ok(()),
+    };
+    Ok(removed.map_err(DataError::io("remove", path))?)
 }
