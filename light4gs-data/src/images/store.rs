@@ -1,6 +1,7 @@
 //! Images in memory: decoded when needed, composited, resized, kept within a bound.
 
 use super::decode::decode;
+use super::mask::{PixelMask, trained_pixels};
 use super::rgb::RgbImage8;
 use crate::error::DataError;
 use crate::frame::Frame;
@@ -10,6 +11,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
+
+/// An image, and which of its pixels are trained on; `None` is all.
+type Masked = (Arc<RgbImage8>, Option<Arc<PixelMask>>);
 
 /// An image file at a size.
 type Key = (PathBuf, u32, u32);
@@ -34,7 +38,7 @@ struct Inner {
 #[derive(Default)]
 struct State {
     /// The image and when it was last asked for.
-    kept: HashMap<Key, (Arc<RgbImage8>, u64)>,
+    kept: HashMap<Key, (Masked, u64)>,
     /// When, to which: the first is the least recently used.
     by_age: BTreeMap<u64, Key>,
     bytes: usize,
@@ -73,6 +77,15 @@ impl ImageStore {
     /// [`DataError::Image`] when the frame has no image, or it is missing, damaged, or of
     /// another size than when the dataset was opened.
     pub fn get(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
+        Ok(self.get_masked(frame)?.0)
+    }
+
+    /// The image of a frame as [`Self::get`] gives it, and which of its pixels may be trained on: not those that its mask
+    /// ignores, nor those that its lens did not record. `None` is all of them.
+    ///
+    /// # Errors
+    /// As [`Self::get`], also for the mask.
+    pub fn get_masked(&self, frame: &Frame) -> Result<(Arc<RgbImage8>, Option<Arc<PixelMask>>), DataError> {
         let key = key(frame);
         let mut state = self.inner.lock();
         loop {
@@ -145,6 +158,11 @@ fn key(frame: &Frame) -> Key {
     (frame.path.clone(), frame.camera.width, frame.camera.height)
 }
 
+/// Bytes of an image and its mask.
+fn size_of((image, mask): &Masked) -> usize {
+    image.pixels.len() + mask.as_ref().map_or(0, |mask| mask.pixels.len())
+}
+
 /// Bytes of a frame's image in the store.
 fn bytes_of(frame: &Frame) -> usize {
     (frame.camera.width as usize).saturating_mul(frame.camera.height as usize).saturating_mul(3)
@@ -156,7 +174,7 @@ impl Inner {
     }
 
     /// Decodes an image that this thread has marked in `decoding`, and keeps it if it fits.
-    fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Arc<RgbImage8>, DataError> {
+    fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Masked, DataError> {
         /// Takes the mark back, also if a decoder panics: others would wait for ever.
         struct Claim<'a>(&'a Inner, Key);
         impl Drop for Claim<'_> {
@@ -166,25 +184,25 @@ impl Inner {
             }
         }
         let claim = Claim(self, key);
-        let image = Arc::new(decode(frame, self.background)?);
+        let image = (Arc::new(decode(frame, self.background)?), trained_pixels(frame)?.map(Arc::new));
         self.lock().keep(claim.1.clone(), &image, self.limit);
         Ok(image)
     }
 }
 
 impl State {
-    fn touch(&mut self, key: &Key) -> Option<Arc<RgbImage8>> {
+    fn touch(&mut self, key: &Key) -> Option<Masked> {
         self.clock += 1;
         let (image, used) = self.kept.get_mut(key)?;
         self.by_age.remove(used);
         *used = self.clock;
-        let image = Arc::clone(image);
+        let image = image.clone();
         self.by_age.insert(self.clock, key.clone());
         Some(image)
     }
 
-    fn keep(&mut self, key: Key, image: &Arc<RgbImage8>, limit: usize) {
-        let size = image.pixels.len();
+    fn keep(&mut self, key: Key, image: &Masked, limit: usize) {
+        let size = size_of(image);
         if size > limit || self.kept.contains_key(&key) {
             return;
         }
@@ -193,13 +211,13 @@ impl State {
                 break;
             };
             if let Some((dropped, _)) = self.kept.remove(&oldest) {
-                self.bytes -= dropped.pixels.len();
+                self.bytes -= size_of(&dropped);
             }
         }
         self.clock += 1;
         self.bytes += size;
         self.by_age.insert(self.clock, key.clone());
-        self.kept.insert(key, (Arc::clone(image), self.clock));
+        self.kept.insert(key, (image.clone(), self.clock));
     }
 }
 

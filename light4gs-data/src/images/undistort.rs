@@ -50,6 +50,19 @@ pub(super) fn undistort_mask(mask: &[u8], size: (u32, u32), camera: &Camera, len
     (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| value(i, j)).collect()
 }
 
+/// Whether every pixel of the pinhole image was recorded. The image's rim decides: what lies within it is seen if it is.
+pub(super) fn is_recorded_everywhere(size: (u32, u32), camera: &Camera, lens: &Lens) -> bool {
+    let map = Map::new(size, camera, lens);
+    let (right, bottom) = (f64::from(size.0) - 1.0, f64::from(size.1) - 1.0);
+    let inside = |(i, j): (f64, f64)| {
+        let at = map.recorded(i, j);
+        at.x > -0.5 && at.y > -0.5 && at.x < right + 0.5 && at.y < bottom + 0.5
+    };
+    let columns = (0..size.0).map(f64::from).flat_map(|i| [(i, 0.0), (i, bottom)]);
+    let rows = (0..size.1).map(f64::from).flat_map(|j| [(0.0, j), (right, j)]);
+    columns.chain(rows).all(inside)
+}
+
 /// From pixels of the pinhole image to pixels of the recorded one; integers are pixel centers.
 struct Map<'a> {
     lens: &'a Lens,

@@ -8,7 +8,7 @@ mod layout;
 mod nerfies;
 mod nerfstudio;
 mod neu3d;
-mod shared;
+pub(crate) mod shared;
 #[cfg(test)]
 mod written;
 

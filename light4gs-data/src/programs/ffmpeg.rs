@@ -28,9 +28,52 @@ pub(crate) struct Wanted {
     pub(crate) rate: Option<f64>,
     /// At most this many, from the first.
     pub(crate) count: Option<usize>,
+    /// As JPEG files of high quality instead of PNG: a tenth of the size.
+    pub(crate) jpeg: bool,
 }
 
-/// Writes the frames of a video as `0000.png`, `0001.png`... into a new folder, which is complete or absent.
+impl Wanted {
+    /// The suffix of the frames.
+    pub(crate) fn suffix(&self) -> &'static str {
+        if self.jpeg { "jpg" } else { "png" }
+    }
+}
+
+/// What a video's container says.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct VideoInfo {
+    /// Seconds; 0 where it is not said.
+    pub(crate) duration: f64,
+    /// Frames a second; 0 where it is not said.
+    pub(crate) rate: f64,
+}
+
+/// Length and frame rate of a video.
+///
+/// # Errors
+/// [`DataError::Program`] where ffmpeg is absent, or finds no video in the file.
+pub(crate) fn video_info(video: &Path) -> Result<VideoInfo, DataError> {
+    let place = std::path::absolute(video).map_err(DataError::io("read", video))?;
+    // Without an output it says what it found, and ends with an error.
+    let output = FFMPEG.output(FFMPEG.command().args(["-hide_banner", "-nostdin", "-i"]).arg(place))?;
+    let text = String::from_utf8_lossy(&output.stderr).into_owned();
+    parse_info(&text).ok_or_else(|| {
+        let words = super::last_lines(text.as_bytes());
+        FFMPEG.error(format!("finds no video in {}: {words}", video.display()), "check that the video plays")
+    })
+}
+
+fn parse_info(text: &str) -> Option<VideoInfo> {
+    let stream = text.lines().find(|line| line.contains("Stream #") && line.contains("Video:"))?;
+    let before = |unit: &str| stream.split(',').find_map(|part| part.trim().strip_suffix(unit)?.trim().parse().ok());
+    let duration = text.split_once("Duration: ").and_then(|(_, rest)| {
+        let clock = rest.split([',', ' ', '\n']).next()?;
+        clock.split(':').map(|part| part.parse::<f64>().ok()).try_fold(0.0, |sum, part| Some(60.0 * sum + part?))
+    });
+    Some(VideoInfo { duration: duration.unwrap_or(0.0), rate: before(" fps").or(before(" tbr")).unwrap_or(0.0) })
+}
+
+/// Writes the frames of a video as `0000.png`, `0001.png`... (or `.jpg`) into a new folder, which is complete or absent.
 ///
 /// # Errors
 /// [`DataError::Program`] where ffmpeg is absent, too old, or cannot read the video; [`DataError::Io`] where the folder
@@ -70,7 +113,11 @@ fn extraction(version: (u32, u32), video: &Path, folder: &Path, wanted: &Wanted)
     if let Some(count) = wanted.count {
         command.arg("-frames:v").arg(argument(count));
     }
-    command.args(["-start_number", "0", "%04d.png"]);
+    if wanted.jpeg {
+        // The finest quality of the encoder, and all of its color.
+        command.args(["-q:v", "1", "-qmin", "1", "-pix_fmt", "yuvj444p"]);
+    }
+    command.args(["-start_number", "0"]).arg(format!("%04d.{}", wanted.suffix()));
     command
 }
 
@@ -80,4 +127,18 @@ fn at_least_one(folder: &Path, video: &Path) -> Result<(), DataError> {
         return Ok(());
     }
     Err(FFMPEG.error(format!("found no frame in {}", video.display()), "check that the file is a video"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_ffmpeg_says_about_a_video() {
+        let text = "Input #0, mov,mp4, from 'a.mp4':\n  Duration: 00:01:02.50, start: 0.0, bitrate: 97 kb/s\n  \
+                    Stream #0:0[0x1](und): Video: h264 (High), yuv420p, 336x252, 95 kb/s, 29.97 fps, 30 tbr (default)\n";
+        assert_eq!(parse_info(text), Some(VideoInfo { duration: 62.5, rate: 29.97 }));
+        assert_eq!(parse_info("Duration: N/A,\n Stream #0:0: Video: x"), Some(VideoInfo { duration: 0.0, rate: 0.0 }));
+        assert_eq!(parse_info("a.txt: Invalid data found"), None);
+    }
 }

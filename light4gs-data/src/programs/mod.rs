@@ -1,10 +1,12 @@
 //! Other people's programs, called as programs: found, asked for their version, run, and their last words reported.
 
+pub(crate) mod colmap;
 pub(crate) mod ffmpeg;
 
 use crate::error::DataError;
+use std::collections::VecDeque;
 use std::ffi::OsStr;
-use std::io::ErrorKind;
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::process::{Command, Output, Stdio};
 
 /// Lines of a program's output that an error quotes.
@@ -82,6 +84,52 @@ impl Program {
         }
         let words = last_lines(&[&output.stdout[..], &output.stderr[..]].concat());
         Err(self.error(format!("{attempt} failed ({}): {words}", output.status), remedy))
+    }
+
+    /// As [`Self::run`], telling `line` every line that the program prints while it runs.
+    ///
+    /// # Errors
+    /// As [`Self::run`].
+    pub(crate) fn stream(
+        &self,
+        command: &mut Command,
+        line: &mut dyn FnMut(&str),
+        attempt: &str,
+        remedy: &str,
+    ) -> Result<(), DataError> {
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut child = command.spawn().map_err(|e| self.not_started(&e))?;
+        let (sender, lines) = std::sync::mpsc::channel::<String>();
+        let streams: [Option<Box<dyn Read + Send>>; 2] = [
+            child.stdout.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>),
+            child.stderr.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>),
+        ];
+        for stream in streams.into_iter().flatten() {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                // Bytes that are no UTF-8 end a line's text, not the reading.
+                for bytes in BufReader::new(stream).split(b'\n').map_while(Result::ok) {
+                    if sender.send(String::from_utf8_lossy(&bytes).into_owned()).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(sender);
+        let mut last: VecDeque<String> = VecDeque::new();
+        for text in lines {
+            line(&text);
+            last.push_back(text);
+            if last.len() > 4 * QUOTED_LINES {
+                last.pop_front();
+            }
+        }
+        let status = child.wait().map_err(|e| self.not_started(&e))?;
+        if status.success() {
+            return Ok(());
+        }
+        let words = last_lines(last.make_contiguous().join("\n").as_bytes());
+        Err(self.error(format!("{attempt} failed ({status}): {words}"), remedy))
     }
 }
 

@@ -88,6 +88,8 @@ pub const BOUNDS: &[(&str, Bounds)] = &[
     ("data.initial_points", Whole { least: 4, most: MOST_GAUSSIANS }),
     ("data.initial_box", Number { least: 1e-6, most: 1e6 }),
     ("model.sh_degree", Whole { least: 0, most: 3 }),
+    ("model.coordinates.pca", Flag),
+    ("model.coordinates.contraction", Flag),
     ("model.hexplane.channels", Whole { least: 1, most: 1024 }),
     ("model.hexplane.resolution", List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION }, length: Some(4) }),
     (
@@ -152,6 +154,8 @@ pub const BOUNDS: &[(&str, Bounds)] = &[
     ("compression.profile", Word(FileProfile::NAMES)),
     ("compression.rate.lambda", WEIGHT),
     ("compression.rate.weighting", Word(RateWeighting::NAMES)),
+    ("compression.rate.planes", Flag),
+    ("compression.rate.sh", Flag),
     ("compression.rate.interval", Whole { least: 1, most: 1000 }),
     ("compression.rate.fraction", Number { least: 1e-6, most: 1.0 }),
     ("compression.rate.from", ITERATION),

@@ -1,6 +1,8 @@
 //! What a trainer is made of.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use burn::tensor::Device;
 use light4gs_data::Scene;
@@ -38,6 +40,7 @@ pub struct TrainerBuilder<F: DeformationField = HexPlaneField> {
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
     accept_changed_dataset: bool,
+    stop: Arc<AtomicBool>,
 }
 
 impl<F: DeformationField> TrainerBuilder<F> {
@@ -51,6 +54,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             significance: Box::new(VolumeWeightedScore::new(&config.train.prune)),
             observers: Vec::new(),
             accept_changed_dataset: false,
+            stop: Arc::default(),
             config,
             data,
             field,
@@ -103,6 +107,13 @@ impl<F: DeformationField> TrainerBuilder<F> {
     /// Goes on with a run although its dataset is not what it was when the run began.
     pub fn accept_changed_dataset(mut self) -> Self {
         self.accept_changed_dataset = true;
+        self
+    }
+
+    /// A request to stop, which anyone may set at any time: before its next iteration the trainer then writes a checkpoint
+    /// and returns [`TrainError::Stopped`]. [`TrainerBuilder::resume`] goes on from there to the same result.
+    pub fn stop_flag(mut self, stop: Arc<AtomicBool>) -> Self {
+        self.stop = stop;
         self
     }
 
@@ -178,7 +189,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
         mut state: Checkpoint<F>,
         checkpoint: Option<PathBuf>,
     ) -> Result<Trainer<F>, TrainError> {
-        let Self { config, data, images, folder, loss, mut density, significance, observers, .. } = self;
+        let Self { config, data, images, folder, loss, mut density, significance, observers, stop, .. } = self;
         let count = state.scene.gaussians.len();
         match checkpoint {
             None => density.begin_stage(count, &device.clone().inner()),
@@ -215,7 +226,9 @@ impl<F: DeformationField> TrainerBuilder<F> {
             density,
             significance,
             observers: all,
+            stop,
             order: FrameOrder::default(),
+            order_ahead: FrameOrder::default(),
             profile: Profile::off(),
             view_pools,
             lap: None,

@@ -127,7 +127,7 @@ fn extracted(root: &Path, camera: &CameraFrames, length: Option<usize>) -> Resul
     let Some(video) = &camera.video else {
         return Err(DataError::field(root, camera.name.clone(), "no frames and no video", "put one of them there"));
     };
-    let wanted = Wanted { max_width: Some(EXTRACTED_WIDTH), rate: None, count: length };
+    let wanted = Wanted { max_width: Some(EXTRACTED_WIDTH), count: length, ..Wanted::default() };
     // Beside the video, where the reference puts them too. A part of the sequence is not for others to find.
     let beside = root.join(&camera.name).join("images");
     let metadata = root.metadata().map_err(DataError::io("read", root))?;

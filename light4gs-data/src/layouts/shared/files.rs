@@ -10,18 +10,18 @@ use std::path::{Component, Path, PathBuf};
 const SUFFIXES: [&str; 4] = ["png", "jpg", "jpeg", "gif"];
 
 /// Whether a file's suffix is that of an image, in upper or lower case.
-pub(in crate::layouts) fn is_image(path: &Path) -> bool {
+pub(crate) fn is_image(path: &Path) -> bool {
     has_suffix(path, &SUFFIXES)
 }
 
 /// Whether a file has one of these suffixes (given in lower case), in upper or lower case.
-pub(in crate::layouts) fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
+pub(crate) fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
     path.extension().is_some_and(|found| suffixes.iter().any(|known| found.eq_ignore_ascii_case(known)))
 }
 
 /// The entries of a folder that are wanted, in natural order. Hidden ones are passed over: editors and file managers
 /// leave them.
-pub(in crate::layouts) fn entries(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, DataError> {
+pub(crate) fn entries(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, DataError> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(DataError::io("read", folder))? {
         let path = entry.map_err(DataError::io("read", folder))?.path();
@@ -35,22 +35,22 @@ pub(in crate::layouts) fn entries(folder: &Path, wanted: impl Fn(&Path) -> bool)
 }
 
 /// The images of a folder, in natural order.
-pub(in crate::layouts) fn images(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
+pub(crate) fn images(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
     entries(folder, |path| is_image(path) && path.is_file())
 }
 
 /// The last part of a path as text.
-pub(in crate::layouts) fn name_of(path: &Path) -> String {
+pub(crate) fn name_of(path: &Path) -> String {
     path.file_name().unwrap_or(OsStr::new("")).to_string_lossy().into_owned()
 }
 
 /// The last part of a path as text, without the suffix.
-pub(in crate::layouts) fn stem_of(path: &Path) -> String {
+pub(crate) fn stem_of(path: &Path) -> String {
     path.file_stem().unwrap_or(OsStr::new("")).to_string_lossy().into_owned()
 }
 
 /// The order in which people count: `cam2` before `cam10`, `7.png` before `0010.png`.
-pub(in crate::layouts) fn natural(a: &str, b: &str) -> Ordering {
+pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a.as_bytes(), b.as_bytes());
     while let (Some(x), Some(y)) = (left.first(), right.first()) {
         let (step_left, step_right, order) = if x.is_ascii_digit() && y.is_ascii_digit() {
@@ -74,7 +74,7 @@ pub(in crate::layouts) fn natural(a: &str, b: &str) -> Ordering {
 /// more `..` than folders before them.
 ///
 /// `file` and `field` say where the path stands.
-pub(in crate::layouts) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Result<PathBuf, DataError> {
+pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Result<PathBuf, DataError> {
     // Written on Windows, it may have the other separator.
     let name = if name.contains('/') { name.to_owned() } else { name.replace('\\', "/") };
     let mut below = PathBuf::new();
@@ -105,7 +105,7 @@ pub(in crate::layouts) fn inside(root: &Path, file: &Path, field: &str, name: &s
 }
 
 /// The image of a path with or without suffix, in upper or lower case; `None` where there is none.
-pub(in crate::layouts) fn find_image(path: &Path) -> Option<PathBuf> {
+pub(crate) fn find_image(path: &Path) -> Option<PathBuf> {
     if is_image(path) {
         return with_any_case(path);
     }
@@ -134,7 +134,7 @@ fn with_any_case(path: &Path) -> Option<PathBuf> {
 }
 
 /// Text from a file, short and without control characters, for messages.
-pub(in crate::layouts) fn shorten(text: &str) -> String {
+pub(crate) fn shorten(text: &str) -> String {
     text.chars().take(80).flat_map(char::escape_debug).collect()
 }
 

@@ -1,7 +1,7 @@
 //! What the readers have in common: files and names, arrays and JSON, times and splits, and the way from posed images to
 //! frames.
 
-pub(super) mod files;
+pub(crate) mod files;
 pub(super) mod json;
 pub(super) mod npy;
 pub(super) mod posed;
