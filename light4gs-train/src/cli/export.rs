@@ -6,6 +6,7 @@ use clap::Args;
 use light4gs_data::{DataError, GaussianPly};
 
 use super::limits::LimitsArgument;
+use super::most::{MOST_FRAMES, frame_count};
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
@@ -20,7 +21,7 @@ pub(super) struct Export {
     #[arg(long)]
     out: PathBuf,
     /// Number of frames over time 0 to 1; as many as the file was made from if not given.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
@@ -33,12 +34,12 @@ impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let decoded: DecodedScene =
             DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
+        let frames = frame_count(&decoded.data.meta, self.frames)?;
         std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
             action: "create",
             path: self.out.clone(),
             source,
         })?;
-        let frames = self.frames.unwrap_or(decoded.data.meta.frame_count.max(1));
         for k in 0..frames {
             let time = if frames == 1 { 0.0 } else { k as f32 / (frames - 1) as f32 };
             let arrays = decoded.model.at(time).to_arrays();

@@ -6,6 +6,7 @@ mod container;
 mod export;
 mod gpu_errors;
 mod limits;
+mod most;
 mod output;
 mod prepare;
 mod progress;
