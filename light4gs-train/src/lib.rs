@@ -20,5 +20,6 @@ pub mod run;
 mod stage;
 pub mod trainer;
 pub mod video;
+pub mod view;
 
 pub use stage::Stage;

@@ -1,5 +1,7 @@
 // The WebAssembly module behind plain functions. Everything here runs in the worker.
 
+import { SceneError } from "./errors.js";
+
 /** Gaussians of a texture row. */
 const ROW = 256;
 /** Gaussians that are computed before the worker looks for messages. */
@@ -23,16 +25,6 @@ const SLICE = 8192;
  * @property {(x: number, y: number, z: number, offset: number) => number} sort
  * @property {() => number} order_length
  */
-
-/** A scene that was refused; `kind` is one of `not-l4gs`, `newer`, `too-large`, `damaged`, `memory`. */
-export class SceneError extends Error {
-  /** @param {string} kind @param {string} message */
-  constructor(kind, message) {
-    super(message);
-    this.name = "SceneError";
-    this.kind = kind;
-  }
-}
 
 /** One decoded scene in one instance of the module. */
 export class Decoder {
@@ -119,8 +111,13 @@ export class Decoder {
     return new Uint32Array(this.wasm.memory.buffer, at, this.wasm.order_length()).slice();
   }
 
-  /** One number for all bits of the decoded scene, as 16 hexadecimal digits. */
-  digest() {
+  /**
+   * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits.
+   * @param {Uint8Array} bytes
+   */
+  digest(bytes) {
+    const at = this.wasm.reserve_input(bytes.length);
+    new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
     return BigInt.asUintN(64, this.wasm.digest()).toString(16).padStart(16, "0");
   }
 }

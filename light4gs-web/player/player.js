@@ -40,8 +40,9 @@ export class Player extends EventTarget {
   #hasHarmonics = false;
   /** @type {number[]} */
   #frameTimes = [];
-  /** @type {ResizeObserver | null} */
-  #resize = null;
+  #visible = true;
+  /** @type {(ResizeObserver | IntersectionObserver)[]} */
+  #observers = [];
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -77,7 +78,7 @@ export class Player extends EventTarget {
   #lost = (/** @type {Event} */ event) => event.preventDefault();
 
   #restored = () => {
-    this.renderer.prepare();
+    this.renderer.restore();
     this.renderer.begin(this.scene.count, this.scene.info.shDegree);
     this.#hasHarmonics = false;
     this.#shownTime = -1;
@@ -92,8 +93,12 @@ export class Player extends EventTarget {
     await this.#show(0);
     if (this.#disposed) return;
     this.#draw();
-    this.#resize = new ResizeObserver(() => (this.#dirty = true));
-    this.#resize.observe(this.canvas);
+    this.#observers = [
+      new ResizeObserver(() => (this.#dirty = true)),
+      // A player that was scrolled away costs nothing.
+      new IntersectionObserver((entries) => (this.#visible = entries[entries.length - 1].isIntersecting)),
+    ];
+    for (const observer of this.#observers) observer.observe(this.canvas);
     if (autoplay) this.play();
     this.#request = requestAnimationFrame(this.#tick);
   }
@@ -111,6 +116,7 @@ export class Player extends EventTarget {
     const { camera, cameras } = this;
     const data = this.#firstData;
     const centers = [0, 1, 2].map((axis) => {
+      /** @type {number[]} */
       const values = [];
       const stride = Math.max(1, Math.floor(this.scene.count / 5000));
       for (let i = 0; i < this.scene.count; i += stride) if (data[12 * i + 3] > 0.05) values.push(data[12 * i + axis]);
@@ -229,6 +235,7 @@ export class Player extends EventTarget {
     this.#request = requestAnimationFrame(this.#tick);
     const seconds = Math.min((now - this.#last) / 1000, 0.25);
     this.#last = now;
+    if (!this.#visible) return;
     if (this.#playing && seconds > 0) this.#advance(seconds);
     if (this.controls?.step(seconds)) {
       this.following = false;
@@ -376,7 +383,7 @@ export class Player extends EventTarget {
   dispose() {
     this.#disposed = true;
     cancelAnimationFrame(this.#request);
-    this.#resize?.disconnect();
+    for (const observer of this.#observers) observer.disconnect();
     this.controls?.dispose();
     this.canvas.removeEventListener("webglcontextlost", this.#lost);
     this.canvas.removeEventListener("webglcontextrestored", this.#restored);

@@ -2,9 +2,7 @@
 
 import wasmBase64 from "virtual:decoder";
 import workerSource from "virtual:worker";
-import { SceneError } from "./decoder.js";
-
-export { SceneError };
+import { SceneError } from "./errors.js";
 
 /**
  * @typedef {object} SceneInfo  what a file says of itself
@@ -163,9 +161,13 @@ export class Scene {
     return this.#ask({ type: "sort", row });
   }
 
-  /** One number for all bits of the decoded scene, as 16 hexadecimal digits. */
-  async digest() {
-    return (await this.#ask({ type: "digest" })).digest;
+  /**
+   * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
+   * @param {ArrayBuffer} bytes
+   * @returns {Promise<string>}
+   */
+  async digest(bytes) {
+    return (await this.#ask({ type: "digest", module: await decoderModule(), bytes })).digest;
   }
 
   /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */

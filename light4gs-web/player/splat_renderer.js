@@ -1,20 +1,13 @@
 // Draws sorted Gaussians with WebGL2: one quad each, back to front, premultiplied, into half floats where the browser can.
 
+import { center } from "./camera.js";
+import { GraphicsError } from "./errors.js";
 import {
   TEXELS, fragmentShader, harmonicsTexels, screenFragmentShader, screenVertexShader, vertexShader,
 } from "./shaders.js";
 
 /** Gaussians of a texture row. */
 const ROW = 256;
-
-/** A browser, or a graphics driver, that cannot draw this. */
-export class GraphicsError extends Error {
-  /** @param {string} message */
-  constructor(message) {
-    super(message);
-    this.name = "GraphicsError";
-  }
-}
 
 /**
  * @typedef {object} View  an OpenCV pinhole: +x right, +y down, +z forward
@@ -46,34 +39,38 @@ export class SplatRenderer {
     this.gl = gl;
     /** Whether sums are half floats; bytes lose faint layers. */
     this.halfFloats = Boolean(gl.getExtension("EXT_color_buffer_float") ?? gl.getExtension("EXT_color_buffer_half_float"));
-    this.prepare();
+    this.degree = 0;
+    this.parts = this.#make();
   }
 
-  /** Makes everything that lives on the graphics card; again after it was lost. */
-  prepare() {
+  /** Everything that lives on the graphics card. */
+  #make() {
     const { gl } = this;
-    this.#program = null;
-    this.#count = 0;
-    this.#targetSize = [0, 0];
-    this.#capacity = [0, 0];
-    this.screen = this.#link(screenVertexShader, screenFragmentShader);
-    this.target = { texture: gl.createTexture(), framebuffer: gl.createFramebuffer() };
-    this.gaussians = gl.createTexture();
-    this.harmonics = gl.createTexture();
-    this.vertices = gl.createVertexArray();
-    this.nothing = gl.createVertexArray();
-    this.order = gl.createBuffer();
-    this.corners = gl.createBuffer();
-    gl.bindVertexArray(this.vertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.corners);
+    const parts = {
+      screen: this.#link(screenVertexShader, screenFragmentShader),
+      target: gl.createTexture(), framebuffer: gl.createFramebuffer(),
+      gaussians: gl.createTexture(), harmonics: gl.createTexture(),
+      vertices: gl.createVertexArray(), nothing: gl.createVertexArray(),
+      order: gl.createBuffer(), corners: gl.createBuffer(),
+    };
+    gl.bindVertexArray(parts.vertices);
+    gl.bindBuffer(gl.ARRAY_BUFFER, parts.corners);
     gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), gl.STATIC_DRAW);
     gl.enableVertexAttribArray(0);
     gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
+    gl.bindBuffer(gl.ARRAY_BUFFER, parts.order);
     gl.enableVertexAttribArray(1);
     gl.vertexAttribIPointer(1, 1, gl.UNSIGNED_INT, 0, 0);
     gl.vertexAttribDivisor(1, 1);
     gl.bindVertexArray(null);
+    return parts;
+  }
+
+  /** Makes everything again after the graphics card has lost it. */
+  restore() {
+    this.#program = null;
+    this.#targetSize = [0, 0];
+    this.parts = this.#make();
   }
 
   /** @param {string} vertex @param {string} fragment */
@@ -145,18 +142,18 @@ export class SplatRenderer {
 
   /** @param {Float32Array} numbers  centers, opacities, covariances, as the decoder packs them */
   setGaussians(numbers) {
-    this.#upload(this.gaussians, 0, TEXELS, numbers, this.gl.RGBA32F);
+    this.#upload(this.parts.gaussians, 0, TEXELS, numbers, this.gl.RGBA32F);
   }
 
   /** @param {Float32Array} numbers  harmonics, as the decoder packs them */
   setHarmonics(numbers) {
-    this.#upload(this.harmonics, 1, harmonicsTexels(this.degree ?? 0), numbers, this.gl.RGBA16F);
+    this.#upload(this.parts.harmonics, 1, harmonicsTexels(this.degree), numbers, this.gl.RGBA16F);
   }
 
   /** @param {Uint32Array} order  back to front */
   setOrder(order) {
     const { gl } = this;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
+    gl.bindBuffer(gl.ARRAY_BUFFER, this.parts.order);
     gl.bufferData(gl.ARRAY_BUFFER, order, gl.DYNAMIC_DRAW);
     this.#count = order.length;
   }
@@ -166,12 +163,12 @@ export class SplatRenderer {
     const { gl } = this;
     if (this.#targetSize[0] === width && this.#targetSize[1] === height) return;
     this.#targetSize = [width, height];
-    gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
+    gl.bindTexture(gl.TEXTURE_2D, this.parts.target);
     gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, width, height, 0, gl.RGBA, gl.HALF_FLOAT, null);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
     gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.target.texture, 0);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.parts.framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.parts.target, 0);
     if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost()) this.halfFloats = false;
   }
 
@@ -186,16 +183,16 @@ export class SplatRenderer {
     if (gl.isContextLost()) return;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
     if (this.halfFloats) this.#resizeTarget(width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.halfFloats ? this.target.framebuffer : null);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, this.halfFloats ? this.parts.framebuffer : null);
     gl.viewport(0, 0, width, height);
     gl.clearColor(background[0], background[1], background[2], 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
     if (this.#count > 0 && this.#program) {
-      const { rotation: r, translation: t } = view;
-      const eye = [0, 1, 2].map((i) => -(r[i] * t[0] + r[3 + i] * t[1] + r[6 + i] * t[2]));
+      const { rotation, translation } = view;
+      const eye = center(view);
       gl.useProgram(this.#program);
-      gl.uniformMatrix3fv(this.#uniforms.rotation, true, Float32Array.from(r));
-      gl.uniform3f(this.#uniforms.translation, t[0], t[1], t[2]);
+      gl.uniformMatrix3fv(this.#uniforms.rotation, true, Float32Array.from(rotation));
+      gl.uniform3f(this.#uniforms.translation, translation[0], translation[1], translation[2]);
       gl.uniform3f(this.#uniforms.eye, eye[0], eye[1], eye[2]);
       gl.uniform2f(this.#uniforms.focal, view.fx, view.fy);
       gl.uniform2f(this.#uniforms.principal, view.cx, view.cy);
@@ -203,10 +200,10 @@ export class SplatRenderer {
       gl.uniform1i(this.#uniforms.gaussians, 0);
       gl.uniform1i(this.#uniforms.harmonics, 1);
       gl.activeTexture(gl.TEXTURE1);
-      gl.bindTexture(gl.TEXTURE_2D, this.harmonics);
+      gl.bindTexture(gl.TEXTURE_2D, this.parts.harmonics);
       gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, this.gaussians);
-      gl.bindVertexArray(this.vertices);
+      gl.bindTexture(gl.TEXTURE_2D, this.parts.gaussians);
+      gl.bindVertexArray(this.parts.vertices);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
       gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.#count);
@@ -214,10 +211,10 @@ export class SplatRenderer {
     }
     if (this.halfFloats) {
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.useProgram(this.screen ?? null);
+      gl.useProgram(this.parts.screen);
       gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
-      gl.bindVertexArray(this.nothing ?? null);
+      gl.bindTexture(gl.TEXTURE_2D, this.parts.target);
+      gl.bindVertexArray(this.parts.nothing);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     }
     gl.bindVertexArray(null);
@@ -242,11 +239,11 @@ export class SplatRenderer {
   /** Gives everything back. */
   dispose() {
     const { gl } = this;
-    for (const texture of [this.gaussians, this.harmonics, this.target.texture]) gl.deleteTexture(texture ?? null);
-    for (const buffer of [this.order, this.corners]) gl.deleteBuffer(buffer ?? null);
-    for (const array of [this.vertices, this.nothing]) gl.deleteVertexArray(array ?? null);
-    gl.deleteFramebuffer(this.target.framebuffer);
-    for (const program of [this.#program, this.screen]) if (program) gl.deleteProgram(program);
+    for (const texture of [this.parts.gaussians, this.parts.harmonics, this.parts.target]) gl.deleteTexture(texture);
+    for (const buffer of [this.parts.order, this.parts.corners]) gl.deleteBuffer(buffer);
+    for (const array of [this.parts.vertices, this.parts.nothing]) gl.deleteVertexArray(array);
+    gl.deleteFramebuffer(this.parts.framebuffer);
+    for (const program of [this.#program, this.parts.screen]) if (program) gl.deleteProgram(program);
     this.#program = null;
     this.#count = 0;
   }

@@ -1,6 +1,7 @@
 // The worker: one scene, decoded, moved and sorted off the main thread.
 
-import { Decoder, SceneError } from "./decoder.js";
+import { Decoder } from "./decoder.js";
+import { SceneError } from "./errors.js";
 
 /** @type {Decoder | null} */
 let decoder = null;
@@ -58,9 +59,8 @@ const answers = {
     send({ id, numbers }, [numbers.buffer]);
   },
 
-  digest({ id }) {
-    if (!decoder) throw new Error("no scene is open");
-    send({ id, digest: decoder.digest() });
+  digest({ id, module, bytes }) {
+    send({ id, digest: new Decoder(module).digest(new Uint8Array(bytes)) });
   },
 };
 

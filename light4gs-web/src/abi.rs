@@ -63,10 +63,11 @@ pub extern "C" fn text_length() -> usize {
     state().text.len()
 }
 
-/// The digest of the decoded scene; 0 where there is none.
+/// The digest of the scene that the input decodes to; 0 where it does not decode. The scene that is open stays.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn digest() -> u64 {
-    state().scene.as_ref().map_or(0, OpenScene::digest)
+    let input = std::mem::take(&mut state().input);
+    light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
 }
 
 /// Computes the Gaussians `first` to `last` at a time in [0, 1].

@@ -12,12 +12,15 @@
 //! | `description.rs` | what the panel of the player shows, as JSON |
 //! | `digest.rs` | one number for all bits of a decoded scene |
 //! | `abi.rs` | the functions that JavaScript calls |
+//! | `page.rs` | pages around the player, for the program; not in WebAssembly |
 
 pub mod abi;
 mod depth_order;
 mod description;
 mod digest;
 mod gaussians;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod page;
 mod scene;
 
 pub use digest::digest;

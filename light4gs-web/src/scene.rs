@@ -4,7 +4,6 @@ use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, in
 
 use crate::depth_order::DepthOrder;
 use crate::description::describe;
-use crate::digest::digest;
 use crate::gaussians::{FLOATS, PADDING, opacity, pack, pack_harmonics, rotation, scales};
 
 /// A decoded scene.
@@ -14,7 +13,6 @@ pub struct OpenScene {
     moved: GaussianArrays,
     evaluator: MotionEvaluator,
     description: String,
-    digest: u64,
     /// What is drawn: [`FLOATS`] numbers a Gaussian, whole texture rows.
     packed: Vec<f32>,
     /// The next of it, while that is being computed.
@@ -31,7 +29,7 @@ impl OpenScene {
         let info = info(bytes)?;
         let scene = OpenStream::new(bytes)?.scene()?;
         let evaluator = MotionEvaluator::new(&scene)?;
-        let (description, digest) = (describe(&scene, &info), digest(&scene));
+        let description = describe(&scene, &info);
         let canonical = scene.gaussians;
         let floats = FLOATS * canonical.len().next_multiple_of(PADDING);
         Ok(Self {
@@ -39,7 +37,6 @@ impl OpenScene {
             canonical,
             evaluator,
             description,
-            digest,
             packed: vec![0.0; floats],
             pending: vec![0.0; floats],
             order: DepthOrder::default(),
@@ -54,11 +51,6 @@ impl OpenScene {
     /// The scene as JSON: name, sizes, sections.
     pub fn description(&self) -> &str {
         &self.description
-    }
-
-    /// [`digest()`] of what was decoded.
-    pub fn digest(&self) -> u64 {
-        self.digest
     }
 
     /// Computes the Gaussians `first` to `last` at a time, and whether harmonics move along. [`OpenScene::present`] shows

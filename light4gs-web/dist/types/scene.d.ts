@@ -1,0 +1,176 @@
+export type SceneInfo = {
+    /**
+     * for people
+     */
+    name: string;
+    /**
+     * frames of the source
+     */
+    frameCount: number;
+    /**
+     * frames a second of the source, 0 where it is not known
+     */
+    fps: number;
+    /**
+     * smallest and largest corner, world units
+     */
+    bounds: [number[], number[]];
+    /**
+     * red, green, blue in [0, 1]
+     */
+    background: [number, number, number];
+    /**
+     * of the source's default camera, pixels
+     */
+    width: number;
+    /**
+     * of the source's default camera, pixels
+     */
+    height: number;
+    /**
+     * its horizontal field of view, radians
+     */
+    fovX: number;
+    /**
+     * of the format
+     */
+    version: number;
+    /**
+     * of the file
+     */
+    bytes: number;
+    /**
+     * Gaussians
+     */
+    count: number;
+    /**
+     * of the spherical harmonics, 0 to 3
+     */
+    shDegree: number;
+    /**
+     * whether anything changes with time
+     */
+    moves: boolean;
+    /**
+     * whether the spherical harmonics change with time
+     */
+    changesHarmonics: boolean;
+    /**
+     * name and bytes of each part of the file
+     */
+    sections: [string, number][];
+    /**
+     * free notes
+     */
+    extra: Record<string, string>;
+};
+export type GaussiansAt = {
+    /**
+     * N
+     */
+    count: number;
+    /**
+     * `[N, 3]`: centers, world units
+     */
+    means: Float32Array;
+    /**
+     * `[N, 3]`: standard deviations, world units
+     */
+    scales: Float32Array;
+    /**
+     * `[N, 4]`: `(w, x, y, z)` of unit length
+     */
+    quaternions: Float32Array;
+    /**
+     * `[N]` in [0, 1]
+     */
+    opacities: Float32Array;
+    /**
+     * d
+     */
+    shDegree: number;
+    /**
+     * `[N, (d + 1)², 3]`: a color is `max(0, 0.5 + Σ basis · coefficient)`
+     */
+    sh: Float32Array;
+};
+export type Frame = {
+    /**
+     * 12 numbers a Gaussian, whole texture rows
+     */
+    data: Float32Array;
+    /**
+     * back to front
+     */
+    order: Uint32Array;
+    /**
+     * harmonics, where they changed
+     */
+    colors: Float32Array | null;
+    /**
+     * what the motion took
+     */
+    evaluateMs: number;
+    /**
+     * what the order took
+     */
+    sortMs: number;
+};
+/** A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. */
+export declare class Scene {
+    #private;
+    /** @type {SceneInfo} */
+    info: SceneInfo;
+    /** What decoding took, in milliseconds. */
+    decodeMs: number;
+    /** Use {@link load}. */
+    constructor();
+    /** @param {ArrayBuffer} bytes */
+    open(bytes: ArrayBuffer): Promise<void>;
+    /** Number of Gaussians. */
+    get count(): number;
+    /** Length in seconds: the source's where it is known, else at 30 frames a second. */
+    get duration(): number;
+    /**
+     * The Gaussians at a time in [0, 1], activated, for a renderer of your own.
+     * @param {number} time
+     * @returns {Promise<GaussiansAt>}
+     */
+    gaussiansAt(time: number): Promise<GaussiansAt>;
+    /**
+     * What the renderer draws at a time, seen along a row of the view matrix.
+     * @param {number} time
+     * @param {ArrayLike<number>} row
+     * @param {{ buffer?: ArrayBuffer | null, harmonics?: boolean }} [options]  memory to be used again; whether the
+     *   harmonics are wanted though they did not change
+     * @returns {Promise<Frame>}
+     */
+    frame(time: number, row: ArrayLike<number>, { buffer, harmonics }?: {
+        buffer?: ArrayBuffer | null;
+        harmonics?: boolean;
+    }): Promise<Frame>;
+    /**
+     * The order of the last frame's Gaussians from elsewhere.
+     * @param {ArrayLike<number>} row
+     * @returns {Promise<{ order: Uint32Array, sortMs: number }>}
+     */
+    sort(row: ArrayLike<number>): Promise<{
+        order: Uint32Array;
+        sortMs: number;
+    }>;
+    /**
+     * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
+     * @param {ArrayBuffer} bytes
+     * @returns {Promise<string>}
+     */
+    digest(bytes: ArrayBuffer): Promise<string>;
+    /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
+    close(): void;
+}
+/**
+ * Decodes a `.l4gs` file.
+ * @param {ArrayBuffer | Uint8Array} bytes
+ * @returns {Promise<Scene>}
+ * @throws {SceneError} whose `kind` says what is wrong with the file
+ */
+export declare function load(bytes: ArrayBuffer | Uint8Array): Promise<Scene>;

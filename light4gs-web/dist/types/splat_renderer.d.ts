@@ -1,0 +1,92 @@
+export type View = {
+    /**
+     * `[3, 3]` row-major, world to camera
+     */
+    rotation: ArrayLike<number>;
+    /**
+     * `[3]`: `x_camera = rotation · x_world + translation`
+     */
+    translation: ArrayLike<number>;
+    /**
+     * focal length, pixels
+     */
+    fx: number;
+    /**
+     * focal length, pixels
+     */
+    fy: number;
+    /**
+     * principal point, pixels from the left edge
+     */
+    cx: number;
+    /**
+     * principal point, pixels from the upper edge
+     */
+    cy: number;
+    /**
+     * pixels
+     */
+    width: number;
+    /**
+     * pixels
+     */
+    height: number;
+};
+/**
+ * @typedef {object} View  an OpenCV pinhole: +x right, +y down, +z forward
+ * @property {ArrayLike<number>} rotation  `[3, 3]` row-major, world to camera
+ * @property {ArrayLike<number>} translation  `[3]`: `x_camera = rotation · x_world + translation`
+ * @property {number} fx  focal length, pixels
+ * @property {number} fy  focal length, pixels
+ * @property {number} cx  principal point, pixels from the left edge
+ * @property {number} cy  principal point, pixels from the upper edge
+ * @property {number} width  pixels
+ * @property {number} height  pixels
+ */
+export declare class SplatRenderer {
+    #private;
+    canvas: HTMLCanvasElement | OffscreenCanvas;
+    gl: WebGL2RenderingContext;
+    /** Whether sums are half floats; bytes lose faint layers. */
+    halfFloats: boolean;
+    degree: number;
+    parts: {
+        screen: WebGLProgram;
+        target: WebGLTexture;
+        framebuffer: WebGLFramebuffer;
+        gaussians: WebGLTexture;
+        harmonics: WebGLTexture;
+        vertices: WebGLVertexArrayObject;
+        nothing: WebGLVertexArrayObject;
+        order: WebGLBuffer;
+        corners: WebGLBuffer;
+    };
+    /** @param {HTMLCanvasElement | OffscreenCanvas} canvas */
+    constructor(canvas: HTMLCanvasElement | OffscreenCanvas);
+    /** Makes everything again after the graphics card has lost it. */
+    restore(): void;
+    /**
+     * Prepares for a scene.
+     * @param {number} count  Gaussians
+     * @param {number} degree  of the spherical harmonics
+     */
+    begin(count: number, degree: number): void;
+    /** @param {Float32Array} numbers  centers, opacities, covariances, as the decoder packs them */
+    setGaussians(numbers: Float32Array): void;
+    /** @param {Float32Array} numbers  harmonics, as the decoder packs them */
+    setHarmonics(numbers: Float32Array): void;
+    /** @param {Uint32Array} order  back to front */
+    setOrder(order: Uint32Array): void;
+    /**
+     * Draws what was set, over a background.
+     * @param {View} view
+     * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
+     */
+    draw(view: View, background: ArrayLike<number>): void;
+    /** Waits until everything is drawn: for measuring. */
+    finish(): void;
+    /** The picture on the canvas: `[height, width, 4]` bytes from the upper edge. Right after {@link draw}. */
+    readPixels(): Uint8Array<ArrayBuffer>;
+    /** Gives everything back. */
+    dispose(): void;
+}
