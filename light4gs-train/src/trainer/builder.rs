@@ -199,6 +199,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             significance,
             observers: all,
             order: FrameOrder::default(),
+            order_ahead: FrameOrder::default(),
             profile: Profile::off(),
             view_pools,
             lap: None,

@@ -108,6 +108,8 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
     order: FrameOrder,
+    /// The same order, asked for what comes later.
+    order_ahead: FrameOrder,
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,

@@ -15,6 +15,9 @@ use crate::optimization::learning_rates::GroupRates;
 use crate::optimization::parameters::COMPRESSION;
 use crate::stage::Stage;
 
+/// How many iterations ahead images are decoded.
+const PREFETCHED_ITERATIONS: usize = 8;
+
 impl<F: DeformationField> Trainer<F> {
     /// Forward, backward, and one optimizer step.
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
@@ -23,6 +26,7 @@ impl<F: DeformationField> Trainer<F> {
         let count = self.data.train.len();
         let indices: Vec<usize> =
             (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, count)).collect();
+        self.prefetch(stage, iteration, batch);
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
@@ -70,6 +74,18 @@ impl<F: DeformationField> Trainer<F> {
         }
         self.profile.lap("Adam");
         Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
+    }
+
+    /// Has the images of the next iterations decoded in the background. An iteration asks for as many as it uses, so that
+    /// those before it are there already.
+    fn prefetch(&mut self, stage: Stage, iteration: usize, batch: usize) {
+        let count = self.data.train.len();
+        let first = (iteration - 1 + PREFETCHED_ITERATIONS) * batch;
+        // Another order: this one is asked for positions of the next pass while the first is still in the last.
+        let frames: Vec<Frame> = (first..first + batch)
+            .map(|position| self.data.train[self.order_ahead.at(self.config.seed, stage, position, count)].clone())
+            .collect();
+        self.images.prefetch(&frames);
     }
 
     /// Adds the gradients of the regularizers, and returns their value, `[1]`.
