@@ -83,6 +83,8 @@ export declare class Player extends EventTarget {
     cameraMoved(): void;
     /** The training cameras in the order of their times: the path that {@link following} takes. */
     get path(): import("./camera.js").DatasetCamera[];
+    /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
+    get draftScale(): number;
     /** Images a second over the last second; 0 where nothing changes. */
     get fps(): number;
     /** Draws again, as after {@link background} was changed. */

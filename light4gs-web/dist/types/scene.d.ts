@@ -52,10 +52,6 @@ export type SceneInfo = {
      */
     moves: boolean;
     /**
-     * whether the spherical harmonics change with time
-     */
-    changesHarmonics: boolean;
-    /**
      * name and bytes of each part of the file
      */
     sections: [string, number][];
@@ -94,25 +90,28 @@ export type GaussiansAt = {
      */
     sh: Float32Array;
 };
+export type Viewpoint = {
+    /**
+     * the depth of a point is `row · (x, y, z, 1)`
+     */
+    row: ArrayLike<number>;
+    /**
+     * the camera's center, world units
+     */
+    eye: ArrayLike<number>;
+};
 export type Frame = {
     /**
-     * 12 numbers a Gaussian, whole texture rows
+     * back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
+     * color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
      */
-    data: Float32Array;
-    /**
-     * back to front
-     */
-    order: Uint32Array;
-    /**
-     * harmonics, where they changed
-     */
-    colors: Float32Array | null;
+    list: Float32Array;
     /**
      * what the motion took
      */
     evaluateMs: number;
     /**
-     * what the order took
+     * what order and colors took
      */
     sortMs: number;
 };
@@ -138,26 +137,13 @@ export declare class Scene {
      */
     gaussiansAt(time: number): Promise<GaussiansAt>;
     /**
-     * What the renderer draws at a time, seen along a row of the view matrix.
-     * @param {number} time
-     * @param {ArrayLike<number>} row
-     * @param {{ buffer?: ArrayBuffer | null, harmonics?: boolean }} [options]  memory to be used again; whether the
-     *   harmonics are wanted though they did not change
+     * What the renderer draws at a time from a viewpoint.
+     * @param {number | null} time  nothing: as before
+     * @param {Viewpoint} viewpoint
+     * @param {ArrayBuffer | null} [memory]  to be used again
      * @returns {Promise<Frame>}
      */
-    frame(time: number, row: ArrayLike<number>, { buffer, harmonics }?: {
-        buffer?: ArrayBuffer | null;
-        harmonics?: boolean;
-    }): Promise<Frame>;
-    /**
-     * The order of the last frame's Gaussians from elsewhere.
-     * @param {ArrayLike<number>} row
-     * @returns {Promise<{ order: Uint32Array, sortMs: number }>}
-     */
-    sort(row: ArrayLike<number>): Promise<{
-        order: Uint32Array;
-        sortMs: number;
-    }>;
+    frame(time: number | null, viewpoint: Viewpoint, memory?: ArrayBuffer | null): Promise<Frame>;
     /**
      * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
      * @param {ArrayBuffer} bytes

@@ -49,40 +49,34 @@ export declare class SplatRenderer {
     gl: WebGL2RenderingContext;
     /** Whether sums are half floats; bytes lose faint layers. */
     halfFloats: boolean;
-    degree: number;
     parts: {
+        splats: WebGLProgram;
         screen: WebGLProgram;
+        rotation: WebGLUniformLocation | null;
+        translation: WebGLUniformLocation | null;
+        focal: WebGLUniformLocation | null;
+        principal: WebGLUniformLocation | null;
+        size: WebGLUniformLocation | null;
         target: WebGLTexture;
         framebuffer: WebGLFramebuffer;
-        gaussians: WebGLTexture;
-        harmonics: WebGLTexture;
-        vertices: WebGLVertexArrayObject;
+        list: WebGLTexture;
+        quads: WebGLVertexArrayObject;
         nothing: WebGLVertexArrayObject;
-        order: WebGLBuffer;
-        corners: WebGLBuffer;
+        indices: WebGLBuffer;
     };
     /** @param {HTMLCanvasElement | OffscreenCanvas} canvas */
     constructor(canvas: HTMLCanvasElement | OffscreenCanvas);
     /** Makes everything again after the graphics card has lost it. */
     restore(): void;
-    /**
-     * Prepares for a scene.
-     * @param {number} count  Gaussians
-     * @param {number} degree  of the spherical harmonics
-     */
-    begin(count: number, degree: number): void;
-    /** @param {Float32Array} numbers  centers, opacities, covariances, as the decoder packs them */
-    setGaussians(numbers: Float32Array): void;
-    /** @param {Float32Array} numbers  harmonics, as the decoder packs them */
-    setHarmonics(numbers: Float32Array): void;
-    /** @param {Uint32Array} order  back to front */
-    setOrder(order: Uint32Array): void;
+    /** @param {Float32Array} list  what is drawn, as {@link import("./scene.js").Scene.frame} gives it */
+    setList(list: Float32Array): void;
     /**
      * Draws what was set, over a background.
      * @param {View} view
      * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
+     * @param {number} [scale]  below 1: a draft of so many of the pixels along each side, in bytes, and enlarged
      */
-    draw(view: View, background: ArrayLike<number>): void;
+    draw(view: View, background: ArrayLike<number>, scale?: number): void;
     /** Waits until everything is drawn: for measuring. */
     finish(): void;
     /** The picture on the canvas: `[height, width, 4]` bytes from the upper edge. Right after {@link draw}. */
