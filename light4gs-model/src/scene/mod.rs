@@ -18,7 +18,7 @@ pub mod spherical_harmonics;
 
 pub use arrays::ModelError;
 pub use contraction::contract;
-pub use coordinates::{Pca, SceneCoordinates};
+pub use coordinates::{CoordinatesConfig, Pca, SceneCoordinates};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
 pub use field::{DeformationField, Offsets};

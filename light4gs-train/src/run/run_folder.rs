@@ -28,6 +28,22 @@ pub struct RunRecord {
     pub scene: PathBuf,
     /// Version of the program that began the run.
     pub version: String,
+    /// Commit that it was built from, with `-dirty` behind it where files had been changed; `unknown` outside of the
+    /// repository.
+    #[serde(default)]
+    pub commit: String,
+    /// Device that the run began on.
+    #[serde(default)]
+    pub device: String,
+    /// Threads that it began with.
+    #[serde(default)]
+    pub threads: usize,
+    /// When it began, UTC.
+    #[serde(default)]
+    pub begun: String,
+    /// SHA-256 of the configuration that it began with.
+    #[serde(default)]
+    pub configuration: String,
 }
 
 impl RunRecord {
@@ -35,7 +51,7 @@ impl RunRecord {
     ///
     /// # Errors
     /// [`TrainError::Input`] if the path is not Unicode, which JSON cannot hold.
-    pub fn new(scene: &Path) -> Result<Self, TrainError> {
+    pub fn new(scene: &Path, config: &Config) -> Result<Self, TrainError> {
         let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
         if scene.to_str().is_none() {
             return Err(TrainError::Input(format!(
@@ -43,7 +59,15 @@ impl RunRecord {
                 scene.display()
             )));
         }
-        Ok(Self { scene, version: env!("CARGO_PKG_VERSION").to_owned() })
+        Ok(Self {
+            scene,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: env!("LIGHT4GS_COMMIT").to_owned(),
+            device: config.device.to_string(),
+            threads: rayon::current_num_threads(),
+            begun: jiff::Timestamp::now().strftime("%F %T UTC").to_string(),
+            configuration: config.digest_text(),
+        })
     }
 }
 
@@ -62,7 +86,7 @@ impl RunFolder {
     /// [`TrainError::RunExists`] if it holds a run and `overwrite` is not set; [`TrainError::RunInUse`] if another process
     /// writes into it; [`TrainError::Input`] if it holds anything else.
     pub fn create(root: &Path, scene: &Path, config: &Config, overwrite: bool) -> Result<Self, TrainError> {
-        let record = RunRecord::new(scene)?;
+        let record = RunRecord::new(scene, config)?;
         let mut folder = Self { root: root.to_owned(), lock: None };
         // Before the lock, whose file says that the folder is one of ours.
         folder.allow_new_run(overwrite)?;
