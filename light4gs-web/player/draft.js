@@ -22,15 +22,16 @@ export class Draft {
   }
 
   /**
-   * After a moving image it took so long until the page could draw again.
+   * A moving image took so long.
    * @param {number} interval  milliseconds
    * @param {number} now
    */
   measure(interval, now) {
     // Whoever looked elsewhere for a while says nothing about the machine.
-    if (interval > 1500) return;
+    if (interval > 5000) return;
     this.#intervals.push(interval);
-    if (this.#intervals.length < SAMPLES) return;
+    const hopeless = this.#intervals.length > 1 && Math.min(...this.#intervals) > 3 * SLOW;
+    if (this.#intervals.length < SAMPLES && !hopeless) return;
     const sorted = this.#intervals.sort((a, b) => a - b);
     const median = sorted[Math.floor(sorted.length / 2)];
     this.#intervals = [];

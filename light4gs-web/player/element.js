@@ -189,10 +189,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     if (player.controls) player.controls.wheelAlways = this.hasAttribute("page");
     this.#only("");
     this.find("bar").hidden = false;
-    for (const id of ["play", "time", "clock", "speed", "loop"]) {
-      const part = this.find(id);
-      (part.closest("label") ?? part).hidden = !info.moves;
-    }
+    for (const id of ["play", "time", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
     this.find("background").value = toHex(player.background);
     this.find("speed").value = String(player.speed);
     this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);

@@ -39,15 +39,15 @@ export const LAYOUT = `<style>${style}</style>
   ${button("play", "Play", "space")}
   <input id="time" type="range" min="0" max="1" step="0.001" value="0" aria-label="Time">
   <output id="clock" for="time"></output>
-  <label class="field"><span class="spoken">Speed</span><select id="speed" title="Speed">
+  <select id="speed" aria-label="Speed" title="Speed">
     <option value="0.1">0.1×</option><option value="0.25">0.25×</option><option value="0.5">0.5×</option>
     <option value="1" selected>1×</option><option value="2">2×</option><option value="4">4×</option>
-  </select></label>
+  </select>
   ${button("loop", "Loop", "L")}
-  <label class="field" id="cameras"><span class="spoken">Camera</span><select id="camera" title="Cameras of the dataset (C)"></select></label>
+  <span id="cameras"><select id="camera" aria-label="Camera" title="Cameras of the dataset (C)"></select></span>
   ${button("fly", "Look around in place of turning the scene", "V")}
   ${button("reset", "Reset the view", "R")}
-  <label class="field" title="Background color"><span class="spoken">Background color</span><input id="background" type="color"></label>
+  <input id="background" type="color" aria-label="Background color" title="Background color">
   ${button("info", "About this scene", "I")}
   ${button("open", "Open a file", "O")}
   ${button("full", "Full screen", "F")}

@@ -44,8 +44,8 @@ export class Player extends EventTarget {
   #draft = new Draft();
   #wasDraft = false;
   #lastDraw = 0;
-  /** Whether something was drawn in the frame before. */
-  #moving = false;
+  /** The image that the graphics card is at. @type {{ fence: WebGLSync | null, since: number, moving: boolean } | null} */
+  #drawing = null;
   /** @type {number[]} */
   #frameTimes = [];
   #visible = true;
@@ -199,6 +199,7 @@ export class Player extends EventTarget {
   resetView() {
     this.camera = this.home.clone();
     this.following = false;
+    this.controls?.rest();
     this.cameraMoved();
   }
 
@@ -211,6 +212,7 @@ export class Player extends EventTarget {
     if (!camera) return;
     this.#take(camera);
     this.following = false;
+    this.controls?.rest();
     if (camera.time !== undefined) this.time = camera.time;
     this.cameraMoved();
   }
@@ -238,13 +240,9 @@ export class Player extends EventTarget {
   #tick = (/** @type {number} */ now) => {
     if (this.#disposed) return;
     this.#request = requestAnimationFrame(this.#tick);
-    const interval = now - this.#last;
-    const seconds = Math.min(interval / 1000, 0.25);
+    const seconds = Math.min((now - this.#last) / 1000, 0.25);
     this.#last = now;
     if (!this.#visible) return;
-    // An image that takes the graphics card long delays the next frame of the page.
-    if (this.#moving) this.#draft.measure(interval, now);
-    this.#moving = false;
     if (this.#playing && seconds > 0) this.#advance(seconds);
     if (this.controls?.step(seconds)) {
       this.following = false;
@@ -255,14 +253,19 @@ export class Player extends EventTarget {
       const time = this.#time === this.#shownTime ? null : this.#time;
       if (time !== null || this.#viewpointKey() !== this.#shownFrom) this.#show(time).catch(this.#fail);
     }
-    if (this.#dirty) {
-      this.#moving = true;
+    // One image at a time: a queue of them would only make the player slow to answer.
+    if (this.#drawing && !this.renderer.isDone(this.#drawing.fence)) return;
+    if (this.#drawing?.moving) this.#draft.measure(now - this.#drawing.since, now);
+    this.#drawing = null;
+    const moving = this.#dirty;
+    if (moving) {
       this.#lastDraw = now;
       this.#measure();
       this.#draw(this.#draft.scale);
     } else if (this.#wasDraft && now - this.#lastDraw > STILL) {
       this.#draw(1);
-    }
+    } else return;
+    this.#drawing = { fence: this.renderer.fence(), since: now, moving };
   };
 
   #fail = (/** @type {any} */ error) => {

@@ -184,6 +184,25 @@ export class SplatRenderer {
     gl.bindVertexArray(null);
   }
 
+  /** A mark behind everything that was asked for until now. */
+  fence() {
+    const fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.gl.flush();
+    return fence;
+  }
+
+  /**
+   * Whether the graphics card has come to a mark. Takes the mark away then.
+   * @param {WebGLSync | null} fence
+   */
+  isDone(fence) {
+    const { gl } = this;
+    if (!fence || gl.isContextLost()) return true;
+    if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(fence);
+    return true;
+  }
+
   /** Waits until everything is drawn: for measuring. */
   finish() {
     this.gl.readPixels(0, 0, 1, 1, this.gl.RGBA, this.gl.UNSIGNED_BYTE, new Uint8Array(4));

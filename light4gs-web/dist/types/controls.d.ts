@@ -14,6 +14,8 @@ export declare class Controls {
      * @param {number} seconds
      */
     step(seconds: number): boolean;
+    /** Lets nothing go on moving by itself. */
+    rest(): void;
     /** Listens no more. */
     dispose(): void;
 }

@@ -77,6 +77,13 @@ export declare class SplatRenderer {
      * @param {number} [scale]  below 1: a draft of so many of the pixels along each side, in bytes, and enlarged
      */
     draw(view: View, background: ArrayLike<number>, scale?: number): void;
+    /** A mark behind everything that was asked for until now. */
+    fence(): WebGLSync | null;
+    /**
+     * Whether the graphics card has come to a mark. Takes the mark away then.
+     * @param {WebGLSync | null} fence
+     */
+    isDone(fence: WebGLSync | null): boolean;
     /** Waits until everything is drawn: for measuring. */
     finish(): void;
     /** The picture on the canvas: `[height, width, 4]` bytes from the upper edge. Right after {@link draw}. */
