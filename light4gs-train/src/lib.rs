@@ -21,5 +21,6 @@ mod stage;
 pub mod study;
 pub mod trainer;
 pub mod video;
+pub mod view;
 
 pub use stage::Stage;

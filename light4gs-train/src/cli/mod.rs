@@ -16,6 +16,7 @@ mod signals;
 mod study;
 mod synth;
 mod train;
+mod view;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -55,6 +56,9 @@ enum Command {
     /// Render a file over time along a camera path, to a GIF or to PNG frames.
     #[command(after_help = "Example:\n  light4gs render runs/bouncing/scene.l4gs --out bouncing.gif --frames 60")]
     Render(render::Render),
+    /// Show a file or a run in the browser, and follow a run that is still training.
+    #[command(after_help = "Example:\n  light4gs view runs/bouncing --open")]
+    View(view::View),
     /// Write the newest checkpoint of a run as a .l4gs file.
     #[command(after_help = "Example:\n  light4gs encode runs/bouncing --out bouncing.l4gs")]
     Encode(container::Encode),
@@ -64,8 +68,10 @@ enum Command {
     /// Print what a .l4gs file holds, with sizes by section.
     #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
     Info(container::Info),
-    /// Write the Gaussians at successive times as PLY files that 3DGS viewers read.
-    #[command(after_help = "Example:\n  light4gs export bouncing.l4gs --out frames --frames 30")]
+    /// Write the Gaussians at successive times as PLY files that 3DGS viewers read, or the scene as a page that plays it.
+    #[command(
+        after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
+    )]
     Export(export::Export),
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
@@ -99,6 +105,7 @@ impl Cli {
             Command::Resume(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Render(command) => command.run(),
+            Command::View(command) => command.run(),
             Command::Encode(command) => command.run(),
             Command::Decode(command) => command.run(),
             Command::Info(command) => command.run(),
