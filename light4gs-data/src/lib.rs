@@ -13,6 +13,7 @@
 mod atomic;
 mod camera;
 mod error;
+mod exchange;
 mod frame;
 mod images;
 mod layouts;
@@ -28,6 +29,7 @@ mod synthetic;
 pub use atomic::{is_temporary_name, sweep_leftovers, write_atomically};
 pub use camera::{Camera, PoseError};
 pub use error::DataError;
+pub use exchange::{GlbOptions, MotionSample, glb_bytes, write_four_dgs, write_glb};
 pub use frame::Frame;
 pub use images::{ImageStore, RgbImage8, RgbImage32, composite, composite_resized, image_size};
 pub use layouts::{DNerf, DatasetLayout, Layouts};

@@ -83,6 +83,7 @@ fn train(check: &mut Check, train: &TrainConfig) {
         "and `train.coarse_iterations` are both 0: nothing would be trained".to_owned()
     });
     check.range("train.batch_size", train.batch_size, 1, 1024);
+    check.toml_integer("train.coarse_times", train.coarse_times.unwrap_or(0));
     check.share("train.lambda_dssim", train.lambda_dssim);
     check.toml_integer("train.l2_until", train.l2_until);
     check.range("train.sh_degree_interval", train.sh_degree_interval, 1, MOST);
@@ -213,10 +214,14 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     for (name, step) in attributes.steps().named() {
         check.encodable(&format!("compression.attributes.{name}"), checks::attribute_step(name, step));
     }
-    let tolerance = attributes.search_tolerance;
-    check.that("compression.attributes.search_tolerance", tolerance.is_finite() && tolerance >= 0.0, || {
-        format!("is {tolerance}; it must be finite and at least 0 dB")
-    });
+    for (part, tolerance) in
+        [("steps", steps.search_tolerance), ("sh", sh.search_tolerance), ("attributes", attributes.search_tolerance)]
+    {
+        let key = format!("compression.{part}.search_tolerance");
+        check.that(&key, tolerance.is_finite() && tolerance >= 0.0, || {
+            format!("is {tolerance}; it must be finite and at least 0 dB")
+        });
+    }
     for (name, bits) in [("deformation_bits", weights.deformation_bits), ("context_bits", weights.context_bits)] {
         let (least, most) = (LEAST_WEIGHT_BITS.into(), MOST_WEIGHT_BITS.into());
         check.range(&format!("compression.weights.{name}"), bits.into(), least, most);

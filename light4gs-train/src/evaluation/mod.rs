@@ -205,6 +205,14 @@ impl<F: DeformationField> DecodedScene<F> {
     }
 }
 
+/// Whether nothing moves in a file.
+///
+/// # Errors
+/// A file that cannot be read, or is damaged.
+pub fn is_still(path: &Path) -> Result<bool, TrainError> {
+    Ok(light4gs_codec::read_info(path)?.motion.kind.is_empty())
+}
+
 /// Sections of a file with the header in front; they add up to the file.
 pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
     let header = SectionSize { name: "header".into(), bytes: info.header_bytes };

@@ -2,6 +2,7 @@
 //!
 //! - here: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
 //! - `builder`: what a trainer is made of
+//! - `sampling`: the frames of an iteration
 //! - `step`: one iteration
 //! - `views`: the views of an iteration, each with a tape of its own
 //! - `rate`: quantization noise, and the rate in the loss
@@ -17,6 +18,7 @@ pub(crate) mod divergence;
 pub mod profile;
 mod pruning;
 mod rate;
+mod sampling;
 mod step;
 mod views;
 
@@ -40,11 +42,11 @@ use crate::loss::Loss;
 use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
-use crate::randomness::FrameOrder;
 use crate::run::{Checkpoint, RunFolder, SaveError, list_checkpoints};
 use crate::stage::Stage;
 use divergence::{EmptyImageWatch, not_finite_in, remedy};
 use profile::Profile;
+use sampling::FrameSampler;
 use views::ViewPools;
 
 /// A run in progress.
@@ -107,7 +109,7 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
-    order: FrameOrder,
+    sampler: FrameSampler,
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,
@@ -206,7 +208,7 @@ impl<F: DeformationField> Trainer<F> {
             compression: self.state.compression.as_ref(),
             config: &self.config,
             data: &self.data,
-            images: &*self.images,
+            images: Some(&*self.images),
             device: &self.device,
         };
         let observers = &mut self.observers;

@@ -20,9 +20,7 @@ impl<F: DeformationField> Trainer<F> {
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
         self.profile.begin_step();
         let batch = self.config.train.batch_size.max(1);
-        let count = self.data.train.len();
-        let indices: Vec<usize> =
-            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, count)).collect();
+        let indices = self.sampler.batch(self.config.seed, stage, iteration);
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();

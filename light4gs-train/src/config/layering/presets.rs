@@ -35,6 +35,7 @@ presets![
     "dnerf-small",
     "four-views",
     "high",
+    "imported",
     "medium",
     "paper-profile",
     "quickstart",
