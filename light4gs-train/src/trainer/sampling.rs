@@ -102,11 +102,11 @@ fn batches_of_one_time(times: &[TimeViews], batch: usize, random: &mut impl rand
     let mut times = times.to_vec();
     times.shuffle(random);
     times.iter_mut().for_each(|views| views.shuffle(random));
-    let filled = |views: &[usize], others: &[usize]| -> Vec<usize> {
-        views.iter().chain(others).copied().take(batch).collect()
-    };
+    let filled =
+        |views: &[usize], others: &[usize]| -> Vec<usize> { views.iter().chain(others).copied().take(batch).collect() };
     if times_fill_batches(&times, batch) {
-        let of_time = |views: &TimeViews| -> Vec<Vec<usize>> { views.chunks(batch).map(|part| filled(part, views)).collect() };
+        let of_time =
+            |views: &TimeViews| -> Vec<Vec<usize>> { views.chunks(batch).map(|part| filled(part, views)).collect() };
         return times.iter().flat_map(of_time).collect();
     }
     let order: Vec<usize> = times.concat();
