@@ -76,14 +76,7 @@ fn read_line(root: &Path, line: &str, options: &LoadOptions) -> Result<(Split, F
     let source = image_size(&path).map_err(|error| error.to_string())?;
     let (width, height) = options.resolution.apply(source);
     let camera = Camera::look_at(eye.into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), FOV_X, source.0, source.1);
-    let frame = Frame {
-        name: image.to_owned(),
-        camera: camera.resized(width, height),
-        time: number(seconds)?,
-        path,
-        source_width: source.0,
-        source_height: source.1,
-    };
+    let frame = Frame::new(image, camera.resized(width, height), number(seconds)?, path, source);
     Ok((split, frame))
 }
 

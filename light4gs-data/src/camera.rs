@@ -29,6 +29,32 @@ pub struct Camera {
     pub height: u32,
 }
 
+/// Focal lengths and principal point of a camera, in the pixels of an image of `width` × `height`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Intrinsics {
+    /// Image width, pixels.
+    pub width: u32,
+    /// Image height, pixels.
+    pub height: u32,
+    /// Horizontal focal length, pixels.
+    pub fx: f64,
+    /// Vertical focal length, pixels.
+    pub fy: f64,
+    /// Horizontal principal point, pixels from the image's left edge.
+    pub cx: f64,
+    /// Vertical principal point, pixels from the image's upper edge.
+    pub cy: f64,
+}
+
+impl Intrinsics {
+    /// The same camera for an image of another size.
+    pub fn resized(&self, width: u32, height: u32) -> Self {
+        let x = f64::from(width) / f64::from(self.width.max(1));
+        let y = f64::from(height) / f64::from(self.height.max(1));
+        Self { width, height, fx: self.fx * x, fy: self.fy * y, cx: self.cx * x, cy: self.cy * y }
+    }
+}
+
 /// Why four rows of numbers are not a camera pose.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
@@ -65,6 +91,20 @@ pub enum PoseError {
         /// The angle that was given, radians.
         fov_x: f32,
     },
+    /// A focal length is not positive, or the principal point is not finite.
+    #[error(
+        "focal lengths are {fx} x {fy} and the principal point is ({cx}, {cy}), expected positive focal lengths and finite numbers"
+    )]
+    Intrinsics {
+        /// Horizontal focal length, pixels.
+        fx: f32,
+        /// Vertical focal length, pixels.
+        fy: f32,
+        /// Horizontal principal point, pixels.
+        cx: f32,
+        /// Vertical principal point, pixels.
+        cy: f32,
+    },
     /// The image has no pixels.
     #[error("the image is {width} x {height} pixels, expected at least 1 x 1")]
     EmptyImage {
@@ -73,6 +113,18 @@ pub enum PoseError {
         /// Height, pixels.
         height: u32,
     },
+}
+
+/// Refuses what is not orthonormal with determinant 1.
+fn check_rotation(rotation: DMat3) -> Result<(), PoseError> {
+    let excess = rotation.transpose() * rotation - DMat3::IDENTITY;
+    let error = excess.to_cols_array().iter().fold(0.0f64, |worst, v| worst.max(v.abs()));
+    let determinant = rotation.determinant();
+    // Written so that NaN is refused.
+    if error <= ROTATION_TOLERANCE && determinant > 0.0 {
+        return Ok(());
+    }
+    Err(PoseError::NotRotation { determinant, error })
 }
 
 impl Camera {
@@ -113,17 +165,39 @@ impl Camera {
             return Err(PoseError::EmptyImage { width, height });
         }
         let column = |j: usize| DVec3::new(f64::from(c2w[0][j]), f64::from(c2w[1][j]), f64::from(c2w[2][j]));
-        let opengl = DMat3::from_cols(column(0), column(1), column(2));
-        let excess = opengl.transpose() * opengl - DMat3::IDENTITY;
-        let error = excess.to_cols_array().iter().fold(0.0f64, |worst, v| worst.max(v.abs()));
-        let determinant = opengl.determinant();
-        if error > ROTATION_TOLERANCE || determinant <= 0.0 {
-            return Err(PoseError::NotRotation { determinant, error });
-        }
         // OpenGL -> OpenCV: y and z change sign. The inverse of a rotation is its transpose.
         let rotation = DMat3::from_cols(column(0), -column(1), -column(2)).transpose();
+        check_rotation(rotation)?;
         let translation = -(rotation * column(3));
         Ok(Self::centered(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height))
+    }
+
+    /// A camera from a rotation from world to camera (OpenCV axes), its center in world units, and intrinsics in pixels.
+    ///
+    /// # Errors
+    /// [`PoseError`] when a number is not finite as an `f32`, the matrix is not a rotation, a focal length is not
+    /// positive, or the image is empty.
+    pub fn from_pose(rotation: DMat3, center: DVec3, intrinsics: &Intrinsics) -> Result<Self, PoseError> {
+        let Intrinsics { width, height, fx, fy, cx, cy } = *intrinsics;
+        let translation = -(rotation * center);
+        for row in 0..3 {
+            let values = [0, 1, 2].map(|j| rotation.col(j)[row]).into_iter().chain([translation[row]]);
+            for (column, value) in values.enumerate() {
+                if !(value as f32).is_finite() {
+                    return Err(PoseError::NotFinite { row, column, value: value as f32 });
+                }
+            }
+        }
+        check_rotation(rotation)?;
+        let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(|value| value as f32);
+        if ![fx, fy].iter().all(|f| f.is_finite() && *f > 0.0) || !(cx.is_finite() && cy.is_finite()) {
+            return Err(PoseError::Intrinsics { fx, fy, cx, cy });
+        }
+        if width == 0 || height == 0 {
+            return Err(PoseError::EmptyImage { width, height });
+        }
+        let (rotation, translation) = (rotation.as_mat3(), translation.as_vec3());
+        Ok(Self { rotation, translation, fx, fy, cx, cy, width, height })
     }
 
     /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the image.

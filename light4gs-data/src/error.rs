@@ -58,6 +58,16 @@ pub enum DataError {
         /// What the user can do about it.
         remedy: String,
     },
+    /// Another program is missing, too old, or did not do what it should.
+    #[error("{program}: {problem}; {remedy}")]
+    Program {
+        /// The program, such as `ffmpeg`.
+        program: &'static str,
+        /// What happened.
+        problem: String,
+        /// What the user can do about it.
+        remedy: String,
+    },
     /// A folder holds none of the known dataset layouts.
     #[error("{}: no known dataset layout: {problem}; {remedy}", path.display())]
     UnknownLayout {

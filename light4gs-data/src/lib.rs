@@ -12,31 +12,40 @@
 
 mod atomic;
 mod camera;
+mod digest;
 mod error;
 mod exchange;
 mod frame;
 mod images;
 mod layouts;
+mod lens;
 mod options;
 mod orbit;
 pub mod ply;
 mod points;
+mod prepare;
+mod programs;
 mod pytorch;
 mod regular_file;
 mod scene;
 mod synthetic;
 
 pub use atomic::{is_temporary_name, sweep_leftovers, write_atomically};
-pub use camera::{Camera, PoseError};
+pub use camera::{Camera, Intrinsics, PoseError};
+pub use digest::DatasetDigest;
 pub use error::DataError;
 pub use exchange::{GlbOptions, MotionSample, glb_bytes, write_four_dgs, write_glb};
-pub use frame::Frame;
-pub use images::{ImageStore, RgbImage8, RgbImage32, composite, composite_resized, image_size};
-pub use layouts::{DNerf, DatasetLayout, Layouts};
+pub use frame::{Frame, Mask, MaskMeaning};
+pub use images::{
+    ImageStore, PixelMask, RgbImage8, RgbImage32, composite, composite_resized, image_size, measured_pixels,
+};
+pub use layouts::{Colmap, DNerf, DatasetLayout, HyperNerf, Layouts, NerfDs, Nerfstudio, Neu3d};
+pub use lens::{Distortion, Lens};
 pub use options::{LoadOptions, Resolution};
 pub use orbit::orbit_path;
 pub use ply::GaussianPly;
 pub use points::{PointCloud, SH_C0, SMALLEST_MEAN_SQUARED_DISTANCE, mean_squared_distance_to_3_nearest};
+pub use prepare::{PrepareOptions, PrepareProgress, PrepareSummary, prepare};
 pub use pytorch::{PlainTensor, read_pytorch};
 pub use regular_file::{read_regular_file, read_regular_text};
 pub use scene::{Scene, Split, SplitFrames};

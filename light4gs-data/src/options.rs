@@ -47,6 +47,9 @@ pub struct LoadOptions {
     pub layout: Option<String>,
     /// The size at which images are used.
     pub resolution: Resolution,
+    /// Length of the sequence in frames: later ones are left out, and the time of frame `i` is `i / frames` where the
+    /// dataset counts frames instead of saying times (layout `neu3d`, whose captures have 300). `None`: all there are.
+    pub frames: Option<usize>,
     /// What shows through transparent pixels: red, green, blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Seed of the random point cloud.
@@ -63,6 +66,7 @@ impl Default for LoadOptions {
         Self {
             layout: None,
             resolution: Resolution::Native,
+            frames: None,
             background: [1.0; 3],
             seed: 0,
             random_points: 2000,
@@ -87,6 +91,9 @@ impl LoadOptions {
                 return bad("resolution", format!("{width} x {height}, expected at most 16384"));
             }
             _ => {}
+        }
+        if self.frames == Some(0) {
+            return bad("frames", "0, expected at least 1".into());
         }
         if self.random_points == 0 || self.random_points > 100_000_000 {
             let found = self.random_points;
@@ -120,6 +127,7 @@ mod tests {
         let bad = [
             ("background", LoadOptions { background: [0.0, f32::NAN, 0.0], ..Default::default() }),
             ("resolution", LoadOptions { resolution: Resolution::MaxSide(0), ..Default::default() }),
+            ("frames", LoadOptions { frames: Some(0), ..Default::default() }),
             ("random_points", LoadOptions { random_points: 0, ..Default::default() }),
             ("random_half_size", LoadOptions { random_half_size: -1.0, ..Default::default() }),
         ];

@@ -3,6 +3,7 @@
 use crate::error::DataError;
 use crate::frame::Frame;
 use crate::points::PointCloud;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -94,12 +95,19 @@ pub struct Scene {
     /// 1.1 times the largest distance of a training camera's center from their mean, world units
     /// (1 if they all coincide, since learning rates are multiplied by it).
     pub extent: f32,
+    /// What a user should know about how the folder was read: images without a pose, frames left out.
+    pub notes: Vec<String>,
 }
+
+/// Far above any capture: 20 cameras of half an hour.
+const MAX_FRAMES: usize = 1_000_000;
 
 impl Scene {
     /// A scene of frames and points that a [`crate::DatasetLayout`] has read from the folder `root`.
     ///
-    /// The name is that of the folder; `camera_mean` and `extent` follow from the training cameras.
+    /// The name is that of the folder; `camera_mean` and `extent` follow from the training cameras. Frames of a split
+    /// whose names are the same, or differ in case only, get other names: with the folder of the image before it, or a
+    /// number after it, so that files which are named after frames do not overwrite each other.
     ///
     /// # Errors
     /// [`DataError::Field`] when there is no training or no test frame, or no point to start from.
@@ -114,10 +122,31 @@ impl Scene {
         if let Some((what, _)) = counts.into_iter().find(|(_, count)| *count == 0) {
             return Err(DataError::field(root, what, "0 found, expected at least one", "complete the dataset"));
         }
-        let SplitFrames { train, test, val, video } = frames;
+        let SplitFrames { mut train, mut test, mut val, mut video } = frames;
+        let count = train.len() + test.len() + val.len() + video.len();
+        if count > MAX_FRAMES {
+            let problem = format!("{count} found, expected at most {MAX_FRAMES}");
+            return Err(DataError::field(root, "frames", problem, "take every n-th frame"));
+        }
+        for split in [&mut train, &mut test, &mut val, &mut video] {
+            make_names_unique(split);
+        }
         let (camera_mean, extent) = mean_and_extent(&train);
         let (name, root) = (folder_name(root), root.to_path_buf());
-        Ok(Self { name, root, layout, train, test, val, video, background, points, camera_mean, extent })
+        Ok(Self {
+            name,
+            root,
+            layout,
+            train,
+            test,
+            val,
+            video,
+            background,
+            points,
+            camera_mean,
+            extent,
+            notes: Vec::new(),
+        })
     }
 
     /// The frames of a split.
@@ -140,6 +169,24 @@ fn mean_and_extent(frames: &[Frame]) -> ([f32; 3], f32) {
     (mean.as_vec3().to_array(), extent as f32)
 }
 
+/// Gives frames of the same name others, see [`Scene::new`]. Names that are unique stay as they are.
+fn make_names_unique(frames: &mut [Frame]) {
+    let folded = |name: &str| name.to_lowercase();
+    let mut uses: HashMap<String, usize> = HashMap::new();
+    for frame in frames.iter() {
+        *uses.entry(folded(&frame.name)).or_default() += 1;
+    }
+    let mut taken: HashSet<String> =
+        uses.iter().filter(|(_, count)| **count == 1).map(|(name, _)| name.clone()).collect();
+    for frame in frames.iter_mut().filter(|frame| uses[&folded(&frame.name)] > 1) {
+        let folder = frame.path.parent().and_then(Path::file_name).map(|name| name.to_string_lossy().into_owned());
+        let base = folder.map_or_else(|| frame.name.clone(), |folder| format!("{folder}_{}", frame.name));
+        let numbered = (2..).map(|count| format!("{base}_{count}"));
+        let name = std::iter::once(base.clone()).chain(numbered).find(|name| taken.insert(folded(name)));
+        frame.name = name.unwrap_or(base);
+    }
+}
+
 /// The last part of a path, made absolute if need be, for use as a scene's name.
 fn folder_name(root: &Path) -> String {
     let absolute = root.canonicalize().unwrap_or_else(|_| root.to_path_buf());
@@ -158,6 +205,25 @@ mod tests {
             assert_eq!(split.to_string().parse::<Split>().unwrap(), split);
         }
         assert!("training".parse::<Split>().unwrap_err().to_string().contains("expected train"));
+    }
+
+    #[test]
+    fn frames_of_one_name_get_others() {
+        let frame = |name: &str, path: &str| {
+            let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 8, 8);
+            Frame::new(name, camera, 0.0, path.into(), (8, 8))
+        };
+        let mut frames = [
+            frame("0001", "a/cam00/0001.png"),
+            frame("0001", "a/cam01/0001.png"),
+            frame("x", "b/x.png"),
+            frame("X", "b/X.png"),
+            frame("cam00_0001", "c/cam00_0001.png"),
+            frame("only", "b/only.png"),
+        ];
+        make_names_unique(&mut frames);
+        let names = frames.map(|frame| frame.name);
+        assert_eq!(names, ["cam00_0001_2", "cam01_0001", "b_x", "b_X_2", "cam00_0001", "only"]);
     }
 
     #[test]

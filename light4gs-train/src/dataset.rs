@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use light4gs_codec::SceneMeta;
-use light4gs_data::{DataError, Frame, ImageStore, LoadOptions, Resolution, RgbImage8, Scene};
+use light4gs_data::{DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene};
 
 use crate::config::Config;
 
@@ -16,6 +16,15 @@ pub trait ImageSource: Send + Sync {
     /// Where the frame has no image, or it cannot be read.
     fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError>;
 
+    /// Which pixels of the frame's image may be trained on; `None` is all of them.
+    ///
+    /// # Errors
+    /// Where the mask cannot be read.
+    fn trained_pixels(&self, frame: &Frame) -> Result<Option<Arc<PixelMask>>, DataError> {
+        let _ = frame;
+        Ok(None)
+    }
+
     /// These frames will be asked for; a source may begin to read them.
     fn prefetch(&self, frames: &[Frame]) {
         let _ = frames;
@@ -25,6 +34,10 @@ pub trait ImageSource: Send + Sync {
 impl ImageSource for ImageStore {
     fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
         self.get(frame)
+    }
+
+    fn trained_pixels(&self, frame: &Frame) -> Result<Option<Arc<PixelMask>>, DataError> {
+        Ok(self.get_masked(frame)?.1)
     }
 
     fn prefetch(&self, frames: &[Frame]) {
@@ -55,12 +68,13 @@ impl ImageSource for MemoryImages {
 /// How a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
     LoadOptions {
+        layout: config.data.layout.clone(),
+        frames: config.data.frames,
         resolution: config.data.resolution.map_or(Resolution::Native, Resolution::MaxSide),
         background: config.data.background,
         seed: config.seed,
         random_points: config.data.initial_points,
         random_half_size: config.data.initial_box,
-        ..LoadOptions::default()
     }
 }
 

@@ -1,10 +1,19 @@
-//! Images in memory: decoding within a bound, compositing on the background, resizing, and writing as PNG.
+//! Images in memory: headers, decoding within a bound, straightening, compositing on the background, resizing, and
+//! writing as PNG.
 
 mod composite;
+mod decode;
+mod header;
+mod large;
+mod mask;
 mod rgb;
 mod store;
+mod undistort;
 
 pub use composite::{composite, composite_resized};
+pub use header::image_size;
+pub(crate) use header::{ImageHeader, orientation, read_headers, turns_sideways};
+pub use mask::{PixelMask, measured_pixels};
 pub(crate) use rgb::save_png;
 pub use rgb::{RgbImage8, RgbImage32};
-pub use store::{ImageStore, image_size};
+pub use store::ImageStore;

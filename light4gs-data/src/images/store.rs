@@ -1,19 +1,19 @@
 //! Images in memory: decoded when needed, composited, resized, kept within a bound.
 
-use super::composite::composite_resized;
+use super::decode::decode;
+use super::mask::{PixelMask, trained_pixels};
 use super::rgb::RgbImage8;
 use crate::error::DataError;
 use crate::frame::Frame;
 use crate::options::LoadOptions;
-use image::ImageReader;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Decoding a single image may take at most this much memory.
-const MAX_DECODED_BYTES: u64 = 1 << 30;
+/// An image, and which of its pixels are trained on; `None` is all.
+type Masked = (Arc<RgbImage8>, Option<Arc<PixelMask>>);
 
 /// An image file at a size.
 type Key = (PathBuf, u32, u32);
@@ -38,7 +38,7 @@ struct Inner {
 #[derive(Default)]
 struct State {
     /// The image and when it was last asked for.
-    kept: HashMap<Key, (Arc<RgbImage8>, u64)>,
+    kept: HashMap<Key, (Masked, u64)>,
     /// When, to which: the first is the least recently used.
     by_age: BTreeMap<u64, Key>,
     bytes: usize,
@@ -75,8 +75,17 @@ impl ImageStore {
     ///
     /// # Errors
     /// [`DataError::Image`] when the frame has no image, or it is missing, damaged, or of
-    /// another size than its split's first one.
+    /// another size than when the dataset was opened.
     pub fn get(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError> {
+        Ok(self.get_masked(frame)?.0)
+    }
+
+    /// The image of a frame as [`Self::get`] gives it, and which of its pixels may be trained on: not those that its mask
+    /// ignores, nor those that its lens did not record. `None` is all of them.
+    ///
+    /// # Errors
+    /// As [`Self::get`], also for the mask.
+    pub fn get_masked(&self, frame: &Frame) -> Result<(Arc<RgbImage8>, Option<Arc<PixelMask>>), DataError> {
         let key = key(frame);
         let mut state = self.inner.lock();
         loop {
@@ -149,6 +158,11 @@ fn key(frame: &Frame) -> Key {
     (frame.path.clone(), frame.camera.width, frame.camera.height)
 }
 
+/// Bytes of an image and its mask.
+fn size_of((image, mask): &Masked) -> usize {
+    image.pixels.len() + mask.as_ref().map_or(0, |mask| mask.pixels.len())
+}
+
 /// Bytes of a frame's image in the store.
 fn bytes_of(frame: &Frame) -> usize {
     (frame.camera.width as usize).saturating_mul(frame.camera.height as usize).saturating_mul(3)
@@ -160,7 +174,7 @@ impl Inner {
     }
 
     /// Decodes an image that this thread has marked in `decoding`, and keeps it if it fits.
-    fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Arc<RgbImage8>, DataError> {
+    fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Masked, DataError> {
         /// Takes the mark back, also if a decoder panics: others would wait for ever.
         struct Claim<'a>(&'a Inner, Key);
         impl Drop for Claim<'_> {
@@ -170,25 +184,25 @@ impl Inner {
             }
         }
         let claim = Claim(self, key);
-        let image = Arc::new(decode(frame, self.background)?);
+        let image = (Arc::new(decode(frame, self.background)?), trained_pixels(frame)?.map(Arc::new));
         self.lock().keep(claim.1.clone(), &image, self.limit);
         Ok(image)
     }
 }
 
 impl State {
-    fn touch(&mut self, key: &Key) -> Option<Arc<RgbImage8>> {
+    fn touch(&mut self, key: &Key) -> Option<Masked> {
         self.clock += 1;
         let (image, used) = self.kept.get_mut(key)?;
         self.by_age.remove(used);
         *used = self.clock;
-        let image = Arc::clone(image);
+        let image = image.clone();
         self.by_age.insert(self.clock, key.clone());
         Some(image)
     }
 
-    fn keep(&mut self, key: Key, image: &Arc<RgbImage8>, limit: usize) {
-        let size = image.pixels.len();
+    fn keep(&mut self, key: Key, image: &Masked, limit: usize) {
+        let size = size_of(image);
         if size > limit || self.kept.contains_key(&key) {
             return;
         }
@@ -197,73 +211,14 @@ impl State {
                 break;
             };
             if let Some((dropped, _)) = self.kept.remove(&oldest) {
-                self.bytes -= dropped.pixels.len();
+                self.bytes -= size_of(&dropped);
             }
         }
         self.clock += 1;
         self.bytes += size;
         self.by_age.insert(self.clock, key.clone());
-        self.kept.insert(key, (Arc::clone(image), self.clock));
+        self.kept.insert(key, (image.clone(), self.clock));
     }
-}
-
-/// Opens an image file far enough to know its format.
-fn open(path: &Path) -> Result<ImageReader<std::io::BufReader<std::fs::File>>, DataError> {
-    ImageReader::open(path)
-        .and_then(ImageReader::with_guessed_format)
-        .map_err(|e| DataError::image(path, format!("cannot be read: {e}"), "restore the file or remove its frame"))
-}
-
-/// Size (width, height) of an image, from its header alone.
-///
-/// # Errors
-/// [`DataError::Image`] when the file is missing or its header is damaged.
-pub fn image_size(path: &Path) -> Result<(u32, u32), DataError> {
-    open(path)?.into_dimensions().map_err(|e| {
-        DataError::image(
-            path,
-            format!("its header cannot be read ({e}), expected a PNG or JPEG image"),
-            "restore the file or remove its frame",
-        )
-    })
-}
-
-/// Decodes, composites and resizes the image of a frame.
-fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, DataError> {
-    let path = &frame.path;
-    if !frame.has_image() {
-        return Err(DataError::image(
-            Path::new(&frame.name),
-            "this frame has no image, it belongs to a camera path",
-            "use a frame of the train, test or val split",
-        ));
-    }
-    let mut reader = open(path)?;
-    let mut limits = image::Limits::default();
-    limits.max_alloc = Some(MAX_DECODED_BYTES);
-    reader.limits(limits);
-    let image = reader.decode().map_err(|e| {
-        DataError::image(
-            path,
-            format!("cannot be decoded ({e}): it is truncated or damaged"),
-            "restore the file or remove its frame",
-        )
-    })?;
-    let found = (image.width(), image.height());
-    let expected = (frame.source_width, frame.source_height);
-    if found != expected {
-        return Err(DataError::image(
-            path,
-            format!(
-                "it is {} x {} pixels, expected {} x {} as the first image of its split",
-                found.0, found.1, expected.0, expected.1
-            ),
-            "make all images of a split the same size",
-        ));
-    }
-    let rgba = image.into_rgba8();
-    let target = (frame.camera.width, frame.camera.height);
-    composite_resized(rgba.as_raw(), found, target, background)
 }
 
 #[cfg(test)]
@@ -271,6 +226,7 @@ mod tests {
     use super::*;
     use crate::camera::Camera;
     use glam::Vec3;
+    use std::path::Path;
 
     /// `count` gray 8×8 images; image `i` has value `i`.
     fn frames(folder: &Path, count: u8) -> Vec<Frame> {
@@ -279,14 +235,8 @@ mod tests {
                 let path = folder.join(format!("{i}.png"));
                 let image = RgbImage8 { width: 8, height: 8, pixels: vec![i; 192] };
                 image.save_png(&path).unwrap();
-                Frame {
-                    name: i.to_string(),
-                    camera: Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 8, 8),
-                    time: 0.0,
-                    path,
-                    source_width: 8,
-                    source_height: 8,
-                }
+                let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 8, 8);
+                Frame::new(i.to_string(), camera, 0.0, path, (8, 8))
             })
             .collect()
     }

@@ -6,16 +6,17 @@
 //! may be absent. A `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise
 //! they are random.
 
-use super::json;
 use super::layout::DatasetLayout;
+use super::shared::{files, json, posed};
 use crate::camera::{Camera, PoseError};
 use crate::error::DataError;
 use crate::frame::Frame;
-use crate::images::image_size;
+use crate::images::read_headers;
 use crate::options::LoadOptions;
 use crate::orbit::orbit_path;
 use crate::points::PointCloud;
 use crate::scene::{Scene, SplitFrames};
+use rayon::prelude::*;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -167,51 +168,49 @@ fn find_image(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Resu
             "add the field to the frame",
         )
     })?;
-    let base = root.join(name.trim_start_matches("./"));
-    let known = ["png", "jpg", "jpeg", "PNG", "JPG", "JPEG"];
-    let has_extension = base.extension().is_some_and(|extension| known.iter().any(|known| extension == *known));
-    let with_extension = |extension: &str| {
-        let mut name = base.clone().into_os_string();
-        name.push(".");
-        name.push(extension);
-        PathBuf::from(name)
-    };
-    let as_given = has_extension.then(|| base.clone());
-    as_given
-        .into_iter()
-        .chain(known.iter().map(|extension| with_extension(extension)))
-        .find(|candidate| candidate.is_file())
-        .ok_or_else(|| {
-            let tried = if has_extension { base.clone() } else { with_extension("png") };
-            DataError::image(
-                &tried,
-                format!("missing, but {} names it in frames[{i}].file_path", path.display()),
-                "copy the image there or remove the frame",
-            )
-        })
+    let base = files::inside(root, path, &format!("frames[{i}].file_path"), name)?;
+    files::find_image(&base).ok_or_else(|| {
+        let tried = if files::is_image(&base) { base.clone() } else { with_suffix(&base) };
+        DataError::image(
+            &tried,
+            format!("missing, but {} names it in frames[{i}].file_path", path.display()),
+            "copy the image there or remove the frame",
+        )
+    })
+}
+
+/// What the layout's own images are called.
+fn with_suffix(base: &Path) -> PathBuf {
+    let mut name = base.as_os_str().to_owned();
+    name.push(".png");
+    name.into()
 }
 
 /// Frames with cameras at the wanted size and times in `[0, 1]`; `last` is the time that becomes 1.
 fn frames(split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
-    let Some(first) = split.frames.first() else {
+    let headers = read_headers(split.frames.par_iter().map(|frame| frame.image.as_path()).collect::<Vec<_>>())?;
+    let Some(source) = headers.first().map(|header| header.size) else {
         return Ok(Vec::new());
     };
-    // One header speaks for the split; the loader checks each image against it.
-    let source = image_size(&first.image)?;
-    let (width, height) = options.resolution.apply(source);
+    // One field of view for the split means one size.
+    if let Some(i) = headers.iter().position(|header| header.size != source) {
+        let (found, expected) = (headers[i].size, source);
+        return Err(DataError::image(
+            &split.frames[i].image,
+            format!(
+                "it is {} x {} pixels, expected {} x {} as the first image of its split",
+                found.0, found.1, expected.0, expected.1
+            ),
+            "make all images of a split the same size",
+        ));
+    }
+    let (width, height) = posed::used_size(&split.frames[0].image, source, options)?;
     let to_frame = |(i, raw): (usize, &RawFrame)| {
         let camera = Camera::from_camera_to_world_opengl(&raw.pose, split.fov_x, source.0, source.1)
             .map_err(|error| pose_error(&split.path, i, error))?;
         let time = if last > 0.0 { (raw.time / last).min(1.0) } else { 0.0 };
         let name = raw.image.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
-        Ok(Frame {
-            name,
-            camera: camera.resized(width, height),
-            time: time as f32,
-            path: raw.image.clone(),
-            source_width: source.0,
-            source_height: source.1,
-        })
+        Ok(Frame::new(name, camera.resized(width, height), time as f32, raw.image.clone(), source))
     };
     split.frames.iter().enumerate().map(to_frame).collect()
 }

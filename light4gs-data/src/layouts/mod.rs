@@ -2,12 +2,22 @@
 //!
 //! To add one to this crate: its own file in this folder, its `mod` line and its place in [`Layouts::default`].
 
+pub(crate) mod colmap;
 mod dnerf;
-mod json;
 mod layout;
+mod nerfies;
+mod nerfstudio;
+mod neu3d;
+pub(crate) mod shared;
+#[cfg(test)]
+mod written;
 
+pub use colmap::Colmap;
 pub use dnerf::DNerf;
 pub use layout::DatasetLayout;
+pub use nerfies::{HyperNerf, NerfDs};
+pub use nerfstudio::Nerfstudio;
+pub use neu3d::Neu3d;
 
 use crate::error::DataError;
 use crate::options::LoadOptions;
@@ -21,7 +31,7 @@ use std::sync::Arc;
 /// ```
 /// use light4gs_data::Layouts;
 ///
-/// assert_eq!(Layouts::default().names(), ["dnerf"]);
+/// assert_eq!(Layouts::default().names(), ["dnerf", "neu3d", "nerfds", "hypernerf", "nerfstudio", "colmap"]);
 /// ```
 #[derive(Clone)]
 pub struct Layouts {
@@ -31,7 +41,16 @@ pub struct Layouts {
 impl Default for Layouts {
     /// The layouts of this crate. Where two might match one folder, the more specific one stands first.
     fn default() -> Self {
-        Self { list: vec![Arc::new(DNerf)] }
+        Self {
+            list: vec![
+                Arc::new(DNerf),
+                Arc::new(Neu3d),
+                Arc::new(NerfDs),
+                Arc::new(HyperNerf),
+                Arc::new(Nerfstudio),
+                Arc::new(Colmap),
+            ],
+        }
     }
 }
 
@@ -145,7 +164,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let root = folder.path();
         let layouts = Layouts::default().with(Marked("a")).with(Marked("b"));
-        assert_eq!(layouts.names(), ["b", "a", "dnerf"]);
+        assert_eq!(layouts.names()[..3], ["b", "a", "dnerf"]);
         let unknown = message(&layouts, root, None);
         assert!(unknown.contains("marker.txt (a)") && unknown.contains("transforms_train.json (dnerf)"), "{unknown}");
         std::fs::write(root.join("marker.txt"), "").unwrap();
@@ -153,7 +172,7 @@ mod tests {
         assert!(message(&layouts, root, Some("a")).contains(": a: opened"));
         let named = message(&layouts, root, Some("blurays"));
         assert!(named.contains("`blurays`") && named.contains("b, a, dnerf"), "{named}");
-        assert_eq!(layouts.with(Marked("dnerf")).names(), ["dnerf", "b", "a"]);
+        assert_eq!(layouts.with(Marked("dnerf")).names()[..4], ["dnerf", "b", "a", "neu3d"]);
     }
 
     #[test]

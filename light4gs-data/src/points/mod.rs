@@ -1,6 +1,7 @@
 //! Colored points, and their nearest neighbors.
 
 mod cloud;
+mod found;
 mod neighbors;
 
 pub use cloud::{PointCloud, SH_C0};

@@ -104,6 +104,30 @@ pub fn write_synthetic(root: &Path, options: &SyntheticOptions) -> Result<(), Da
     make_folder_atomically(root, |part| write_folder(part, options))
 }
 
+/// The procedural scene, for tests that photograph it with cameras of their own.
+#[cfg(test)]
+pub(crate) struct Stage(World);
+
+#[cfg(test)]
+impl Stage {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(World::new(seed))
+    }
+
+    /// `[H, W, 3]` bytes on black, see [`render::render_rays`].
+    pub(crate) fn photograph(
+        &self,
+        eye: Vec3,
+        size: (u32, u32),
+        time: f32,
+        direction: impl Fn(f32, f32) -> Vec3,
+    ) -> crate::images::RgbImage8 {
+        let rgba = render::render_rays(&self.0, eye, size, time, direction);
+        let pixels = crate::images::composite(&rgba, [0.0; 3]);
+        crate::images::RgbImage8 { width: size.0, height: size.1, pixels }
+    }
+}
+
 fn write_folder(folder: &Path, options: &SyntheticOptions) -> Result<(), DataError> {
     let world = World::new(options.seed);
     let intrinsics = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, FOV_X, options.resolution, options.resolution);

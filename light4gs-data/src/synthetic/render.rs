@@ -12,17 +12,28 @@ const WORLD_RADIUS: f32 = 1.3;
 
 /// Renders `[H, W, 4]` bytes with straight alpha: the share of rays that hit something.
 pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Vec<u8> {
-    let solids = world.at(time);
-    let eye = camera.center();
     // A direction is linear in the pixel before it is normalized.
     let axes = camera.rotation.transpose();
     let direction = |u: f32, v: f32| {
         let in_camera = Vec3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
         (axes * in_camera).normalize()
     };
-    let mut rgba = Vec::with_capacity((camera.width * camera.height * 4) as usize);
-    for j in 0..camera.height {
-        for i in 0..camera.width {
+    render_rays(world, camera.center(), (camera.width, camera.height), time, direction)
+}
+
+/// As [`render`], for any camera: `direction` gives the unit direction in the world through a place in the image, in
+/// pixels from its upper left corner.
+pub(super) fn render_rays(
+    world: &World,
+    eye: Vec3,
+    (width, height): (u32, u32),
+    time: f32,
+    direction: impl Fn(f32, f32) -> Vec3,
+) -> Vec<u8> {
+    let solids = world.at(time);
+    let mut rgba = Vec::with_capacity((width * height * 4) as usize);
+    for j in 0..height {
+        for i in 0..width {
             let mut sum = Vec3::ZERO;
             let mut hits = 0u32;
             for sample in 0..SAMPLES * SAMPLES {

@@ -7,6 +7,7 @@ mod export;
 mod gpu_errors;
 mod import;
 mod output;
+mod prepare;
 mod progress;
 mod quickstart;
 mod render;
@@ -33,6 +34,10 @@ enum Command {
     /// Make a small synthetic scene, train on it, write the file and the report.
     #[command(after_help = "Example:\n  light4gs quickstart --out runs/quickstart")]
     Quickstart(quickstart::Quickstart),
+    /// Make a dataset of one or several videos: frames by ffmpeg, poses by colmap.
+    #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
+                            middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
+    Prepare(prepare::Prepare),
     /// Train on a dataset.
     #[command(
         after_help = "Example:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-small --out runs/bouncing"
@@ -80,6 +85,7 @@ impl Cli {
     pub fn run(self) -> Result<(), TrainError> {
         match self.command {
             Command::Quickstart(command) => command.run(),
+            Command::Prepare(command) => command.run(),
             Command::Train(command) => command.run(),
             Command::Resume(command) => command.run(),
             Command::Eval(command) => command.run(),

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_data::Scene;
+use clap::builder::PossibleValuesParser;
+use light4gs_data::{Layouts, Scene};
 use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
 use super::output::{say, say_json, tell};
@@ -38,9 +39,13 @@ pub(super) struct RunOutput {
 pub(super) struct Train {
     /// Folder of the dataset.
     scene: PathBuf,
-    /// A preset (see docs/configuration.md) or a TOML file.
-    #[arg(long, default_value = "dnerf-small", value_name = "PRESET|FILE")]
-    config: String,
+    /// A preset (see docs/configuration.md) or a TOML file. Without it: the small preset of the dataset's layout, such as
+    /// dnerf-small.
+    #[arg(long, value_name = "PRESET|FILE")]
+    config: Option<String>,
+    /// Layout of the dataset; without it, it is found by content (see docs/data.md).
+    #[arg(long, value_name = "NAME", value_parser = PossibleValuesParser::new(Layouts::default().names()))]
+    format: Option<String>,
     /// Folder of the run.
     #[arg(long)]
     out: PathBuf,
@@ -61,7 +66,13 @@ impl Train {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
-        let config = Config::load(&self.config, &overrides)?;
+        overrides.extend(self.format.as_ref().map(|layout| format!("data.layout={layout}")));
+        let preset = match (self.config, self.format) {
+            (Some(config), _) => config,
+            (None, Some(layout)) => format!("{layout}-small"),
+            (None, None) => format!("{}-small", Layouts::default().detect(&self.scene)?.name()),
+        };
+        let config = Config::load(&preset, &overrides)?;
         train(config, &self.scene, &self.out, self.overwrite, &self.output)
     }
 }
@@ -76,7 +87,9 @@ pub(super) fn train(
 ) -> Result<(), TrainError> {
     device::open(config.device)?;
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
-    Scene::open(scene, &load_options(&config))?;
+    for note in Scene::open(scene, &load_options(&config))?.notes {
+        tell(format_args!("note: {note}"));
+    }
     let folder = RunFolder::create(out, Some(scene), &config, overwrite)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;

@@ -8,6 +8,12 @@ use super::optional;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct DataConfig {
+    /// The dataset's layout, such as `neu3d`; `None` (empty in TOML) finds it by content.
+    #[serde(with = "optional")]
+    pub layout: Option<String>,
+    /// Length of the sequence in frames: later ones are left out. `None` (0 in TOML) takes all.
+    #[serde(with = "optional")]
+    pub frames: Option<usize>,
     /// Images are resized to this width; `None` (0 in TOML) leaves them as they are.
     #[serde(with = "optional")]
     pub resolution: Option<u32>,
@@ -23,6 +29,14 @@ pub struct DataConfig {
 
 impl Default for DataConfig {
     fn default() -> Self {
-        Self { resolution: None, background: [1.0; 3], memory_limit_mib: 1024, initial_points: 2000, initial_box: 1.3 }
+        Self {
+            layout: None,
+            frames: None,
+            resolution: None,
+            background: [1.0; 3],
+            memory_limit_mib: 2048,
+            initial_points: 2000,
+            initial_box: 1.3,
+        }
     }
 }

@@ -1,14 +1,14 @@
-//! TOML has no null: an optional whole number is written as 0 where it is absent. A file that is written out is
+//! TOML has no null: an optional whole number is written as 0 where it is absent, an optional word as an empty one. A file that is written out is
 //! complete that way, and a file can take back what the one that it extends has set.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 pub(super) fn serialize<T, S>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error>
 where
-    T: Serialize + Default + Copy,
+    T: Serialize + Default + Clone,
     S: Serializer,
 {
-    value.unwrap_or_default().serialize(serializer)
+    value.clone().unwrap_or_default().serialize(serializer)
 }
 
 pub(super) fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>

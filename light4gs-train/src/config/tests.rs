@@ -28,13 +28,19 @@ fn every_preset_loads_and_survives_a_round_trip() {
 
 #[test]
 fn every_file_of_configs_is_a_preset() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/configs");
-    let mut names: Vec<String> = fs::read_dir(folder)
-        .expect("reading configs")
-        .map(|entry| entry.expect("an entry").path())
-        .filter(|path| path.extension().is_some_and(|extension| extension == "toml"))
-        .filter_map(|path| Some(path.file_stem()?.to_str()?.to_owned()))
-        .collect();
+    fn below(folder: &Path) -> Vec<String> {
+        let paths = fs::read_dir(folder).expect("reading configs").map(|entry| entry.expect("an entry").path());
+        paths
+            .flat_map(|path| {
+                if path.is_dir() {
+                    return below(&path);
+                }
+                let name = path.file_stem().and_then(|stem| stem.to_str()).expect("a name");
+                vec![name.to_owned()]
+            })
+            .collect()
+    }
+    let mut names = below(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/configs")));
     names.sort();
     assert_eq!(names, preset_names());
 }

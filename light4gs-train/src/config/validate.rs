@@ -2,6 +2,7 @@
 
 use light4gs_codec::plane_layout::check_resolution;
 use light4gs_codec::{CodecError, checks};
+use light4gs_data::Layouts;
 
 use super::compression::{LEAST_WEIGHT_BITS, MOST_WEIGHT_BITS};
 use super::{
@@ -29,6 +30,13 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
 }
 
 fn data(check: &mut Check, data: &DataConfig) {
+    if let Some(name) = &data.layout {
+        let known = Layouts::default().names();
+        check.that("data.layout", known.contains(&name.as_str()), || {
+            format!("is `{name}`; it must be empty (found by content) or one of {}", known.join(", "))
+        });
+    }
+    check.range("data.frames", data.frames.unwrap_or(0), 0, 1_000_000);
     if let Some(width) = data.resolution {
         check.that("data.resolution", (8..=MAX_IMAGE_WIDTH).contains(&width), || {
             format!("is {width}; it must be 0 (leave images as they are) or 8 to {MAX_IMAGE_WIDTH} pixels")

@@ -199,6 +199,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             density,
             significance,
             observers: all,
+            sampler_ahead: sampler.clone(),
             sampler,
             profile: Profile::off(),
             view_pools,

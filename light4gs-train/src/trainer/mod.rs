@@ -110,6 +110,8 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
     sampler: FrameSampler,
+    /// The same, asked for what comes later.
+    sampler_ahead: FrameSampler,
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,

@@ -15,12 +15,16 @@ use crate::optimization::learning_rates::GroupRates;
 use crate::optimization::parameters::COMPRESSION;
 use crate::stage::Stage;
 
+/// How many iterations ahead images are decoded.
+const PREFETCHED_ITERATIONS: usize = 8;
+
 impl<F: DeformationField> Trainer<F> {
     /// Forward, backward, and one optimizer step.
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
         self.profile.begin_step();
         let batch = self.config.train.batch_size.max(1);
         let indices = self.sampler.batch(self.config.seed, stage, iteration);
+        self.prefetch(stage, iteration);
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
@@ -68,6 +72,15 @@ impl<F: DeformationField> Trainer<F> {
         }
         self.profile.lap("Adam");
         Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
+    }
+
+    /// Has the images of the next iterations decoded in the background. An iteration asks for as many as it uses, so that
+    /// those before it are there already.
+    fn prefetch(&mut self, stage: Stage, iteration: usize) {
+        // Another sampler: this one is asked for positions of the next pass while the first is still in the last.
+        let indices = self.sampler_ahead.batch(self.config.seed, stage, iteration + PREFETCHED_ITERATIONS);
+        let frames: Vec<Frame> = indices.into_iter().map(|frame| self.data.train[frame].clone()).collect();
+        self.images.prefetch(&frames);
     }
 
     /// Adds the gradients of the regularizers, and returns their value, `[1]`.

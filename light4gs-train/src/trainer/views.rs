@@ -1,8 +1,8 @@
 //! The views of a training step. Each has a tape of its own, so that they can be rendered and differentiated side by side.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
-use light4gs_data::Frame;
+use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_data::{Frame, PixelMask};
 use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -119,8 +119,15 @@ impl ViewPass<'_> {
         let rendering = self.splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
         profile.lap("splatting");
         let truth = image_tensor(&*self.images.image(frame)?, self.device);
+        let mut image = rendering.image;
+        let mut truth = truth;
+        if let Some(mask) = self.images.trained_pixels(frame)? {
+            // Black in both: such pixels are alike, whatever the loss.
+            let mask = mask_tensor(&mask, self.device);
+            image = image * mask.clone();
+            truth = truth * mask;
+        }
         profile.lap("training image");
-        let image = rendering.image;
         let loss = self.loss.loss(LossInput {
             image: image.clone(),
             alpha: rendering.alpha,
@@ -149,6 +156,12 @@ impl ViewPass<'_> {
             truth: truth.inner(),
         })
     }
+}
+
+/// `[H, W, 1]`: 1 where a pixel counts.
+fn mask_tensor(mask: &PixelMask, device: &Device) -> Tensor<3> {
+    let values: Vec<f32> = mask.pixels.iter().map(|value| f32::from(*value)).collect();
+    Tensor::from_data(TensorData::new(values, [mask.height as usize, mask.width as usize, 1]), device)
 }
 
 #[cfg(test)]

@@ -185,16 +185,42 @@ fn images() {
     write(folder.path(), "train", &value);
     let scene = Scene::open(folder.path(), &LoadOptions::default()).unwrap();
     assert_eq!(scene.train[4].name, "r_004");
-    // Damage to the first one shows on opening, to others when they are needed.
+    // What headers and ends of files show is found on opening, other damage when the image is needed.
     let store = ImageStore::new(&LoadOptions::default(), 1 << 20);
     let path = &scene.train[2].path;
     let bytes = fs::read(path).unwrap();
+    let mut damaged = bytes.clone();
+    damaged[bytes.len() / 2] ^= 0x55;
+    fs::write(path, &damaged).unwrap();
+    assert!(Scene::open(folder.path(), &LoadOptions::default()).is_ok());
+    let message = store.get(&scene.train[2]).unwrap_err().to_string();
+    assert!(message.contains("r_002.png") && message.contains("damaged"), "{message}");
     fs::write(path, &bytes[..bytes.len() / 2]).unwrap();
-    let truncated = store.get(&scene.train[2]).unwrap_err().to_string();
-    assert!(truncated.contains("r_002.png") && truncated.contains("truncated"), "{truncated}");
+    expect(folder.path(), &["r_002.png", "truncated"]);
     image(path, 31, 24);
-    let other = store.get(&scene.train[2]).unwrap_err().to_string();
-    assert!(other.contains("31 x 24 pixels, expected 32 x 24"), "{other}");
-    fs::write(&scene.train[0].path, &bytes[..10]).unwrap();
-    expect(folder.path(), &["r_000.png", "header"]);
+    expect(folder.path(), &["r_002.png", "31 x 24 pixels, expected 32 x 24"]);
+    let changed = store.get(&scene.train[2]).unwrap_err().to_string();
+    assert!(changed.contains("31 x 24 pixels, expected 32 x 24"), "{changed}");
+    fs::write(&scene.train[2].path, &bytes[..10]).unwrap();
+    expect(folder.path(), &["r_002.png", "header"]);
+}
+
+#[test]
+fn paths_that_leave_the_folder() {
+    for path in ["../secret.png", "/etc/passwd", "train/../../x"] {
+        refuses(|v| v["frames"][1]["file_path"] = json!(path), &["frames[1].file_path", "leads out"]);
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn folders_whose_names_are_not_utf_8() {
+    use std::os::unix::ffi::OsStrExt;
+    let folder = scene();
+    let odd = folder.path().with_file_name(std::ffi::OsStr::from_bytes(b"light4gs-\xff-name"));
+    let _ = fs::remove_dir_all(&odd);
+    fs::rename(folder.path(), &odd).unwrap();
+    let opened = Scene::open(&odd, &LoadOptions::default());
+    fs::rename(&odd, folder.path()).unwrap();
+    assert_eq!(opened.unwrap().name, "light4gs-\u{fffd}-name");
 }

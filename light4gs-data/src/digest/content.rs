@@ -1,0 +1,51 @@
+//! The content of a file, sampled.
+
+use crate::error::DataError;
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::{self, Read, Seek, SeekFrom};
+use std::path::Path;
+
+/// Blocks that are read, and their size in bytes. A file that is no longer than all of them is read whole.
+const BLOCKS: u64 = 8;
+const BLOCK: u64 = 4096;
+
+/// Length and hash of a file.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Content {
+    /// Bytes.
+    length: u64,
+    /// SHA-256 of what was read, its first 16 bytes, hexadecimal.
+    hash: String,
+}
+
+impl Content {
+    pub(super) fn of(path: &Path) -> Result<Self, DataError> {
+        sampled(path).map_err(DataError::io("read", path))
+    }
+}
+
+fn sampled(path: &Path) -> io::Result<Content> {
+    let mut file = File::open(path)?;
+    let length = file.metadata()?.len();
+    let mut hash = Sha256::new();
+    if length <= BLOCKS * BLOCK {
+        let mut bytes = Vec::with_capacity(length as usize);
+        file.read_to_end(&mut bytes)?;
+        hash.update(&bytes);
+    } else {
+        let mut block = [0; BLOCK as usize];
+        for i in 0..BLOCKS {
+            // The first block and the last are the file's ends.
+            file.seek(SeekFrom::Start((length - BLOCK) / (BLOCKS - 1) * i))?;
+            file.read_exact(&mut block)?;
+            hash.update(block);
+        }
+    }
+    Ok(Content { length, hash: hexadecimal(&hash.finalize()[..16]) })
+}
+
+pub(super) fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}

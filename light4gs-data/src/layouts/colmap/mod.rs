@@ -1,0 +1,191 @@
+//! COLMAP: a sparse model (binary or text) and the images that it was made from.
+//!
+//! The model lies in `sparse/0`, `sparse`, `colmap/sparse/0`, `distorted/sparse/0` or the folder itself, the images in
+//! `images`, or a smaller version of them in `images_2`, `images_4`, `images_8`. COLMAP knows no time: it comes from the
+//! images' names, see [`places`]. One folder of numbered frames is one moving camera; folders `cam00`, `cam01`... with the
+//! same numbers are a rig.
+
+mod binary;
+pub(crate) mod model;
+mod text;
+
+use super::layout::DatasetLayout;
+use super::shared::files;
+use super::shared::posed::{self, PosedImage};
+use super::shared::sequence::{held_out, places};
+use crate::error::DataError;
+use crate::options::LoadOptions;
+use crate::points::PointCloud;
+use crate::scene::{Scene, SplitFrames};
+use model::Model;
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+
+/// Folders of models that are tried, in this order.
+const MODELS: [&str; 6] = ["sparse/0", "sparse", "colmap/sparse/0", "distorted/sparse/0", "dense/sparse", "."];
+/// Folders of images that are tried, in this order.
+const IMAGES: [&str; 7] = ["images", "images_2", "images_4", "images_8", "input", "dense/images", "rgb"];
+
+/// The layout `colmap`: a sparse model and its images.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Colmap;
+
+impl DatasetLayout for Colmap {
+    fn name(&self) -> &'static str {
+        "colmap"
+    }
+
+    fn signature(&self) -> &'static str {
+        "sparse/0/cameras.bin or .txt"
+    }
+
+    fn detect(&self, root: &Path) -> bool {
+        model_folder(root).is_some()
+    }
+
+    fn open(&self, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
+        let folder = model_folder(root).ok_or_else(|| {
+            let expected = MODELS.map(|folder| format!("{folder}/cameras.bin")).join(", ");
+            DataError::field(
+                root,
+                "sparse",
+                format!("no model, expected one of {expected} (or .txt)"),
+                "run COLMAP first",
+            )
+        })?;
+        let model = read_model(&folder)?;
+        let mut notes = Vec::new();
+        let images_folder = find_images(root, &model)?;
+        let posed = posed_images(&model, &images_folder, &mut notes)?;
+        note_unposed(&images_folder, &posed, &mut notes);
+        let names: Vec<String> = posed.iter().map(|image| image.name.clone()).collect();
+        let places = places(&names);
+        let mut posed = posed;
+        for (image, place) in posed.iter_mut().zip(&places) {
+            (image.camera_id, image.time) = (place.camera, place.time);
+            // A frame's name has no folders.
+            image.name = frame_name(&image.name);
+        }
+        let splits = split(posed::frames(&posed, options)?, &held_out(&places));
+        let points = match (model.points.is_empty(), PointCloud::find(root)?) {
+            (_, Some(points)) => points,
+            (false, None) => model.points,
+            (true, None) => PointCloud::in_front_of(&splits.train, options),
+        };
+        let mut scene = Scene::new(self.name(), root, splits, points, options.background)?;
+        scene.notes = notes;
+        Ok(scene)
+    }
+}
+
+/// Sorts frames into training and test, each in the order of time and camera; all of them together are the path of videos.
+pub(super) fn split(frames: Vec<crate::frame::Frame>, tests: &[bool]) -> SplitFrames {
+    let mut marked: Vec<_> = frames.into_iter().zip(tests).collect();
+    marked.sort_by(|(a, _), (b, _)| a.time.total_cmp(&b.time).then(a.camera_id.cmp(&b.camera_id)));
+    let mut splits = SplitFrames::default();
+    for (frame, test) in marked {
+        splits.video.push(crate::frame::Frame::without_image(frame.name.clone(), frame.camera, frame.time));
+        if *test { splits.test.push(frame) } else { splits.train.push(frame) }
+    }
+    splits
+}
+
+/// `cam00/0001.png` as `cam00_0001`.
+pub(super) fn frame_name(path: &str) -> String {
+    let without_suffix = Path::new(path).with_extension("");
+    without_suffix.to_string_lossy().replace(['/', '\\'], "_")
+}
+
+/// The folder that holds a model, binary or text.
+fn model_folder(root: &Path) -> Option<PathBuf> {
+    let holds_one = |folder: &PathBuf| {
+        ["bin", "txt"]
+            .iter()
+            .any(|suffix| ["cameras", "images"].iter().all(|name| folder.join(format!("{name}.{suffix}")).is_file()))
+    };
+    MODELS.iter().map(|folder| root.join(folder)).find(holds_one)
+}
+
+/// Reads the model of a folder.
+pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
+    let is_binary = folder.join("cameras.bin").is_file();
+    let file = |name: &str| folder.join(format!("{name}.{}", if is_binary { "bin" } else { "txt" }));
+    let images_file = file("images");
+    let (cameras, images) = if is_binary {
+        (binary::cameras(&file("cameras"))?, binary::images(&images_file)?)
+    } else {
+        (text::cameras(&file("cameras"))?, text::images(&images_file)?)
+    };
+    let points_file = file("points3D");
+    let (points, error) = match (points_file.is_file(), is_binary) {
+        (false, _) => (PointCloud::default(), None),
+        (true, true) => binary::points(&points_file)?,
+        (true, false) => text::points(&points_file)?,
+    };
+    if images.is_empty() {
+        let problem = "0 posed images, expected at least 2";
+        return Err(DataError::field(&images_file, "images", problem, "COLMAP found no poses: see docs/data.md"));
+    }
+    if let Some(image) = images.iter().find(|image| !cameras.contains_key(&image.camera)) {
+        let (name, camera) = (files::shorten(&image.name), image.camera);
+        let problem = format!("image `{name}` is of camera {camera}, which {} lacks", file("cameras").display());
+        return Err(DataError::field(&images_file, "camera", problem, "take both files from the same model"));
+    }
+    Ok(Model { cameras, images, points, error, images_file })
+}
+
+/// The folder in which most of the model's images are.
+fn find_images(root: &Path, model: &Model) -> Result<PathBuf, DataError> {
+    let present = |folder: &PathBuf| {
+        let sample = model.images.iter().step_by(model.images.len().div_ceil(32).max(1));
+        sample.filter(|image| files::find_image(&folder.join(&image.name)).is_some()).count()
+    };
+    let folders: Vec<PathBuf> = IMAGES.iter().chain(&["."]).map(|name| root.join(name)).collect();
+    let best = folders.into_iter().rev().filter(|folder| folder.is_dir()).max_by_key(present);
+    best.filter(|folder| present(folder) > 0).ok_or_else(|| {
+        let expected = root.join("images").join(model.images.first().map_or("", |image| image.name.as_str()));
+        DataError::image(
+            &expected,
+            format!("missing, with every image that {} names", model.images_file.display()),
+            "copy the images into the folder `images`",
+        )
+    })
+}
+
+/// The images of the model that are there. The names keep their folders.
+fn posed_images(model: &Model, folder: &Path, notes: &mut Vec<String>) -> Result<Vec<PosedImage>, DataError> {
+    let mut wanted = Vec::with_capacity(model.images.len());
+    for image in &model.images {
+        let path = files::inside(folder, &model.images_file, "image name", &image.name)?;
+        wanted.push((image, path));
+    }
+    let found = posed::present(&model.images_file, wanted, notes, |(_, path)| (path.clone(), files::find_image(path)))?;
+    let posed = found.into_iter().map(|((image, _), path)| {
+        let camera = model.cameras[&image.camera];
+        PosedImage {
+            name: image.name.clone(),
+            path,
+            mask: None,
+            rotation: image.rotation,
+            center: image.center,
+            intrinsics: camera.intrinsics,
+            lens: camera.lens,
+            camera_id: 0,
+            time: 0.0,
+            described: (model.images_file.clone(), format!("image `{}`", files::shorten(&image.name))),
+        }
+    });
+    Ok(posed.collect())
+}
+
+/// Says how many images beside the posed ones have no pose.
+fn note_unposed(folder: &Path, posed: &[PosedImage], notes: &mut Vec<String>) {
+    let known: HashSet<&Path> = posed.iter().map(|image| image.path.as_path()).collect();
+    let folders: HashSet<&Path> = posed.iter().filter_map(|image| image.path.parent()).collect();
+    let images = folders.iter().flat_map(|folder| files::images(folder).unwrap_or_default());
+    let unposed = images.filter(|path| !known.contains(path.as_path())).count();
+    if unposed > 0 {
+        let (folder, all) = (folder.display(), unposed + posed.len());
+        notes.push(format!("{unposed} of the {all} images in {folder} have no pose and are left out"));
+    }
+}

@@ -1,0 +1,122 @@
+//! COLMAP's text files: `cameras.txt`, `images.txt`, `points3D.txt`.
+
+use super::model::{ModelCamera, ModelImage, REMEDY, model_of_name, unknown_model};
+use crate::error::DataError;
+use crate::layouts::shared::files::shorten;
+use crate::points::PointCloud;
+use crate::regular_file::read_regular_text;
+use std::collections::HashMap;
+use std::path::Path;
+use std::str::FromStr;
+
+/// As text they are larger than in binary.
+const MAX_BYTES: u64 = 8 << 30;
+
+fn read(path: &Path) -> Result<String, DataError> {
+    read_regular_text(path, MAX_BYTES).map_err(DataError::io("read", path))
+}
+
+/// The words of a line, with its number for messages.
+struct Line<'a> {
+    path: &'a Path,
+    number: usize,
+    words: Vec<&'a str>,
+}
+
+impl Line<'_> {
+    fn error(&self, problem: String) -> DataError {
+        DataError::field(self.path, format!("line {}", self.number), problem, REMEDY)
+    }
+
+    fn field(&self) -> String {
+        format!("line {}", self.number)
+    }
+
+    fn at_least(self, count: usize, layout: &str) -> Result<Self, DataError> {
+        if self.words.len() < count {
+            return Err(self.error(format!("{} words, expected {layout}", self.words.len())));
+        }
+        Ok(self)
+    }
+
+    fn parse<T: FromStr>(&self, i: usize, what: &str) -> Result<T, DataError> {
+        let word = self.words[i];
+        word.parse().map_err(|_| self.error(format!("`{}` stands where {what} is expected", shorten(word))))
+    }
+
+    fn floats<const N: usize>(&self, from: usize) -> Result<[f64; N], DataError> {
+        let mut out = [0.0; N];
+        for (i, value) in out.iter_mut().enumerate() {
+            *value = self.parse(from + i, "a number")?;
+        }
+        Ok(out)
+    }
+}
+
+/// Lines that are no comments, with their numbers from 1.
+fn lines<'a>(path: &'a Path, text: &'a str) -> impl Iterator<Item = (&'a str, Line<'a>)> {
+    text.lines()
+        .enumerate()
+        .filter(|(_, line)| !line.starts_with('#'))
+        .map(move |(i, line)| (line, Line { path, number: i + 1, words: line.split_whitespace().collect() }))
+}
+
+pub(super) fn cameras(path: &Path) -> Result<HashMap<u32, ModelCamera>, DataError> {
+    let text = read(path)?;
+    let mut cameras = HashMap::new();
+    for (_, line) in lines(path, &text).filter(|(_, line)| !line.words.is_empty()) {
+        let line = line.at_least(5, "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]")?;
+        let id = line.parse(0, "the number of a camera")?;
+        let (model, parameters) =
+            model_of_name(line.words[1]).ok_or_else(|| unknown_model(path, &line.field(), &shorten(line.words[1])))?;
+        let size = (line.parse(2, "a width")?, line.parse(3, "a height")?);
+        let given = line.words.len() - 4;
+        if given != parameters {
+            return Err(line.error(format!("{given} parameters, expected {parameters} for {model}")));
+        }
+        let values = (4..4 + parameters).map(|i| line.parse(i, "a number")).collect::<Result<Vec<f64>, _>>()?;
+        cameras.insert(id, ModelCamera::new(path, &line.field(), model, size, &values)?);
+    }
+    Ok(cameras)
+}
+
+/// An image takes two lines: the pose, and its keypoints. The second may be empty.
+pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, DataError> {
+    let text = read(path)?;
+    let mut images = Vec::new();
+    let mut all = lines(path, &text);
+    while let Some((whole, line)) = all.next() {
+        if line.words.is_empty() {
+            continue;
+        }
+        let line = line.at_least(10, "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")?;
+        let camera = line.parse(8, "the number of a camera")?;
+        // A name may contain spaces: it is all that follows the ninth word.
+        let name = (0..9)
+            .fold(whole, |rest, _| rest.trim_start().split_once(char::is_whitespace).map_or("", |(_, rest)| rest));
+        let name = name.trim().to_owned();
+        images.push(ModelImage::new(path, &line.field(), name, line.floats(1)?, line.floats(5)?, camera)?);
+        // The keypoints.
+        all.next();
+    }
+    Ok(images)
+}
+
+/// The points, and their mean reprojection error in pixels.
+pub(super) fn points(path: &Path) -> Result<(PointCloud, Option<f64>), DataError> {
+    let text = read(path)?;
+    let mut cloud = PointCloud::default();
+    let mut errors = 0.0;
+    for (_, line) in lines(path, &text).filter(|(_, line)| !line.words.is_empty()) {
+        let line = line.at_least(8, "POINT3D_ID X Y Z R G B ERROR TRACK[]")?;
+        let [x, y, z, r, g, b, error] = line.floats(1)?;
+        let position = [x, y, z].map(|v| v as f32);
+        if position.iter().all(|v| v.is_finite()) {
+            cloud.positions.push(position);
+            cloud.colors.push([r, g, b].map(|v| (v / 255.0).clamp(0.0, 1.0) as f32));
+            errors += error;
+        }
+    }
+    let mean = (!cloud.is_empty()).then(|| errors / cloud.len() as f64);
+    Ok((cloud, mean))
+}

@@ -1,0 +1,179 @@
+//! Finding files: suffixes in any case, names in the order people expect, nothing outside of the dataset.
+
+use crate::error::DataError;
+use std::cmp::Ordering;
+use std::ffi::OsStr;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+/// Suffixes of images that can be decoded, lower case.
+const SUFFIXES: [&str; 4] = ["png", "jpg", "jpeg", "gif"];
+
+/// Whether a file's suffix is that of an image, in upper or lower case.
+pub(crate) fn is_image(path: &Path) -> bool {
+    has_suffix(path, &SUFFIXES)
+}
+
+/// Whether a file has one of these suffixes (given in lower case), in upper or lower case.
+pub(crate) fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
+    path.extension().is_some_and(|found| suffixes.iter().any(|known| found.eq_ignore_ascii_case(known)))
+}
+
+/// The entries of a folder that are wanted, in natural order. Hidden ones are passed over: editors and file managers
+/// leave them.
+pub(crate) fn entries(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, DataError> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).map_err(DataError::io("read", folder))? {
+        let path = entry.map_err(DataError::io("read", folder))?.path();
+        let hidden = path.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"."));
+        if !hidden && wanted(&path) {
+            found.push(path);
+        }
+    }
+    found.sort_by(|a, b| natural(&name_of(a), &name_of(b)));
+    Ok(found)
+}
+
+/// The images of a folder, in natural order.
+pub(crate) fn images(folder: &Path) -> Result<Vec<PathBuf>, DataError> {
+    entries(folder, |path| is_image(path) && path.is_file())
+}
+
+/// The last part of a path as text.
+pub(crate) fn name_of(path: &Path) -> String {
+    path.file_name().unwrap_or(OsStr::new("")).to_string_lossy().into_owned()
+}
+
+/// The last part of a path as text, without the suffix.
+pub(crate) fn stem_of(path: &Path) -> String {
+    path.file_stem().unwrap_or(OsStr::new("")).to_string_lossy().into_owned()
+}
+
+/// The order in which people count: `cam2` before `cam10`, `7.png` before `0010.png`.
+pub(crate) fn natural(a: &str, b: &str) -> Ordering {
+    let (mut left, mut right) = (a.as_bytes(), b.as_bytes());
+    while let (Some(x), Some(y)) = (left.first(), right.first()) {
+        let (step_left, step_right, order) = if x.is_ascii_digit() && y.is_ascii_digit() {
+            let digits = |text: &[u8]| text.iter().take_while(|c| c.is_ascii_digit()).count();
+            let (m, n) = (digits(left), digits(right));
+            let value = |text: &[u8]| text.iter().position(|c| *c != b'0').map_or(Vec::new(), |i| text[i..].to_vec());
+            let (u, v) = (value(&left[..m]), value(&right[..n]));
+            (m, n, u.len().cmp(&v.len()).then(u.cmp(&v)))
+        } else {
+            (1, 1, x.cmp(y))
+        };
+        if order.is_ne() {
+            return order;
+        }
+        (left, right) = (&left[step_left..], &right[step_right..]);
+    }
+    left.len().cmp(&right.len()).then_with(|| a.cmp(b))
+}
+
+/// A path that a file of the dataset names, below `root`. What would leave the folder is refused: absolute paths, and
+/// more `..` than folders before them.
+///
+/// `file` and `field` say where the path stands.
+pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Result<PathBuf, DataError> {
+    // Written on Windows, it may have the other separator.
+    let name = if name.contains('/') { name.to_owned() } else { name.replace('\\', "/") };
+    let mut below = PathBuf::new();
+    for part in Path::new(&name).components() {
+        let allowed = match part {
+            Component::CurDir => true,
+            Component::Normal(part) => {
+                below.push(part);
+                true
+            }
+            Component::ParentDir => below.pop(),
+            Component::RootDir | Component::Prefix(_) => false,
+        };
+        if !allowed {
+            return Err(DataError::field(
+                file,
+                field,
+                format!("`{}` leads out of the dataset's folder", shorten(&name)),
+                "copy the images into the folder and name them relative to it",
+            ));
+        }
+    }
+    if below.as_os_str().is_empty() {
+        let problem = format!("`{}` names no file", shorten(&name));
+        return Err(DataError::field(file, field, problem, "write the file's path, relative to the folder"));
+    }
+    Ok(root.join(below))
+}
+
+/// The image of a path with or without suffix, in upper or lower case; `None` where there is none.
+pub(crate) fn find_image(path: &Path) -> Option<PathBuf> {
+    if is_image(path) {
+        return with_any_case(path);
+    }
+    let added = |suffix: &str| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".");
+        name.push(suffix);
+        PathBuf::from(name)
+    };
+    SUFFIXES
+        .iter()
+        .flat_map(|suffix| [added(suffix), added(&suffix.to_ascii_uppercase())])
+        .find(|candidate| candidate.is_file())
+}
+
+/// The file of this path, or the one whose suffix is written in the other case.
+fn with_any_case(path: &Path) -> Option<PathBuf> {
+    if path.is_file() {
+        return Some(path.to_path_buf());
+    }
+    let suffix = path.extension()?.to_str()?;
+    [suffix.to_ascii_lowercase(), suffix.to_ascii_uppercase()]
+        .iter()
+        .map(|suffix| path.with_extension(suffix))
+        .find(|candidate| candidate.is_file())
+}
+
+/// Text from a file, short and without control characters, for messages.
+pub(crate) fn shorten(text: &str) -> String {
+    text.chars().take(80).flat_map(char::escape_debug).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn natural_order() {
+        let mut names = ["cam10", "cam2", "cam02", "b", "cam2a", "", "10", "9", "99999999999999999999999", "cam"];
+        names.sort_by(|a, b| natural(a, b));
+        assert_eq!(names, ["", "9", "10", "99999999999999999999999", "b", "cam", "cam02", "cam2", "cam2a", "cam10"]);
+    }
+
+    #[test]
+    fn paths_stay_inside() {
+        let root = Path::new("/data");
+        let inside = |name: &str| inside(root, Path::new("t.json"), "file_path", name);
+        assert_eq!(inside("./train/../test/a.png").unwrap(), root.join("test/a.png"));
+        assert_eq!(inside("images\\a.png").unwrap(), root.join("images/a.png"));
+        for bad in ["../a.png", "/etc/passwd", "a/../../b", "", ".", "\x1b[31m/../../x"] {
+            let message = inside(bad).unwrap_err().to_string();
+            assert!(message.contains("t.json: file_path") && message.contains("; "), "{message}");
+            assert!(!message.contains('\x1b'));
+        }
+    }
+
+    #[test]
+    fn suffixes_in_any_case() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["a.PNG", "b.Jpg", "c.jpeg", ".hidden.png", "notes.txt"] {
+            fs::write(folder.path().join(name), "").unwrap();
+        }
+        let at = |name: &str| find_image(&folder.path().join(name)).map(|path| name_of(&path));
+        assert_eq!(at("a.png").as_deref(), Some("a.PNG"));
+        assert_eq!(at("a").as_deref(), Some("a.PNG"));
+        assert_eq!(at("c.jpeg").as_deref(), Some("c.jpeg"));
+        assert_eq!(at("d.png"), None);
+        let names: Vec<String> = images(folder.path()).unwrap().iter().map(|path| name_of(path)).collect();
+        assert_eq!(names, ["a.PNG", "b.Jpg", "c.jpeg"]);
+    }
+}

@@ -1,0 +1,8 @@
+//! What the readers have in common: files and names, arrays and JSON, times and splits, and the way from posed images to
+//! frames.
+
+pub(crate) mod files;
+pub(super) mod json;
+pub(super) mod npy;
+pub(super) mod posed;
+pub(super) mod sequence;

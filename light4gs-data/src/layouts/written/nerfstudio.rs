@@ -1,0 +1,130 @@
+//! The layout `nerfstudio`: shared and own intrinsics, both lenses, times, splits, masks.
+
+use super::capture::{Capture, SIZE, Shot, fisheye, opencv};
+use super::*;
+use crate::lens::Distortion;
+use serde_json::{Value, json};
+use std::fs;
+
+fn intrinsics(shot: &Shot) -> Value {
+    let c = shot.pinhole;
+    let mut value = json!({"fl_x": c.fx, "fl_y": c.fy, "cx": c.cx, "cy": c.cy, "w": SIZE.0, "h": SIZE.1});
+    match shot.lens.map(|lens| lens.distortion) {
+        Some(Distortion::Fisheye { radial }) => {
+            value["camera_model"] = json!("OPENCV_FISHEYE");
+            for (i, k) in radial.iter().enumerate() {
+                value[format!("k{}", i + 1)] = json!(k);
+            }
+        }
+        Some(Distortion::RadialTangential { radial, tangential }) => {
+            value["camera_model"] = json!("OPENCV");
+            (value["k1"], value["k2"]) = (json!(radial[0]), json!(radial[1]));
+            (value["p1"], value["p2"]) = (json!(tangential[0]), json!(tangential[1]));
+        }
+        _ => {}
+    }
+    value
+}
+
+/// The document with intrinsics at the top, or in every frame.
+fn document(capture: &Capture, shared: bool) -> Value {
+    let mut top = if shared { intrinsics(&capture.shots[0]) } else { json!({}) };
+    let frames: Vec<Value> = capture
+        .shots
+        .iter()
+        .map(|shot| {
+            let mut frame = if shared { json!({}) } else { intrinsics(shot) };
+            frame["file_path"] = json!(format!("images/{}.png", shot.name));
+            frame["transform_matrix"] = json!(shot.pinhole.camera_to_world_opengl());
+            frame
+        })
+        .collect();
+    top["frames"] = json!(frames);
+    top
+}
+
+fn write(root: &Path, capture: &Capture, document: &Value) {
+    fs::create_dir_all(root.join("images")).unwrap();
+    for (i, shot) in capture.shots.iter().enumerate() {
+        let path = root.join(format!("images/{}.png", shot.name));
+        if !path.exists() {
+            capture.recorded(i).save_png(&path).unwrap();
+        }
+    }
+    fs::write(root.join("transforms.json"), document.to_string()).unwrap();
+}
+
+#[test]
+fn shared_intrinsics_and_names_that_count() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 6, Some(opencv()));
+    write(folder.path(), &capture, &document(&capture, true));
+    let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
+    assert_eq!((scene.train.len(), scene.test.len()), (5, 1));
+    assert_eq!(scene.test[0].name, "frame_0003");
+    assert_eq!(times(&scene, Split::Train), [0.0, 0.2, 0.4, 0.8, 1.0]);
+}
+
+#[test]
+fn own_intrinsics_times_and_splits() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = (0..6).map(|i| {
+        let lens = [None, Some(opencv()), Some(fisheye())][i % 3];
+        (format!("x{i}"), i as f32 / 5.0, i as f32 / 10.0, lens)
+    });
+    let capture = Capture::new(false, plan.collect());
+    let mut document = document(&capture, false);
+    for (i, shot) in capture.shots.iter().enumerate() {
+        document["frames"][i]["time"] = json!(shot.time);
+    }
+    document["train_filenames"] = json!(["images/x0.png", "images/x1.png", "images/x2.png", "images/x5.png"]);
+    document["val_filenames"] = json!(["images/x3.png"]);
+    document["test_filenames"] = json!(["./images/x4.png"]);
+    document["frames"][1]["mask_path"] = json!("masks/x1.png");
+    fs::create_dir(folder.path().join("masks")).unwrap();
+    fs::write(folder.path().join("masks/x1.png"), "").unwrap();
+    write(folder.path(), &capture, &document);
+    let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
+    assert_eq!((scene.train.len(), scene.val.len(), scene.test.len()), (4, 1, 1));
+    assert_eq!(times(&scene, Split::Train), [0.0, 0.1, 0.2, 0.5]);
+    assert!(scene.train[1].mask.is_some() && scene.train[0].mask.is_none());
+    // Times in seconds or frames are brought to [0, 1].
+    for i in 0..6 {
+        document["frames"][i]["time"] = json!(100 + i);
+    }
+    write(folder.path(), &capture, &document);
+    assert_eq!(times(&Scene::open(folder.path(), &options()).unwrap(), Split::Train), [0.0, 0.2, 0.4, 1.0]);
+}
+
+#[test]
+fn damaged_files_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 3, None);
+    let refuses = |change: &dyn Fn(&mut Value), words: &[&str]| {
+        let mut document = document(&capture, true);
+        change(&mut document);
+        write(folder.path(), &capture, &document);
+        let message = Scene::open(folder.path(), &options()).unwrap_err().to_string();
+        for word in words.iter().chain(&["; "]) {
+            assert!(message.contains(word), "`{word}` is not in: {message}");
+        }
+    };
+    let file = "transforms.json";
+    refuses(&|v| drop(v.as_object_mut().unwrap().remove("frames")), &[file, "frames", "missing"]);
+    refuses(&|v| v["frames"] = json!([]), &[file, "frames", "at least one"]);
+    let without = |v: &mut Value| ["fl_x", "fl_y"].iter().for_each(|key| drop(v.as_object_mut().unwrap().remove(*key)));
+    refuses(&without, &[file, "fl_x", "camera_angle_x"]);
+    refuses(&|v| v["camera_model"] = json!("EQUIRECTANGULAR"), &[file, "camera_model", "EQUIRECTANGULAR"]);
+    refuses(&|v| v["fl_x"] = json!("wide"), &[file, "fl_x", "wide"]);
+    refuses(&|v| v["fl_x"] = json!(0), &[file, "focal lengths are 0"]);
+    refuses(&|v| v["w"] = json!(-4), &[file, "w", "-4"]);
+    refuses(&|v| (v["w"], v["h"]) = (json!(50), json!(100)), &["frame_0000.png", "lies on its side"]);
+    refuses(&|v| v["k1"] = json!(null), &[file, "k1"]);
+    refuses(&|v| v["frames"][1]["transform_matrix"] = json!([[1, 0], [0, 1]]), &["frames[1].transform_matrix"]);
+    refuses(&|v| v["frames"][1]["transform_matrix"][0][0] = json!(7), &["frames[1].transform_matrix", "rotation"]);
+    refuses(&|v| v["frames"][1]["file_path"] = json!("/etc/passwd"), &["frames[1].file_path", "leads out"]);
+    refuses(&|v| drop(v["frames"][1].as_object_mut().unwrap().remove("file_path")), &["frames[1].file_path"]);
+    refuses(&|v| v["frames"][1]["time"] = json!(0.5), &["frames[0].time", "missing"]);
+    refuses(&|v| v["test_filenames"] = json!("x"), &["test_filenames", "a list of names"]);
+    refuses(&|v| v["ply_file_path"] = json!("../x.ply"), &["ply_file_path", "leads out"]);
+}

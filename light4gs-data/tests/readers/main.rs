@@ -1,0 +1,4 @@
+//! The readers of datasets: golden vectors, scenes written in every layout and read back, damaged files.
+
+mod dnerf_errors;
+mod golden;
