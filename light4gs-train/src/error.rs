@@ -52,6 +52,9 @@ pub enum TrainError {
         /// What was found and expected, with the tensor.
         problem: String,
     },
+    /// The user asked a run or a study to stop; it can be gone on with.
+    #[error("{0}")]
+    Stopped(String),
     /// Numbers of the training are no longer finite.
     #[error(transparent)]
     Diverged(Box<Divergence>),
@@ -64,6 +67,16 @@ impl TrainError {
             Self::Codec(error) => error.is_internal(),
             Self::Gpu(_) => true,
             _ => false,
+        }
+    }
+
+    /// The exit code of a program that ends with this error: 2 for wrong input, 1 for our own fault, 75 (`EX_TEMPFAIL`: try
+    /// again) for a run that was asked to stop.
+    pub fn exit_code(&self) -> u8 {
+        match self {
+            Self::Stopped(_) => 75,
+            error if error.is_internal() => 1,
+            _ => 2,
         }
     }
 }

@@ -19,6 +19,7 @@ mod randomness;
 pub mod report;
 pub mod run;
 mod stage;
+pub mod study;
 pub mod trainer;
 pub mod video;
 

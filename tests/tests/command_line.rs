@@ -4,7 +4,7 @@ use std::fs;
 
 use light4gs_model::DynamicScene;
 use light4gs_tests::golden::devices;
-use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
+use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
@@ -115,34 +115,6 @@ fn a_run_with_the_rate_in_its_loss_on_wgpu() {
     // The checkpoint is no GPU's either.
     assert_success(&w.run(["encode", "run", "--out", "again.l4gs", "--device", "flex"]));
     assert!(light4gs_codec::decode(&fs::read(w.path("again.l4gs")).unwrap()).is_ok());
-}
-
-#[test]
-fn ablation_tables() {
-    let w = Workspace::new(PROGRAM);
-    let ablate = || {
-        let mut command = w.command(["ablate", "scene", "--table", "sizes", "--out", "table", "--quiet"]);
-        for key_value in TINY.iter().chain(&["train.prune.iterations=[42, 45]", "compression.rate.from=12"]) {
-            command.args(["--set", key_value]);
-        }
-        command.output().unwrap()
-    };
-    let first = ablate();
-    assert_success(&first);
-    let table = fs::read_to_string(w.path("table/table.md")).unwrap();
-    for row in ["float32", "paper-profile", "high", "medium", "small"] {
-        assert!(table.contains(&format!("| {row} |")), "{table}");
-    }
-    // The middle size is not trained again for the paper's profile: the log says so to the microsecond.
-    let log = |variant: &str| fs::read(w.path(&format!("table/{variant}/metrics.jsonl"))).unwrap();
-    assert_eq!(log("paper-profile"), log("medium"));
-    assert_ne!(log("medium"), log("small"));
-    // Finished runs are not repeated: the same table, minutes and all.
-    assert_success(&ablate());
-    assert_eq!(fs::read_to_string(w.path("table/table.md")).unwrap(), table);
-    // Another configuration in the same folders is refused.
-    let output = w.run(["ablate", "scene", "--table", "sizes", "--out", "table", "--quiet"]);
-    assert_refused(&output, &["another configuration"]);
 }
 
 #[test]

@@ -46,6 +46,62 @@ impl Pca {
         let std = order.map(|i| eigen.eigenvalues[i].max(0.0).sqrt().max(MIN_RELATIVE_STD * largest) as f32);
         Self { mean, axes, std }
     }
+
+    /// The same mean, the world's axes, and the unbiased standard deviation along each of them.
+    fn along_world_axes(points: &[[f32; 3]]) -> Self {
+        let mean = Self::fit(points).mean;
+        let count = (points.len() as f64 - 1.0).max(1.0);
+        let spread: [f64; 3] = std::array::from_fn(|axis| {
+            let squares = points.iter().map(|p| (f64::from(p[axis]) - f64::from(mean[axis])).powi(2));
+            (squares.sum::<f64>() / count).sqrt()
+        });
+        let largest = spread.into_iter().fold(0.0, f64::max);
+        let axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        if !(largest.is_finite() && largest > 0.0) {
+            return Self { mean, axes, std: [1.0; 3] };
+        }
+        Self { mean, axes, std: spread.map(|std| std.max(MIN_RELATIVE_STD * largest) as f32) }
+    }
+
+    /// Distance of a world point from the mean, in standard deviations.
+    fn standardized_norm(&self, point: [f32; 3]) -> f64 {
+        let along = |axis: usize| {
+            let offset = (0..3).map(|k| f64::from(point[k] - self.mean[k]) * f64::from(self.axes[axis][k]));
+            offset.sum::<f64>() / f64::from(self.std[axis])
+        };
+        (0..3).map(|axis| along(axis).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// What the coordinates of a scene are made of: both on is the paper's (III-A), each may be switched off to see what it
+/// is good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CoordinatesConfig {
+    /// Along the principal axes of the cloud. Off: along the world's axes, with the cloud's standard deviation along each.
+    pub pca: bool,
+    /// Contracted outside of one standard deviation. Off: the whole cloud is scaled into the ball that the contraction
+    /// leaves as it is, half as wide as the planes; what lies or moves outside of it is contracted all the same.
+    pub contraction: bool,
+}
+
+impl Default for CoordinatesConfig {
+    fn default() -> Self {
+        Self { pca: true, contraction: true }
+    }
+}
+
+impl CoordinatesConfig {
+    /// The analysis of a cloud that stands for these coordinates.
+    pub fn fit(&self, points: &[[f32; 3]]) -> Pca {
+        let mut pca = if self.pca { Pca::fit(points) } else { Pca::along_world_axes(points) };
+        if !self.contraction {
+            let farthest = points.iter().map(|point| pca.standardized_norm(*point)).fold(0.0, f64::max);
+            if farthest.is_finite() && farthest > 0.0 {
+                pca.std = pca.std.map(|std| (f64::from(std) * farthest) as f32);
+            }
+        }
+        pca
+    }
 }
 
 /// Maps world points to the hexplane's coordinates. Fixed once made: none of its tensors is trained.
@@ -133,6 +189,43 @@ impl SceneCoordinates {
             mean: triple(values(self.mean.val())),
             axes: std::array::from_fn(|j| [axes[j], axes[3 + j], axes[6 + j]]),
             std: triple(values(self.std.val())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CLOUD: [[f32; 3]; 5] =
+        [[0.0, 0.0, 0.0], [4.0, 4.0, 0.0], [-4.0, -4.0, 0.5], [1.0, -1.0, 0.0], [3.0, 5.0, -2.0]];
+
+    #[test]
+    fn without_pca_the_axes_are_the_world_s() {
+        let pca = CoordinatesConfig { pca: false, contraction: true }.fit(&CLOUD);
+        assert_eq!(pca.axes, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        assert_eq!(pca.mean, Pca::fit(&CLOUD).mean);
+        let variance: f32 = CLOUD.iter().map(|p| (p[0] - pca.mean[0]).powi(2)).sum::<f32>() / 4.0;
+        assert!((pca.std[0] - variance.sqrt()).abs() < 1e-5);
+        assert_eq!(CoordinatesConfig::default().fit(&CLOUD), Pca::fit(&CLOUD));
+    }
+
+    #[test]
+    fn without_contraction_the_cloud_lies_where_nothing_is_contracted() {
+        for pca in [false, true] {
+            let fitted = CoordinatesConfig { pca, contraction: false }.fit(&CLOUD);
+            let farthest = CLOUD.iter().map(|p| fitted.standardized_norm(*p)).fold(0.0, f64::max);
+            assert!((farthest - 1.0).abs() < 1e-5, "{farthest}");
+        }
+    }
+
+    #[test]
+    fn degenerate_clouds_have_coordinates() {
+        for cloud in [vec![], vec![[1.0; 3]], vec![[2.0; 3]; 4], vec![[f32::NAN; 3], [0.0; 3]]] {
+            for (pca, contraction) in [(false, false), (false, true), (true, false)] {
+                let fitted = CoordinatesConfig { pca, contraction }.fit(&cloud);
+                assert!(fitted.std.iter().all(|std| *std > 0.0), "{cloud:?}: {fitted:?}");
+            }
         }
     }
 }

@@ -4,7 +4,7 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_data::PointCloud;
 
-use super::coordinates::{Pca, SceneCoordinates};
+use super::coordinates::{CoordinatesConfig, SceneCoordinates};
 use super::field::DeformationField;
 use super::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
 use super::hexplane::HexPlane;
@@ -17,6 +17,8 @@ pub struct DynamicSceneConfig<F: DeformationField = HexPlaneField> {
     pub gaussians: GaussiansConfig,
     /// What moves them.
     pub field: F::Config,
+    /// From world coordinates to the field's.
+    pub coordinates: CoordinatesConfig,
     /// Whether the field's gradient reaches the positions (the reference detaches them).
     pub differentiate_points: bool,
 }
@@ -24,7 +26,13 @@ pub struct DynamicSceneConfig<F: DeformationField = HexPlaneField> {
 impl<F: DeformationField> DynamicSceneConfig<F> {
     /// With gradients to the positions.
     pub fn new(gaussians: GaussiansConfig, field: F::Config) -> Self {
-        Self { gaussians, field, differentiate_points: true }
+        Self { gaussians, field, coordinates: CoordinatesConfig::default(), differentiate_points: true }
+    }
+
+    /// What the scene's coordinates are made of.
+    pub fn with_coordinates(mut self, coordinates: CoordinatesConfig) -> Self {
+        self.coordinates = coordinates;
+        self
     }
 
     /// Whether the field's gradient reaches the positions.
@@ -33,11 +41,11 @@ impl<F: DeformationField> DynamicSceneConfig<F> {
         self
     }
 
-    /// A model over a cloud, whose principal axes become those of the scene's coordinates.
+    /// A model over a cloud, from which the scene's coordinates are taken.
     pub fn init(&self, cloud: &PointCloud, device: &Device) -> DynamicScene<F> {
         DynamicScene {
             gaussians: self.gaussians.init(cloud, device),
-            coordinates: SceneCoordinates::new(&Pca::fit(&cloud.positions), device),
+            coordinates: SceneCoordinates::new(&self.coordinates.fit(&cloud.positions), device),
             field: F::init(&self.field, device),
             differentiate_points: self.differentiate_points,
         }

@@ -19,7 +19,7 @@ mod still_field;
 
 pub use arrays::ModelError;
 pub use contraction::contract;
-pub use coordinates::{Pca, SceneCoordinates};
+pub use coordinates::{CoordinatesConfig, Pca, SceneCoordinates};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
 pub use field::{DeformationField, Offsets};

@@ -1,7 +1,7 @@
 //! The command line: one file a command.
 
-mod ablate;
 mod bench;
+mod compare;
 mod container;
 mod export;
 mod gpu_errors;
@@ -11,6 +11,8 @@ mod prepare;
 mod progress;
 mod quickstart;
 mod render;
+mod signals;
+mod study;
 mod synth;
 mod train;
 
@@ -72,9 +74,20 @@ enum Command {
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
     Synth(synth::Synth),
-    /// Train a scene several times, each with another part switched off, and print the paper's tables.
-    #[command(after_help = "Example:\n  light4gs ablate data/dnerf/flag --table context --out runs/flag-context")]
-    Ablate(ablate::Ablate),
+    /// Make a table or a figure of the paper: train a scene several times, and show what varies.
+    #[command(
+        after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-small --seeds 3 --out runs/context"
+    )]
+    Study(study::Study),
+    /// Write a study's tables and report anew from the runs that are finished, and say which are missing.
+    #[command(after_help = "Example:\n  light4gs gather runs/context")]
+    Gather(study::Gather),
+    /// One task of a study, as its launcher starts it.
+    #[command(hide = true)]
+    StudyTask(study::StudyTask),
+    /// Print what differs between runs: program and machine, configuration, results.
+    #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
+    Compare(compare::Compare),
     /// Time every stage of training on one or more devices.
     #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
@@ -96,14 +109,17 @@ impl Cli {
             Command::Info(command) => command.run(),
             Command::Export(command) => command.run(),
             Command::Synth(command) => command.run(),
-            Command::Ablate(command) => command.run(),
+            Command::Study(command) => command.run(),
+            Command::Gather(command) => command.run(),
+            Command::StudyTask(command) => command.run(),
+            Command::Compare(command) => command.run(),
             Command::Bench(command) => command.run(),
         }
     }
 }
 
 /// Parses the arguments of this process, runs the command, and reports an error on stderr. Exit codes: 0 done, 2 wrong
-/// input, 1 our fault.
+/// input, 1 our fault, 75 stopped on request (SIGUSR1).
 pub fn main() -> ExitCode {
     let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
     tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
@@ -111,7 +127,7 @@ pub fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             output::tell(format_args!("error: {error}"));
-            ExitCode::from(if error.is_internal() { 1 } else { 2 })
+            ExitCode::from(error.exit_code())
         }
     }
 }

@@ -9,6 +9,7 @@ use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
 use super::output::{say, say_json, tell};
 use super::progress::ProgressBars;
+use super::signals::stop_flag;
 use crate::compression::CodingRecord;
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
@@ -32,7 +33,7 @@ pub(super) struct RunOutput {
     pub(super) quiet: bool,
     /// Print the time of every stage of a training step. The run itself gets slower, since each stage is waited for.
     #[arg(long)]
-    profile: bool,
+    pub(super) profile: bool,
 }
 
 #[derive(Debug, Args)]
@@ -85,6 +86,8 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
+    // From here on a request to stop is heard.
+    stop_flag();
     device::open(config.device)?;
     // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
     for note in Scene::open(scene, &load_options(&config))?.notes {
@@ -126,7 +129,9 @@ pub(super) fn train_to_evaluation(
             "{out} holds a run of another configuration or scene; name another folder, or remove that one"
         )));
     }
-    if !folder.stream().exists() {
+    let coded = config.compression.profile.coded().is_some();
+    // `bit_maps.json` is the last of what encoding writes.
+    if !folder.stream().exists() || (coded && !folder.path("bit_maps.json").exists()) {
         run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(record.dataset()?, &load_options(&config))?;
@@ -142,7 +147,7 @@ fn trainer(
 ) -> Result<TrainerBuilder, TrainError> {
     let data = Scene::open(record.dataset()?, &load_options(config))?;
     let bars = ProgressBars::new(output.quiet);
-    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars))
+    Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars).stop_flag(stop_flag()))
 }
 
 /// Trains to the end, and prints what the stages took if that is asked for.
@@ -185,6 +190,7 @@ pub(super) struct Resume {
 
 impl Resume {
     pub(super) fn run(self) -> Result<(), TrainError> {
+        stop_flag();
         let (mut folder, record, found) = RunFolder::open(&self.run)?;
         folder.lock()?;
         let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;

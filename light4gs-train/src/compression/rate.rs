@@ -141,6 +141,25 @@ impl Compression {
 }
 
 impl<F: DeformationField> NoisyScene<F> {
+    /// The same scene for a rate that does not reach its planes, or its spherical harmonics: their models learn what they
+    /// cost, and they do not.
+    pub fn out_of_reach(&self, planes: bool, sh: bool) -> Self {
+        let mut apart = self.clone();
+        if planes {
+            for plane in apart.scene.planes_mut().into_iter().flat_map(|hexplane| &mut hexplane.planes) {
+                detach(plane);
+            }
+            apart.steps = apart.steps.map(|steps| steps.leaves(false));
+        }
+        if sh {
+            detach(&mut apart.scene.gaussians.sh_rest);
+            // Some models look at these.
+            detach(&mut apart.scene.gaussians.sh_dc);
+            detach(&mut apart.scene.gaussians.means);
+        }
+        apart
+    }
+
     /// Whether the steps are learned.
     pub fn learns_steps(&self) -> bool {
         self.steps.as_ref().is_some_and(|steps| steps.of(0).is_require_grad())
@@ -157,6 +176,11 @@ impl<F: DeformationField> NoisyScene<F> {
 /// Gives a parameter the value as the beginning of a tape.
 fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
     *parameter = Param::initialized(parameter.id, value.require_grad());
+}
+
+/// Gives a parameter its own value as a constant.
+fn detach<const D: usize>(parameter: &mut Param<Tensor<D>>) {
+    *parameter = Param::initialized(parameter.id, parameter.val().detach().set_require_grad(false));
 }
 
 /// The planes of a scene; none if its field has none.

@@ -63,6 +63,10 @@ pub struct RateConfig {
     pub lambda: f64,
     /// What lambda weighs.
     pub weighting: RateWeighting,
+    /// Whether the rate of the planes shapes the planes. Where it does not, their entropy model learns all the same.
+    pub planes: bool,
+    /// Whether the rate of the spherical harmonics shapes the Gaussians. Where it does not, its model learns all the same.
+    pub sh: bool,
     /// The rate is taken in every so many iterations.
     pub interval: usize,
     /// Share of the planes, and of the Gaussians, on which it is estimated.
@@ -247,6 +251,8 @@ impl Default for RateConfig {
         Self {
             lambda: 0.0,
             weighting: RateWeighting::Megabytes,
+            planes: true,
+            sh: true,
             interval: 3,
             fraction: 0.125,
             from: 1000,

@@ -33,6 +33,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+pub(crate) use choice::choice;
 use layering::layers;
 
 pub use choice::UnknownChoice;
@@ -45,7 +46,7 @@ pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin, Problem};
 pub use eval::{EvalConfig, EvalSplit};
 pub use layering::presets::preset_names;
-pub use model::{DeformationConfig, HexPlaneConfig, ModelConfig};
+pub use model::{CoordinatesConfig, DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use prune::{PruneConfig, PruneScore, PruneVolume};
 pub use train::{DensifyConfig, LearningRates, RegularizerConfig, Sampling, TrainConfig};
 
@@ -115,6 +116,11 @@ impl Config {
     /// SHA-256 of [`Config::to_toml`]: two runs with the same digest were configured alike.
     pub fn digest(&self) -> [u8; 32] {
         Sha256::digest(self.to_toml().as_bytes()).into()
+    }
+
+    /// [`Config::digest`] in hexadecimal digits.
+    pub fn digest_text(&self) -> String {
+        self.digest().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
     /// Whether training is the same with both, so that they differ at most in how the result is written.

@@ -9,10 +9,30 @@ use serde::{Deserialize, Serialize};
 pub struct ModelConfig {
     /// Highest degree of the spherical harmonics, 0 to 3.
     pub sh_degree: u8,
+    /// From world coordinates to those of the planes.
+    pub coordinates: CoordinatesConfig,
     /// The feature planes.
     pub hexplane: HexPlaneConfig,
     /// The network that turns features into motion.
     pub deformation: DeformationConfig,
+}
+
+/// What the coordinates in which the planes lie are made of (paper III-A).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct CoordinatesConfig {
+    /// Whether they lie along the principal axes of the initial cloud; else along the world's.
+    pub pca: bool,
+    /// Whether what lies outside of one standard deviation of the cloud is contracted; else the whole cloud is scaled into
+    /// what is not.
+    pub contraction: bool,
+}
+
+impl Default for CoordinatesConfig {
+    fn default() -> Self {
+        let light4gs_model::CoordinatesConfig { pca, contraction } = light4gs_model::CoordinatesConfig::default();
+        Self { pca, contraction }
+    }
 }
 
 /// Sizes of the multiscale hexplane.
@@ -51,7 +71,12 @@ pub struct DeformationConfig {
 
 impl Default for ModelConfig {
     fn default() -> Self {
-        Self { sh_degree: 3, hexplane: HexPlaneConfig::default(), deformation: DeformationConfig::default() }
+        Self {
+            sh_degree: 3,
+            coordinates: CoordinatesConfig::default(),
+            hexplane: HexPlaneConfig::default(),
+            deformation: DeformationConfig::default(),
+        }
     }
 }
 
@@ -88,7 +113,10 @@ impl ModelConfig {
     /// The same with another deformation field.
     pub fn scene<F: DeformationField>(&self, field: F::Config) -> DynamicSceneConfig<F> {
         let gaussians = GaussiansConfig::new().with_sh_degree(usize::from(self.sh_degree));
-        DynamicSceneConfig::new(gaussians, field).with_differentiate_points(self.deformation.differentiate_points)
+        let CoordinatesConfig { pca, contraction } = self.coordinates;
+        DynamicSceneConfig::new(gaussians, field)
+            .with_coordinates(light4gs_model::CoordinatesConfig { pca, contraction })
+            .with_differentiate_points(self.deformation.differentiate_points)
     }
 
     /// The built-in deformation field.

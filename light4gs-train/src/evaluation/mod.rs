@@ -1,6 +1,5 @@
 //! Measuring a decoded file: quality on held-out views, speed, size.
 
-pub mod ablation;
 pub mod finish;
 pub mod measure;
 pub mod metrics;

@@ -23,7 +23,7 @@ const INFERNO: [[u8; 3]; 17] = [
 ];
 
 /// The color of a value, 0 to 1; what lies outside takes the color at the end.
-pub(super) fn inferno(value: f32) -> [u8; 3] {
+pub(crate) fn inferno(value: f32) -> [u8; 3] {
     let last = INFERNO.len() - 1;
     // Written so that NaN becomes 0.
     let value = if value > 0.0 { value.min(1.0) } else { 0.0 };

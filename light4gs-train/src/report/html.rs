@@ -1,7 +1,7 @@
 //! Text into HTML.
 
 /// Text as it is to be read: safe between tags and within quoted attributes.
-pub(super) fn escape(text: &str) -> String {
+pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

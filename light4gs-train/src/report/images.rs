@@ -85,7 +85,7 @@ fn error_map(truth: &RgbImage8, render: &RgbImage8) -> Result<RgbImage8, String>
 }
 
 /// The image as a PNG inside the page.
-pub(super) fn data_uri(image: &RgbImage8) -> image::ImageResult<String> {
+pub(crate) fn data_uri(image: &RgbImage8) -> image::ImageResult<String> {
     let mut png = Vec::new();
     PngEncoder::new(&mut png).write_image(&image.pixels, image.width, image.height, ExtendedColorType::Rgb8)?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(png)))

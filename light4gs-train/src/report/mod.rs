@@ -24,7 +24,15 @@ use light4gs_data::{DataError, RgbImage8};
 use crate::compression::{BitMap, CodingRecord};
 use crate::evaluation::measure::Scores;
 use crate::observers::metrics_log::MetricsRecord;
-use html::{escape, fill};
+#[cfg(feature = "cli")]
+pub(crate) use color_map::inferno;
+#[cfg(not(feature = "cli"))]
+use html::escape;
+#[cfg(feature = "cli")]
+pub(crate) use html::escape;
+use html::fill;
+#[cfg(feature = "cli")]
+pub(crate) use images::data_uri;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
@@ -150,6 +158,25 @@ fn page(path: &Path, report: &Report) -> Result<String, DataError> {
             ("script", SCRIPT),
         ],
     ))
+}
+
+/// A page in the style of the report, with sections of one's own: pairs of an id-like heading and HTML.
+#[cfg(feature = "cli")]
+pub(crate) fn page_of(title: &str, about: &str, sections: &[(String, String)]) -> String {
+    let sections = sections.iter().enumerate();
+    let sections: String =
+        sections.map(|(k, (heading, html))| section(&format!("s{k}"), &escape(heading), html.clone())).collect();
+    fill(
+        PAGE,
+        &[
+            ("title", &escape(title)),
+            ("about", &escape(about)),
+            ("tiles", ""),
+            ("sections", &sections),
+            ("style", STYLE),
+            ("script", SCRIPT),
+        ],
+    )
 }
 
 /// A part of the page with its heading; nothing if it has no content.

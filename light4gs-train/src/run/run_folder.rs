@@ -28,6 +28,22 @@ pub struct RunRecord {
     pub scene: Option<PathBuf>,
     /// Version of the program that began the run.
     pub version: String,
+    /// Commit that it was built from, with `-dirty` behind it where files had been changed; `unknown` outside of the
+    /// repository.
+    #[serde(default)]
+    pub commit: String,
+    /// Device that the run began on.
+    #[serde(default)]
+    pub device: String,
+    /// Threads that it began with.
+    #[serde(default)]
+    pub threads: usize,
+    /// When it began, UTC.
+    #[serde(default)]
+    pub begun: String,
+    /// SHA-256 of the configuration that it began with.
+    #[serde(default)]
+    pub configuration: String,
 }
 
 impl RunRecord {
@@ -35,17 +51,17 @@ impl RunRecord {
     ///
     /// # Errors
     /// [`TrainError::Input`] if the path is not Unicode, which JSON cannot hold.
-    pub fn new(scene: Option<&Path>) -> Result<Self, TrainError> {
-        let version = env!("CARGO_PKG_VERSION").to_owned();
-        let Some(scene) = scene else { return Ok(Self { scene: None, version }) };
-        let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
-        if scene.to_str().is_none() {
-            return Err(TrainError::Input(format!(
-                "the dataset's path {} is not valid Unicode, so that {RECORD} cannot hold it; rename the folder, or link to it",
-                scene.display()
-            )));
-        }
-        Ok(Self { scene: Some(scene), version })
+    pub fn new(scene: Option<&Path>, config: &Config) -> Result<Self, TrainError> {
+        let scene = scene.map(absolute).transpose()?;
+        Ok(Self {
+            scene,
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            commit: env!("LIGHT4GS_COMMIT").to_owned(),
+            device: config.device.to_string(),
+            threads: rayon::current_num_threads(),
+            begun: jiff::Timestamp::now().strftime("%F %T UTC").to_string(),
+            configuration: config.digest_text(),
+        })
     }
 
     /// The dataset.
@@ -58,6 +74,18 @@ impl RunRecord {
             TrainError::Input(format!("this run was imported without a dataset; {remedy}"))
         })
     }
+}
+
+/// A path that JSON can hold.
+fn absolute(scene: &Path) -> Result<PathBuf, TrainError> {
+    let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
+    if scene.to_str().is_none() {
+        return Err(TrainError::Input(format!(
+            "the dataset's path {} is not valid Unicode, so that {RECORD} cannot hold it; rename the folder, or link to it",
+            scene.display()
+        )));
+    }
+    Ok(scene)
 }
 
 /// Paths of a run. A folder that is written to is locked: by [`RunFolder::create`], or by [`RunFolder::lock`]. The lock is
@@ -75,7 +103,7 @@ impl RunFolder {
     /// [`TrainError::RunExists`] if it holds a run and `overwrite` is not set; [`TrainError::RunInUse`] if another process
     /// writes into it; [`TrainError::Input`] if it holds anything else.
     pub fn create(root: &Path, scene: Option<&Path>, config: &Config, overwrite: bool) -> Result<Self, TrainError> {
-        let record = RunRecord::new(scene)?;
+        let record = RunRecord::new(scene, config)?;
         let mut folder = Self { root: root.to_owned(), lock: None };
         // Before the lock, whose file says that the folder is one of ours.
         folder.allow_new_run(overwrite)?;

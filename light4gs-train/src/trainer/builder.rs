@@ -1,6 +1,8 @@
 //! What a trainer is made of.
 
 use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 use burn::tensor::Device;
 use light4gs_data::Scene;
@@ -37,6 +39,7 @@ pub struct TrainerBuilder<F: DeformationField = HexPlaneField> {
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
+    stop: Arc<AtomicBool>,
 }
 
 impl<F: DeformationField> TrainerBuilder<F> {
@@ -49,6 +52,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             density: Box::new(AdaptiveDensityControl::new(config.train.densify.clone())),
             significance: Box::new(VolumeWeightedScore::new(&config.train.prune)),
             observers: Vec::new(),
+            stop: Arc::default(),
             config,
             data,
             field,
@@ -95,6 +99,13 @@ impl<F: DeformationField> TrainerBuilder<F> {
     /// One more observer. They are told in the order in which they were added, after the logs of the run folder.
     pub fn observer(mut self, observer: impl Observer + 'static) -> Self {
         self.observers.push(Box::new(observer));
+        self
+    }
+
+    /// A request to stop, which anyone may set at any time: before its next iteration the trainer then writes a checkpoint
+    /// and returns [`TrainError::Stopped`]. [`TrainerBuilder::resume`] goes on from there to the same result.
+    pub fn stop_flag(mut self, stop: Arc<AtomicBool>) -> Self {
+        self.stop = stop;
         self
     }
 
@@ -161,7 +172,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
         mut state: Checkpoint<F>,
         checkpoint: Option<PathBuf>,
     ) -> Result<Trainer<F>, TrainError> {
-        let Self { config, data, images, folder, loss, mut density, significance, observers, .. } = self;
+        let Self { config, data, images, folder, loss, mut density, significance, observers, stop, .. } = self;
         let count = state.scene.gaussians.len();
         match checkpoint {
             None => density.begin_stage(count, &device.clone().inner()),
@@ -199,6 +210,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             density,
             significance,
             observers: all,
+            stop,
             sampler_ahead: sampler.clone(),
             sampler,
             profile: Profile::off(),

@@ -22,6 +22,8 @@ mod sampling;
 mod step;
 mod views;
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 use burn::module::Module;
@@ -109,6 +111,7 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
+    stop: Arc<AtomicBool>,
     sampler: FrameSampler,
     /// The same, asked for what comes later.
     sampler_ahead: FrameSampler,
@@ -213,8 +216,11 @@ impl<F: DeformationField> Trainer<F> {
             images: Some(&*self.images),
             device: &self.device,
         };
-        let observers = &mut self.observers;
-        code_scene(&trained, &mut |done, iterations| observers.iter_mut().try_for_each(|o| o.on_fit(done, iterations)))
+        let (observers, stop, folder) = (&mut self.observers, &self.stop, self.folder.as_ref());
+        code_scene(&trained, &mut |done, iterations| match stop.load(Ordering::Relaxed) {
+            true => Err(stopped("while the entropy models were fitted", folder)),
+            false => observers.iter_mut().try_for_each(|observer| observer.on_fit(done, iterations)),
+        })
     }
 
     /// One iteration: forward and backward through a batch of views, the optimizer's step, then cloning, splitting and
@@ -223,9 +229,12 @@ impl<F: DeformationField> Trainer<F> {
     ///
     /// # Errors
     /// [`TrainError::Diverged`] if the loss or a parameter is not finite; an image that cannot be read; a log or a checkpoint that cannot be
-    /// written; an observer's own.
+    /// written; an observer's own; [`TrainError::Stopped`] where that was asked for.
     pub fn step(&mut self) -> Result<Option<StepReport>, TrainError> {
         let Some(iterations) = self.begin_iteration()? else { return Ok(None) };
+        if self.stop.load(Ordering::Relaxed) {
+            return Err(self.stop()?);
+        }
         let stage = self.state.stage;
         let iteration = self.state.iteration + 1;
         let begin = Instant::now();
@@ -268,6 +277,18 @@ impl<F: DeformationField> Trainer<F> {
             self.restart_lap();
         }
         Ok(Some(iterations))
+    }
+
+    /// Makes sure that nothing is lost, and returns the error that says where training has stopped.
+    fn stop(&mut self) -> Result<TrainError, TrainError> {
+        let (stage, iteration) = self.position();
+        let saved =
+            |folder: &RunFolder| folder.checkpoints().join(Checkpoint::<F>::file_name(stage, iteration)).exists();
+        // At the beginning of a stage there is nothing that the last checkpoint, or the dataset, does not have.
+        if iteration > 0 && !self.folder.as_ref().is_some_and(saved) {
+            self.save_checkpoint()?;
+        }
+        Ok(stopped(&format!("after iteration {iteration} of the {stage} stage"), self.folder.as_ref()))
     }
 
     /// The fine stage starts with a new optimizer and new statistics.
@@ -362,6 +383,12 @@ impl<F: DeformationField> Trainer<F> {
         }
         Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
     }
+}
+
+/// The error of a run that was asked to stop.
+fn stopped(place: &str, folder: Option<&RunFolder>) -> TrainError {
+    let remedy = folder.map(|folder| format!("; `light4gs resume {}` goes on from there", folder.root().display()));
+    TrainError::Stopped(format!("stopped on request {place}{}", remedy.unwrap_or_default()))
 }
 
 /// The model between two iterations.

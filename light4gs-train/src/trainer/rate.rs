@@ -72,7 +72,8 @@ impl<F: DeformationField> Trainer<F> {
         let anything = compression.planes.is_some() || (with_sh && compression.sh.is_some());
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
-            let rate = compression.rate(noisy, config.fraction, with_sh, &mut generator);
+            let apart = (!config.planes || !config.sh).then(|| noisy.out_of_reach(!config.planes, !config.sh));
+            let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_sh, &mut generator);
             let term = match config.weighting {
                 RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
                 // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.

@@ -1,0 +1,135 @@
+//! Which pixels of an image count.
+
+use super::decode::decode_upright;
+use super::undistort::{is_recorded_everywhere, undistort_mask};
+use crate::error::DataError;
+use crate::frame::{Frame, Mask, MaskMeaning};
+use std::path::Path;
+
+/// `[H, W]` marks at the size of a frame's camera.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PixelMask {
+    /// Width, pixels.
+    pub width: u32,
+    /// Height, pixels.
+    pub height: u32,
+    /// `height * width` values, row-major: 1 where a pixel counts, otherwise 0.
+    pub pixels: Vec<u8>,
+}
+
+/// The pixels that a frame may be trained on; `None` where it is all of them. Not: what its mask ignores, and what its
+/// lens did not record.
+pub(super) fn trained_pixels(frame: &Frame) -> Result<Option<PixelMask>, DataError> {
+    let ignored = frame.mask.as_ref().filter(|mask| mask.zero == MaskMeaning::Ignored);
+    let size = (frame.source_width, frame.source_height);
+    let bent = frame.lens.is_some_and(|lens| !is_recorded_everywhere(size, &frame.camera, &lens));
+    match ignored {
+        None if !bent => Ok(None),
+        None => Ok(Some(at_camera(frame, vec![1; size.0 as usize * size.1 as usize]))),
+        Some(mask) => {
+            let marks = read(mask, size)?.into_iter().map(|value| u8::from(value != 0)).collect();
+            let mask = at_camera(frame, marks);
+            Ok(mask.pixels.contains(&0).then_some(mask))
+        }
+    }
+}
+
+/// The pixels that masked measures look at: those that the frame's mask does not ignore, or those where something moves;
+/// `None` without a mask.
+///
+/// # Errors
+/// [`DataError::Image`] where the mask cannot be read.
+pub fn measured_pixels(frame: &Frame) -> Result<Option<PixelMask>, DataError> {
+    let Some(mask) = &frame.mask else { return Ok(None) };
+    let counts = |value: u8| (value != 0) == (mask.zero == MaskMeaning::Ignored);
+    let marks = read(mask, (frame.source_width, frame.source_height))?;
+    Ok(Some(at_camera(frame, marks.into_iter().map(|value| u8::from(counts(value))).collect())))
+}
+
+/// The mask's values at the size of the image's file, each from the nearest pixel.
+fn read(mask: &Mask, size: (u32, u32)) -> Result<Vec<u8>, DataError> {
+    let found = super::image_size(&mask.path)?;
+    let gray = decode_upright(&mask.path, found)?.into_luma8();
+    same_aspect(&mask.path, found, size)?;
+    Ok(nearest(gray.as_raw(), found, size))
+}
+
+fn same_aspect(path: &Path, found: (u32, u32), size: (u32, u32)) -> Result<(), DataError> {
+    if (found.0 > found.1) != (size.0 > size.1) && found.0 != found.1 && size.0 != size.1 {
+        let problem = format!("the mask is {} x {} pixels, its image {} x {}", found.0, found.1, size.0, size.1);
+        return Err(DataError::image(path, problem, "make masks of the images as they are"));
+    }
+    Ok(())
+}
+
+/// Marks of the image's file as the frame's camera sees them.
+fn at_camera(frame: &Frame, marks: Vec<u8>) -> PixelMask {
+    let source = (frame.source_width, frame.source_height);
+    let straight = match &frame.lens {
+        Some(lens) => undistort_mask(&marks, source, &frame.camera, lens, 0),
+        None => marks,
+    };
+    let (width, height) = (frame.camera.width, frame.camera.height);
+    PixelMask { width, height, pixels: nearest(&straight, source, (width, height)) }
+}
+
+fn nearest(values: &[u8], from: (u32, u32), to: (u32, u32)) -> Vec<u8> {
+    if from == to {
+        return values.to_vec();
+    }
+    let at = |i: u32, from: u32, to: u32| {
+        let place = (f64::from(i) + 0.5) * f64::from(from) / f64::from(to);
+        (place as usize).min(from.saturating_sub(1) as usize)
+    };
+    let columns: Vec<usize> = (0..to.0).map(|i| at(i, from.0, to.0)).collect();
+    let rows = (0..to.1).map(|j| at(j, from.1, to.1) * from.0 as usize);
+    rows.flat_map(|row| columns.iter().map(move |column| values[row + column])).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use crate::lens::{Distortion, Lens};
+    use glam::Vec3;
+
+    fn frame(folder: &Path, zero: MaskMeaning) -> Frame {
+        let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 1.0, 8, 4);
+        let mut frame = Frame::new("a", camera, 0.0, folder.join("a.png"), (16, 8));
+        frame.mask = Some(Mask { path: folder.join("m.png"), zero });
+        frame
+    }
+
+    #[test]
+    fn masks_come_at_the_size_of_the_camera_with_their_meaning() {
+        let folder = tempfile::tempdir().unwrap();
+        // The left half is 0; the mask is half as large as the image.
+        let mask = image::GrayImage::from_fn(8, 4, |x, _| image::Luma([if x < 4 { 0 } else { 200 }]));
+        mask.save(folder.path().join("m.png")).unwrap();
+        let right: Vec<u8> = [0, 0, 0, 0, 1, 1, 1, 1].repeat(4);
+        let left: Vec<u8> = right.iter().map(|v| 1 - v).collect();
+        let ignored = frame(folder.path(), MaskMeaning::Ignored);
+        assert_eq!(trained_pixels(&ignored).unwrap().unwrap().pixels, right);
+        assert_eq!(measured_pixels(&ignored).unwrap().unwrap().pixels, right);
+        let moving = frame(folder.path(), MaskMeaning::Moving);
+        assert_eq!(trained_pixels(&moving).unwrap(), None);
+        assert_eq!(measured_pixels(&moving).unwrap().unwrap().pixels, left);
+        // A mask on its side is refused; none is none.
+        image::GrayImage::new(4, 8).save(folder.path().join("m.png")).unwrap();
+        assert!(measured_pixels(&moving).unwrap_err().to_string().contains("m.png"));
+        assert_eq!(measured_pixels(&Frame { mask: None, ..moving }).unwrap(), None);
+    }
+
+    #[test]
+    fn what_a_lens_did_not_record_is_not_trained_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let with_lens = |k1: f64| {
+            let distortion =
+                Distortion::RadialTangential { radial: [k1, 0.0, 0.0, 0.0, 0.0, 0.0], tangential: [0.0; 2] };
+            Frame { mask: None, lens: Lens::new(distortion, 0.0), ..frame(folder.path(), MaskMeaning::Moving) }
+        };
+        let pincushion = trained_pixels(&with_lens(0.9)).unwrap().unwrap();
+        assert_eq!((pincushion.pixels[0], pincushion.pixels[2 * 8 + 4]), (0, 1));
+        assert_eq!(trained_pixels(&with_lens(-0.1)).unwrap(), None);
+    }
+}

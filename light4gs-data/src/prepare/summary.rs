@@ -1,0 +1,93 @@
+//! What came out, and what to do if it is poor.
+
+use std::fmt;
+
+/// Below this share of the images with a pose, something went wrong.
+const LEAST_REGISTERED: f64 = 0.8;
+/// Above this mean reprojection error, pixels, the poses blur what is trained.
+const MOST_ERROR: f64 = 1.5;
+/// Fewer points than this say that there was little to hold on to.
+const LEAST_POINTS: usize = 500;
+
+/// What [`crate::prepare`] found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PrepareSummary {
+    /// Images that poses were looked for.
+    pub images: usize,
+    /// Images that have one.
+    pub registered: usize,
+    /// Mean distance between where points were seen and where they project, pixels.
+    pub reprojection_error: f64,
+    /// Points of the sparse model.
+    pub points: usize,
+    /// Frames of the dataset.
+    pub frames: usize,
+    /// Cameras of the dataset.
+    pub cameras: usize,
+}
+
+impl PrepareSummary {
+    /// What to do better, in sentences; empty where all is well.
+    pub fn advice(&self) -> Vec<&'static str> {
+        let mut advice = Vec::new();
+        if (self.registered as f64) < LEAST_REGISTERED * self.images as f64 {
+            advice.push(if self.cameras > 1 {
+                "Cameras without a pose see too little of what the others see: put them closer together, or turn them \
+                 to a common background with texture."
+            } else {
+                "Many frames have no pose: move more slowly and sideways, avoid blank walls and fast turns, or take more \
+                 frames with --frames."
+            });
+        }
+        if self.reprojection_error > MOST_ERROR {
+            advice.push(
+                "The reprojection error is high: fix focus and exposure, switch off zoom and stabilization, and film in \
+                 good light so that frames are sharp.",
+            );
+        }
+        if self.points < LEAST_POINTS {
+            advice.push(
+                "There are few points: bring objects with texture into the background, and keep most of the image still \
+                 while something moves.",
+            );
+        }
+        advice
+    }
+}
+
+impl fmt::Display for PrepareSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let share = 100.0 * self.registered as f64 / self.images.max(1) as f64;
+        writeln!(f, "images with a pose      {} of {} ({share:.0} %)", self.registered, self.images)?;
+        writeln!(f, "reprojection error      {:.2} pixels", self.reprojection_error)?;
+        writeln!(f, "points                  {}", self.points)?;
+        write!(f, "frames of the dataset   {} of {} camera", self.frames, self.cameras)?;
+        f.write_str(if self.cameras == 1 { "" } else { "s" })?;
+        for advice in self.advice() {
+            write!(f, "\n{advice}")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn poor_results_come_with_advice() {
+        let good = PrepareSummary {
+            images: 100,
+            registered: 98,
+            reprojection_error: 0.7,
+            points: 9000,
+            frames: 98,
+            cameras: 1,
+        };
+        assert!(good.advice().is_empty());
+        assert!(good.to_string().contains("98 of 100 (98 %)"));
+        let poor = PrepareSummary { registered: 40, reprojection_error: 2.5, points: 80, ..good };
+        assert_eq!(poor.advice().len(), 3);
+        assert!(poor.to_string().contains("sideways"));
+    }
+}

@@ -1,0 +1,104 @@
+//! The dataset: `transforms.json` and `points3D.ply`, from COLMAP's model.
+
+use super::poses::{Work, posed_images};
+use super::{PrepareOptions, PrepareSummary, frame_names};
+use crate::atomic::write_atomically;
+use crate::error::DataError;
+use crate::layouts::colmap::{
+    model::{Model, ModelCamera, ModelImage},
+    read_model,
+};
+use crate::lens::Distortion;
+use crate::ply::Encoding;
+use glam::{DMat3, DVec3};
+use serde_json::{Value, json};
+use std::collections::HashMap;
+use std::io::Write;
+
+/// Mean distance of the cameras to the middle of the points, world units: that of the field's synthetic scenes, so that
+/// thresholds in world units mean the same.
+const CAMERA_DISTANCE: f64 = 4.0;
+
+/// Writes the dataset, and says what is in it.
+pub(super) fn dataset(options: &PrepareOptions, cameras: &[String]) -> Result<PrepareSummary, DataError> {
+    let mut model = read_model(&Work::of(&options.out).best_model()?)?;
+    let wanted = posed_images(options, cameras)?.len();
+    let registered = model.images.len();
+    normalize(&mut model);
+    let posed: HashMap<&str, &ModelImage> = model.images.iter().map(|image| (image.name.as_str(), image)).collect();
+    let lists = frame_names(&options.out, cameras)?;
+    let stands = cameras.len() > 1 && !options.moving_rig;
+    let last = lists.first().map_or(0, Vec::len).saturating_sub(1).max(1) as f64;
+    let mut frames = Vec::new();
+    let mut used = 0;
+    for list in &lists {
+        // A camera that stands still has the pose of its first frame.
+        let of_camera = list.first().and_then(|name| posed.get(name.as_str()));
+        let before = frames.len();
+        for (i, name) in list.iter().enumerate() {
+            let image = if stands { of_camera } else { posed.get(name.as_str()) };
+            if let Some(image) = image {
+                frames.push(frame(name, i as f64 / last, image, &model.cameras[&image.camera]));
+            }
+        }
+        used += usize::from(frames.len() > before);
+    }
+    let summary = PrepareSummary {
+        images: wanted,
+        registered,
+        reprojection_error: model.error.unwrap_or(0.0),
+        points: model.points.len(),
+        frames: frames.len(),
+        cameras: used,
+    };
+    model.points.write_ply(&options.out.join("points3D.ply"), Encoding::BinaryLittleEndian)?;
+    let document = json!({ "ply_file_path": "points3D.ply", "frames": frames });
+    let path = options.out.join("transforms.json");
+    write_atomically(&path, |out| writeln!(out, "{document:#}"))?;
+    Ok(summary)
+}
+
+fn frame(name: &str, time: f64, image: &ModelImage, camera: &ModelCamera) -> Value {
+    let to_world = image.rotation.transpose();
+    // OpenGL axes: y and z change sign.
+    let (x, y, z) = (to_world.x_axis, -to_world.y_axis, -to_world.z_axis);
+    let row = |i: usize| json!([x[i], y[i], z[i], image.center[i]]);
+    let k = camera.intrinsics;
+    let mut value = json!({
+        "file_path": format!("images/{name}"),
+        "time": time,
+        "transform_matrix": [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]],
+        "camera_model": "OPENCV",
+        "w": k.width, "h": k.height, "fl_x": k.fx, "fl_y": k.fy, "cx": k.cx, "cy": k.cy,
+    });
+    if let Some(Distortion::RadialTangential { radial, tangential }) = camera.lens.map(|lens| lens.distortion) {
+        (value["k1"], value["k2"]) = (json!(radial[0]), json!(radial[1]));
+        (value["p1"], value["p2"]) = (json!(tangential[0]), json!(tangential[1]));
+    }
+    value
+}
+
+/// COLMAP's world has an arbitrary origin, orientation and size. Brings the mean upward direction of the cameras to z, the
+/// middle of the points to the origin, and the cameras to their usual distance.
+fn normalize(model: &mut Model) {
+    let up = model.images.iter().map(|image| -image.rotation.row(1)).sum::<DVec3>().normalize_or(DVec3::Z);
+    let side = up.any_orthonormal_vector();
+    let turn = DMat3::from_cols(side, up.cross(side), up).transpose();
+    let mut middle = DVec3::ZERO;
+    for axis in 0..3 {
+        let mut values: Vec<f32> = model.points.positions.iter().map(|point| point[axis]).collect();
+        values.sort_by(f32::total_cmp);
+        middle[axis] = values.get(values.len() / 2).copied().unwrap_or(0.0).into();
+    }
+    let count = model.images.len().max(1) as f64;
+    let distance = model.images.iter().map(|image| image.center.distance(middle)).sum::<f64>() / count;
+    let scale = if distance > 1e-9 { CAMERA_DISTANCE / distance } else { 1.0 };
+    for image in &mut model.images {
+        image.center = turn * (image.center - middle) * scale;
+        image.rotation *= turn.transpose();
+    }
+    for position in &mut model.points.positions {
+        let moved = turn * (DVec3::from(position.map(f64::from)) - middle) * scale;
+        *position = moved.as_vec3().to_array();
+    }
+}

@@ -1,0 +1,88 @@
+//! Poses of images, through the program `colmap`.
+
+use super::{Program, argument};
+use crate::error::DataError;
+use std::path::Path;
+use std::process::Command;
+
+/// The program.
+pub(crate) const COLMAP: Program = Program {
+    name: "colmap",
+    variable: "LIGHT4GS_COLMAP",
+    version_arguments: &["help"],
+    oldest: (3, 6),
+    install: "install it with `apt install colmap`, `brew install colmap` or from https://colmap.github.io",
+};
+
+/// A step of a reconstruction.
+pub(crate) struct Step<'a> {
+    /// COLMAP's command, such as `mapper`.
+    pub(crate) command: &'a str,
+    /// The group of options that says whether a graphics card computes: its names before and after COLMAP 3.12.
+    pub(crate) gpu_groups: &'a [&'a str],
+    /// What is done, for messages.
+    pub(crate) attempt: &'a str,
+    /// What to do if it fails.
+    pub(crate) remedy: &'a str,
+}
+
+/// Runs a step. `arguments` fills in what it works on; `line` is told every line that it prints.
+///
+/// # Errors
+/// [`DataError::Program`] where COLMAP is absent, or ends badly.
+pub(crate) fn run(
+    step: &Step,
+    arguments: impl FnOnce(&mut Command),
+    line: &mut dyn FnMut(&str),
+) -> Result<(), DataError> {
+    let mut command = COLMAP.command();
+    // It is linked with a window system that may not be there.
+    command.env("QT_QPA_PLATFORM", "offscreen").arg(step.command);
+    if !step.gpu_groups.is_empty() {
+        // Most builds of Linux distributions cannot use a graphics card, and say so by ending.
+        let help =
+            COLMAP.output(COLMAP.command().env("QT_QPA_PLATFORM", "offscreen").args([step.command, "--help"]))?;
+        let help = String::from_utf8_lossy(&[help.stdout, help.stderr].concat()).into_owned();
+        let known = step.gpu_groups.iter().map(|group| format!("--{group}.use_gpu")).find(|name| help.contains(name));
+        if let Some(name) = known {
+            command.arg(name).arg(argument(0));
+        }
+    }
+    arguments(&mut command);
+    COLMAP.stream(&mut command, line, step.attempt, step.remedy)
+}
+
+/// The two numbers of `... [3/20]`, as COLMAP counts images.
+pub(crate) fn counted(line: &str) -> Option<(usize, usize)> {
+    let inside = line.rsplit_once('[')?.1.split_once(']')?.0;
+    let (done, total) = inside.split_once('/')?;
+    Some((done.trim().parse().ok()?, total.trim().split(',').next()?.parse().ok()?))
+}
+
+/// The last number in parentheses, as the mapper counts images: `Registering image #5 (6)`.
+pub(crate) fn registered(line: &str) -> Option<usize> {
+    if !line.contains("Registering image #") {
+        return None;
+    }
+    line.rsplit_once('(')?.1.split_once(')')?.0.trim().parse().ok()
+}
+
+/// A path as an argument.
+pub(crate) fn path_argument<'a>(command: &'a mut Command, name: &str, path: &Path) -> &'a mut Command {
+    command.arg(name).arg(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_colmap_counts() {
+        assert_eq!(counted("Processed file [3/20]"), Some((3, 20)));
+        assert_eq!(counted("Matching image [7/20] in 0.1s"), Some((7, 20)));
+        assert_eq!(counted("I2024 x.cc:254] Processed file [1/2]"), Some((1, 2)));
+        assert_eq!(counted("Name: a.png"), None);
+        assert_eq!(registered("Registering image #5 (6)"), Some(6));
+        assert_eq!(registered("=> Image sees 5 (6)"), None);
+    }
+}

@@ -1,0 +1,75 @@
+//! Tables and report of the runs that are finished.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use serde::Serialize;
+
+use super::super::output::{say, say_json, tell};
+use crate::error::TrainError;
+use crate::study::figures::{figures, write_report};
+use crate::study::manifest::{Manifest, StudyFolder};
+use crate::study::rate_curves::{RateCurves, rate_curves};
+use crate::study::results::Results;
+use crate::study::table::{StudyTable, legend, tables, to_markdown};
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct Gather {
+    /// Folder of the study.
+    study: PathBuf,
+    /// Print the results as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Gather {
+    pub(in crate::cli) fn run(self) -> Result<(), TrainError> {
+        let (folder, manifest) = StudyFolder::open(&self.study)?;
+        gather(&folder, &manifest, self.json)
+    }
+}
+
+/// `results.json`.
+#[derive(Serialize)]
+struct ResultsFile<'a> {
+    #[serde(flatten)]
+    results: &'a Results,
+    tables: &'a [StudyTable],
+    curves: &'a [RateCurves],
+}
+
+/// Writes everything that the finished runs give, and prints the tables.
+///
+/// # Errors
+/// [`TrainError::Input`] that names what is missing, once all has been written.
+pub(super) fn gather(folder: &StudyFolder, manifest: &Manifest, json: bool) -> Result<(), TrainError> {
+    let results = Results::read(folder, manifest)?;
+    let tables = tables(manifest, &results);
+    let curves = rate_curves(manifest, &results);
+    let file = ResultsFile { results: &results, tables: &tables, curves: &curves };
+    folder.write_json("results.json", &file)?;
+    folder.write("results.csv", results.to_csv(manifest, false).as_bytes())?;
+    folder.write("times.csv", results.to_csv(manifest, true).as_bytes())?;
+    folder.write("table.md", to_markdown(manifest, &results, &tables, &curves).as_bytes())?;
+    let figures = figures(folder, manifest, &results, &curves)?;
+    write_report(folder, manifest, &results, &tables, &curves, &figures)?;
+    if json {
+        say_json(&file)?;
+    } else {
+        for table in &tables {
+            say(table.to_text())?;
+        }
+        say(legend(manifest))?;
+    }
+    if results.missing.is_empty() {
+        return Ok(());
+    }
+    for missing in &results.missing {
+        tell(format_args!("missing: {}: {}", missing.run, missing.state));
+    }
+    Err(TrainError::Input(format!(
+        "{} of {} runs are missing; the command that began the study goes on with them",
+        results.missing.len(),
+        manifest.runs.len()
+    )))
+}

@@ -1,0 +1,59 @@
+//! Test views of all variants, side by side.
+
+use std::path::Path;
+
+use light4gs_data::{RgbImage8, Scene};
+
+use super::{Content, Figure};
+use crate::dataset::{ImageSource, image_store, load_options};
+use crate::error::TrainError;
+use crate::run::RunFolder;
+use crate::study::manifest::{Manifest, StudyFolder};
+use crate::study::results::RunResult;
+
+/// The middle frame of the test split, of each run that has saved its images; in front of them the ground truth, where the
+/// dataset is still there.
+pub(super) fn side_by_side(
+    folder: &StudyFolder,
+    manifest: &Manifest,
+    scene: usize,
+    runs: &[(String, &RunResult)],
+) -> Result<Option<Figure>, TrainError> {
+    let named = &manifest.scenes[scene];
+    let renders = |run: &RunResult| folder.path(&run.run).join("renders/test");
+    let Some(name) = runs.iter().find_map(|(_, run)| middle_name(&renders(run))) else { return Ok(None) };
+    let mut images = Vec::new();
+    if let Some((_, run)) = runs.first() {
+        let (_, _, config) = RunFolder::open(&folder.path(&run.run))?;
+        let truth = Scene::open(&named.path, &load_options(&config)).ok().and_then(|scene| {
+            let frame = scene.test.iter().find(|frame| format!("{}.png", frame.name) == name)?;
+            Some((*image_store(&config).image(frame).ok()?).clone())
+        });
+        images.extend(truth.map(|truth| ("ground truth".to_owned(), truth)));
+    }
+    for (label, run) in runs {
+        if let Some(image) = read(&renders(run).join(&name)) {
+            images.push((label.clone(), image));
+        }
+    }
+    Ok(Some(Figure {
+        section: "Images",
+        name: format!("images-{}", named.name),
+        caption: format!("{}: test view {}, from the decoded files.", named.name, name.trim_end_matches(".png")),
+        content: Content::Images(images),
+    }))
+}
+
+/// The name in the middle of a folder's images.
+fn middle_name(folder: &Path) -> Option<String> {
+    let names = std::fs::read_dir(folder).ok()?.flatten().filter_map(|entry| entry.file_name().into_string().ok());
+    let mut names: Vec<String> = names.filter(|name| name.ends_with(".png") && !name.starts_with('.')).collect();
+    names.sort();
+    names.get(names.len() / 2).cloned()
+}
+
+/// An image that we wrote; none if it is not there.
+fn read(path: &Path) -> Option<RgbImage8> {
+    let image = image::open(path).ok()?.into_rgb8();
+    Some(RgbImage8 { width: image.width(), height: image.height(), pixels: image.into_raw() })
+}

@@ -1,0 +1,258 @@
+//! What can be measured of a run, and the columns of tables.
+
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+use super::results::RunResult;
+use crate::config::choice;
+
+choice! {
+    /// Something measured of a finished run.
+    #[derive(PartialOrd, Ord)]
+    pub enum Measure: "measure" {
+        /// Mean PSNR of the test split (the first measured one where there is none), dB.
+        Psnr = "psnr",
+        /// Mean SSIM of the same split.
+        Ssim = "ssim",
+        /// Mean PSNR of the validation split, dB.
+        ValPsnr = "val_psnr",
+        /// Size of the file.
+        Bytes = "bytes",
+        /// Size of what the Gaussians take: their attributes and spherical harmonics.
+        GaussianBytes = "gaussian_bytes",
+        /// Size of the spherical harmonics beyond degree 0, with their model.
+        ShBytes = "sh_bytes",
+        /// Size of what the hexplanes take: values and context model.
+        HexplaneBytes = "hexplane_bytes",
+        /// Size of the context model alone.
+        ContextBytes = "context_bytes",
+        /// Size of the motion network.
+        MotionBytes = "motion_bytes",
+        /// Gaussians in the file.
+        Gaussians = "gaussians",
+        /// Smallest step of the planes.
+        LeastStep = "least_step",
+        /// Largest step of the planes.
+        MostStep = "most_step",
+        /// Minutes of training.
+        Minutes = "minutes",
+        /// Seconds of fitting entropy models to a scene that was trained without them.
+        FitSeconds = "fit_seconds",
+        /// Seconds of encoding, the check by decoding included.
+        EncodeSeconds = "encode_seconds",
+        /// Seconds of decoding.
+        DecodeSeconds = "decode_seconds",
+        /// Milliseconds of rendering a frame.
+        RenderMilliseconds = "render_milliseconds",
+        /// Encoding, spread over the frames of the scene: milliseconds.
+        EncodePerFrame = "encode_per_frame",
+        /// Decoding, spread over the frames of the scene: milliseconds.
+        DecodePerFrame = "decode_per_frame",
+        /// Encoding, decoding and rendering of one frame: milliseconds.
+        EndToEnd = "end_to_end",
+        /// Frames a second, decoding excluded.
+        Fps = "fps",
+    }
+}
+
+impl Measure {
+    /// All of them.
+    pub const ALL: [Self; 21] = [
+        Self::Psnr,
+        Self::Ssim,
+        Self::ValPsnr,
+        Self::Bytes,
+        Self::GaussianBytes,
+        Self::ShBytes,
+        Self::HexplaneBytes,
+        Self::ContextBytes,
+        Self::MotionBytes,
+        Self::Gaussians,
+        Self::LeastStep,
+        Self::MostStep,
+        Self::Minutes,
+        Self::FitSeconds,
+        Self::EncodeSeconds,
+        Self::DecodeSeconds,
+        Self::RenderMilliseconds,
+        Self::EncodePerFrame,
+        Self::DecodePerFrame,
+        Self::EndToEnd,
+        Self::Fps,
+    ];
+
+    /// Heading of a column, with its unit.
+    pub fn heading(self) -> &'static str {
+        match self {
+            Self::Psnr => "PSNR dB",
+            Self::Ssim => "SSIM",
+            Self::ValPsnr => "val PSNR dB",
+            Self::Bytes => "file, bytes",
+            Self::GaussianBytes => "Gaussians, bytes",
+            Self::ShBytes => "SH, bytes",
+            Self::HexplaneBytes => "hexplanes, bytes",
+            Self::ContextBytes => "context model, bytes",
+            Self::MotionBytes => "network, bytes",
+            Self::Gaussians => "Gaussians",
+            Self::LeastStep => "least step",
+            Self::MostStep => "largest step",
+            Self::Minutes => "training, min",
+            Self::FitSeconds => "fitting, s",
+            Self::EncodeSeconds => "encoding, s",
+            Self::DecodeSeconds => "decoding, s",
+            Self::RenderMilliseconds => "rendering, ms a frame",
+            Self::EncodePerFrame => "encoding, ms a frame",
+            Self::DecodePerFrame => "decoding, ms a frame",
+            Self::EndToEnd => "end to end, ms a frame",
+            Self::Fps => "FPS",
+        }
+    }
+
+    /// Short name, for headings of differences.
+    fn short(self) -> &'static str {
+        self.heading().split(',').next().unwrap_or_default().trim_end_matches(" dB")
+    }
+
+    /// Digits after the point.
+    pub fn digits(self) -> usize {
+        match self {
+            Self::Bytes | Self::GaussianBytes | Self::ShBytes | Self::HexplaneBytes | Self::ContextBytes => 0,
+            Self::MotionBytes | Self::Gaussians => 0,
+            Self::Minutes | Self::FitSeconds | Self::Fps => 1,
+            Self::Psnr | Self::ValPsnr | Self::EncodeSeconds | Self::DecodeSeconds | Self::RenderMilliseconds => 2,
+            Self::EncodePerFrame | Self::DecodePerFrame | Self::EndToEnd => 2,
+            Self::Ssim | Self::LeastStep | Self::MostStep => 4,
+        }
+    }
+
+    /// Whether it is a time, which is another in every run.
+    pub fn is_time(self) -> bool {
+        matches!(
+            self,
+            Self::Minutes
+                | Self::FitSeconds
+                | Self::EncodeSeconds
+                | Self::DecodeSeconds
+                | Self::RenderMilliseconds
+                | Self::EncodePerFrame
+                | Self::DecodePerFrame
+                | Self::EndToEnd
+                | Self::Fps
+        )
+    }
+
+    /// Its value in a run; none where it was not measured, or is not finite.
+    pub fn of(self, run: &RunResult) -> Option<f64> {
+        let section = |names: &[&str]| -> Option<f64> {
+            let bytes = run.sections.iter().filter(|(name, _)| names.contains(&name.as_str())).map(|(_, bytes)| *bytes);
+            Some(bytes.sum::<u64>() as f64)
+        };
+        let per_frame = |seconds: Option<f64>| Some(1e3 * seconds? / run.frames? as f64);
+        let render = 1e3 / run.fps;
+        let value = match self {
+            Self::Psnr => run.psnr,
+            Self::Ssim => run.ssim,
+            Self::ValPsnr => run.val_psnr,
+            Self::Bytes => Some(run.bytes as f64),
+            Self::GaussianBytes => section(&["gaussians", "sh"]),
+            Self::ShBytes => section(&["sh"]),
+            Self::HexplaneBytes => section(&["hexplanes", "context_model"]),
+            Self::ContextBytes => section(&["context_model"]),
+            Self::MotionBytes => section(&["motion"]),
+            Self::Gaussians => Some(run.gaussians as f64),
+            Self::LeastStep => run.steps.iter().copied().reduce(f64::min),
+            Self::MostStep => run.steps.iter().copied().reduce(f64::max),
+            Self::Minutes => run.training_seconds.map(|seconds| seconds / 60.0),
+            Self::FitSeconds => run.fit_seconds,
+            Self::EncodeSeconds => run.encode_seconds,
+            Self::DecodeSeconds => Some(run.decode_seconds),
+            Self::RenderMilliseconds => Some(render),
+            Self::EncodePerFrame => per_frame(run.encode_seconds),
+            Self::DecodePerFrame => per_frame(Some(run.decode_seconds)),
+            Self::EndToEnd => {
+                per_frame(run.encode_seconds.map(|encode| encode + run.decode_seconds)).map(|t| t + render)
+            }
+            Self::Fps => Some(run.fps),
+        };
+        value.filter(|value| value.is_finite())
+    }
+}
+
+/// How a column shows its measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// As it is.
+    Value,
+    /// As the difference to the reference.
+    Difference,
+    /// As that difference in percent of the reference.
+    Percent,
+}
+
+/// A column of a table: `psnr`, `psnr:difference`, `bytes:percent`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Column {
+    /// What is shown.
+    pub measure: Measure,
+    /// How.
+    pub form: Form,
+}
+
+/// The columns of a study that names none.
+pub(super) fn default_columns() -> Vec<Column> {
+    let value = |measure| Column { measure, form: Form::Value };
+    let percent = |measure| Column { measure, form: Form::Percent };
+    vec![
+        value(Measure::Psnr),
+        percent(Measure::Psnr),
+        value(Measure::Ssim),
+        value(Measure::Bytes),
+        percent(Measure::Bytes),
+        value(Measure::Gaussians),
+    ]
+}
+
+impl Column {
+    /// Its heading.
+    pub fn heading(&self) -> String {
+        match self.form {
+            Form::Value => self.measure.heading().to_owned(),
+            Form::Difference => format!("Δ{}", self.measure.heading()),
+            Form::Percent => format!("Δ{} %", self.measure.short()),
+        }
+    }
+}
+
+impl std::fmt::Display for Column {
+    fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.form {
+            Form::Value => write!(formatter, "{}", self.measure),
+            Form::Difference => write!(formatter, "{}:difference", self.measure),
+            Form::Percent => write!(formatter, "{}:percent", self.measure),
+        }
+    }
+}
+
+impl Serialize for Column {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_str(self)
+    }
+}
+
+impl<'de> Deserialize<'de> for Column {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let text = String::deserialize(deserializer)?;
+        let (measure, form) = text.split_once(':').unwrap_or((&text, "value"));
+        let measure = measure.parse().map_err(D::Error::custom)?;
+        let form = match form {
+            "value" => Form::Value,
+            "difference" => Form::Difference,
+            "percent" => Form::Percent,
+            _ => {
+                let expected = "nothing, `:difference` or `:percent` follows the measure";
+                return Err(D::Error::custom(format!("column `{text}`: {expected}")));
+            }
+        };
+        Ok(Self { measure, form })
+    }
+}

@@ -1,0 +1,30 @@
+//! Studies: the paper's tables and figures, each a TOML file that says what varies and what is shown of it.
+//!
+//! - [`definition`]: such a file; [`catalog`]: those of the paper, embedded in the program
+//! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs that train alike are trained once
+//! - [`manifest`]: `study.json`, which says what a study's folder is to hold
+//! - [`measure`]: what can be measured of a run, and the columns of tables
+//! - [`results`]: what the runs have come to so far, `results.json` and the CSV files
+//! - [`table`]: means, spreads and differences to the reference
+//! - [`rate_curves`]: runs as curves of quality over size
+//! - `plots`, `figures`: what is drawn, and the study's `report.html` (feature `cli`)
+//! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
+
+pub mod catalog;
+pub mod curve;
+pub mod definition;
+#[cfg(feature = "cli")]
+pub mod figures;
+pub mod manifest;
+pub mod measure;
+pub mod plan;
+#[cfg(feature = "cli")]
+pub mod plots;
+pub mod rate_curves;
+pub mod results;
+pub mod spread;
+pub mod table;
+
+pub use definition::Study;
+pub use manifest::Manifest;
+pub use plan::Plan;

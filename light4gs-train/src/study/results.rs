@@ -1,0 +1,229 @@
+//! What the runs have come to so far.
+//!
+//! `results.json` and `results.csv` hold what every repetition of the study must give again, `times.csv` what depends on the
+//! machine and the hour.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::manifest::{Manifest, ManifestRun, StudyFolder};
+use super::measure::Measure;
+use crate::compression::CodingRecord;
+use crate::error::TrainError;
+use crate::observers::metrics_log::read_metrics;
+use crate::run::RunFolder;
+
+/// A finished run.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RunResult {
+    /// Its folder below the study's.
+    pub run: String,
+    /// Index of the scene.
+    pub scene: usize,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Counted from 0.
+    pub seed: u64,
+    /// Digest of its configuration.
+    pub configuration: String,
+    /// Mean PSNR of the test split, dB; of the first measured split where there is none.
+    pub psnr: Option<f64>,
+    /// Mean SSIM of the same split.
+    pub ssim: Option<f64>,
+    /// Mean PSNR of the validation split, dB.
+    pub val_psnr: Option<f64>,
+    /// Size of the file.
+    pub bytes: u64,
+    /// By section, header included.
+    pub sections: Vec<(String, u64)>,
+    /// Gaussians in the file.
+    pub gaussians: usize,
+    /// Width and height of the measured images.
+    pub resolution: [u32; 2],
+    /// Times in the training frames; none where the file does not say.
+    pub frames: Option<u32>,
+    /// Quantization step of every plane; none where planes are not coded.
+    pub steps: Vec<f64>,
+    /// Seconds of training.
+    #[serde(skip)]
+    pub training_seconds: Option<f64>,
+    /// Seconds of fitting entropy models to the finished scene.
+    #[serde(skip)]
+    pub fit_seconds: Option<f64>,
+    /// Seconds of encoding.
+    #[serde(skip)]
+    pub encode_seconds: Option<f64>,
+    /// Seconds of decoding.
+    #[serde(skip)]
+    pub decode_seconds: f64,
+    /// Frames a second.
+    #[serde(skip)]
+    pub fps: f64,
+    /// What it was measured on.
+    #[serde(skip)]
+    pub device: String,
+}
+
+/// A run that has no result.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MissingRun {
+    /// Its folder below the study's.
+    pub run: String,
+    /// Its task.
+    pub task: usize,
+    /// How far it is, and what its task said if that failed.
+    pub state: String,
+}
+
+/// All that is known of a study's runs.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Results {
+    /// In the order of the manifest.
+    pub runs: Vec<RunResult>,
+    /// In the order of the manifest.
+    pub missing: Vec<MissingRun>,
+}
+
+/// The parts of `eval.json` that studies show.
+#[derive(Deserialize)]
+struct EvaluationFile {
+    device: String,
+    bytes: u64,
+    sections: Vec<SectionFile>,
+    gaussians: usize,
+    resolution: [u32; 2],
+    /// JSON has no infinity; it is written as null.
+    fps: Option<f64>,
+    decode_seconds: f64,
+    training_seconds: Option<f64>,
+    splits: Vec<SplitFile>,
+    #[serde(default)]
+    coding: Option<CodingRecord>,
+}
+
+#[derive(Deserialize)]
+struct SectionFile {
+    name: String,
+    bytes: u64,
+}
+
+#[derive(Deserialize)]
+struct SplitFile {
+    split: String,
+    psnr: Option<f64>,
+    ssim: Option<f64>,
+}
+
+/// Whether a run in a folder has nothing left to do. `report.html` is what is written last.
+pub fn is_finished(run: &Path) -> bool {
+    ["scene.l4gs", "eval.json", "report.html"].iter().all(|name| run.join(name).is_file())
+}
+
+impl Results {
+    /// Reads what there is.
+    ///
+    /// # Errors
+    /// A run whose files are damaged.
+    pub fn read(folder: &StudyFolder, manifest: &Manifest) -> Result<Self, TrainError> {
+        let mut results = Self { runs: Vec::new(), missing: Vec::new() };
+        for run in &manifest.runs {
+            let path = folder.path(&run.name);
+            if !is_finished(&path) {
+                let state = state(folder, run);
+                results.missing.push(MissingRun { run: run.name.clone(), task: run.task, state });
+                continue;
+            }
+            let (run_folder, _, config) = RunFolder::open(&path)?;
+            if config.digest_text() != run.configuration {
+                let state = "has another configuration than the study planned".to_owned();
+                results.missing.push(MissingRun { run: run.name.clone(), task: run.task, state });
+                continue;
+            }
+            let evaluation: EvaluationFile = run_folder
+                .read_json("eval.json")?
+                .ok_or_else(|| TrainError::Input(format!("{} has no eval.json", path.display())))?;
+            let frames = light4gs_codec::read_info(&run_folder.stream()).ok().map(|info| info.meta.frame_count);
+            results.runs.push(result(run, evaluation, frames.filter(|count| *count > 0)));
+        }
+        Ok(results)
+    }
+
+    /// The result of one run.
+    pub fn get(&self, scene: usize, variant: usize, seed: u64) -> Option<&RunResult> {
+        self.runs.iter().find(|run| (run.scene, run.variant, run.seed) == (scene, variant, seed))
+    }
+
+    /// `results.csv` (times left out) or `times.csv` (nothing else).
+    pub fn to_csv(&self, manifest: &Manifest, times: bool) -> String {
+        let variants = manifest.variants();
+        let measures: Vec<Measure> = Measure::ALL.into_iter().filter(|measure| measure.is_time() == times).collect();
+        let mut heading = vec!["scene".to_owned()];
+        heading.extend(manifest.study.axis.iter().map(|axis| axis.name.clone()));
+        heading.push("seed".to_owned());
+        heading.extend(measures.iter().map(ToString::to_string));
+        let mut text = line(heading);
+        for run in &self.runs {
+            let mut cells = vec![manifest.scenes[run.scene].name.clone()];
+            let values = manifest.study.axis.iter().zip(&variants[run.variant].values);
+            cells.extend(values.map(|(axis, value)| axis.value[*value].name.clone()));
+            cells.push(run.seed.to_string());
+            cells.extend(measures.iter().map(|measure| measure.of(run).map_or_else(String::new, |v| v.to_string())));
+            text += &line(cells);
+        }
+        text
+    }
+}
+
+fn line(cells: Vec<String>) -> String {
+    let quoted = |cell: String| {
+        if cell.contains([',', '"', '\n', '\r']) { format!("\"{}\"", cell.replace('"', "\"\"")) } else { cell }
+    };
+    let mut text = cells.into_iter().map(quoted).collect::<Vec<_>>().join(",");
+    text.push('\n');
+    text
+}
+
+fn result(run: &ManifestRun, evaluation: EvaluationFile, frames: Option<u32>) -> RunResult {
+    let split = |name: &str| evaluation.splits.iter().find(|split| split.split == name);
+    let shown = split("test").or(evaluation.splits.first());
+    let coding = evaluation.coding.as_ref();
+    RunResult {
+        run: run.name.clone(),
+        scene: run.scene,
+        variant: run.variant,
+        seed: run.seed,
+        configuration: run.configuration.clone(),
+        psnr: shown.and_then(|split| split.psnr),
+        ssim: shown.and_then(|split| split.ssim),
+        val_psnr: split("val").and_then(|split| split.psnr),
+        bytes: evaluation.bytes,
+        sections: evaluation.sections.iter().map(|section| (section.name.clone(), section.bytes)).collect(),
+        gaussians: evaluation.gaussians,
+        resolution: evaluation.resolution,
+        frames,
+        steps: coding.map(|coding| coding.planes.iter().map(|p| p.step.into()).collect()).unwrap_or_default(),
+        training_seconds: evaluation.training_seconds,
+        fit_seconds: coding.and_then(|coding| coding.fit_seconds),
+        encode_seconds: coding.map(|coding| coding.encode_seconds),
+        decode_seconds: evaluation.decode_seconds,
+        fps: evaluation.fps.unwrap_or(f64::NAN),
+        device: evaluation.device,
+    }
+}
+
+/// How far a run is that is not finished.
+fn state(folder: &StudyFolder, run: &ManifestRun) -> String {
+    let path = folder.path(&run.name);
+    let last = read_metrics(&path.join("metrics.jsonl")).ok().and_then(|records| records.last().cloned());
+    let mut state = match last {
+        _ if path.join("scene.l4gs").is_file() => "trained, not measured".to_owned(),
+        Some(record) => format!("{} stage, iteration {}", record.stage, record.iteration),
+        None if path.join("run.json").is_file() => "begun".to_owned(),
+        None => "not begun".to_owned(),
+    };
+    if let Ok(failure) = light4gs_data::read_regular_text(&folder.failure(run.task), 1 << 20) {
+        state += &format!("; its task failed: {}", failure.trim());
+    }
+    state
+}
