@@ -4,7 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use light4gs_codec::SceneMeta;
-use light4gs_data::{DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene, measured_pixels};
+use light4gs_data::{
+    DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene, measured_pixels,
+};
 
 use crate::config::Config;
 

@@ -18,8 +18,8 @@ use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::evaluation::measure::Scores;
-use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::evaluation::metrics::lpips::Lpips;
+use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
