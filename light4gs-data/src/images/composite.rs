@@ -1,8 +1,9 @@
 //! From the RGBA bytes of a file to the `[H, W, 3]` bytes that are trained on.
 
+use super::resize::resize;
 use super::rgb::RgbImage8;
 use crate::error::DataError;
-use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::Image};
+use fast_image_resize::{FilterType, pixels::F32x3};
 
 /// Color over background as floats in `[0, 1]`.
 ///
@@ -50,34 +51,14 @@ pub fn composite_resized(
         let pixels = composite(rgba, background);
         return Ok(RgbImage8 { width, height, pixels });
     }
-    let mut floats = Vec::with_capacity(rgba.len() * 3);
-    for p in rgba.chunks_exact(4) {
-        for c in 0..3 {
-            floats.extend_from_slice(&(over(p[c], p[3], background[c]) as f32).to_ne_bytes());
-        }
-    }
+    let floats: Vec<F32x3> =
+        rgba.chunks_exact(4).map(|p| F32x3::new([0, 1, 2].map(|c| over(p[c], p[3], background[c]) as f32))).collect();
     let filter = if source.0.is_multiple_of(width) && source.1.is_multiple_of(height) {
         FilterType::Box
     } else {
         FilterType::Lanczos3
     };
-    let resized = Image::from_vec_u8(source.0, source.1, floats, PixelType::F32x3)
-        .map_err(|e| bad(e.to_string()))
-        .and_then(|from| {
-            let mut to = Image::new(width, height, PixelType::F32x3);
-            let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(filter)).use_alpha(false);
-            Resizer::new().resize(&from, &mut to, &options).map_err(|e| bad(e.to_string()))?;
-            Ok(to)
-        })?;
-    let pixels = resized
-        .buffer()
-        .chunks_exact(4)
-        .map(|b| {
-            let value = f32::from_ne_bytes([b[0], b[1], b[2], b[3]]);
-            (value.clamp(0.0, 1.0) * 255.0).round() as u8
-        })
-        .collect();
-    Ok(RgbImage8 { width, height, pixels })
+    resize(&floats, source, target, filter)
 }
 
 #[cfg(test)]

@@ -1,25 +1,23 @@
 //! Images of many megapixels, in memory that follows from the size that is wanted, not from that of the file.
 
 use super::composite::composite;
+use super::resize::resize;
 use super::rgb::RgbImage8;
 use crate::error::DataError;
-use fast_image_resize::{FilterType, PixelType, ResizeAlg, ResizeOptions, Resizer, images::Image};
+use fast_image_resize::{FilterType, pixels::F32x3};
 use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
 /// Resizes `[H, W, 3]` bytes of `source` = (width, height) pixels: Lanczos with a window of radius 3, antialiased.
 pub(super) fn resize_rgb(rgb: Vec<u8>, source: (u32, u32), target: (u32, u32)) -> Result<RgbImage8, DataError> {
-    let bad = |problem: String| DataError::Options { option: "resolution", problem };
     let (width, height) = target;
     if source == target {
         return Ok(RgbImage8 { width, height, pixels: rgb });
     }
-    let from = Image::from_vec_u8(source.0, source.1, rgb, PixelType::U8x3).map_err(|e| bad(e.to_string()))?;
-    let mut to = Image::new(width, height, PixelType::U8x3);
-    let options = ResizeOptions::new().resize_alg(ResizeAlg::Convolution(FilterType::Lanczos3)).use_alpha(false);
-    Resizer::new().resize(&from, &mut to, &options).map_err(|e| bad(e.to_string()))?;
-    Ok(RgbImage8 { width, height, pixels: to.into_vec() })
+    let colors: Vec<F32x3> =
+        rgb.as_chunks::<3>().0.iter().map(|color| F32x3::new(color.map(|value| f32::from(value) / 255.0))).collect();
+    resize(&colors, source, target, FilterType::Lanczos3)
 }
 
 /// Reads a PNG row by row and shrinks it on the way: means of whole blocks of pixels, as large as still leaves twice the

@@ -6,6 +6,7 @@ mod decode;
 mod header;
 mod large;
 mod mask;
+mod resize;
 mod rgb;
 mod store;
 mod undistort;
