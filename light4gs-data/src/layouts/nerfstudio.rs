@@ -19,7 +19,7 @@ use crate::points::PointCloud;
 use crate::scene::{Scene, SplitFrames};
 use glam::{DMat3, DVec3};
 use serde_json::Value;
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 /// What a malformed field is told.
@@ -63,8 +63,9 @@ impl DatasetLayout for Nerfstudio {
             .collect();
         let places = file.places(entries, &present, &relative)?;
         let mut images = Vec::with_capacity(present.len());
-        for ((((i, _), path), place), name) in present.iter().zip(&places).zip(&relative) {
-            images.push(file.image(&document, *i, &entries[*i], path, place, name)?);
+        let names = frame_names(&relative);
+        for ((((i, _), path), place), name) in present.iter().zip(&places).zip(names) {
+            images.push(PosedImage { name, ..file.image(&document, *i, &entries[*i], path, place)? });
         }
         let frames = posed::frames(&images, options)?;
         let splits = file.splits(&document, frames, &held_out(&places))?;
@@ -73,6 +74,20 @@ impl DatasetLayout for Nerfstudio {
         scene.notes = notes;
         Ok(scene)
     }
+}
+
+/// Names for frames, of their images' paths: the last part, and the folder before it where that is not enough.
+fn frame_names(paths: &[String]) -> Vec<String> {
+    let last = |count: usize| -> Vec<String> {
+        let of = |path: &String| {
+            let parts: Vec<&str> = path.split(['/', '\\']).collect();
+            frame_name(&parts[parts.len().saturating_sub(count)..].join("/"))
+        };
+        paths.iter().map(of).collect()
+    };
+    let short = last(1);
+    let unique: HashSet<&String> = short.iter().collect();
+    if unique.len() == short.len() { short } else { last(2) }
 }
 
 /// The transforms file and the folder that its paths are relative to.
@@ -124,7 +139,6 @@ impl File<'_> {
         entry: &Value,
         path: &Path,
         place: &Place,
-        name: &str,
     ) -> Result<PosedImage, DataError> {
         let field = format!("frames[{i}].transform_matrix");
         let rows = json::rows::<3, 4>(&self.path, &field, entry.get("transform_matrix"), REMEDY)?;
@@ -138,7 +152,7 @@ impl File<'_> {
             }
         };
         Ok(PosedImage {
-            name: frame_name(Path::new(name).file_name().map_or(name, |last| last.to_str().unwrap_or(name))),
+            name: files::stem_of(path),
             path: path.to_path_buf(),
             mask,
             // OpenGL -> OpenCV: y and z change sign. The inverse of a rotation is its transpose.

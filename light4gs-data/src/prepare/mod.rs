@@ -6,6 +6,8 @@
 mod poses;
 mod record;
 mod summary;
+#[cfg(test)]
+mod tests;
 mod write;
 
 pub use summary::PrepareSummary;

@@ -2,3 +2,4 @@
 
 mod dnerf_errors;
 mod golden;
+mod large;

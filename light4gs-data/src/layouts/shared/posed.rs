@@ -36,6 +36,10 @@ pub(in crate::layouts) struct PosedImage {
 /// Reads the headers of the images, and gives frames at the size that the options ask for.
 pub(in crate::layouts) fn frames(images: &[PosedImage], options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
     let headers = read_headers(images.par_iter().map(|image| image.path.as_path()).collect::<Vec<_>>())?;
+    // Their size may be another one; that they are images is known before training begins.
+    read_headers(
+        images.iter().filter_map(|image| image.mask.as_ref()).map(|mask| mask.path.as_path()).collect::<Vec<_>>(),
+    )?;
     images.iter().zip(headers).map(|(image, header)| frame(image, header, options)).collect()
 }
 

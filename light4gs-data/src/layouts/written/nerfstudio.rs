@@ -82,7 +82,7 @@ fn own_intrinsics_times_and_splits() {
     document["test_filenames"] = json!(["./images/x4.png"]);
     document["frames"][1]["mask_path"] = json!("masks/x1.png");
     fs::create_dir(folder.path().join("masks")).unwrap();
-    fs::write(folder.path().join("masks/x1.png"), "").unwrap();
+    image::GrayImage::from_pixel(SIZE.0, SIZE.1, image::Luma([255])).save(folder.path().join("masks/x1.png")).unwrap();
     write(folder.path(), &capture, &document);
     let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
     assert_eq!((scene.train.len(), scene.val.len(), scene.test.len()), (4, 1, 1));
