@@ -93,8 +93,8 @@ pub use limits::Limits;
 pub use network::{Network, weights as network_weights};
 pub use planes::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, section::PlaneBytes};
 pub use scene::{
-    GaussianArrays, HexPlaneArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource,
-    NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
+    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput,
+    MotionSource, NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use stream::names::legal_name;

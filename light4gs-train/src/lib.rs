@@ -10,6 +10,7 @@ pub mod density;
 pub mod device;
 pub mod error;
 pub mod evaluation;
+pub mod import;
 pub mod loss;
 pub mod memory;
 pub mod observers;

@@ -74,7 +74,7 @@ pub fn encode_compressed_with_limits(
     push(&mut sections, Kind::MotionDescription, encoding_of(compact(input.weights.motion)), writer);
     let mut writer = Writer::default();
     scene_frame::write(&scene.frame, &mut writer);
-    push(&mut sections, Kind::SceneFramePrincipalAxes, Encoding::Float32, writer);
+    push(&mut sections, scene_frame::kind(&scene.frame), Encoding::Float32, writer);
     let precision = compact(input.weights.context_model);
     let (hexplane, planes) = write_planes(&scene.hexplane, input.planes.as_ref(), precision, limits, &mut sections)?;
 

@@ -55,7 +55,7 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
     let sections = [
         section(Kind::GaussiansExplicit, &|writer| gaussians::write(&scene.gaussians, writer)),
         section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
-        section(Kind::SceneFramePrincipalAxes, &|writer| scene_frame::write(&scene.frame, writer)),
+        section(scene_frame::kind(&scene.frame), &|writer| scene_frame::write(&scene.frame, writer)),
         section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
         section(Kind::HexPlanesExplicit, &|writer| planes::explicit::write(&scene.hexplane, writer)),
     ];

@@ -79,7 +79,8 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn frame(&self) -> Result<SceneFrameArrays, CodecError> {
-        scene_frame::read(self.container.section(Section::SceneFrame)?.2)
+        let (kind, _, payload) = self.container.section(Section::SceneFrame)?;
+        scene_frame::read(payload, kind)
     }
 
     /// How the Gaussians move.

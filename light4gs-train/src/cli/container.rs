@@ -23,6 +23,7 @@ use crate::dataset::{image_store, load_options};
 use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
+use crate::import::scene_around;
 use crate::run::Checkpoint;
 use crate::run::RunFolder;
 
@@ -63,7 +64,10 @@ impl Encode {
         };
         let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
         let checkpoint: Checkpoint = Checkpoint::load(&path, &config, &config.model.field(), &device)?;
-        let data = Scene::open(&record.scene, &load_options(&config))?;
+        let data = match &record.scene {
+            Some(dataset) => Scene::open(dataset, &load_options(&config))?,
+            None => scene_around(&checkpoint.scene.gaussians.to_arrays(), folder.root(), config.data.background)?,
+        };
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
             return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
@@ -76,7 +80,7 @@ impl Encode {
             compression: checkpoint.compression.as_ref().filter(|_| same_models),
             config: &changed,
             data: &data,
-            images: &images,
+            images: record.scene.is_some().then_some(&images),
             device: &device,
         };
         let mut bar = FitBar::new(self.json);
@@ -120,7 +124,7 @@ impl Info {
     }
 }
 
-fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
+pub(super) fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let SceneMeta { name, frame_count, fps, bounds, background, config_digest, width, height, fov_x, .. } = &info.meta;
     let digest: String = config_digest.iter().map(|byte| format!("{byte:02x}")).collect();
     if json {

@@ -18,8 +18,8 @@ use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::evaluation::measure::Scores;
-use crate::evaluation::metrics::image_tensor;
 use crate::evaluation::metrics::lpips::Lpips;
+use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
@@ -182,7 +182,8 @@ impl<F: DeformationField> DecodedScene<F> {
                 let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
-                let scores = Scores::measure(&image, &truth_tensor, None, &lpips);
+                let mask = images.measured_pixels(frame)?.map(|mask| mask_tensor(&mask, &self.device));
+                let scores = Scores::measure(&image, &truth_tensor, mask.as_ref(), &lpips);
                 let (name, time, psnr) = (frame.name.clone(), frame.time, scores.psnr());
                 views.push(ViewScore { name: name.clone(), time, scores });
                 let (truth, render) = ((*truth).clone(), render.to_u8());
@@ -207,6 +208,14 @@ impl<F: DeformationField> DecodedScene<F> {
         };
         Ok((evaluation, rendered))
     }
+}
+
+/// Whether nothing moves in a file.
+///
+/// # Errors
+/// A file that cannot be read, or is damaged.
+pub fn is_still(path: &Path) -> Result<bool, TrainError> {
+    Ok(light4gs_codec::read_info(path)?.motion.kind.is_empty())
 }
 
 /// Sections of a file with the header in front; they add up to the file.

@@ -13,6 +13,7 @@ use light4gs_model::{DeformationField, HexPlaneField};
 use super::Trainer;
 use super::divergence::EmptyImageWatch;
 use super::profile::Profile;
+use super::sampling::FrameSampler;
 use super::views::ViewPools;
 use crate::compression::{Compression, compression_input};
 use crate::config::Config;
@@ -25,7 +26,6 @@ use crate::observers::Observer;
 use crate::observers::metrics_log::MetricsLog;
 use crate::observers::tensorboard::TensorBoardLog;
 use crate::optimization::adam::Adam;
-use crate::randomness::FrameOrder;
 use crate::run::{Checkpoint, RunFolder};
 use crate::stage::Stage;
 
@@ -233,6 +233,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             None => config.device.computes_on_processor(),
         };
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
+        let sampler = FrameSampler::new(&config.train, &data.train);
         Ok(Trainer {
             config,
             device,
@@ -245,8 +246,8 @@ impl<F: DeformationField> TrainerBuilder<F> {
             significance,
             observers: all,
             stop,
-            order: FrameOrder::default(),
-            order_ahead: FrameOrder::default(),
+            sampler_ahead: sampler.clone(),
+            sampler,
             profile: Profile::off(),
             view_pools,
             lap: None,
