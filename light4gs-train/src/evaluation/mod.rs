@@ -9,7 +9,7 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 use light4gs_codec::{SceneData, StreamInfo};
-use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
+use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split, measured_pixels};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::Serialize;
 
@@ -18,8 +18,8 @@ use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::evaluation::measure::Scores;
-use crate::evaluation::metrics::image_tensor;
 use crate::evaluation::metrics::lpips::Lpips;
+use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
@@ -177,7 +177,8 @@ impl<F: DeformationField> DecodedScene<F> {
                 let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
-                let scores = Scores::measure(&image, &truth_tensor, None, &lpips);
+                let mask = measured_pixels(frame)?.map(|mask| mask_tensor(&mask, &self.device));
+                let scores = Scores::measure(&image, &truth_tensor, mask.as_ref(), &lpips);
                 let (name, time, psnr) = (frame.name.clone(), frame.time, scores.psnr());
                 views.push(ViewScore { name: name.clone(), time, scores });
                 let (truth, render) = ((*truth).clone(), render.to_u8());
