@@ -9,7 +9,8 @@ use serde_json::Value;
 
 use super::compression::{LEAST_WEIGHT_BITS, MOST_WEIGHT_BITS};
 use super::{
-    Config, ContextArchitecture, DEVICES, EvalSplit, FileProfile, Problem, PruneScore, PruneVolume, RateWeighting, Sampling,
+    Config, ContextArchitecture, DEVICES, EvalSplit, FileProfile, Problem, PruneScore, PruneVolume, RateWeighting,
+    Sampling,
 };
 
 /// What a key may hold. What keys may not hold together is said in `validate.rs`.

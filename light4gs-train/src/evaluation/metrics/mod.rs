@@ -44,7 +44,7 @@ fn masked_mean(map: Tensor<3>, mask: Tensor<2>) -> Tensor<1> {
     (map * mask.unsqueeze_dim::<3>(2)).sum() / (pixels * channels)
 }
 
-/// A mask as a tensor `[H, W]`: 1 where a pixel counts.
+/// Which pixels count as a tensor `[H, W]`: 1 where they do.
 pub fn mask_tensor(mask: &PixelMask, device: &Device) -> Tensor<2> {
     let values: Vec<f32> = mask.pixels.iter().map(|value| f32::from(*value)).collect();
     Tensor::from_data(TensorData::new(values, [mask.height as usize, mask.width as usize]), device)
