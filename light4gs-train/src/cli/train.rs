@@ -206,7 +206,7 @@ impl Resume {
         let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
         let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
-        check_inputs(&config, &record.scene)?;
+        check_inputs(&config, record.dataset()?)?;
         let mut builder = trainer(&config, &folder, &record, &self.output)?;
         if self.accept_changed_dataset {
             builder = builder.accept_changed_dataset();

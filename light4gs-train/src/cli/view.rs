@@ -98,8 +98,8 @@ pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) ->
         return Ok(cameras_json(&Scene::open(folder, &load_options(&Config::default()))?, most));
     }
     // The dataset of a run may be gone; its file plays all the same.
-    let dataset =
-        run_around(file).and_then(|(_, record, config)| Scene::open(&record.scene, &load_options(&config)).ok());
+    let dataset = run_around(file)
+        .and_then(|(_, record, config)| Scene::open(record.dataset().ok()?, &load_options(&config)).ok());
     Ok(dataset.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
 }
 

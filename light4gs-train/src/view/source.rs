@@ -57,7 +57,7 @@ impl ViewSource {
     pub fn run(root: &Path, device: Option<DeviceName>) -> Result<Self, TrainError> {
         let (folder, record, config) = RunFolder::open(root)?;
         let device = device::open(device.unwrap_or(config.device))?.autodiff();
-        let dataset = Scene::open(&record.scene, &load_options(&config))?;
+        let dataset = Scene::open(record.dataset()?, &load_options(&config))?;
         Self::new(Kind::Run(Box::new(Run { folder, config, dataset, device })))
     }
 
