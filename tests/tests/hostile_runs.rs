@@ -14,6 +14,7 @@ use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, asser
 use light4gs_train::Stage;
 use light4gs_train::config::Config;
 use light4gs_train::dataset::load_options;
+use light4gs_train::density::{AdaptiveDensityControl, DensityStrategy};
 use light4gs_train::error::TrainError;
 use light4gs_train::loss::LossInput;
 use light4gs_train::run::{Checkpoint, RunFolder};
@@ -42,8 +43,14 @@ fn checkpoint(folder: &Path) -> (Config, PathBuf) {
     (config, path)
 }
 
+/// As `resume` does: the density strategy takes its part.
 fn load(path: &Path, config: &Config) -> Result<Checkpoint, TrainError> {
-    Checkpoint::load(path, config, &config.model.field(), &Device::flex().autodiff())
+    let checkpoint: Checkpoint = Checkpoint::load(path, config, &config.model.field(), &Device::flex().autodiff())?;
+    let mut density = AdaptiveDensityControl::new(config.train.densify.clone());
+    density
+        .restore(checkpoint.density.clone(), checkpoint.scene.gaussians.len())
+        .map_err(|problem| TrainError::Checkpoint { path: path.to_owned(), problem })?;
+    Ok(checkpoint)
 }
 
 #[test]

@@ -195,7 +195,7 @@ fn the_coordinates_of_4dgaussians_are_kept_for_every_number_of_times() {
             let imported = reference::read(folder.path(), &device).unwrap();
             assert_eq!(imported.background, [0.0; 3]);
             let rows = imported.scene.field.hexplane.to_arrays().resolution[3];
-            assert!(rows % 4 == 0 && rows as usize <= (times / 2 + 2).next_multiple_of(4), "{times}: {rows}");
+            assert!(rows.is_multiple_of(4) && rows as usize <= (times / 2 + 2).next_multiple_of(4), "{times}: {rows}");
             let mut random = Random::new(5);
             // Some outside the box, where the border counts.
             let points: Vec<[f32; 3]> = (0..200).map(|_| [0; 3].map(|_| random.uniform(-2.0, 2.0) as f32)).collect();

@@ -282,7 +282,7 @@ impl Eval {
         config.data.background = decoded.data.meta.background;
         config.eval.lpips = self.lpips.clone();
         let options = load_options(&config);
-        let scene = Scene::open(&scene, &options)?;
+        let scene = Scene::open(scene, &options)?;
         let images = image_store(&config);
         let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)

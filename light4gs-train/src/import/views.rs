@@ -30,7 +30,7 @@ pub fn scene_around(gaussians: &GaussianArrays, root: &Path, background: [f32; 3
     let frame = |view: usize| {
         // From above and from below in turns, so that no side is left out.
         let angle = view as f32 / VIEWS as f32 * std::f32::consts::TAU;
-        let height = if view % 2 == 0 { 0.5 } else { -0.25 };
+        let height = if view.is_multiple_of(2) { 0.5 } else { -0.25 };
         let eye = center + distance * Vec3::new(angle.cos(), angle.sin(), height);
         let camera = Camera::look_at(eye, center, Vec3::Z, FIELD_OF_VIEW, SIDE, SIDE);
         Frame::without_image(format!("view-{view}"), camera, view as f32 / (VIEWS - 1) as f32)
