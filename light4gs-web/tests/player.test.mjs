@@ -306,6 +306,7 @@ describe("the element", () => {
       await differs(key);
       await page.keyboard.up(key);
     }
+    await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("combobox", { name: "Camera" }).selectOption({ label: "second · 1.00" });
     const second = await state(page);
     assert.equal(second.time, 1);
