@@ -12,7 +12,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Up to this many images all pairs are matched; beyond it, neighbors in time.
-const EXHAUSTIVE: usize = 60;
+const EXHAUSTIVE: usize = 30;
 /// Neighbors in time that are matched, and further ones at distances of powers of two.
 const OVERLAP: usize = 15;
 
