@@ -190,7 +190,7 @@ impl Camera {
         }
         check_rotation(rotation)?;
         let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(|value| value as f32);
-        if ![fx, fy].iter().all(|f| f.is_finite() && *f > 0.0) || !(cx.is_finite() && cy.is_finite()) {
+        if !([fx, fy].iter().all(|f| f.is_finite() && *f > 0.0) && cx.is_finite() && cy.is_finite()) {
             return Err(PoseError::Intrinsics { fx, fy, cx, cy });
         }
         if width == 0 || height == 0 {
