@@ -2,14 +2,21 @@
 
 use std::path::{Path, PathBuf};
 
+use light4gs_data::read_regular_file;
 use serde::Serialize;
 use serde_json::Value;
+use sha2::{Digest, Sha256};
 
 use super::RunFolder;
 use crate::error::TrainError;
 
 /// Lists of an evaluation with an entry for each view or plane: too long to compare.
 const LONG_LISTS: [&str; 2] = ["views", "planes"];
+
+/// What a run's dataset was when it began, in the run's folder.
+const DATASET: &str = "dataset.json";
+/// Those are far shorter.
+const MAX_DATASET_BYTES: u64 = 1 << 28;
 
 /// Something that is not the same in all runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -62,8 +69,14 @@ fn leaves_of(run: &Path) -> Result<RunLeaves, TrainError> {
     let (folder, record, config) = RunFolder::open(run)?;
     let to_json = |value: Result<Value, serde_json::Error>| value.expect("plain data has a JSON form");
     let evaluation: Option<Value> = folder.read_json("eval.json")?;
+    let mut provenance = leaves(&to_json(serde_json::to_value(&record)));
+    // What the dataset was is long; that it was another one is short.
+    if let Ok(dataset) = read_regular_file(&folder.path(DATASET), MAX_DATASET_BYTES) {
+        let digest: String = Sha256::digest(&dataset).iter().map(|byte| format!("{byte:02x}")).collect();
+        provenance.push(("data".to_owned(), digest));
+    }
     Ok(RunLeaves {
-        provenance: leaves(&to_json(serde_json::to_value(&record))),
+        provenance,
         configuration: leaves(&to_json(serde_json::to_value(&config))),
         results: evaluation.map(|value| leaves(&value)).unwrap_or_default(),
     })

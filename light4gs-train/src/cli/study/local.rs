@@ -103,8 +103,10 @@ fn report(folder: &StudyFolder, task: usize, status: ExitStatus, jobs: usize) {
         return;
     }
     let failure = folder.failure(task);
-    if status.code().is_none() {
-        let _ = std::fs::write(&failure, format!("{status}\n"));
+    // A task that was killed, or panicked, has not said so itself.
+    if !failure.exists() {
+        let log = if jobs > 1 { format!("; see {}", folder.log(task).display()) } else { String::new() };
+        let _ = std::fs::write(&failure, format!("{status}{log}\n"));
     }
     let said = std::fs::read_to_string(&failure).unwrap_or_else(|_| status.to_string());
     if jobs > 1 || status.code().is_none() {

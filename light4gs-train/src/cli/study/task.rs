@@ -40,9 +40,11 @@ impl StudyTask {
             )));
         }
         let failure = folder.failure(self.task);
+        // That of an earlier attempt.
+        let _ = std::fs::remove_file(&failure);
         let result = run_task(&folder, &manifest, self.task, self.quiet);
         match &result {
-            Ok(()) | Err(TrainError::Stopped(_)) => drop(std::fs::remove_file(&failure)),
+            Ok(()) | Err(TrainError::Stopped(_)) => {}
             // For the summary. Where even that cannot be written, the summary says what it sees.
             Err(error) => drop(std::fs::write(&failure, format!("{error}\n"))),
         }

@@ -28,5 +28,7 @@ elif [ "$code" -gt 128 ]; then
     else
         echo "killed by signal $((code - 128)), $restarts times queued again" >"$study/.logs/task-$SLURM_ARRAY_TASK_ID.failed"
     fi
+elif [ "$code" -ne 0 ] && [ ! -e "$study/.logs/task-$SLURM_ARRAY_TASK_ID.failed" ]; then
+    echo "exit code $code; see $study/.logs/task-$SLURM_ARRAY_TASK_ID.log" >"$study/.logs/task-$SLURM_ARRAY_TASK_ID.failed"
 fi
 exit "$code"

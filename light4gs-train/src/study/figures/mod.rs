@@ -189,9 +189,10 @@ impl Figure {
                         TrainError::Input(format!("image {label} of {} cannot be shown: {error}", self.name))
                     })?;
                     let (label, width, height) = (escape(label), image.width, image.height);
+                    let class = if width > 3 * height { " class=\"wide\"" } else { "" };
                     let _ = writeln!(
                         html,
-                        "<div><img src=\"{data}\" alt=\"{label}\" width=\"{width}\" height=\"{height}\"><span>{label}</span></div>"
+                        "<div{class}><img src=\"{data}\" alt=\"{label}\" width=\"{width}\" height=\"{height}\"><span>{label}</span></div>"
                     );
                 }
                 html += "</div>\n";

@@ -99,9 +99,11 @@ impl Plot for ScatterPlot {
             let points = self.points(series);
             let line = LineSeries::new(points.clone(), stroke(series.mark, index));
             match series.mark {
-                Mark::Line | Mark::LinePoints => drop(chart.draw_series(line)?),
+                Mark::Line | Mark::LinePoints => {
+                    chart.draw_series(line)?;
+                }
                 Mark::Dashed => {
-                    drop(chart.draw_series(DashedLineSeries::new(points.clone(), 6, 4, stroke(series.mark, index)))?)
+                    chart.draw_series(DashedLineSeries::new(points.clone(), 6, 4, stroke(series.mark, index)))?;
                 }
                 Mark::Points => {}
             }
