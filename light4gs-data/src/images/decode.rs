@@ -85,3 +85,57 @@ pub(super) fn decode_upright(path: &Path, expected: (u32, u32)) -> Result<Dynami
     }
     Ok(image)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::Camera;
+    use glam::Vec3;
+
+    /// A JPEG whose EXIF data say that it must be turned by a quarter clockwise (orientation 6).
+    fn sideways_jpeg(path: &Path) {
+        let pixels =
+            image::RgbImage::from_fn(64, 32, |x, _| image::Rgb(if x < 32 { [220, 20, 20] } else { [20, 20, 220] }));
+        pixels.save(path).unwrap();
+        let plain = std::fs::read(path).unwrap();
+        let mut exif = b"\xff\xe1\x00\x22Exif\0\0MM\0\x2a\0\0\0\x08\0\x01".to_vec();
+        exif.extend(b"\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0");
+        std::fs::write(path, [&plain[..2], &exif, &plain[2..]].concat()).unwrap();
+    }
+
+    #[test]
+    fn an_image_on_its_side_is_turned_where_its_camera_stands_upright() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.jpg");
+        sideways_jpeg(&path);
+        let upright = decode_upright(&path, (32, 64)).unwrap().into_rgb8();
+        assert!(upright.get_pixel(16, 10)[0] > 150 && upright.get_pixel(16, 54)[2] > 150);
+        // A camera that lies as the file does: the mark is passed over, as COLMAP does.
+        let stored = decode_upright(&path, (64, 32)).unwrap().into_rgb8();
+        assert!(stored.get_pixel(10, 16)[0] > 150 && stored.get_pixel(54, 16)[2] > 150);
+        assert!(decode_upright(&path, (30, 64)).unwrap_err().to_string().contains("expected 30 x 64"));
+    }
+
+    #[test]
+    fn gray_and_sixteen_bit_images_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 4, 4);
+        let frame = |name: &str| Frame::new(name, camera, 0.0, folder.path().join(name), (4, 4));
+        image::GrayImage::from_pixel(4, 4, image::Luma([77])).save(folder.path().join("gray.png")).unwrap();
+        assert_eq!(decode(&frame("gray.png"), [1.0; 3]).unwrap().pixels, [77; 48]);
+        let deep = image::ImageBuffer::<image::Rgb<u16>, _>::from_pixel(4, 4, image::Rgb([0x4d4d, 0, 0xffff]));
+        deep.save(folder.path().join("deep.PNG")).unwrap();
+        assert_eq!(decode(&frame("deep.PNG"), [1.0; 3]).unwrap().pixels, [77, 0, 255].repeat(16));
+    }
+
+    #[test]
+    fn a_large_image_takes_memory_for_what_is_wanted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large.png");
+        // 9000 x 6000 gray pixels, a few kilobytes on the disk.
+        image::GrayImage::from_pixel(9000, 6000, image::Luma([100])).save(&path).unwrap();
+        let camera = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 0.7, 90, 60);
+        let image = decode(&Frame::new("large", camera, 0.0, path, (9000, 6000)), [1.0; 3]).unwrap();
+        assert_eq!(image.pixels, [100; 90 * 60 * 3]);
+    }
+}
