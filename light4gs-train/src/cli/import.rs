@@ -4,7 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use light4gs_codec::read_info;
+use light4gs_codec::{Limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
 
 use super::check_output;
@@ -124,6 +124,6 @@ impl Import {
             Ok(())
         })?;
         write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
-        print_info(&read_info(&self.out)?, self.json)
+        print_info(&read_info_with_limits(&self.out, &Limits::large())?, self.json)
     }
 }

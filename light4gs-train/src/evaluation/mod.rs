@@ -215,7 +215,7 @@ impl<F: DeformationField> DecodedScene<F> {
 /// # Errors
 /// A file that cannot be read, or is damaged.
 pub fn is_still(path: &Path) -> Result<bool, TrainError> {
-    Ok(light4gs_codec::read_info(path)?.motion.kind.is_empty())
+    Ok(light4gs_codec::read_info_with_limits(path, &Limits::large())?.motion.kind.is_empty())
 }
 
 /// Sections of a file with the header in front; they add up to the file.
