@@ -4,6 +4,7 @@
 #![allow(deprecated)]
 
 pub mod golden;
+pub mod hostile;
 pub mod named;
 pub mod odd_scenes;
 pub mod program;

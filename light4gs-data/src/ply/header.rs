@@ -22,19 +22,20 @@ pub(super) fn shorten(word: &str) -> String {
     word.chars().take(40).collect()
 }
 
-/// One line without its end, or `None` at the end of the file.
-pub(super) fn read_line(path: &Path, input: &mut impl BufRead, limit: u64) -> Result<Option<String>, DataError> {
+/// One line without its end, or `None` at the end of the file. `too_long` says what a line is that takes `limit` bytes.
+pub(super) fn read_line(
+    path: &Path,
+    input: &mut impl BufRead,
+    limit: u64,
+    too_long: impl FnOnce() -> String,
+) -> Result<Option<String>, DataError> {
     let mut bytes = Vec::new();
     input.by_ref().take(limit).read_until(b'\n', &mut bytes).map_err(DataError::io("read", path))?;
     if bytes.is_empty() {
         return Ok(None);
     }
     if bytes.len() as u64 == limit && bytes.last() != Some(&b'\n') {
-        return Err(DataError::ply(
-            path,
-            format!("a line is longer than {limit} bytes"),
-            "this is not a PLY file that we can read: export it again",
-        ));
+        return Err(DataError::ply(path, too_long(), "this is not a PLY file that we can read: export it again"));
     }
     Ok(Some(String::from_utf8_lossy(&bytes).trim_end().to_string()))
 }
@@ -43,11 +44,12 @@ pub(super) fn read_header(path: &Path, input: &mut impl BufRead) -> Result<Heade
     let bad = |problem: String| DataError::ply(path, problem, "export it as ASCII or binary little endian PLY");
     let mut budget = MAX_HEADER_BYTES;
     let mut next_line = || -> Result<String, DataError> {
-        let line =
-            read_line(path, input, budget.max(1))?.ok_or_else(|| bad("the header has no `end_header`".into()))?;
+        let too_long = || format!("the header is longer than {MAX_HEADER_BYTES} bytes");
+        let line = read_line(path, input, budget.max(1), too_long)?
+            .ok_or_else(|| bad("the header has no `end_header`".into()))?;
         budget = budget.saturating_sub(line.len() as u64 + 1);
         if budget == 0 {
-            return Err(bad(format!("the header is longer than {MAX_HEADER_BYTES} bytes")));
+            return Err(bad(too_long()));
         }
         Ok(line)
     };

@@ -119,7 +119,8 @@ fn read_from(path: &Path, mut input: impl BufRead, size: u64) -> Result<VertexTa
         Encoding::Ascii => {
             let longest = 4096 + 64 * header.properties.len() as u64;
             for found in 0..rows {
-                let line = read_line(path, &mut input, longest)?.ok_or_else(|| truncated(found))?;
+                let too_long = || format!("the line of vertex {found} is longer than {longest} bytes");
+                let line = read_line(path, &mut input, longest, too_long)?.ok_or_else(|| truncated(found))?;
                 let before = values.len();
                 for word in line.split_ascii_whitespace() {
                     values.push(word.parse().map_err(|_| {

@@ -57,10 +57,6 @@ impl ShEntropy for ShBottleneck {
         bits(self.likelihood(values))
     }
 
-    fn quantize(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
-        (values.detach() / self.step).round() * self.step
-    }
-
     fn tables(&self) -> Option<&dyn ShTables> {
         Some(self)
     }

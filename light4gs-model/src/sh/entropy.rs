@@ -47,8 +47,12 @@ pub trait ShEntropy {
         values + noise
     }
 
-    /// `values` as a decoder gets them. Without gradient.
-    fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
+    /// `values` as a decoder gets them. Without gradient. To the nearest multiples of the step, unless the model rounds
+    /// around a prediction.
+    fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
+        let _ = known;
+        (values.detach() / self.step()).round() * self.step()
+    }
 
     /// The model's frequency tables, if its densities depend on nothing; it then travels as such.
     fn tables(&self) -> Option<&dyn ShTables> {

@@ -80,10 +80,6 @@ impl ShEntropy for ShMixture {
         bits(self.likelihood(values))
     }
 
-    fn quantize(&self, values: Tensor<3>, _: &ShKnown) -> Tensor<3> {
-        (values.detach() / self.step).round() * self.step
-    }
-
     fn tables(&self) -> Option<&dyn ShTables> {
         Some(self)
     }

@@ -20,13 +20,13 @@ pub(super) struct Bench {
     #[arg(long, value_name = "FILE.safetensors", conflicts_with_all = ["gaussians", "size"])]
     scene: Vec<PathBuf>,
     /// Gaussians of the generated scenes.
-    #[arg(long, value_delimiter = ',', default_value = "5000,20000,100000")]
+    #[arg(long, value_delimiter = ',', default_value = "5000,20000,100000", allow_negative_numbers = true)]
     gaussians: Vec<usize>,
     /// Widths and heights of the generated scenes' images.
-    #[arg(long, value_delimiter = ',', default_value = "400,800")]
+    #[arg(long, value_delimiter = ',', default_value = "400,800", allow_negative_numbers = true)]
     size: Vec<u32>,
     /// Timed repetitions of each stage, after two untimed ones.
-    #[arg(long, default_value_t = 11, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    #[arg(long, default_value_t = 11, value_parser = clap::value_parser!(u32).range(1..=10_000), allow_negative_numbers = true)]
     repeats: u32,
     /// Time the entropy coders instead, on a scene of the paper's size.
     #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "device"])]

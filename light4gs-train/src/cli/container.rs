@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use light4gs_codec::plane_layout::plane_name;
@@ -50,7 +50,10 @@ pub(super) struct Encode {
 impl Encode {
     pub(super) fn run(self) -> Result<(), TrainError> {
         check_output(&self.out)?;
-        let (folder, record, config) = RunFolder::open(&self.run)?;
+        let (mut folder, record, config) = RunFolder::open(&self.run)?;
+        if is_inside(&self.out, folder.root()) {
+            folder.lock()?;
+        }
         let Some(path) = self.checkpoint.or_else(|| folder.last_checkpoint()) else {
             let run = self.run.display();
             return Err(TrainError::Input(format!(
@@ -90,6 +93,13 @@ impl Encode {
         }
         Ok(())
     }
+}
+
+/// Whether an output lies in a run's folder, where only one process may write. Its own folder exists.
+fn is_inside(out: &Path, root: &Path) -> bool {
+    let absolute = |path: &Path| std::fs::canonicalize(path).ok();
+    let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    absolute(folder).zip(absolute(root)).is_some_and(|(folder, root)| folder.starts_with(root))
 }
 
 #[derive(Debug, Args)]

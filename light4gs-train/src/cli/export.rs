@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use light4gs_data::{DataError, GaussianPly};
 
+use super::limits::{MOST_FRAMES, frame_count};
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
@@ -19,7 +20,7 @@ pub(super) struct Export {
     #[arg(long)]
     out: PathBuf,
     /// Number of frames over time 0 to 1; as many as the file was made from if not given.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
@@ -29,12 +30,12 @@ pub(super) struct Export {
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
         let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
+        let frames = frame_count(&decoded.data.meta, self.frames)?;
         std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
             action: "create",
             path: self.out.clone(),
             source,
         })?;
-        let frames = self.frames.unwrap_or(decoded.data.meta.frame_count.max(1));
         for k in 0..frames {
             let time = if frames == 1 { 0.0 } else { k as f32 / (frames - 1) as f32 };
             let arrays = decoded.model.at(time).to_arrays();

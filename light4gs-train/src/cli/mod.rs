@@ -5,6 +5,7 @@ mod compare;
 mod container;
 mod export;
 mod gpu_errors;
+mod limits;
 mod output;
 mod prepare;
 mod progress;

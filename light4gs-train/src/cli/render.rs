@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
 
 use super::check_output;
+use super::limits::{MOST_FRAMES, MOST_SIDE, image_size};
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
@@ -40,22 +41,22 @@ pub(super) struct Render {
     #[arg(long, conflicts_with = "path")]
     scene: Option<PathBuf>,
     /// Number of frames.
-    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: u32,
     /// The moment of a frozen path, in [0, 1].
-    #[arg(long, default_value_t = 0.0)]
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     time: f32,
     /// Width in pixels; the training images' if not given.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16_384))]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SIDE)), allow_negative_numbers = true)]
     width: Option<u32>,
     /// Distance of the orbit from the origin, world units.
-    #[arg(long, default_value_t = ORBIT.0)]
+    #[arg(long, default_value_t = ORBIT.0, allow_negative_numbers = true)]
     radius: f32,
     /// Height of the orbit in degrees.
-    #[arg(long, default_value_t = ORBIT.1)]
+    #[arg(long, default_value_t = ORBIT.1, allow_negative_numbers = true)]
     elevation: f32,
     /// Frames a second of a GIF.
-    #[arg(long, default_value_t = 20.0)]
+    #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
@@ -67,8 +68,11 @@ impl Render {
         if !(0.0..=1.0).contains(&self.time) {
             return Err(TrainError::Input(format!("--time must be in [0, 1], not {}", self.time)));
         }
-        if !(self.radius.is_finite() && self.radius > 0.0 && self.elevation.is_finite()) {
-            return Err(TrainError::Input("--radius must be positive and --elevation finite".into()));
+        if !(1e-6..=1e6).contains(&self.radius) {
+            return Err(TrainError::Input(format!("--radius must be 1e-6 to 1e6, not {}", self.radius)));
+        }
+        if !(-90.0..=90.0).contains(&self.elevation) {
+            return Err(TrainError::Input(format!("--elevation must be -90 to 90 degrees, not {}", self.elevation)));
         }
         check_output(&self.out)?;
         let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
@@ -86,9 +90,7 @@ impl Render {
 
     fn camera_frames(&self, decoded: &DecodedScene) -> Result<Vec<Frame>, TrainError> {
         let meta = &decoded.data.meta;
-        let (width, height) = (meta.width.max(1), meta.height.max(1));
-        let new_width = self.width.unwrap_or(width);
-        let new_height = ((u64::from(height) * u64::from(new_width)).div_ceil(u64::from(width)) as u32).max(1);
+        let (new_width, new_height) = image_size(meta, self.width)?;
         if let Some(scene) = &self.scene {
             let resolution = Resolution::Exact { width: new_width, height: new_height };
             let options = LoadOptions { resolution, background: meta.background, ..LoadOptions::default() };
@@ -99,8 +101,8 @@ impl Render {
             [0.0; 3].into(),
             [0.0, 0.0, 1.0].into(),
             meta.fov_x,
-            width,
-            height,
+            meta.width.max(1),
+            meta.height.max(1),
         )
         .resized(new_width, new_height);
         let path = orbit_path(self.frames as usize, self.radius, self.elevation, &intrinsics);

@@ -13,19 +13,19 @@ pub(super) struct Synth {
     /// Folder to make.
     out: PathBuf,
     /// Width and height in pixels.
-    #[arg(long, default_value_t = 200)]
+    #[arg(long, default_value_t = 200, allow_negative_numbers = true)]
     resolution: u32,
     /// Training images.
-    #[arg(long, default_value_t = 100)]
+    #[arg(long, default_value_t = 100, allow_negative_numbers = true)]
     train_frames: usize,
     /// Test images.
-    #[arg(long, default_value_t = 20)]
+    #[arg(long, default_value_t = 20, allow_negative_numbers = true)]
     test_frames: usize,
     /// Validation images.
-    #[arg(long, default_value_t = 10)]
+    #[arg(long, default_value_t = 10, allow_negative_numbers = true)]
     val_frames: usize,
     /// Seed of the cameras.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, allow_negative_numbers = true)]
     seed: u64,
 }
 

@@ -17,6 +17,7 @@ use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::measure::Scores;
+use crate::evaluation::metrics::lpips::Lpips;
 use crate::evaluation::{DecodedScene, Evaluation};
 use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
@@ -88,9 +89,7 @@ pub(super) fn train(
 ) -> Result<(), TrainError> {
     // From here on a request to stop is heard.
     stop_flag();
-    device::open(config.device)?;
-    // The dataset is checked before the run's folder is made, so that a wrong path leaves nothing behind.
-    for note in Scene::open(scene, &load_options(&config))?.notes {
+    for note in check_inputs(&config, scene)?.notes {
         tell(format_args!("note: {note}"));
     }
     let folder = RunFolder::create(out, scene, &config, overwrite)?;
@@ -111,10 +110,9 @@ pub(super) fn train_to_evaluation(
     like: Option<&Path>,
     output: &RunOutput,
 ) -> Result<Evaluation, TrainError> {
-    device::open(config.device)?;
     let fresh = !out.join("run.json").exists();
     if fresh {
-        Scene::open(scene, &load_options(&config))?;
+        check_inputs(&config, scene)?;
         let folder = RunFolder::create(out, scene, &config, false)?;
         if let Some(like) = like {
             folder.adopt(&RunFolder::open(like)?.0)?;
@@ -136,6 +134,14 @@ pub(super) fn train_to_evaluation(
     }
     let scene = Scene::open(&record.scene, &load_options(&config))?;
     evaluate_run::<HexPlaneField>(&folder, &config, &scene)
+}
+
+/// Checks what a run needs from its first iteration to its evaluation, before its folder is made or emptied, so that a
+/// wrong path leaves nothing behind and nothing is lost: the device, the dataset, files that metrics need.
+fn check_inputs(config: &Config, scene: &Path) -> Result<Scene, TrainError> {
+    let device = device::open(config.device)?;
+    Lpips::load(&config.eval.lpips, &device)?;
+    Ok(Scene::open(scene, &load_options(config))?)
 }
 
 /// A trainer of a run's folder, with progress bars.
@@ -184,6 +190,9 @@ pub(super) struct Resume {
     /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
+    /// Go on although the dataset is not what it was when the run began.
+    #[arg(long)]
+    accept_changed_dataset: bool,
     #[command(flatten)]
     output: RunOutput,
 }
@@ -196,7 +205,12 @@ impl Resume {
         let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
         let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
-        let trainer = trainer(&config, &folder, &record, &self.output)?.resume()?;
+        check_inputs(&config, &record.scene)?;
+        let mut builder = trainer(&config, &folder, &record, &self.output)?;
+        if self.accept_changed_dataset {
+            builder = builder.accept_changed_dataset();
+        }
+        let trainer = builder.resume()?;
         if changed != found {
             // Only now that the checkpoint has been found to fit. The next `resume` goes on with it as well.
             folder.write("config.toml", changed.to_toml().as_bytes())?;

@@ -51,6 +51,19 @@ pub struct BitMap {
     pub bits: Vec<f32>,
 }
 
+impl BitMap {
+    /// What keeps it from being drawn, if it comes from a file: as many numbers as places, none below 0.
+    pub fn problem(&self) -> Option<String> {
+        let Self { name, width, height, bits } = self;
+        let places = u64::from(*width) * u64::from(*height);
+        if bits.is_empty() || bits.len() as u64 != places {
+            return Some(format!("the map of plane `{name}` is {width}×{height}, but has {} numbers", bits.len()));
+        }
+        let bad = bits.iter().find(|bits| !(bits.is_finite() && **bits >= 0.0))?;
+        Some(format!("the map of plane `{name}` has the number {bad}, expected bits"))
+    }
+}
+
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BitEstimate {
@@ -88,7 +101,10 @@ pub fn encode<F: DeformationField>(
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
-        input.attributes = step_search::search(&data, &input.attributes, tolerance, images.error, images.render)?;
+        // The search tries steps much finer than those given. Values too far out for them, as a training that has gone
+        // wrong leaves them, may still fit the given ones.
+        let found = step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
+        input.attributes = found.unwrap_or(input.attributes);
     }
     let encoded = encode_compressed(&data, &input)?;
     let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;

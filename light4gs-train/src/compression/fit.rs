@@ -12,12 +12,14 @@ use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
 use crate::optimization::schedule::ExponentialDecay;
 use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
+use crate::trainer::Divergence;
+use crate::trainer::divergence::{not_finite_parameter, remedy};
 
 /// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told the iterations
 /// done, and those that there are, after each.
 ///
 /// # Errors
-/// What `progress` returns.
+/// What `progress` returns; [`TrainError::Diverged`] if a model has numbers that are not finite.
 pub fn fit<F: DeformationField>(
     scene: &DynamicScene<F>,
     config: &Config,
@@ -52,5 +54,15 @@ pub fn fit<F: DeformationField>(
         });
         progress(iteration, iterations)?;
     }
-    Ok(compression)
+    match not_finite_parameter(&compression, COMPRESSION) {
+        None => Ok(compression),
+        Some(found) => Err(TrainError::Diverged(Box::new(Divergence {
+            stage: Stage::Fine,
+            iteration: iterations,
+            remedy: remedy(&found, config),
+            found,
+            checkpoint: None,
+            run: None,
+        }))),
+    }
 }

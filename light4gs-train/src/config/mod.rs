@@ -12,6 +12,7 @@
 //! fine_iterations = 2000
 //! ```
 
+mod bounds;
 mod choice;
 mod compression;
 mod data;
@@ -36,6 +37,7 @@ use sha2::{Digest, Sha256};
 pub(crate) use choice::choice;
 use layering::layers;
 
+pub use bounds::{BOUNDS, Bounds};
 pub use choice::UnknownChoice;
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,

@@ -5,6 +5,7 @@ use std::fs;
 use light4gs_data::{DataError, Scene};
 use light4gs_model::DeformationField;
 
+use crate::compression::BitMap;
 use crate::config::Config;
 use crate::dataset::image_store;
 use crate::device::{self, describe};
@@ -46,7 +47,14 @@ pub fn evaluate_run<F: DeformationField>(
             .collect(),
         coding: match &evaluation.coding {
             Some(record) => {
-                let bit_maps = folder.read_json("bit_maps.json")?.unwrap_or_default();
+                let bit_maps: Vec<BitMap> = folder.read_json("bit_maps.json")?.unwrap_or_default();
+                if let Some(problem) = bit_maps.iter().find_map(BitMap::problem) {
+                    return Err(TrainError::Input(format!(
+                        "{} is damaged: {problem}. `light4gs resume {}` writes it anew",
+                        folder.path("bit_maps.json").display(),
+                        folder.root().display()
+                    )));
+                }
                 Some(CodingReport { record: record.clone(), bit_maps })
             }
             None => None,

@@ -13,9 +13,21 @@ use crate::error::TrainError;
 /// Says where the run's scene is; a folder with this file holds a run.
 pub(super) const RECORD: &str = "run.json";
 
+/// What the dataset was when the run began.
+pub(super) const DATASET: &str = "dataset.json";
+
 /// Files of a run; `--overwrite` removes them, in this order.
-pub(super) const FILES: [&str; 8] =
-    [RECORD, "config.toml", "metrics.jsonl", "scene.l4gs", "coding.json", "bit_maps.json", "eval.json", "report.html"];
+pub(super) const FILES: [&str; 9] = [
+    RECORD,
+    "config.toml",
+    DATASET,
+    "metrics.jsonl",
+    "scene.l4gs",
+    "coding.json",
+    "bit_maps.json",
+    "eval.json",
+    "report.html",
+];
 
 /// Folders of a run; `--overwrite` removes them.
 pub(super) const FOLDERS: [&str; 3] = ["events", "checkpoints", "renders"];

@@ -1,4 +1,4 @@
-//! The folder of a run: `config.toml`, `run.json`, `metrics.jsonl`, `events/`, `checkpoints/`, `scene.l4gs`,
+//! The folder of a run: `config.toml`, `run.json`, `dataset.json`, `metrics.jsonl`, `events/`, `checkpoints/`, `scene.l4gs`,
 //! `eval.json`, `renders/`, `report.html`.
 //!
 //! `run.json` is written last when a run is made, and removed first when it is replaced: where it is, the rest is whole.
@@ -8,10 +8,10 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use light4gs_data::{DataError, read_regular_file, write_atomically};
+use light4gs_data::{DataError, DatasetDigest, Scene, read_regular_file, write_atomically};
 use serde::{Deserialize, Serialize};
 
-use super::contents::{self, Contents, FILES, FOLDERS, RECORD};
+use super::contents::{self, Contents, DATASET, FILES, FOLDERS, RECORD};
 use super::list_checkpoints;
 use super::lock::RunLock;
 use crate::config::Config;
@@ -122,13 +122,7 @@ impl RunFolder {
 
     /// Removes what a run consists of, and nothing else.
     fn clear(&self) -> Result<(), TrainError> {
-        for name in FILES {
-            remove(&self.path(name), |path| fs::remove_file(path))?;
-        }
-        for name in FOLDERS {
-            remove(&self.path(name), |path| fs::remove_dir_all(path))?;
-        }
-        Ok(())
+        FILES.iter().chain(&FOLDERS).try_for_each(|name| remove(&self.path(name)))
     }
 
     /// Opens the folder of a run to read it; see [`RunFolder::lock`].
@@ -139,17 +133,17 @@ impl RunFolder {
         let folder = Self { root: root.to_owned(), lock: None };
         let path = folder.path(RECORD);
         let shown = root.display();
-        let anew = format!("`light4gs train DATASET --out {shown}`");
+        let anew = format!("light4gs train DATASET --out {shown}");
         match contents::of(root)? {
             Contents::Run => {}
             Contents::AbandonedStart => {
                 return Err(TrainError::Input(format!(
-                    "{shown} has no {RECORD}: the run was stopped before it began. Begin it with {anew}"
+                    "{shown} has no {RECORD}: the run was stopped before it began. Begin it with `{anew}`"
                 )));
             }
             Contents::Remains => {
                 return Err(TrainError::Input(format!(
-                    "{shown} has no {RECORD}: it holds what is left of a run. Replace it with {anew} --overwrite"
+                    "{shown} has no {RECORD}: it holds what is left of a run. Replace it with `{anew} --overwrite`"
                 )));
             }
             Contents::Nothing | Contents::Foreign(_) => {
@@ -159,7 +153,7 @@ impl RunFolder {
         let record = read_json(&path).map_err(|error| match error {
             DataError::Json { source, .. } => TrainError::Input(format!(
                 "{} is damaged: {source}. It holds \"scene\", the dataset's absolute path, and \"version\": write it anew, \
-                 or replace the run with {anew} --overwrite",
+                 or replace the run with `{anew} --overwrite`",
                 path.display()
             )),
             other => other.into(),
@@ -227,17 +221,47 @@ impl RunFolder {
         Ok(write_atomically(&path, |file| file.write_all(bytes))?)
     }
 
-    /// Reads a JSON file of the run; nothing if it is not there.
+    /// Compares a dataset with the one that the run was begun with, and keeps what it is: the first time, and where it
+    /// may have changed.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] with what has changed, unless `accept` is set; an image file that cannot be read.
+    pub fn check_dataset(&self, data: &Scene, accept: bool) -> Result<(), TrainError> {
+        let now = DatasetDigest::of(data)?;
+        let remedy = "remove the file to go on with the dataset as it is";
+        if let Some(before) = self.read_described(DATASET, remedy)?.filter(|_| !accept) {
+            let changes = now.changes_since(&before);
+            if changes.is_empty() {
+                return Ok(());
+            }
+            let run = self.root.display();
+            return Err(TrainError::Input(format!(
+                "the dataset {} is not what it was when the run {run} began: {}. Bring back what it was, or go on with what \
+                 it is by `light4gs resume {run} --accept-changed-dataset`",
+                data.root.display(),
+                changes.join("; ")
+            )));
+        }
+        self.write_json(DATASET, &now)
+    }
+
+    /// Reads a JSON file of the run that `resume` writes; nothing if it is not there.
     pub fn read_json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<Option<T>, TrainError> {
+        self.read_described(name, &format!("`light4gs resume {}` writes it anew", self.root.display()))
+    }
+
+    fn read_described<T: serde::de::DeserializeOwned>(
+        &self,
+        name: &str,
+        remedy: &str,
+    ) -> Result<Option<T>, TrainError> {
         let path = self.path(name);
         match read_json(&path) {
             Ok(value) => Ok(Some(value)),
             Err(DataError::Io { source, .. }) if source.kind() == std::io::ErrorKind::NotFound => Ok(None),
-            Err(DataError::Json { source, .. }) => Err(TrainError::Input(format!(
-                "{} is damaged: {source}. `light4gs resume {}` writes it anew",
-                path.display(),
-                self.root.display()
-            ))),
+            Err(DataError::Json { source, .. }) => {
+                Err(TrainError::Input(format!("{} is damaged: {source}; {remedy}", path.display())))
+            }
             Err(error) => Err(error.into()),
         }
     }
@@ -255,10 +279,13 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, DataError
     serde_json::from_slice(&bytes).map_err(|source| DataError::Json { path: path.to_owned(), source })
 }
 
-fn remove(path: &Path, remove: impl FnOnce(&Path) -> std::io::Result<()>) -> Result<(), TrainError> {
-    // A link that leads nowhere is to be removed as well.
-    if path.symlink_metadata().is_err() {
-        return Ok(());
-    }
-    Ok(remove(path).map_err(DataError::io("remove", path))?)
+/// Removes a file or a folder, if it is there.
+fn remove(path: &Path) -> Result<(), TrainError> {
+    // A link is removed, not what it leads to; one that leads nowhere as well.
+    let removed = match path.symlink_metadata() {
+        Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
+        Ok(_) => fs::remove_file(path),
+        Err(_) => Ok(()),
+    };
+    Ok(removed.map_err(DataError::io("remove", path))?)
 }

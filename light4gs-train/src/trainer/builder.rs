@@ -39,6 +39,7 @@ pub struct TrainerBuilder<F: DeformationField = HexPlaneField> {
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
+    accept_changed_dataset: bool,
     stop: Arc<AtomicBool>,
 }
 
@@ -52,6 +53,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             density: Box::new(AdaptiveDensityControl::new(config.train.densify.clone())),
             significance: Box::new(VolumeWeightedScore::new(&config.train.prune)),
             observers: Vec::new(),
+            accept_changed_dataset: false,
             stop: Arc::default(),
             config,
             data,
@@ -102,6 +104,12 @@ impl<F: DeformationField> TrainerBuilder<F> {
         self
     }
 
+    /// Goes on with a run although its dataset is not what it was when the run began.
+    pub fn accept_changed_dataset(mut self) -> Self {
+        self.accept_changed_dataset = true;
+        self
+    }
+
     /// A request to stop, which anyone may set at any time: before its next iteration the trainer then writes a checkpoint
     /// and returns [`TrainError::Stopped`]. [`TrainerBuilder::resume`] goes on from there to the same result.
     pub fn stop_flag(mut self, stop: Arc<AtomicBool>) -> Self {
@@ -123,7 +131,8 @@ impl<F: DeformationField> TrainerBuilder<F> {
     /// it had never been interrupted: bit-identical on a CPU.
     ///
     /// # Errors
-    /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration.
+    /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration;
+    /// [`TrainError::Input`] with what has changed if the dataset is not what it was when the run began.
     pub fn resume(mut self) -> Result<Trainer<F>, TrainError> {
         let device = self.open_device()?;
         match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
@@ -139,10 +148,18 @@ impl<F: DeformationField> TrainerBuilder<F> {
         self.config.validate()?;
         if let Some(folder) = &mut self.folder {
             folder.lock()?;
+            // Images from elsewhere have no files to compare.
+            if self.images.is_none() {
+                folder.check_dataset(&self.data, self.accept_changed_dataset)?;
+            }
         }
         if self.data.train.is_empty() {
             return Err(TrainError::Input(format!("the dataset `{}` has no training frames", self.data.name)));
         }
+        // What the encoder would refuse in the end is refused now.
+        light4gs_codec::checks::positions(&self.data.points.positions).map_err(|error| {
+            TrainError::Input(format!("the point cloud of the dataset {}: {error}", self.data.root.display()))
+        })?;
         let device = match &self.device {
             Some(device) => device.clone(),
             None => device::open(self.config.device)?,

@@ -26,7 +26,23 @@ pub struct Divergence {
     /// Folder of the run, if it has one.
     pub run: Option<PathBuf>,
     /// A key of the configuration to change, and a value for it.
-    pub remedy: (String, f64),
+    pub remedy: Remedy,
+}
+
+/// A change of the configuration that may help.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Remedy {
+    /// The key.
+    pub key: &'static str,
+    /// A value for it.
+    pub value: f64,
+}
+
+impl fmt::Display for Remedy {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // As short as a float32: nobody needs more digits of a learning rate.
+        write!(formatter, "{}={:e}", self.key, self.value as f32)
+    }
 }
 
 /// What is not finite.
@@ -49,7 +65,7 @@ impl std::error::Error for Divergence {}
 
 impl fmt::Display for Divergence {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { stage, iteration, found, checkpoint, run, remedy: (key, value) } = self;
+        let Self { stage, iteration, found, checkpoint, run, remedy } = self;
         write!(formatter, "training diverged in the {stage} stage at iteration {iteration}: ")?;
         match found {
             NotFinite::Loss(loss) => write!(formatter, "the loss is {loss}")?,
@@ -62,8 +78,8 @@ impl fmt::Display for Divergence {
             None => write!(formatter, ". There is no checkpoint yet; begin anew")?,
         }
         match run {
-            Some(run) => write!(formatter, " with `light4gs resume {} --set {key}={value:e}`", run.display()),
-            None => write!(formatter, " with `{key}` at {value:e}"),
+            Some(run) => write!(formatter, " with `light4gs resume {} --set {remedy}`", run.display()),
+            None => write!(formatter, " with `{remedy}`"),
         }
     }
 }
@@ -85,10 +101,13 @@ fn learning_rate(group: ParameterGroup, config: &Config) -> (&'static str, f64) 
     }
 }
 
-/// Weights of the loss besides the images': key and value.
-fn loss_weights(config: &Config) -> [(&'static str, f64); 4] {
-    let weights = &config.train.regularizer;
+/// What else can drive a training apart: the rates at the end, and the weights of the loss besides the images'.
+fn other_keys(config: &Config) -> [(&'static str, f64); 7] {
+    let (rates, weights) = (&config.train.learning_rate, &config.train.regularizer);
     [
+        ("train.learning_rate.means_final", rates.means_final),
+        ("train.learning_rate.grid_final", rates.grid_final),
+        ("train.learning_rate.deformation_final", rates.deformation_final),
         ("train.regularizer.plane_tv", weights.plane_tv.into()),
         ("train.regularizer.time_smoothness", weights.time_smoothness.into()),
         ("train.regularizer.time_l1", weights.time_l1.into()),
@@ -96,28 +115,34 @@ fn loss_weights(config: &Config) -> [(&'static str, f64); 4] {
     ]
 }
 
-/// What to change, and to which value, so that it does not happen again: of the learning rates and the weights of the loss
-/// the one that is furthest above its default. Where none is, a tenth of the learning rate of what is not finite.
-pub(crate) fn remedy(found: &NotFinite, config: &Config) -> (String, f64) {
+/// A key this many times above its default is to blame before any other. Presets stay below.
+const SUSPICIOUS: f64 = 8.0;
+
+/// Of the learning rates and the weights of the loss the one that is furthest above its default, and that default. None
+/// where all are about as usual.
+pub(super) fn unusual_key(config: &Config) -> Option<Remedy> {
     let keys = |config: &Config| -> Vec<(&'static str, f64)> {
         let rates = ParameterGroup::ALL.into_iter().map(|group| learning_rate(group, config));
-        rates.chain(loss_weights(config)).collect()
+        rates.chain(other_keys(config)).collect()
     };
-    // Where the default is 0, the least that a weight is worth writing.
-    let usual = keys(&Config::default()).into_iter().map(|(_, value)| value.max(1e-3));
+    // Where the default is 0, a small weight.
+    let usual = keys(&Config::default()).into_iter().map(|(_, value)| if value > 0.0 { value } else { 0.1 });
     let ratios = keys(config).into_iter().zip(usual).map(|((key, value), usual)| (key, usual, value / usual));
-    let highest = ratios.max_by(|a, b| a.2.total_cmp(&b.2));
-    if let Some((key, usual, ratio)) = highest
-        && ratio > 3.0
-    {
-        return (key.to_owned(), usual);
+    let (key, value, ratio) = ratios.max_by(|a, b| a.2.total_cmp(&b.2))?;
+    (ratio > SUSPICIOUS).then_some(Remedy { key, value })
+}
+
+/// What to change so that it does not happen again: an unusual key, or else the learning rate of what is not finite.
+pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
+    if let Some(remedy) = unusual_key(config) {
+        return remedy;
     }
     let group = match found {
         NotFinite::Parameter { name, .. } => group_of(name),
         NotFinite::Loss(_) => None,
     };
     let (key, value) = learning_rate(group.unwrap_or(ParameterGroup::Means), config);
-    (key.to_owned(), value / 10.0)
+    Remedy { key, value: value / 10.0 }
 }
 
 /// The group of a tensor of a checkpoint: a parameter, or a moment of one.
@@ -200,7 +225,7 @@ pub(super) struct EmptyImageWatch {
 impl EmptyImageWatch {
     /// Takes an image that was logged: PSNR of the rendering and of the empty image, both against the training image.
     /// Returns what to tell, where renderings have fallen to empty images, or where a stage ends with such.
-    pub(super) fn log(&mut self, psnr: f64, empty_psnr: f64, stage_ends: bool) -> Option<String> {
+    pub(super) fn log(&mut self, psnr: f64, empty_psnr: f64, stage_ends: bool, training_ends: bool) -> Option<String> {
         if self.window.len() == WINDOW {
             self.window.pop_front();
         }
@@ -210,7 +235,7 @@ impl EmptyImageWatch {
         let full = self.window.len() == WINDOW;
         self.was_better |= full && !is_empty;
         self.told &= is_empty;
-        let due = is_empty && !self.told && ((full && self.was_better) || stage_ends);
+        let due = is_empty && !self.told && ((full && self.was_better) || training_ends || (full && stage_ends));
         if !due {
             return None;
         }
@@ -254,21 +279,28 @@ mod tests {
         let found = not_finite_parameter(&scene, "scene").unwrap();
         let name = "scene.gaussians.means".to_owned();
         assert_eq!(found, NotFinite::Parameter { name, index: 1, value: f32::INFINITY });
-        assert_eq!(remedy(&found, &config).0, "train.learning_rate.means_init");
+        assert_eq!(remedy(&found, &config).to_string(), "train.learning_rate.means_init=1.6e-5");
         config.train.learning_rate.opacity *= 100.0;
-        assert_eq!(remedy(&found, &config), ("train.learning_rate.opacity".to_owned(), 0.05));
+        assert_eq!(remedy(&found, &config).to_string(), "train.learning_rate.opacity=5e-2");
+    }
+
+    #[test]
+    fn presets_are_not_suspicious() {
+        for name in crate::config::preset_names() {
+            assert_eq!(unusual_key(&Config::from_preset(name).unwrap()), None, "{name}");
+        }
     }
 
     #[test]
     fn renderings_that_fall_to_empty_images_are_noticed_once() {
         let mut watch = EmptyImageWatch::default();
         // The first images are worse than nothing; that is no news.
-        assert!((0..5).all(|_| watch.log(8.0, 12.0, false).is_none()));
-        assert!((0..30).all(|_| watch.log(20.0, 12.0, false).is_none()));
-        let told: Vec<_> = (0..40).filter_map(|_| watch.log(12.0, 12.0, false)).collect();
+        assert!((0..5).all(|_| watch.log(8.0, 12.0, false, false).is_none()));
+        assert!((0..30).all(|_| watch.log(20.0, 12.0, false, false).is_none()));
+        let told: Vec<_> = (0..40).filter_map(|_| watch.log(12.0, 12.0, false, false)).collect();
         assert_eq!(told.len(), 1, "{told:?}");
         watch.reset();
-        assert!((0..30).all(|_| watch.log(8.0, 12.0, false).is_none()));
-        assert!(watch.log(8.0, 12.0, true).unwrap().contains("8.00 dB"));
+        assert!((0..30).all(|_| watch.log(8.0, 12.0, false, false).is_none()));
+        assert!(watch.log(8.0, 12.0, true, true).unwrap().contains("8.00 dB"));
     }
 }

@@ -30,7 +30,7 @@ use light4gs_data::{Scene, Split};
 use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneField, Splatter};
 
 pub use builder::TrainerBuilder;
-pub use divergence::{Divergence, NotFinite};
+pub use divergence::{Divergence, NotFinite, Remedy};
 
 use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
 use crate::config::Config;
@@ -45,7 +45,7 @@ use crate::optimization::adam::Adam;
 use crate::randomness::FrameOrder;
 use crate::run::{Checkpoint, RunFolder, SaveError, list_checkpoints};
 use crate::stage::Stage;
-use divergence::{EmptyImageWatch, not_finite_in, remedy};
+use divergence::{EmptyImageWatch, not_finite_in, remedy, unusual_key};
 use profile::Profile;
 use views::ViewPools;
 
@@ -215,9 +215,14 @@ impl<F: DeformationField> Trainer<F> {
             device: &self.device,
         };
         let (observers, stop, folder) = (&mut self.observers, &self.stop, self.folder.as_ref());
-        code_scene(&trained, &mut |done, iterations| match stop.load(Ordering::Relaxed) {
+        let coded = code_scene(&trained, &mut |done, iterations| match stop.load(Ordering::Relaxed) {
             true => Err(stopped("while the entropy models were fitted", folder)),
             false => observers.iter_mut().try_for_each(|observer| observer.on_fit(done, iterations)),
+        });
+        coded.map_err(|error| match error {
+            // The run to go on with is known here only.
+            TrainError::Diverged(fit) => self.diverged(fit.stage, fit.iteration, fit.found),
+            other => other,
         })
     }
 
@@ -315,9 +320,14 @@ impl<F: DeformationField> Trainer<F> {
         record.psnr = Some(training_psnr);
         let background = Tensor::<1>::from_floats(self.data.background, &report.truth.device());
         let empty = background.reshape([1, 1, 3]).expand(report.truth.dims());
-        if let Some(warning) = self.empty_images.log(training_psnr, psnr(empty, report.truth.clone()), is_last) {
-            let (key, value) = remedy(&NotFinite::Loss(report.loss), &self.config);
-            let warning = format!("{stage} stage, iteration {iteration}: {warning}. Try `--set {key}={value:e}`");
+        let psnr_of_nothing = psnr(empty, report.truth.clone());
+        let over = is_last && stage == Stage::Fine;
+        if let Some(warning) = self.empty_images.log(training_psnr, psnr_of_nothing, is_last, over) {
+            let advice = match unusual_key(&self.config) {
+                Some(remedy) => format!("Try `--set {remedy}`"),
+                None => "Lower the learning rates, or look whether the cameras see the points".to_owned(),
+            };
+            let warning = format!("{stage} stage, iteration {iteration}: {warning}. {advice}");
             self.observers.iter_mut().try_for_each(|observer| observer.on_warning(&warning))?;
         }
         record.iterations_per_second = rate;

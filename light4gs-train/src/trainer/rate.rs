@@ -68,8 +68,9 @@ impl<F: DeformationField> Trainer<F> {
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
         let mut steps = vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())];
-        // A field without planes has nothing to weigh before the spherical harmonics count.
-        let anything = compression.planes.is_some() || (with_sh && compression.sh.is_some());
+        // Frozen planes, and a field without any, have nothing to weigh where the spherical harmonics do not count: a rate
+        // of constants has no gradient.
+        let anything = noisy.steps.is_some() || (with_sh && compression.sh.is_some());
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
             let apart = (!config.planes || !config.sh).then(|| noisy.out_of_reach(!config.planes, !config.sh));

@@ -1,0 +1,74 @@
+//! Whatever the configuration allows trains: both ends of every key's range, every word, true and false.
+
+use std::path::Path;
+
+use light4gs_data::{SyntheticOptions, write_synthetic};
+use light4gs_tests::hostile::configurations::{ends, tiny_with};
+use light4gs_tests::hostile::{train, without_panic};
+use light4gs_train::config::{BOUNDS, Config};
+use light4gs_train::error::TrainError;
+
+/// Where an end of the range would ask for the machine: a large value that takes a moment.
+const CHEAPER: [(&str, &str); 9] = [
+    ("data.resolution", "64"),
+    ("data.initial_points", "3000"),
+    ("model.hexplane.channels", "48"),
+    ("model.hexplane.resolution", "[64, 64, 64, 32]"),
+    ("model.hexplane.multipliers", "[1, 2, 3, 4, 5, 6]"),
+    ("model.deformation.width", "512"),
+    ("model.deformation.depth", "20"),
+    ("train.batch_size", "40"),
+    ("compression.context.fit_iterations", "30"),
+];
+
+/// What else must be said where a value does not stand alone.
+const COMPANIONS: [(&str, &str, &[(&str, &str)]); 13] = [
+    ("train.coarse_iterations", "0", &[("train.fine_iterations", "3")]),
+    ("train.fine_iterations", "0", &[("train.prune.iterations", "[]"), ("train.coarse_iterations", "3")]),
+    ("train.densify.from", "", &[("train.densify.until", "9223372036854775807"), ("train.prune.fraction", "0.0")]),
+    ("train.densify.until", "", &[("train.prune.fraction", "0.0")]),
+    ("train.densify.until", "0", &[("train.densify.from", "0")]),
+    ("train.prune.iterations", "[1]", &[("train.densify.until", "0")]),
+    ("train.prune.iterations", "[100000000]", &[("train.fine_iterations", "100000000")]),
+    ("compression.rate.from", "", &[("compression.rate.planes_until", "0")]),
+    ("compression.context.high_scale_hyperprior", "", &[("compression.context.inter_scale", "true")]),
+    ("compression.context.hyperprior", "false", &[("compression.context.high_scale_hyperprior", "false")]),
+    ("eval.views", "0", &[("eval.interval", "0")]),
+    ("compression.context.fit_iterations", "", &[("compression.rate.lambda", "0.0")]),
+    ("model.sh_degree", "", &[("train.sh_degree_interval", "1")]),
+];
+
+fn scene(folder: &Path) {
+    let options = SyntheticOptions { resolution: 16, train_frames: 4, test_frames: 1, val_frames: 0, seed: 0 };
+    write_synthetic(folder, &options).unwrap();
+}
+
+#[test]
+fn every_legal_value_of_every_key_trains_and_is_encoded() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("scene");
+    scene(&data);
+    let mut failures = Vec::new();
+    let mut count = 0;
+    for (key, bounds) in BOUNDS {
+        let mut values = ends(bounds);
+        if let Some((_, cheaper)) = CHEAPER.iter().find(|(expensive, _)| expensive == key) {
+            *values.last_mut().unwrap() = (*cheaper).to_owned();
+        }
+        for value in values {
+            let companions = COMPANIONS.iter().filter(|(other, at, _)| other == key && (at.is_empty() || *at == value));
+            let mut pairs: Vec<(&str, &str)> = companions.flat_map(|(_, _, pairs)| *pairs).copied().collect();
+            pairs.push((key, &value));
+            let text = tiny_with(&pairs);
+            let config = Config::from_toml(&text, key).unwrap_or_else(|error| panic!("{key} = {value}: {error}"));
+            count += 1;
+            match without_panic(&format!("{key} = {value}"), || train(&config, &data, 4)) {
+                // What training makes of an extreme rate is its own affair, as long as it says so.
+                Ok(()) | Err(TrainError::Diverged(_)) => {}
+                Err(error) => failures.push(format!("{key} = {value}: {error}")),
+            }
+        }
+    }
+    println!("{count} configurations");
+    assert!(failures.is_empty(), "{} of {count} failed:\n{}", failures.len(), failures.join("\n"));
+}
