@@ -23,6 +23,9 @@ use crate::{
 /// fit into the 2^22 steps that a symbol can count.
 pub const LEAST_STEP: f32 = 1e-5;
 
+/// The smallest step that a decoder takes: a value is never a subnormal number, which takes long.
+pub(crate) const LEAST_STEP_IN_STREAM: f32 = 1.0 / (1u64 << 60) as f32;
+
 /// Refuses a hexplane that no stream can hold, or whose planes cannot be coded: channels, resolution, and multipliers of it.
 ///
 /// # Errors
@@ -44,7 +47,8 @@ pub fn plane_step(step: f32) -> Result<(), CodecError> {
 
 /// The nearest steps that [`plane_step`] takes: learned steps are not bounded by anything else.
 pub fn nearest_plane_steps(steps: PerGroup) -> PerGroup {
-    let nearest = |step: f32| step.max(LEAST_STEP).min(LARGEST_STEP);
+    // NaN becomes the smallest, which `clamp` would keep.
+    let nearest = |step: f32| if step > LEAST_STEP { step.min(LARGEST_STEP) } else { LEAST_STEP };
     PerGroup { space_only: nearest(steps.space_only), space_time: nearest(steps.space_time) }
 }
 

@@ -97,7 +97,10 @@ pub enum CodecError {
         section: &'static str,
     },
     /// A number is beyond what a reader accepts.
-    #[error("{section}: {field} is {found}, at most {limit} is accepted; make the scene smaller or raise the limit")]
+    #[error(
+        "{section}: {field} is {found}, at most {limit} is accepted; make the scene smaller, or \
+         raise the limit if you trust the file (`--limits large`, `Limits::large`)"
+    )]
     OverLimit {
         /// The section.
         section: &'static str,

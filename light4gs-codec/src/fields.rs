@@ -34,6 +34,10 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     add(section, "mean".into(), &frame.mean);
     add(section, "axes".into(), frame.axes.as_flattened());
     add(section, "std".into(), &frame.std);
+    add(section, "scale".into(), &frame.mapping.scale);
+    add(section, "offset".into(), &frame.mapping.offset);
+    add(section, "time_scale".into(), from_ref(&frame.mapping.time_scale));
+    add(section, "time_offset".into(), from_ref(&frame.mapping.time_offset));
 
     let section = Section::Motion.name();
     let layers = motion.network.iter().flat_map(|motion| motion.network.layers());

@@ -7,7 +7,7 @@ use std::{
 };
 
 use crate::{
-    CodecError, Limits, SceneData, StreamInfo, decode, info,
+    CodecError, Limits, SceneData, StreamInfo, decode_with_limits, info_with_limits,
     stream::container::{PRELUDE, Prelude},
 };
 
@@ -16,7 +16,15 @@ use crate::{
 /// # Errors
 /// What the system refuses, and what [`decode`] refuses; the message names the file.
 pub fn read_file(path: &Path) -> Result<SceneData, CodecError> {
-    read_and(path, decode)
+    read_file_with_limits(path, &Limits::default())
+}
+
+/// As [`read_file`], within limits of the caller's.
+///
+/// # Errors
+/// As [`read_file`].
+pub fn read_file_with_limits(path: &Path, limits: &Limits) -> Result<SceneData, CodecError> {
+    read_and(path, limits, |bytes| decode_with_limits(bytes, limits))
 }
 
 /// Reads what a file holds. See [`info`].
@@ -24,11 +32,23 @@ pub fn read_file(path: &Path) -> Result<SceneData, CodecError> {
 /// # Errors
 /// What the system refuses, and what [`info`] refuses; the message names the file.
 pub fn read_info(path: &Path) -> Result<StreamInfo, CodecError> {
-    read_and(path, info)
+    read_info_with_limits(path, &Limits::default())
+}
+
+/// As [`read_info`], within limits of the caller's.
+///
+/// # Errors
+/// As [`read_info`].
+pub fn read_info_with_limits(path: &Path, limits: &Limits) -> Result<StreamInfo, CodecError> {
+    read_and(path, limits, |bytes| info_with_limits(bytes, limits))
 }
 
 /// Reads a file and gives it to `parse`. A file that is no stream, or claims to be too long, is not read to its end.
-fn read_and<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, CodecError>) -> Result<T, CodecError> {
+fn read_and<T>(
+    path: &Path,
+    limits: &Limits,
+    parse: impl FnOnce(&[u8]) -> Result<T, CodecError>,
+) -> Result<T, CodecError> {
     let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
     let file = File::open(path).map_err(io)?;
     if file.metadata().as_ref().is_ok_and(fs::Metadata::is_dir) {
@@ -37,7 +57,7 @@ fn read_and<T>(path: &Path, parse: impl FnOnce(&[u8]) -> Result<T, CodecError>) 
     let mut bytes = Vec::new();
     (&file).take(PRELUDE as u64).read_to_end(&mut bytes).map_err(io)?;
     let in_file = |error| CodecError::InFile { path: path.to_owned(), error: Box::new(error) };
-    let prelude = Prelude::read(&bytes, &Limits::default()).map_err(in_file)?;
+    let prelude = Prelude::read(&bytes, limits).map_err(in_file)?;
     // One byte more than the header claims shows that something was appended.
     let rest = (prelude.file_bytes + 1).saturating_sub(bytes.len() as u64);
     file.take(rest).read_to_end(&mut bytes).map_err(io)?;

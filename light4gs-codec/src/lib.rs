@@ -57,7 +57,8 @@
 //! # Hostile bytes, other platforms
 //!
 //! A reader trusts nothing: every length and every count is checked against the bytes that are there and against
-//! [`Limits`] before memory is taken, so hostile input gets a [`CodecError`], never a panic.
+//! [`Limits`] before memory or time is taken, so hostile input gets a [`CodecError`], never a panic. `SECURITY.md` has the
+//! promises. What the encoder refuses can be asked before: see [`checks`].
 //!
 //! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`,
 //! where `read_file` and `read_info` are absent and work is done by one thread. Elsewhere
@@ -67,6 +68,7 @@
 
 mod adaptive;
 pub mod attributes;
+mod budget;
 pub mod checks;
 mod entropy;
 mod error;
@@ -82,24 +84,26 @@ mod scene;
 mod sh;
 mod stream;
 
+pub use budget::Demand;
 pub use entropy::FrequencyTable;
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
-pub use file::{read_file, read_info};
+pub use file::{read_file, read_file_with_limits, read_info, read_info_with_limits};
 pub use limits::Limits;
 pub use network::{Network, weights as network_weights};
 pub use planes::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, section::PlaneBytes};
 pub use scene::{
-    GaussianArrays, HexPlaneArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource,
-    NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
+    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput,
+    MotionSource, NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
+pub use stream::names::legal_name;
 pub use stream::{
     CompressionInput, CompressionReport, Distributions, Encoded, OpenStream, PerGroup, PlaneCoding, Profile,
     SectionInfo, StreamInfo, WeightPrecisions,
     container::{MAGIC, VERSION},
     decode, decode_with_limits, encode, encode_compressed, encode_compressed_with_limits, encode_planes, encode_sh,
-    info, plane_distributions,
+    info, info_with_limits, plane_distributions,
     sections::{Encoding, Kind},
     sh_distributions,
 };

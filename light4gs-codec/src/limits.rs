@@ -2,10 +2,10 @@
 
 use crate::CodecError;
 
-/// The most that a reader accepts, checked before memory is taken.
+/// The most that a reader accepts, checked before memory and time are taken.
 ///
-/// The default is for files of strangers: a file takes some seconds of one thread and 256 MiB at most, or a small
-/// multiple of its own length if that is more. A program that knows its files may want less, or more:
+/// The default is for files of strangers: a file takes [`Limits::memory_bytes`] and [`Limits::nanoseconds`] of one thread at
+/// most, or a small multiple of its own length if that is more. A program that knows its files may want less, or more:
 ///
 /// ```
 /// use light4gs_codec::{Limits, SceneData, decode_with_limits, encode};
@@ -13,6 +13,7 @@ use crate::CodecError;
 /// let bytes = encode(&SceneData::default())?;
 /// let limits = Limits { gaussians: 1_000_000, ..Limits::default() };
 /// assert!(decode_with_limits(&bytes, &limits).is_ok());
+/// assert!(decode_with_limits(&bytes, &Limits::large()).is_ok());
 /// # Ok::<(), light4gs_codec::CodecError>(())
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,8 +26,16 @@ pub struct Limits {
     pub sections: u32,
     /// Bytes of one string.
     pub string_bytes: u32,
+    /// Bytes of a name: the scene's, a key's, a tensor's.
+    pub name_bytes: u32,
     /// Free notes in the scene meta.
     pub extras: u32,
+    /// Frames of the source.
+    pub frames: u32,
+    /// Width and height of the source's camera, in pixels.
+    pub image_side: u32,
+    /// Width times height of the source's camera.
+    pub image_pixels: u64,
     /// Gaussians.
     pub gaussians: u32,
     /// Channels of a plane.
@@ -43,13 +52,12 @@ pub struct Limits {
     pub layer_width: u32,
     /// Weights of all networks of a section.
     pub layer_weights: u64,
-    /// Values of all entropy-coded planes, or of the entropy-coded spherical harmonics. Coded values can take next to
-    /// no bytes, so this bounds the memory that a small stream can ask for. A stream of `b` bytes may hold `64 b` of
-    /// them whatever this says.
-    pub coded_values: u64,
-    /// Multiplications that the networks of the planes, or those of the spherical harmonics, may ask for. The default is
-    /// three times what the largest architecture takes for planes of the paper's size.
-    pub multiplications: u64,
+    /// Memory that decoding takes, results included and the stream itself not. Added up from counts and sizes before
+    /// memory is taken. A stream of `b` bytes may take `4 b` whatever this says.
+    pub memory_bytes: u64,
+    /// Time that decoding takes on one thread of a server core of 2023. Added up from counts and sizes before any work is
+    /// done, so that it is the same on every machine. A stream of `b` bytes may take `400 b` whatever this says.
+    pub nanoseconds: u64,
 }
 
 impl Default for Limits {
@@ -59,7 +67,11 @@ impl Default for Limits {
             meta_bytes: 1 << 20,
             sections: 64,
             string_bytes: 1 << 16,
+            name_bytes: 1 << 10,
             extras: 1 << 10,
+            frames: 100_000,
+            image_side: 1 << 14,
+            image_pixels: 1 << 25,
             gaussians: 1 << 26,
             channels: 1 << 12,
             resolution: 1 << 16,
@@ -68,37 +80,40 @@ impl Default for Limits {
             nodes: 256,
             layer_width: 1 << 16,
             layer_weights: 1 << 21,
-            coded_values: 1 << 23,
-            multiplications: 1 << 34,
+            memory_bytes: 256 << 20,
+            nanoseconds: 1_800_000_000,
         }
     }
 }
 
 impl Limits {
-    /// What the encoder keeps to, for files that are trusted: they may take minutes and gigabytes.
-    pub const fn large() -> Self {
+    /// For files that are trusted, such as one's own; what the encoder keeps to. A file may take 64 GiB and half an hour.
+    pub fn large() -> Self {
         Self {
-            file_bytes: 1 << 40,
-            meta_bytes: 1 << 20,
-            sections: 64,
-            string_bytes: 1 << 16,
-            extras: 1 << 10,
-            gaussians: 1 << 28,
-            channels: 1 << 12,
-            resolution: 1 << 16,
-            scales: 16,
-            networks: 32,
-            nodes: 256,
+            image_pixels: 1 << 28,
             layer_width: 1 << 19,
             layer_weights: 1 << 28,
-            coded_values: 1 << 30,
-            multiplications: 1 << 44,
+            gaussians: 1 << 28,
+            memory_bytes: 64 << 30,
+            nanoseconds: 1_800_000_000_000,
+            ..Self::default()
         }
     }
 
-    /// These limits for a stream of some length, which raises what it may hold.
+    /// These limits for a stream of some length, which raises what it may take.
     pub(crate) fn for_stream(&self, bytes: usize) -> Self {
-        Self { coded_values: self.coded_values.max(64 * bytes as u64), ..*self }
+        let bytes = bytes as u64;
+        Self { memory_bytes: self.memory_bytes.max(4 * bytes), nanoseconds: self.nanoseconds.max(400 * bytes), ..*self }
+    }
+
+    /// Refuses the size of an image: what a file says of its camera, or what somebody wants to render.
+    ///
+    /// # Errors
+    /// A side beyond [`Limits::image_side`], or more pixels than [`Limits::image_pixels`].
+    pub fn check_image(&self, width: u32, height: u32) -> Result<(), CodecError> {
+        at_most("meta", "width", width.into(), self.image_side)?;
+        at_most("meta", "height", height.into(), self.image_side)?;
+        at_most("meta", "width times height", u64::from(width) * u64::from(height), self.image_pixels)
     }
 }
 

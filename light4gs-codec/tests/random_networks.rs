@@ -133,7 +133,7 @@ proptest! {
         let end = (at + new.len()).min(payload.len());
         payload[at..end].copy_from_slice(&new[..end - at]);
         let forged = common::with_payload(bytes, section, &payload);
-        let limits = Limits { coded_values: 1 << 12, multiplications: 1 << 24, ..Limits::default() };
+        let limits = Limits { nanoseconds: 20_000_000, ..Limits::default() };
         let begin = Instant::now();
         if let Ok(scene) = decode_with_limits(&forged, &limits) {
             let _ = scene.positions_at(0.5);

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{gaussians, hexplane, motion, sample};
-use light4gs_codec::{MotionArrays, SceneData, SceneMeta, decode, encode, info};
+use light4gs_codec::{CoordinateMapping, MotionArrays, SceneData, SceneMeta, decode, encode, info};
 use proptest::{collection::btree_map, prelude::*};
 
 #[test]
@@ -129,4 +129,29 @@ proptest! {
         prop_assert!(decode(&bytes).is_err());
         prop_assert!(info(&bytes).is_err());
     }
+}
+
+#[test]
+fn a_mapping_of_coordinates_is_kept_and_used() {
+    let mut scene = sample();
+    scene.frame.mapping = CoordinateMapping {
+        contracts: false,
+        scale: [-0.5, 0.25, 1.5],
+        offset: [0.1, -0.2, 0.3],
+        time_scale: 0.5,
+        time_offset: 0.5,
+    };
+    let bytes = encode(&scene).unwrap();
+    assert_eq!(decode(&bytes).unwrap(), scene);
+    let kinds: Vec<&str> = info(&bytes).unwrap().sections.iter().map(|section| section.kind.name()).collect();
+    assert!(kinds.contains(&"mapped principal axes"), "{kinds:?}");
+    // The contraction's flag stands 60 bytes into the section; a section that is cut short is refused too.
+    let mut paper = scene.clone();
+    paper.frame.mapping = CoordinateMapping::default();
+    assert_eq!(encode(&paper).unwrap().len() + 33, bytes.len());
+    // Half the time from the middle on: the beginning of the one is the middle of the other.
+    let mut late = scene.clone();
+    late.frame.mapping = CoordinateMapping { time_scale: 1.0, time_offset: 0.0, ..scene.frame.mapping };
+    assert_eq!(scene.positions_at(0.0).unwrap(), late.positions_at(0.5).unwrap());
+    assert_eq!(scene.positions_at(1.0).unwrap(), late.positions_at(1.0).unwrap());
 }

@@ -190,7 +190,8 @@ impl Camera {
         }
         check_rotation(rotation)?;
         let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(|value| value as f32);
-        if ![fx, fy].iter().all(|f| f.is_finite() && *f > 0.0) || !(cx.is_finite() && cy.is_finite()) {
+        let legal = [fx, fy, cx, cy].iter().all(|value| value.is_finite()) && fx > 0.0 && fy > 0.0;
+        if !legal {
             return Err(PoseError::Intrinsics { fx, fy, cx, cy });
         }
         if width == 0 || height == 0 {

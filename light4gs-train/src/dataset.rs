@@ -3,8 +3,10 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use light4gs_codec::SceneMeta;
-use light4gs_data::{DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene};
+use light4gs_codec::{SceneMeta, legal_name};
+use light4gs_data::{
+    DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene, measured_pixels,
+};
 
 use crate::config::Config;
 
@@ -25,6 +27,15 @@ pub trait ImageSource: Send + Sync {
         Ok(None)
     }
 
+    /// The pixels that masked measures look at; `None` where the frame has no mask.
+    ///
+    /// # Errors
+    /// Where the mask cannot be read.
+    fn measured_pixels(&self, frame: &Frame) -> Result<Option<PixelMask>, DataError> {
+        let _ = frame;
+        Ok(None)
+    }
+
     /// These frames will be asked for; a source may begin to read them.
     fn prefetch(&self, frames: &[Frame]) {
         let _ = frames;
@@ -38,6 +49,10 @@ impl ImageSource for ImageStore {
 
     fn trained_pixels(&self, frame: &Frame) -> Result<Option<Arc<PixelMask>>, DataError> {
         Ok(self.get_masked(frame)?.1)
+    }
+
+    fn measured_pixels(&self, frame: &Frame) -> Result<Option<PixelMask>, DataError> {
+        measured_pixels(frame)
     }
 
     fn prefetch(&self, frames: &[Frame]) {
@@ -96,7 +111,8 @@ pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
     times.sort_by(f32::total_cmp);
     times.dedup();
     SceneMeta {
-        name: data.name.clone(),
+        // A folder may be called anything.
+        name: legal_name(&data.name),
         frame_count: times.len() as u32,
         // Times are a share of the whole; nobody says how long it lasts.
         fps: 0.0,

@@ -10,6 +10,7 @@ pub mod density;
 pub mod device;
 pub mod error;
 pub mod evaluation;
+pub mod import;
 pub mod loss;
 pub mod memory;
 pub mod observers;
@@ -21,5 +22,6 @@ mod stage;
 pub mod study;
 pub mod trainer;
 pub mod video;
+pub mod view;
 
 pub use stage::Stage;

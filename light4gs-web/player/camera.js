@@ -33,7 +33,13 @@ export function turn(v, axis, angle) {
   const [cosine, sine] = [Math.cos(angle), Math.sin(angle)];
   const along = dot(v, axis) * (1 - cosine);
   const across = cross(axis, v);
-  return [0, 1, 2].map((i) => v[i] * cosine + across[i] * sine + axis[i] * along);
+  return add(add([v[0] * cosine, v[1] * cosine, v[2] * cosine], across, sine), axis, along);
+}
+
+/** Where a camera stands. @param {View} view @returns {Vector} */
+export function center({ rotation: r, translation: t }) {
+  const coordinate = (/** @type {number} */ i) => -(r[i] * t[0] + r[3 + i] * t[1] + r[6 + i] * t[2]);
+  return [coordinate(0), coordinate(1), coordinate(2)];
 }
 
 /** How near the view may come to the up axis, radians. */
@@ -84,9 +90,9 @@ export class Camera {
    * @param {View} view
    */
   take(view) {
-    const { rotation: r, translation: t } = view;
+    const { rotation: r } = view;
     this.axes = [[r[0], r[1], r[2]], [r[3], r[4], r[5]], [r[6], r[7], r[8]]];
-    this.position = [0, 1, 2].map((i) => -(r[i] * t[0] + r[3 + i] * t[1] + r[6 + i] * t[2]));
+    this.position = center(view);
     const { fx, fy, cx, cy, width, height } = view;
     this.lens = { fx, fy, cx, cy, width, height };
   }
@@ -178,9 +184,9 @@ export function commonTarget(cameras) {
   // Sum of (1 - f fᵀ) x = sum of (1 - f fᵀ) c, solved by Cramer's rule.
   const m = [0, 0, 0, 0, 0, 0, 0, 0, 0];
   const b = [0, 0, 0];
-  for (const { rotation: r, translation: t } of cameras) {
-    const f = [r[6], r[7], r[8]];
-    const c = [0, 1, 2].map((i) => -(r[i] * t[0] + r[3 + i] * t[1] + r[6 + i] * t[2]));
+  for (const camera of cameras) {
+    const f = [camera.rotation[6], camera.rotation[7], camera.rotation[8]];
+    const c = center(camera);
     for (let i = 0; i < 3; i++) {
       for (let j = 0; j < 3; j++) {
         const p = (i === j ? 1 : 0) - f[i] * f[j];

@@ -144,6 +144,12 @@ export class Controls {
     return moved;
   }
 
+  /** Lets nothing go on moving by itself. */
+  rest() {
+    this.#inertia = { sideways: 0, upwards: 0 };
+    this.#moved = false;
+  }
+
   /** Listens no more. */
   dispose() {
     this.#abort.abort();

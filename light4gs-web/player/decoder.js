@@ -1,7 +1,7 @@
 // The WebAssembly module behind plain functions. Everything here runs in the worker.
 
-/** Gaussians of a texture row. */
-const ROW = 256;
+import { SceneError } from "./errors.js";
+
 /** Gaussians that are computed before the worker looks for messages. */
 const SLICE = 8192;
 
@@ -14,25 +14,13 @@ const SLICE = 8192;
  * @property {() => number} text_length
  * @property {() => bigint} digest
  * @property {(time: number, first: number, last: number) => void} evaluate
- * @property {() => number} present
- * @property {() => number} changes_harmonics
- * @property {() => number} harmonics
+ * @property {() => void} present
+ * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number) => number} draw_list
+ * @property {() => number} list_length
  * @property {(time: number) => number} attributes_at
  * @property {() => number} numbers_length
  * @property {() => void} forget_numbers
- * @property {(x: number, y: number, z: number, offset: number) => number} sort
- * @property {() => number} order_length
  */
-
-/** A scene that was refused; `kind` is one of `not-l4gs`, `newer`, `too-large`, `damaged`, `memory`. */
-export class SceneError extends Error {
-  /** @param {string} kind @param {string} message */
-  constructor(kind, message) {
-    super(message);
-    this.name = "SceneError";
-    this.kind = kind;
-  }
-}
 
 /** One decoded scene in one instance of the module. */
 export class Decoder {
@@ -63,7 +51,6 @@ export class Decoder {
     // Notes in a file may be any text.
     const description = JSON.parse(new TextDecoder().decode(text));
     if (!opened) throw new SceneError(description.error, description.message);
-    description.changesHarmonics = wasm.changes_harmonics() === 1;
     this.info = description;
     return description;
   }
@@ -74,29 +61,30 @@ export class Decoder {
   }
 
   /**
-   * The Gaussians at a time, for the texture. Pauses between slices, so that the worker can answer others.
+   * Computes the Gaussians at a time. Pauses between slices, so that the worker can answer others.
    * @param {number} time
    * @param {() => Promise<void>} pause
-   * @param {Float32Array | null} into
    */
-  async evaluate(time, pause, into) {
+  async evaluate(time, pause) {
     for (let first = 0; first < this.count; first += SLICE) {
       if (first > 0) await pause();
       this.wasm.evaluate(time, first, first + SLICE);
     }
-    const length = 12 * Math.ceil(this.count / ROW) * ROW;
-    const numbers = new Float32Array(this.wasm.memory.buffer, this.wasm.present(), length);
-    if (!into || into.length !== length) return numbers.slice();
-    into.set(numbers);
-    return into;
+    this.wasm.present();
   }
 
-  /** The harmonics of what was computed last, for the texture. */
-  harmonics() {
-    const at = this.wasm.harmonics();
-    const numbers = new Float32Array(this.wasm.memory.buffer, at, this.wasm.numbers_length()).slice();
-    this.wasm.forget_numbers();
-    return numbers;
+  /**
+   * What is drawn of the last evaluation, as abi.rs says.
+   * @param {import("./scene.js").Viewpoint} viewpoint
+   * @param {ArrayBuffer | null} memory  to be used again
+   */
+  drawList({ row, eye }, memory) {
+    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2]);
+    const list = new Float32Array(this.wasm.memory.buffer, at, this.wasm.list_length());
+    if (!memory || memory.byteLength < list.byteLength) return list.slice();
+    const copy = new Float32Array(memory, 0, list.length);
+    copy.set(list);
+    return copy;
   }
 
   /**
@@ -111,16 +99,12 @@ export class Decoder {
   }
 
   /**
-   * The order to draw the Gaussians of the last evaluation in: back to front.
-   * @param {ArrayLike<number>} row  four numbers: the depth of a point is `row · (x, y, z, 1)`
+   * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits.
+   * @param {Uint8Array} bytes
    */
-  sort(row) {
-    const at = this.wasm.sort(row[0], row[1], row[2], row[3]);
-    return new Uint32Array(this.wasm.memory.buffer, at, this.wasm.order_length()).slice();
-  }
-
-  /** One number for all bits of the decoded scene, as 16 hexadecimal digits. */
-  digest() {
+  digest(bytes) {
+    const at = this.wasm.reserve_input(bytes.length);
+    new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
     return BigInt.asUintN(64, this.wasm.digest()).toString(16).padStart(16, "0");
   }
 }

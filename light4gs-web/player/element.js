@@ -1,1 +1,438 @@
-export class L4gsPlayer extends HTMLElement {}
+// <l4gs-player>: the player with its buttons.
+
+import { SceneError } from "./errors.js";
+import { icon, LAYOUT } from "./layout.js";
+import { explain } from "./messages.js";
+import { fillPanel } from "./panel.js";
+import { Player } from "./player.js";
+import { load } from "./scene.js";
+
+/** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
+
+/** Milliseconds between two looks at what is watched. */
+const WATCH_INTERVAL = 1500;
+/** Milliseconds between two updates of the panel. */
+const PANEL_INTERVAL = 500;
+
+/** @param {number[]} color */
+const toHex = (color) => `#${color.map((c) => Math.round(255 * Math.min(1, Math.max(0, c))).toString(16).padStart(2, "0")).join("")}`;
+/** @param {string} hex */
+const fromHex = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
+/** @param {string} text  base64 */
+const bytesOf = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+
+/**
+ * Attributes: `src` (address of a scene), `cameras` (address of its cameras as JSON), `autoplay`, `loop`, `background` (a
+ * color such as `#ffffff`), `page` (fills the page: files may be dropped, the wheel zooms at once, `?url=` is looked at),
+ * `watch` (address of a small JSON text; whenever it changes, the scene is loaded again). In place of `src` a child
+ * `<script type="application/l4gs">` may hold the scene as base64, and `<script type="application/json">` the cameras.
+ *
+ * Events: `load`, `error` (detail: the error), `timechange`, `statechange`.
+ */
+export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
+  static observedAttributes = ["src", "background", "loop"];
+
+  /** @type {Player | null} */
+  player = null;
+  /** @type {DatasetCamera[]} */
+  #cameras = [];
+  #loading = 0;
+  #abort = new AbortController();
+  #connected = false;
+  #panelTimer = 0;
+  #watchTimer = 0;
+  #watched = "";
+
+  constructor() {
+    super();
+    const root = this.attachShadow({ mode: "open", delegatesFocus: true });
+    root.innerHTML = LAYOUT;
+    /** @type {(id: string) => any} */
+    this.find = (id) => root.getElementById(id);
+    this.canvas = /** @type {HTMLCanvasElement} */ (root.querySelector("canvas"));
+    this.#listen();
+  }
+
+  connectedCallback() {
+    if (this.#connected) return;
+    this.#connected = true;
+    if (this.hasAttribute("page")) this.#acceptFiles();
+    const query = this.hasAttribute("page") ? new URLSearchParams(location.search).get("url") : null;
+    this.find("open").hidden = !this.hasAttribute("page");
+    const embedded = this.querySelector('script[type="application/l4gs"]');
+    const cameras = this.querySelector('script[type="application/json"]');
+    const source = query ?? this.getAttribute("src");
+    if (embedded) this.open(bytesOf(embedded.textContent ?? ""), { cameras: cameras ? JSON.parse(cameras.textContent ?? "[]") : [] });
+    else if (this.hasAttribute("watch")) this.#progress("Waiting for the scene", NaN);
+    else if (source) this.load(source, this.getAttribute("cameras"));
+    else if (this.hasAttribute("page")) this.#only("invitation");
+    if (this.hasAttribute("watch")) this.#watch();
+  }
+
+  disconnectedCallback() {
+    this.#connected = false;
+    clearTimeout(this.#watchTimer);
+    this.close();
+  }
+
+  /** @param {string} name @param {string | null} before @param {string | null} value */
+  attributeChangedCallback(name, before, value) {
+    if (!this.#connected || before === value) return;
+    if (name === "src" && value) this.load(value, this.getAttribute("cameras"));
+    if (name === "background" && value) this.#setBackground(value);
+    if (name === "loop" && this.player) this.player.loop = value !== null;
+  }
+
+  /**
+   * Loads a scene from an address, and cameras from another.
+   * @param {string} address @param {string | null} [cameras]
+   * @param {{ keep?: boolean }} [options]  whether view and time stay as they are
+   */
+  async load(address, cameras, { keep = false } = {}) {
+    const loading = ++this.#loading;
+    if (!keep) this.#progress("Loading", 0);
+    try {
+      const [bytes, list] = await Promise.all([
+        this.#fetch(address, keep ? () => {} : (share) => loading === this.#loading && this.#progress("Loading", share)),
+        cameras ? this.#fetch(cameras, () => {}).then((bytes) => JSON.parse(new TextDecoder().decode(bytes))) : [],
+      ]);
+      if (loading === this.#loading) await this.open(bytes, { cameras: list, keep });
+    } catch (error) {
+      if (loading === this.#loading) this.#fail(error);
+    }
+  }
+
+  /**
+   * The bytes at an address.
+   * @param {string} address @param {(share: number) => void} report
+   */
+  async #fetch(address, report) {
+    let response;
+    try {
+      response = await fetch(address, { cache: "no-cache" });
+    } catch (error) {
+      throw new SceneError("network", `${address}: ${error instanceof Error ? error.message : error}`);
+    }
+    if (!response.ok || !response.body) throw new SceneError("network", `${address}: HTTP ${response.status} ${response.statusText}`);
+    const total = Number(response.headers.get("content-length"));
+    const parts = [];
+    let received = 0;
+    const reader = response.body.getReader();
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) break;
+      parts.push(value);
+      received += value.length;
+      report(total > 0 ? Math.min(received / total, 1) : NaN);
+    }
+    const bytes = new Uint8Array(received);
+    let at = 0;
+    for (const part of parts) {
+      bytes.set(part, at);
+      at += part.length;
+    }
+    return bytes;
+  }
+
+  /**
+   * Shows a scene.
+   * @param {ArrayBuffer | Uint8Array} bytes
+   * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
+   */
+  async open(bytes, { cameras = [], keep = false } = {}) {
+    const loading = ++this.#loading;
+    const before = keep ? this.player : null;
+    if (!before) this.#progress("Decoding", NaN);
+    let scene;
+    try {
+      scene = await load(bytes);
+      if (loading !== this.#loading) return scene.close();
+      const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+      const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;
+      const { time = 0, speed = 1, background, camera, home, following } = before ?? {};
+      this.#end();
+      this.#cameras = cameras;
+      this.player = new Player(this.canvas, scene, { cameras, loop: this.hasAttribute("loop"), autoplay: playing });
+      this.player.time = time;
+      this.player.speed = speed;
+      if (background) this.player.background = background;
+      else if (this.getAttribute("background")) this.#setBackground(this.getAttribute("background") ?? "");
+      await this.player.ready;
+      if (camera && home) Object.assign(this.player, { camera, home, following });
+      this.#begin();
+    } catch (error) {
+      if (loading !== this.#loading) return scene?.close();
+      this.#end();
+      scene?.close();
+      this.#fail(error);
+    }
+  }
+
+  /** Ends the player and frees what it holds. */
+  close() {
+    this.#loading++;
+    this.#end();
+    this.#only("");
+    this.find("bar").hidden = true;
+  }
+
+  #end() {
+    clearInterval(this.#panelTimer);
+    this.player?.dispose();
+    this.player?.scene.close();
+    this.player = null;
+  }
+
+  #begin() {
+    const player = /** @type {Player} */ (this.player);
+    const { info } = player.scene;
+    if (player.controls) player.controls.wheelAlways = this.hasAttribute("page");
+    this.#only("");
+    this.find("bar").hidden = false;
+    for (const id of ["play", "time", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
+    this.find("background").value = toHex(player.background);
+    this.find("speed").value = String(player.speed);
+    this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
+    this.#fillCameras();
+    player.addEventListener("timechange", this.#showTime);
+    player.addEventListener("statechange", this.#showState);
+    player.addEventListener("camerachange", this.#showCamera);
+    player.addEventListener("error", (event) => this.#fail(/** @type {CustomEvent} */ (event).detail));
+    this.#showTime();
+    this.#showState();
+    this.#togglePanel(!this.find("panel").hidden);
+    this.dispatchEvent(new Event("load"));
+  }
+
+  #fillCameras() {
+    const cameras = this.#cameras;
+    const select = this.find("camera");
+    this.find("cameras").hidden = cameras.length === 0;
+    const option = (/** @type {string} */ value, /** @type {string} */ text) => new Option(text, value);
+    select.replaceChildren(option("free", "Free view"));
+    if (this.player && this.player.path.length > 1) select.append(option("path", "Training path"));
+    /** @type {Map<string, HTMLOptGroupElement>} */
+    const groups = new Map();
+    cameras.forEach(({ name, split, time }, index) => {
+      const key = split ?? "cameras";
+      let group = groups.get(key);
+      if (!group) {
+        group = document.createElement("optgroup");
+        group.label = key;
+        groups.set(key, group);
+        select.append(group);
+      }
+      group.append(option(String(index), `${name ?? index}${time === undefined ? "" : ` · ${time.toFixed(2)}`}`));
+    });
+  }
+
+  #showTime = () => {
+    const { player } = this;
+    if (!player) return;
+    const seconds = player.scene.duration;
+    const text = `${(player.time * seconds).toFixed(2)} / ${seconds.toFixed(2)} s`;
+    this.find("time").value = String(player.time);
+    this.find("time").setAttribute("aria-valuetext", text);
+    this.find("clock").value = text;
+    this.dispatchEvent(new Event("timechange"));
+  };
+
+  #showState = () => {
+    const { player } = this;
+    if (!player) return;
+    const play = this.find("play");
+    const label = player.playing ? "Pause" : "Play";
+    play.innerHTML = icon(player.playing ? "pause" : "play");
+    play.setAttribute("aria-label", label);
+    play.title = `${label} (space)`;
+    this.find("loop").setAttribute("aria-pressed", String(player.loop));
+    this.find("fly").setAttribute("aria-pressed", String(player.controls?.flying ?? false));
+    this.dispatchEvent(new Event("statechange"));
+  };
+
+  #showCamera = () => {
+    if (this.player) this.find("camera").value = this.player.following ? "path" : "free";
+  };
+
+  /** @param {string} color */
+  #setBackground(color) {
+    if (!this.player || !/^#[0-9a-f]{6}$/i.test(color)) return;
+    this.player.background = fromHex(color);
+    this.find("background").value = color;
+    this.player.redraw();
+  }
+
+  /** Shows one of the layers over the canvas, or none. @param {string} id */
+  #only(id) {
+    for (const layer of ["progress", "message", "invitation"]) this.find(layer).hidden = layer !== id;
+  }
+
+  /** @param {string} what @param {number} share  NaN where it is not known */
+  #progress(what, share) {
+    this.#only("progress");
+    const progress = this.find("progress");
+    const bar = progress.querySelector("div");
+    if (Number.isNaN(share)) bar.removeAttribute("aria-valuenow");
+    else bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
+    bar.firstElementChild.style.width = Number.isNaN(share) ? "" : `${100 * share}%`;
+    progress.querySelector("span").textContent = Number.isNaN(share) ? `${what} …` : `${what} ${Math.round(100 * share)} %`;
+  }
+
+  /** @param {any} error */
+  #fail(error) {
+    if (error?.kind === "closed") return;
+    const { title, advice, details } = explain(error);
+    const message = this.find("message");
+    const paragraph = (/** @type {string} */ tag, /** @type {string} */ text) => Object.assign(document.createElement(tag), { textContent: text });
+    const more = document.createElement("details");
+    more.append(paragraph("summary", "Details"), paragraph("p", details));
+    message.replaceChildren(paragraph("b", title), paragraph("p", advice), more);
+    if (this.hasAttribute("page")) {
+      const again = Object.assign(document.createElement("button"), { type: "button", id: "choose", textContent: "Choose another file" });
+      again.addEventListener("click", () => this.find("file").click());
+      message.append(again);
+    }
+    this.#only("message");
+    this.find("bar").hidden = true;
+    this.dispatchEvent(new CustomEvent("error", { detail: error }));
+  }
+
+  #listen() {
+    const { find } = this;
+    const on = (/** @type {string} */ id, /** @type {string} */ type, /** @type {(player: Player) => void} */ act) =>
+      find(id).addEventListener(type, () => this.player && act(this.player));
+    on("play", "click", () => this.#do("play"));
+    on("loop", "click", () => this.#do("loop"));
+    on("fly", "click", () => this.#do("fly"));
+    on("reset", "click", () => this.#do("reset"));
+    on("info", "click", () => this.#do("info"));
+    on("full", "click", () => this.#do("full"));
+    find("open").addEventListener("click", () => find("file").click());
+    find("choose").addEventListener("click", () => find("file").click());
+    find("file").addEventListener("change", () => this.#openFile(find("file").files?.[0]));
+    on("time", "input", (player) => {
+      player.pause();
+      player.time = Number(find("time").value);
+    });
+    on("speed", "change", (player) => (player.speed = Number(find("speed").value)));
+    on("background", "input", () => this.#setBackground(find("background").value));
+    on("camera", "change", (player) => {
+      const { value } = find("camera");
+      if (value === "path") player.following = true;
+      else if (value === "free") player.following = false;
+      else {
+        player.showCamera(Number(value));
+        find("camera").value = value;
+      }
+    });
+    this.shadowRoot?.addEventListener("keydown", (event) => this.#key(/** @type {KeyboardEvent} */ (event)));
+  }
+
+  /** What a button or a key asks for. @param {string} what */
+  #do(what) {
+    const { player } = this;
+    if (!player) return;
+    if (what === "play" && player.scene.info.moves) {
+      if (player.playing) player.pause();
+      else player.play();
+    } else if (what === "loop") {
+      player.loop = !player.loop;
+    } else if (what === "fly" && player.controls) {
+      player.controls.flying = !player.controls.flying;
+    } else if (what === "reset") {
+      player.resetView();
+    } else if (what === "info") {
+      this.#togglePanel(this.find("panel").hidden);
+    } else if (what === "full") {
+      this.#toggleFull();
+    } else if (what === "back" || what === "forth") {
+      player.pause();
+      player.time += (what === "back" ? -1 : 1) / Math.max(player.scene.info.frameCount - 1, 1);
+    } else if (what === "camera" && this.#cameras.length > 0) {
+      const select = this.find("camera");
+      const next = (Number(select.value) + 1 || 0) % this.#cameras.length;
+      player.showCamera(next);
+      select.value = String(next);
+    }
+    this.#showState();
+  }
+
+  /** @param {KeyboardEvent} event */
+  #key(event) {
+    const target = /** @type {HTMLElement} */ (event.target);
+    const does = /** @type {Record<string, string>} */ ({
+      Space: "play", KeyK: "play", KeyL: "loop", KeyV: "fly", KeyR: "reset", KeyI: "info", KeyF: "full", KeyC: "camera",
+      Comma: "back", Period: "forth",
+    })[event.code];
+    if (event.code === "KeyO" && this.hasAttribute("page")) this.find("file").click();
+    if (!does || event.ctrlKey || event.metaKey || event.altKey) return;
+    // A button, a list and a text keep their own keys.
+    if (target.matches("select, input:not([type=range])") || (event.code === "Space" && target.matches("button, summary"))) return;
+    event.preventDefault();
+    this.#do(does);
+  }
+
+  #toggleFull() {
+    if (document.fullscreenElement === /** @type {Element} */ (this)) document.exitFullscreen();
+    // Phones that give no element the whole screen: the page at least.
+    else if (this.requestFullscreen) this.requestFullscreen().catch(() => this.classList.toggle("full"));
+    else this.classList.toggle("full");
+  }
+
+  /** @param {boolean} shown */
+  #togglePanel(shown) {
+    const panel = this.find("panel");
+    panel.hidden = !shown;
+    this.find("info").setAttribute("aria-pressed", String(shown));
+    clearInterval(this.#panelTimer);
+    if (!shown || !this.player) return;
+    const fill = () => this.player && fillPanel(panel, this.player);
+    fill();
+    this.#panelTimer = setInterval(fill, PANEL_INTERVAL);
+  }
+
+  #acceptFiles() {
+    const over = (/** @type {boolean} */ is) => this.classList.toggle("over", is);
+    const options = { signal: this.#abort.signal };
+    addEventListener("dragover", (event) => (event.preventDefault(), over(true)), options);
+    addEventListener("dragleave", (event) => event.relatedTarget === null && over(false), options);
+    addEventListener("drop", (event) => {
+      event.preventDefault();
+      over(false);
+      this.#openFile(event.dataTransfer?.files[0]);
+    }, options);
+  }
+
+  /** @param {File | undefined} file */
+  async #openFile(file) {
+    if (!file) return;
+    this.find("file").value = "";
+    this.#progress("Reading", NaN);
+    try {
+      await this.open(await file.arrayBuffer());
+    } catch (error) {
+      this.#fail(new SceneError("network", `${file.name}: ${error instanceof Error ? error.message : error}`));
+    }
+  }
+
+  /** Looks at the watched text, and loads the scene again when it has changed. */
+  async #watch() {
+    try {
+      const text = await (await fetch(this.getAttribute("watch") ?? "", { cache: "no-store" })).text();
+      const { status, scene } = JSON.parse(text);
+      this.find("status").textContent = status ?? "";
+      this.find("status").hidden = !status;
+      const address = this.getAttribute("src");
+      if (scene && address && this.#watched !== String(scene)) {
+        this.#watched = String(scene);
+        await this.load(address, this.getAttribute("cameras"), { keep: this.player !== null });
+      }
+    } catch {
+      this.find("status").textContent = "The server does not answer";
+      this.find("status").hidden = false;
+    }
+    if (this.#connected) this.#watchTimer = setTimeout(() => this.#watch(), WATCH_INTERVAL);
+  }
+}
+
+if (globalThis.customElements && !customElements.get("l4gs-player")) customElements.define("l4gs-player", L4gsPlayer);

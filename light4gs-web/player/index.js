@@ -3,5 +3,6 @@
 export { Camera } from "./camera.js";
 export { L4gsPlayer } from "./element.js";
 export { Player } from "./player.js";
-export { Scene, SceneError, load } from "./scene.js";
-export { GraphicsError, SplatRenderer } from "./splat_renderer.js";
+export { GraphicsError, SceneError } from "./errors.js";
+export { Scene, load } from "./scene.js";
+export { SplatRenderer } from "./splat_renderer.js";

@@ -2,6 +2,7 @@
 
 import { Camera, commonTarget, commonUp } from "./camera.js";
 import { Controls } from "./controls.js";
+import { Draft } from "./draft.js";
 import { SplatRenderer } from "./splat_renderer.js";
 
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
@@ -20,15 +21,18 @@ import { SplatRenderer } from "./splat_renderer.js";
 
 /** Shares of the Gaussians' coordinates that count as outliers, on either side. */
 const OUTLIERS = 0.03;
+/** Milliseconds of stillness after which a draft is drawn again in full. */
+const STILL = 150;
+/** A viewpoint that has everything before it. */
+const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
 
 /**
  * Plays a {@link Scene} on a canvas. Events: `timechange`, `statechange` (playing, loop, speed), `camerachange`, `error`.
  */
 export class Player extends EventTarget {
-  /** Memory of a frame that is not needed any more. @type {ArrayBuffer | null} */
+  /** Memory of a list that is not needed any more. @type {ArrayBuffer | null} */
   #spare = null;
   #busy = false;
-  #sorting = false;
   #dirty = true;
   #disposed = false;
   #request = 0;
@@ -36,12 +40,17 @@ export class Player extends EventTarget {
   #time = 0;
   #playing = false;
   #shownTime = -1;
-  #sortedRow = "";
-  #hasHarmonics = false;
+  #shownFrom = "";
+  #draft = new Draft();
+  #wasDraft = false;
+  #lastDraw = 0;
+  /** The image that the graphics card is at. @type {{ fence: WebGLSync | null, since: number, moving: boolean } | null} */
+  #drawing = null;
   /** @type {number[]} */
   #frameTimes = [];
-  /** @type {ResizeObserver | null} */
-  #resize = null;
+  #visible = true;
+  /** @type {(ResizeObserver | IntersectionObserver)[]} */
+  #observers = [];
 
   /**
    * @param {HTMLCanvasElement} canvas
@@ -61,7 +70,6 @@ export class Player extends EventTarget {
     /** Red, green, blue in [0, 1]. @type {number[]} */
     this.background = [...scene.info.background];
     this.renderer = new SplatRenderer(canvas);
-    this.renderer.begin(scene.count, scene.info.shDegree);
     this.camera = new Camera();
     this.home = this.camera.clone();
     this.#fitLens();
@@ -77,23 +85,25 @@ export class Player extends EventTarget {
   #lost = (/** @type {Event} */ event) => event.preventDefault();
 
   #restored = () => {
-    this.renderer.prepare();
-    this.renderer.begin(this.scene.count, this.scene.info.shDegree);
-    this.#hasHarmonics = false;
+    this.renderer.restore();
     this.#shownTime = -1;
   };
 
   /** @param {boolean} autoplay */
   async #begin(autoplay) {
     this.#measure();
+    const { list } = await this.scene.frame(0, EVERYWHERE);
+    if (this.#disposed) return;
+    this.#fitCamera(list);
     await this.#show(0);
     if (this.#disposed) return;
-    this.#fitCamera();
-    await this.#show(0);
-    if (this.#disposed) return;
-    this.#draw();
-    this.#resize = new ResizeObserver(() => (this.#dirty = true));
-    this.#resize.observe(this.canvas);
+    this.#draw(1);
+    this.#observers = [
+      new ResizeObserver(() => (this.#dirty = true)),
+      // A player that was scrolled away costs nothing.
+      new IntersectionObserver((entries) => (this.#visible = entries[entries.length - 1].isIntersecting)),
+    ];
+    for (const observer of this.#observers) observer.observe(this.canvas);
     if (autoplay) this.play();
     this.#request = requestAnimationFrame(this.#tick);
   }
@@ -106,14 +116,18 @@ export class Player extends EventTarget {
     this.camera.lens = { fx: focal, fy: focal, cx: w / 2, cy: h / 2, width: w, height: h };
   }
 
-  /** Stands at the dataset's first camera, or where all Gaussians but outliers are seen. */
-  #fitCamera() {
+  /**
+   * Stands at the dataset's first camera, or where all Gaussians but outliers are seen.
+   * @param {Float32Array} list
+   */
+  #fitCamera(list) {
     const { camera, cameras } = this;
-    const data = this.#firstData;
+    const count = list.length / 16;
     const centers = [0, 1, 2].map((axis) => {
+      /** @type {number[]} */
       const values = [];
-      const stride = Math.max(1, Math.floor(this.scene.count / 5000));
-      for (let i = 0; i < this.scene.count; i += stride) if (data[12 * i + 3] > 0.05) values.push(data[12 * i + axis]);
+      const stride = Math.max(1, Math.floor(count / 5000));
+      for (let i = 0; i < count; i += stride) if (list[16 * i + 3] > 0.05) values.push(list[16 * i + axis]);
       values.sort((a, b) => a - b);
       const at = (/** @type {number} */ share) => values[Math.floor(share * (values.length - 1))] ?? 0;
       return { middle: (at(OUTLIERS) + at(1 - OUTLIERS)) / 2, half: (at(1 - OUTLIERS) - at(OUTLIERS)) / 2 };
@@ -136,10 +150,7 @@ export class Player extends EventTarget {
       );
     }
     this.home = camera.clone();
-    this.#firstData = new Float32Array(0);
   }
-
-  #firstData = new Float32Array(0);
 
   /** Pixels of the canvas. */
   #measure() {
@@ -188,6 +199,7 @@ export class Player extends EventTarget {
   resetView() {
     this.camera = this.home.clone();
     this.following = false;
+    this.controls?.rest();
     this.cameraMoved();
   }
 
@@ -200,6 +212,7 @@ export class Player extends EventTarget {
     if (!camera) return;
     this.#take(camera);
     this.following = false;
+    this.controls?.rest();
     if (camera.time !== undefined) this.time = camera.time;
     this.cameraMoved();
   }
@@ -229,21 +242,30 @@ export class Player extends EventTarget {
     this.#request = requestAnimationFrame(this.#tick);
     const seconds = Math.min((now - this.#last) / 1000, 0.25);
     this.#last = now;
+    if (!this.#visible) return;
     if (this.#playing && seconds > 0) this.#advance(seconds);
     if (this.controls?.step(seconds)) {
       this.following = false;
       this.cameraMoved();
     }
     if (this.following) this.#follow();
-    if (this.#time !== this.#shownTime && !this.#busy) {
-      this.#show(this.#time).catch(this.#fail);
-    } else if (!this.#busy && !this.#sorting && this.#rowKey() !== this.#sortedRow) {
-      this.#sort().catch(this.#fail);
+    if (!this.#busy) {
+      const time = this.#time === this.#shownTime ? null : this.#time;
+      if (time !== null || this.#viewpointKey() !== this.#shownFrom) this.#show(time).catch(this.#fail);
     }
-    if (this.#dirty) {
+    // One image at a time: a queue of them would only make the player slow to answer.
+    if (this.#drawing && !this.renderer.isDone(this.#drawing.fence)) return;
+    if (this.#drawing?.moving) this.#draft.measure(now - this.#drawing.since, now);
+    this.#drawing = null;
+    const moving = this.#dirty;
+    if (moving) {
+      this.#lastDraw = now;
       this.#measure();
-      this.#draw();
-    }
+      this.#draw(this.#draft.scale);
+    } else if (this.#wasDraft && now - this.#lastDraw > STILL) {
+      this.#draw(1);
+    } else return;
+    this.#drawing = { fence: this.renderer.fence(), since: now, moving };
   };
 
   #fail = (/** @type {any} */ error) => {
@@ -279,66 +301,59 @@ export class Player extends EventTarget {
   /** @type {DatasetCamera | null} */
   #followed = null;
 
-  /** The row of the view matrix that gives depths. */
-  #row() {
+  /** Where it is seen from. */
+  #viewpoint() {
     const { axes, position } = this.camera;
     const forward = axes[2];
-    return [...forward, -(forward[0] * position[0] + forward[1] * position[1] + forward[2] * position[2])];
+    return { row: [...forward, -(forward[0] * position[0] + forward[1] * position[1] + forward[2] * position[2])], eye: position };
   }
 
-  #rowKey() {
-    return this.#row().join();
+  #viewpointKey() {
+    return this.#viewpoint().row.join() + this.camera.position.join();
   }
 
-  /** Has the worker compute the Gaussians at a time, and gives them to the renderer. @param {number} time */
+  /**
+   * Has the worker make the list for a time, or for another view of the time before, and gives it to the renderer.
+   * @param {number | null} time
+   */
   async #show(time) {
     this.#busy = true;
     try {
-      const key = this.#rowKey();
-      const frame = await this.scene.frame(time, this.#row(), { buffer: this.#spare, harmonics: !this.#hasHarmonics });
+      const key = this.#viewpointKey();
+      const memory = this.#spare;
+      this.#spare = null;
+      const { list, evaluateMs, sortMs } = await this.scene.frame(time, this.#viewpoint(), memory);
       if (this.#disposed) return;
       const start = performance.now();
-      if (!this.#hasHarmonics) this.#firstData = frame.data.slice();
-      this.renderer.setGaussians(frame.data);
-      if (frame.colors) this.renderer.setHarmonics(frame.colors);
-      this.renderer.setOrder(frame.order);
-      this.#hasHarmonics = true;
-      this.#spare = /** @type {ArrayBuffer} */ (frame.data.buffer);
+      this.renderer.setList(list);
+      this.#spare = /** @type {ArrayBuffer} */ (list.buffer);
       this.timings.upload = performance.now() - start;
-      this.timings.evaluate = frame.evaluateMs;
-      this.timings.sort = frame.sortMs;
-      this.#shownTime = time;
-      this.#sortedRow = key;
+      this.timings.sort = sortMs;
+      if (time !== null) {
+        this.timings.evaluate = evaluateMs;
+        this.#shownTime = time;
+      }
+      this.#shownFrom = key;
       this.#dirty = true;
     } finally {
       this.#busy = false;
     }
   }
 
-  async #sort() {
-    this.#sorting = true;
-    try {
-      const key = this.#rowKey();
-      const { order, sortMs } = await this.scene.sort(this.#row());
-      if (this.#disposed) return;
-      // A frame that came in between brought an order of its own.
-      if (this.#busy) return;
-      this.renderer.setOrder(order);
-      this.timings.sort = sortMs;
-      this.#sortedRow = key;
-      this.#dirty = true;
-    } finally {
-      this.#sorting = false;
-    }
-  }
-
-  #draw() {
+  /** @param {number} scale */
+  #draw(scale) {
     const start = performance.now();
     this.#dirty = false;
-    this.renderer.draw(this.view, this.background);
+    this.#wasDraft = scale < 1;
+    this.renderer.draw(this.view, this.background, scale);
     this.timings.draw = performance.now() - start;
     this.#frameTimes.push(start);
     while (this.#frameTimes.length > 1 && start - this.#frameTimes[0] > 1000) this.#frameTimes.shift();
+  }
+
+  /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
+  get draftScale() {
+    return this.#draft.scale;
   }
 
   /** Images a second over the last second; 0 where nothing changes. */
@@ -363,12 +378,13 @@ export class Player extends EventTarget {
     this.pause();
     this.following = false;
     await this.ready;
-    while (this.#busy || this.#sorting) await new Promise((resolve) => setTimeout(resolve, 1));
+    while (this.#busy) await new Promise((resolve) => setTimeout(resolve, 1));
     this.camera.take(view);
     this.time = time;
     await this.#show(this.#time);
     this.renderer.draw(view, this.background);
     this.#dirty = false;
+    this.#wasDraft = false;
     return this.renderer.readPixels();
   }
 
@@ -376,7 +392,7 @@ export class Player extends EventTarget {
   dispose() {
     this.#disposed = true;
     cancelAnimationFrame(this.#request);
-    this.#resize?.disconnect();
+    for (const observer of this.#observers) observer.disconnect();
     this.controls?.dispose();
     this.canvas.removeEventListener("webglcontextlost", this.#lost);
     this.canvas.removeEventListener("webglcontextrestored", this.#restored);

@@ -2,9 +2,7 @@
 
 import wasmBase64 from "virtual:decoder";
 import workerSource from "virtual:worker";
-import { SceneError } from "./decoder.js";
-
-export { SceneError };
+import { SceneError } from "./errors.js";
 
 /**
  * @typedef {object} SceneInfo  what a file says of itself
@@ -21,7 +19,6 @@ export { SceneError };
  * @property {number} count  Gaussians
  * @property {number} shDegree  of the spherical harmonics, 0 to 3
  * @property {boolean} moves  whether anything changes with time
- * @property {boolean} changesHarmonics  whether the spherical harmonics change with time
  * @property {[string, number][]} sections  name and bytes of each part of the file
  * @property {Record<string, string>} extra  free notes
  */
@@ -38,12 +35,17 @@ export { SceneError };
  */
 
 /**
+ * @typedef {object} Viewpoint  where a scene is seen from
+ * @property {ArrayLike<number>} row  the depth of a point is `row · (x, y, z, 1)`
+ * @property {ArrayLike<number>} eye  the camera's center, world units
+ */
+
+/**
  * @typedef {object} Frame  what the renderer draws
- * @property {Float32Array} data  12 numbers a Gaussian, whole texture rows
- * @property {Uint32Array} order  back to front
- * @property {Float32Array | null} colors  harmonics, where they changed
+ * @property {Float32Array} list  back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
+ *   color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
  * @property {number} evaluateMs  what the motion took
- * @property {number} sortMs  what the order took
+ * @property {number} sortMs  what order and colors took
  */
 
 /** @type {Promise<WebAssembly.Module> | null} */
@@ -143,29 +145,23 @@ export class Scene {
   }
 
   /**
-   * What the renderer draws at a time, seen along a row of the view matrix.
-   * @param {number} time
-   * @param {ArrayLike<number>} row
-   * @param {{ buffer?: ArrayBuffer | null, harmonics?: boolean }} [options]  memory to be used again; whether the
-   *   harmonics are wanted though they did not change
+   * What the renderer draws at a time from a viewpoint.
+   * @param {number | null} time  nothing: as before
+   * @param {Viewpoint} viewpoint
+   * @param {ArrayBuffer | null} [memory]  to be used again
    * @returns {Promise<Frame>}
    */
-  frame(time, row, { buffer = null, harmonics = false } = {}) {
-    return this.#ask({ type: "frame", time, row, buffer, harmonics }, buffer ? [buffer] : []);
+  frame(time, viewpoint, memory = null) {
+    return this.#ask({ type: "frame", time, viewpoint, memory }, memory ? [memory] : []);
   }
 
   /**
-   * The order of the last frame's Gaussians from elsewhere.
-   * @param {ArrayLike<number>} row
-   * @returns {Promise<{ order: Uint32Array, sortMs: number }>}
+   * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
+   * @param {ArrayBuffer} bytes
+   * @returns {Promise<string>}
    */
-  sort(row) {
-    return this.#ask({ type: "sort", row });
-  }
-
-  /** One number for all bits of the decoded scene, as 16 hexadecimal digits. */
-  async digest() {
-    return (await this.#ask({ type: "digest" })).digest;
+  async digest(bytes) {
+    return (await this.#ask({ type: "digest", module: await decoderModule(), bytes })).digest;
   }
 
   /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */

@@ -1,20 +1,12 @@
 // Draws sorted Gaussians with WebGL2: one quad each, back to front, premultiplied, into half floats where the browser can.
 
-import {
-  TEXELS, fragmentShader, harmonicsTexels, screenFragmentShader, screenVertexShader, vertexShader,
-} from "./shaders.js";
+import { GraphicsError } from "./errors.js";
+import { fragmentShader, screenFragmentShader, screenVertexShader, vertexShader } from "./shaders.js";
 
-/** Gaussians of a texture row. */
+/** Numbers of a Gaussian in a list: four texels. */
+const ENTRY = 16;
+/** Gaussians of a texture's row. */
 const ROW = 256;
-
-/** A browser, or a graphics driver, that cannot draw this. */
-export class GraphicsError extends Error {
-  /** @param {string} message */
-  constructor(message) {
-    super(message);
-    this.name = "GraphicsError";
-  }
-}
 
 /**
  * @typedef {object} View  an OpenCV pinhole: +x right, +y down, +z forward
@@ -29,13 +21,10 @@ export class GraphicsError extends Error {
  */
 
 export class SplatRenderer {
-  /** @type {WebGLProgram | null} */
-  #program = null;
-  /** @type {Record<string, WebGLUniformLocation | null>} */
-  #uniforms = {};
   #count = 0;
-  #targetSize = [0, 0];
-  #capacity = [0, 0];
+  #rows = 0;
+  #indexed = 0;
+  #target = "";
 
   /** @param {HTMLCanvasElement | OffscreenCanvas} canvas */
   constructor(canvas) {
@@ -46,34 +35,32 @@ export class SplatRenderer {
     this.gl = gl;
     /** Whether sums are half floats; bytes lose faint layers. */
     this.halfFloats = Boolean(gl.getExtension("EXT_color_buffer_float") ?? gl.getExtension("EXT_color_buffer_half_float"));
-    this.prepare();
+    this.parts = this.#make();
   }
 
-  /** Makes everything that lives on the graphics card; again after it was lost. */
-  prepare() {
+  /** Everything that lives on the graphics card. */
+  #make() {
     const { gl } = this;
-    this.#program = null;
-    this.#count = 0;
-    this.#targetSize = [0, 0];
-    this.#capacity = [0, 0];
-    this.screen = this.#link(screenVertexShader, screenFragmentShader);
-    this.target = { texture: gl.createTexture(), framebuffer: gl.createFramebuffer() };
-    this.gaussians = gl.createTexture();
-    this.harmonics = gl.createTexture();
-    this.vertices = gl.createVertexArray();
-    this.nothing = gl.createVertexArray();
-    this.order = gl.createBuffer();
-    this.corners = gl.createBuffer();
-    gl.bindVertexArray(this.vertices);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.corners);
-    gl.bufferData(gl.ARRAY_BUFFER, new Float32Array([-1, -1, 1, -1, -1, 1, 1, 1]), gl.STATIC_DRAW);
-    gl.enableVertexAttribArray(0);
-    gl.vertexAttribPointer(0, 2, gl.FLOAT, false, 0, 0);
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
-    gl.enableVertexAttribArray(1);
-    gl.vertexAttribIPointer(1, 1, gl.UNSIGNED_INT, 0, 0);
-    gl.vertexAttribDivisor(1, 1);
+    const splats = this.#link(vertexShader, fragmentShader);
+    const uniform = (/** @type {string} */ name) => gl.getUniformLocation(splats, name);
+    const parts = {
+      splats, screen: this.#link(screenVertexShader, screenFragmentShader),
+      rotation: uniform("rotation"), translation: uniform("translation"),
+      focal: uniform("focal"), principal: uniform("principal"), size: uniform("size"),
+      target: gl.createTexture(), framebuffer: gl.createFramebuffer(), list: gl.createTexture(),
+      quads: gl.createVertexArray(), nothing: gl.createVertexArray(), indices: gl.createBuffer(),
+    };
+    gl.bindVertexArray(parts.quads);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, parts.indices);
     gl.bindVertexArray(null);
+    return parts;
+  }
+
+  /** Makes everything again after the graphics card has lost it. */
+  restore() {
+    this.#count = this.#rows = this.#indexed = 0;
+    this.#target = "";
+    this.parts = this.#make();
   }
 
   /** @param {string} vertex @param {string} fragment */
@@ -97,130 +84,123 @@ export class SplatRenderer {
     return program;
   }
 
-  /**
-   * Prepares for a scene.
-   * @param {number} count  Gaussians
-   * @param {number} degree  of the spherical harmonics
-   */
-  begin(count, degree) {
-    const { gl } = this;
-    const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
-    if (Math.ceil(count / ROW) > most || ROW * harmonicsTexels(degree) > most) {
-      throw new GraphicsError(`${count} Gaussians are more than this graphics card takes (${most * ROW})`);
+  /** @param {Float32Array} list  what is drawn, as {@link import("./scene.js").Scene.frame} gives it */
+  setList(list) {
+    const { gl, parts } = this;
+    const rows = list.length / (ENTRY * ROW);
+    this.#count = list.length / ENTRY;
+    if (rows === 0 || gl.isContextLost()) return;
+    gl.bindTexture(gl.TEXTURE_2D, parts.list);
+    if (rows > this.#rows) {
+      const most = gl.getParameter(gl.MAX_TEXTURE_SIZE);
+      if (rows > most) throw new GraphicsError(`${this.#count} Gaussians are more than this graphics card takes (${most * ROW})`);
+      // Room for a few more, since their number changes with the view.
+      this.#rows = Math.min(Math.ceil(1.2 * rows), most);
+      gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA32F, 4 * ROW, this.#rows, 0, gl.RGBA, gl.FLOAT, null);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
+      gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
     }
-    this.degree = degree;
-    if (this.#program) gl.deleteProgram(this.#program);
-    this.#program = this.#link(vertexShader(degree), fragmentShader);
-    for (const name of ["gaussians", "harmonics", "rotation", "translation", "eye", "focal", "principal", "size"]) {
-      this.#uniforms[name] = gl.getUniformLocation(this.#program, name);
-    }
-    this.#count = 0;
-    this.#capacity = [0, 0];
+    gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, 4 * ROW, rows, gl.RGBA, gl.FLOAT, list);
+    this.#index(this.#rows * ROW);
   }
 
-  /**
-   * @param {WebGLTexture | null} texture
-   * @param {number} slot
-   * @param {number} texels
-   * @param {Float32Array} numbers
-   * @param {number} format
-   */
-  #upload(texture, slot, texels, numbers, format) {
-    const { gl } = this;
-    const width = ROW * texels;
-    const height = numbers.length / (4 * width);
-    gl.bindTexture(gl.TEXTURE_2D, texture);
-    if (height === 0) return;
-    if (this.#capacity[slot] === height) {
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, width, height, gl.RGBA, gl.FLOAT, numbers);
-      return;
-    }
-    this.#capacity[slot] = height;
-    gl.texImage2D(gl.TEXTURE_2D, 0, format, width, height, 0, gl.RGBA, gl.FLOAT, numbers);
+  /** Two triangles a Gaussian. Quads of one draw are cheaper than instances, above all in software. @param {number} count */
+  #index(count) {
+    if (count <= this.#indexed) return;
+    const { gl, parts } = this;
+    const indices = new Uint32Array(6 * count);
+    for (let i = 0; i < count; i++) indices.set([4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 2, 4 * i + 1, 4 * i + 3], 6 * i);
+    gl.bindVertexArray(parts.quads);
+    gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, indices, gl.STATIC_DRAW);
+    gl.bindVertexArray(null);
+    this.#indexed = count;
+  }
+
+  /** @param {number} width @param {number} height @param {boolean} halfFloats */
+  #prepareTarget(width, height, halfFloats) {
+    const { gl, parts } = this;
+    const target = `${width} ${height} ${halfFloats}`;
+    if (this.#target === target) return;
+    this.#target = target;
+    gl.bindTexture(gl.TEXTURE_2D, parts.target);
+    if (halfFloats) gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, width, height, 0, gl.RGBA, gl.HALF_FLOAT, null);
+    else gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, width, height, 0, gl.RGBA, gl.UNSIGNED_BYTE, null);
     for (const [name, value] of [
-      [gl.TEXTURE_MIN_FILTER, gl.NEAREST], [gl.TEXTURE_MAG_FILTER, gl.NEAREST],
+      [gl.TEXTURE_MIN_FILTER, gl.LINEAR], [gl.TEXTURE_MAG_FILTER, gl.LINEAR],
       [gl.TEXTURE_WRAP_S, gl.CLAMP_TO_EDGE], [gl.TEXTURE_WRAP_T, gl.CLAMP_TO_EDGE],
     ]) gl.texParameteri(gl.TEXTURE_2D, name, value);
-  }
-
-  /** @param {Float32Array} numbers  centers, opacities, covariances, as the decoder packs them */
-  setGaussians(numbers) {
-    this.#upload(this.gaussians, 0, TEXELS, numbers, this.gl.RGBA32F);
-  }
-
-  /** @param {Float32Array} numbers  harmonics, as the decoder packs them */
-  setHarmonics(numbers) {
-    this.#upload(this.harmonics, 1, harmonicsTexels(this.degree ?? 0), numbers, this.gl.RGBA16F);
-  }
-
-  /** @param {Uint32Array} order  back to front */
-  setOrder(order) {
-    const { gl } = this;
-    gl.bindBuffer(gl.ARRAY_BUFFER, this.order);
-    gl.bufferData(gl.ARRAY_BUFFER, order, gl.DYNAMIC_DRAW);
-    this.#count = order.length;
-  }
-
-  /** @param {number} width @param {number} height */
-  #resizeTarget(width, height) {
-    const { gl } = this;
-    if (this.#targetSize[0] === width && this.#targetSize[1] === height) return;
-    this.#targetSize = [width, height];
-    gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
-    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA16F, width, height, 0, gl.RGBA, gl.HALF_FLOAT, null);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.NEAREST);
-    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MAG_FILTER, gl.NEAREST);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.target.framebuffer);
-    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, this.target.texture, 0);
-    if (gl.checkFramebufferStatus(gl.FRAMEBUFFER) !== gl.FRAMEBUFFER_COMPLETE && !gl.isContextLost()) this.halfFloats = false;
+    gl.bindFramebuffer(gl.FRAMEBUFFER, parts.framebuffer);
+    gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0, gl.TEXTURE_2D, parts.target, 0);
+    const complete = gl.checkFramebufferStatus(gl.FRAMEBUFFER) === gl.FRAMEBUFFER_COMPLETE;
+    if (!complete && halfFloats && !gl.isContextLost()) {
+      this.halfFloats = false;
+      this.#prepareTarget(width, height, false);
+    }
   }
 
   /**
    * Draws what was set, over a background.
    * @param {View} view
    * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
+   * @param {number} [scale]  below 1: a draft of so many of the pixels along each side, in bytes, and enlarged
    */
-  draw(view, background) {
-    const { gl, canvas } = this;
-    const { width, height } = view;
+  draw(view, background, scale = 1) {
+    const { gl, canvas, parts } = this;
     if (gl.isContextLost()) return;
+    const { width, height, rotation, translation } = view;
     if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
-    if (this.halfFloats) this.#resizeTarget(width, height);
-    gl.bindFramebuffer(gl.FRAMEBUFFER, this.halfFloats ? this.target.framebuffer : null);
-    gl.viewport(0, 0, width, height);
+    const draft = scale < 1;
+    const direct = !draft && !this.halfFloats;
+    const columns = draft ? Math.max(1, Math.round(width * scale)) : width;
+    const rows = draft ? Math.max(1, Math.round(height * scale)) : height;
+    if (!direct) this.#prepareTarget(columns, rows, !draft && this.halfFloats);
+    gl.bindFramebuffer(gl.FRAMEBUFFER, direct ? null : parts.framebuffer);
+    gl.viewport(0, 0, columns, rows);
     gl.clearColor(background[0], background[1], background[2], 1);
     gl.clear(gl.COLOR_BUFFER_BIT);
-    if (this.#count > 0 && this.#program) {
-      const { rotation: r, translation: t } = view;
-      const eye = [0, 1, 2].map((i) => -(r[i] * t[0] + r[3 + i] * t[1] + r[6 + i] * t[2]));
-      gl.useProgram(this.#program);
-      gl.uniformMatrix3fv(this.#uniforms.rotation, true, Float32Array.from(r));
-      gl.uniform3f(this.#uniforms.translation, t[0], t[1], t[2]);
-      gl.uniform3f(this.#uniforms.eye, eye[0], eye[1], eye[2]);
-      gl.uniform2f(this.#uniforms.focal, view.fx, view.fy);
-      gl.uniform2f(this.#uniforms.principal, view.cx, view.cy);
-      gl.uniform2f(this.#uniforms.size, width, height);
-      gl.uniform1i(this.#uniforms.gaussians, 0);
-      gl.uniform1i(this.#uniforms.harmonics, 1);
-      gl.activeTexture(gl.TEXTURE1);
-      gl.bindTexture(gl.TEXTURE_2D, this.harmonics);
-      gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, this.gaussians);
-      gl.bindVertexArray(this.vertices);
+    if (this.#count > 0) {
+      const [x, y] = [columns / width, rows / height];
+      gl.useProgram(parts.splats);
+      gl.uniformMatrix3fv(parts.rotation, true, Float32Array.from(rotation));
+      gl.uniform3f(parts.translation, translation[0], translation[1], translation[2]);
+      gl.uniform2f(parts.focal, view.fx * x, view.fy * y);
+      gl.uniform2f(parts.principal, view.cx * x, view.cy * y);
+      gl.uniform2f(parts.size, columns, rows);
+      gl.bindTexture(gl.TEXTURE_2D, parts.list);
+      gl.bindVertexArray(parts.quads);
       gl.enable(gl.BLEND);
       gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-      gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, this.#count);
+      gl.drawElements(gl.TRIANGLES, 6 * this.#count, gl.UNSIGNED_INT, 0);
       gl.disable(gl.BLEND);
     }
-    if (this.halfFloats) {
+    if (!direct) {
       gl.bindFramebuffer(gl.FRAMEBUFFER, null);
-      gl.useProgram(this.screen ?? null);
-      gl.activeTexture(gl.TEXTURE0);
-      gl.bindTexture(gl.TEXTURE_2D, this.target.texture);
-      gl.bindVertexArray(this.nothing ?? null);
+      gl.viewport(0, 0, width, height);
+      gl.useProgram(parts.screen);
+      gl.bindTexture(gl.TEXTURE_2D, parts.target);
+      gl.bindVertexArray(parts.nothing);
       gl.drawArrays(gl.TRIANGLES, 0, 3);
     }
     gl.bindVertexArray(null);
+  }
+
+  /** A mark behind everything that was asked for until now. */
+  fence() {
+    const fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
+    this.gl.flush();
+    return fence;
+  }
+
+  /**
+   * Whether the graphics card has come to a mark. Takes the mark away then.
+   * @param {WebGLSync | null} fence
+   */
+  isDone(fence) {
+    const { gl } = this;
+    if (!fence || gl.isContextLost()) return true;
+    if (gl.getSyncParameter(fence, gl.SYNC_STATUS) !== gl.SIGNALED) return false;
+    gl.deleteSync(fence);
+    return true;
   }
 
   /** Waits until everything is drawn: for measuring. */
@@ -241,13 +221,12 @@ export class SplatRenderer {
 
   /** Gives everything back. */
   dispose() {
-    const { gl } = this;
-    for (const texture of [this.gaussians, this.harmonics, this.target.texture]) gl.deleteTexture(texture ?? null);
-    for (const buffer of [this.order, this.corners]) gl.deleteBuffer(buffer ?? null);
-    for (const array of [this.vertices, this.nothing]) gl.deleteVertexArray(array ?? null);
-    gl.deleteFramebuffer(this.target.framebuffer);
-    for (const program of [this.#program, this.screen]) if (program) gl.deleteProgram(program);
-    this.#program = null;
+    const { gl, parts } = this;
+    for (const texture of [parts.target, parts.list]) gl.deleteTexture(texture);
+    gl.deleteFramebuffer(parts.framebuffer);
+    gl.deleteBuffer(parts.indices);
+    for (const array of [parts.quads, parts.nothing]) gl.deleteVertexArray(array);
+    for (const program of [parts.splats, parts.screen]) gl.deleteProgram(program);
     this.#count = 0;
   }
 }

@@ -1,6 +1,7 @@
 // The worker: one scene, decoded, moved and sorted off the main thread.
 
-import { Decoder, SceneError } from "./decoder.js";
+import { Decoder } from "./decoder.js";
+import { SceneError } from "./errors.js";
 
 /** @type {Decoder | null} */
 let decoder = null;
@@ -31,25 +32,13 @@ const answers = {
     send({ id, info, milliseconds: performance.now() - start });
   },
 
-  async frame({ id, time, row, buffer, harmonics }) {
+  async frame({ id, time, viewpoint, memory }) {
     if (!decoder) throw new Error("no scene is open");
     const start = performance.now();
-    const data = await decoder.evaluate(time, pause, buffer ? new Float32Array(buffer) : null);
+    if (time !== null) await decoder.evaluate(time, pause);
     const evaluated = performance.now();
-    const order = decoder.sort(row);
-    const sorted = performance.now();
-    const colors = harmonics || decoder.info?.changesHarmonics ? decoder.harmonics() : null;
-    send(
-      { id, data, order, colors, evaluateMs: evaluated - start, sortMs: sorted - evaluated },
-      [data.buffer, order.buffer, ...(colors ? [colors.buffer] : [])],
-    );
-  },
-
-  sort({ id, row }) {
-    if (!decoder) throw new Error("no scene is open");
-    const start = performance.now();
-    const order = decoder.sort(row);
-    send({ id, order, sortMs: performance.now() - start }, [order.buffer]);
+    const list = decoder.drawList(viewpoint, memory);
+    send({ id, list, evaluateMs: evaluated - start, sortMs: performance.now() - evaluated }, [list.buffer]);
   },
 
   attributes({ id, time }) {
@@ -58,9 +47,8 @@ const answers = {
     send({ id, numbers }, [numbers.buffer]);
   },
 
-  digest({ id }) {
-    if (!decoder) throw new Error("no scene is open");
-    send({ id, digest: decoder.digest() });
+  digest({ id, module, bytes }) {
+    send({ id, digest: new Decoder(module).digest(new Uint8Array(bytes)) });
   },
 };
 

@@ -6,6 +6,7 @@
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::description::describe_error;
+use crate::draw_list::Viewpoint;
 use crate::scene::OpenScene;
 
 #[derive(Default)]
@@ -14,11 +15,11 @@ struct State {
     input: Vec<u8>,
     text: String,
     numbers: Vec<f32>,
-    order_length: usize,
+    list_length: usize,
 }
 
 static STATE: Mutex<State> =
-    Mutex::new(State { scene: None, input: Vec::new(), text: String::new(), numbers: Vec::new(), order_length: 0 });
+    Mutex::new(State { scene: None, input: Vec::new(), text: String::new(), numbers: Vec::new(), list_length: 0 });
 
 fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
@@ -63,10 +64,11 @@ pub extern "C" fn text_length() -> usize {
     state().text.len()
 }
 
-/// The digest of the decoded scene; 0 where there is none.
+/// The digest of the scene that the input decodes to; 0 where it does not decode. The scene that is open stays.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn digest() -> u64 {
-    state().scene.as_ref().map_or(0, OpenScene::digest)
+    let input = std::mem::take(&mut state().input);
+    light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
 }
 
 /// Computes the Gaussians `first` to `last` at a time in [0, 1].
@@ -77,24 +79,37 @@ pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
     }
 }
 
-/// Shows what was computed: numbers for the texture, 12 a Gaussian, filled up to a multiple of 256 Gaussians.
+/// Shows what was computed.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn present() -> *const f32 {
-    state().scene.as_mut().map_or(std::ptr::null(), |scene| scene.present().as_ptr())
+pub extern "C" fn present() {
+    if let Some(scene) = &mut state().scene {
+        scene.present();
+    }
 }
 
-/// 1 where harmonics change with time.
+/// What is drawn, back to front: 16 numbers each, center, opacity, covariance xx, xy, xz, yy, yz, zz, color, and three zeros;
+/// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera stands at the eye. [`list_length`] says how many numbers.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn changes_harmonics() -> u32 {
-    state().scene.as_ref().is_some_and(OpenScene::changes_harmonics).into()
-}
-
-/// The harmonics of what was computed last, for the texture. [`numbers_length`] says how many numbers.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn harmonics() -> *const f32 {
+pub extern "C" fn draw_list(
+    row_x: f32,
+    row_y: f32,
+    row_z: f32,
+    row_w: f32,
+    eye_x: f32,
+    eye_y: f32,
+    eye_z: f32,
+) -> *const f32 {
+    let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z] };
     let state = &mut *state();
-    state.numbers = state.scene.as_ref().map(OpenScene::harmonics).unwrap_or_default();
-    state.numbers.as_ptr()
+    let list = state.scene.as_mut().map_or(&[][..], |scene| scene.draw_list(&viewpoint));
+    state.list_length = list.len();
+    list.as_ptr()
+}
+
+/// How many numbers [`draw_list`] gave.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn list_length() -> usize {
+    state().list_length
 }
 
 /// All attributes at a time. [`numbers_length`] says how many numbers.
@@ -105,29 +120,14 @@ pub extern "C" fn attributes_at(time: f32) -> *const f32 {
     state.numbers.as_ptr()
 }
 
-/// How many numbers [`harmonics`] or [`attributes_at`] gave.
+/// How many numbers [`attributes_at`] gave.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn numbers_length() -> usize {
     state().numbers.len()
 }
 
-/// Frees what [`harmonics`] or [`attributes_at`] gave.
+/// Frees what [`attributes_at`] gave.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn forget_numbers() {
     state().numbers = Vec::new();
-}
-
-/// Back to front by depth `x · row.x + y · row.y + z · row.z + offset`: indices. [`order_length`] says how many.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn sort(x: f32, y: f32, z: f32, offset: f32) -> *const u32 {
-    let state = &mut *state();
-    let order = state.scene.as_mut().map_or(&[][..], |scene| scene.sort([x, y, z, offset]));
-    state.order_length = order.len();
-    order.as_ptr()
-}
-
-/// How many Gaussians [`sort`] gave.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn order_length() -> usize {
-    state().order_length
 }

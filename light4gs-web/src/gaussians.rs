@@ -1,12 +1,9 @@
-//! Activated Gaussians, and how the vertex shader reads them.
+//! Activated Gaussians, and what the vertex shader takes of them.
 
 use light4gs_codec::GaussianArrays;
 
-/// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz, and two that
-/// fill up the third texel.
-pub const FLOATS: usize = 12;
-/// A texture row holds this many Gaussians; arrays for textures are filled up to whole rows.
-pub const PADDING: usize = 256;
+/// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz.
+pub(crate) const FLOATS: usize = 10;
 
 /// The largest logarithm of a scale, as in the renderer of the program.
 const MAX_LOG_SCALE: f32 = 40.0;
@@ -41,7 +38,7 @@ fn covariance([w, x, y, z]: [f32; 4], scales: [f32; 3]) -> [f32; 6] {
     [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)]
 }
 
-/// Packs a range of Gaussians for the texture, [`FLOATS`] numbers each. What cannot be drawn gets opacity 0.
+/// Packs a range of Gaussians, [`FLOATS`] numbers each. What cannot be drawn gets opacity 0.
 pub(crate) fn pack(gaussians: &GaussianArrays, range: std::ops::Range<usize>, packed: &mut [f32]) {
     for (gaussian, packed) in range.clone().zip(packed[FLOATS * range.start..].chunks_exact_mut(FLOATS)) {
         let scales = scales(gaussians.log_scales[gaussian]);
@@ -49,30 +46,12 @@ pub(crate) fn pack(gaussians: &GaussianArrays, range: std::ops::Range<usize>, pa
         packed[3] = opacity(gaussians.opacity_logits[gaussian]);
         packed[4..].fill(0.0);
         if let Some(rotation) = rotation(gaussians.quats[gaussian]) {
-            packed[4..10].copy_from_slice(&covariance(rotation, scales));
+            packed[4..].copy_from_slice(&covariance(rotation, scales));
         }
-        if !packed[4..10].iter().any(|value| *value != 0.0) || packed.iter().any(|value| !value.is_finite()) {
+        if !packed[4..].iter().any(|value| *value != 0.0) || packed.iter().any(|value| !value.is_finite()) {
             packed.fill(0.0);
         }
     }
-}
-
-/// Numbers of one Gaussian's harmonics in the texture: three colors a coefficient, filled up to whole texels.
-pub(crate) fn harmonics_floats(degree: u8) -> usize {
-    let side = usize::from(degree) + 1;
-    (3 * side * side).next_multiple_of(4)
-}
-
-/// Harmonics of all Gaussians for the texture, [`harmonics_floats`] numbers each.
-pub(crate) fn pack_harmonics(gaussians: &GaussianArrays) -> Vec<f32> {
-    let floats = harmonics_floats(gaussians.sh_degree);
-    let rest = gaussians.sh_rest.len() / gaussians.len().max(1);
-    let mut packed = vec![0.0; floats * gaussians.len().next_multiple_of(PADDING)];
-    for (gaussian, packed) in packed.chunks_exact_mut(floats).take(gaussians.len()).enumerate() {
-        packed[..3].copy_from_slice(&gaussians.sh_dc[gaussian]);
-        packed[3..3 + rest].copy_from_slice(&gaussians.sh_rest[rest * gaussian..][..rest]);
-    }
-    packed
 }
 
 #[cfg(test)]
@@ -98,7 +77,7 @@ mod tests {
     fn a_quarter_turn_around_z_exchanges_x_and_y() {
         let half = std::f32::consts::FRAC_1_SQRT_2;
         let packed = one([2.0_f32.ln(), 3.0_f32.ln(), 0.0], [half * 5.0, 0.0, 0.0, half * 5.0]);
-        let expected = [1.0, 2.0, 3.0, 0.5, 9.0, 0.0, 0.0, 4.0, 0.0, 1.0, 0.0, 0.0];
+        let expected = [1.0, 2.0, 3.0, 0.5, 9.0, 0.0, 0.0, 4.0, 0.0, 1.0];
         for (found, expected) in packed.iter().zip(expected) {
             assert!((found - expected).abs() < 1e-5, "{packed:?}");
         }
@@ -112,10 +91,5 @@ mod tests {
         // The covariance overflows.
         assert_eq!(one([60.0; 3], [1.0, 0.0, 0.0, 0.0])[3], 0.5);
         assert!(one([1e30; 3], [1.0, 0.0, 0.0, 0.0]).iter().all(|value| value.is_finite()));
-    }
-
-    #[test]
-    fn harmonics_fill_whole_texels() {
-        assert_eq!([0, 1, 2, 3].map(harmonics_floats), [4, 12, 28, 48]);
     }
 }

@@ -7,19 +7,22 @@
 //! | file | what |
 //! |---|---|
 //! | `scene.rs` | a decoded scene that is asked for one time after the other |
-//! | `gaussians.rs` | activations, and what the vertex shader reads |
-//! | `depth_order.rs` | back to front |
+//! | `gaussians.rs` | activations, and what the vertex shader takes |
+//! | `draw_list.rs` | back to front, with the colors that are seen |
 //! | `description.rs` | what the panel of the player shows, as JSON |
 //! | `digest.rs` | one number for all bits of a decoded scene |
 //! | `abi.rs` | the functions that JavaScript calls |
+//! | `page.rs` | pages around the player, for the program; not in WebAssembly |
 
 pub mod abi;
-mod depth_order;
 mod description;
 mod digest;
+mod draw_list;
 mod gaussians;
+#[cfg(not(target_arch = "wasm32"))]
+pub mod page;
 mod scene;
 
 pub use digest::digest;
-pub use gaussians::{FLOATS, PADDING};
+pub use draw_list::{ENTRY, ROW, Viewpoint};
 pub use scene::OpenScene;

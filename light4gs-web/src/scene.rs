@@ -2,10 +2,9 @@
 
 use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, info};
 
-use crate::depth_order::DepthOrder;
 use crate::description::describe;
-use crate::digest::digest;
-use crate::gaussians::{FLOATS, PADDING, opacity, pack, pack_harmonics, rotation, scales};
+use crate::draw_list::{DrawList, Viewpoint};
+use crate::gaussians::{FLOATS, opacity, pack, rotation, scales};
 
 /// A decoded scene.
 #[derive(Debug)]
@@ -14,12 +13,11 @@ pub struct OpenScene {
     moved: GaussianArrays,
     evaluator: MotionEvaluator,
     description: String,
-    digest: u64,
-    /// What is drawn: [`FLOATS`] numbers a Gaussian, whole texture rows.
+    /// What is drawn: [`FLOATS`] numbers a Gaussian.
     packed: Vec<f32>,
     /// The next of it, while that is being computed.
     pending: Vec<f32>,
-    order: DepthOrder,
+    list: DrawList,
 }
 
 impl OpenScene {
@@ -31,18 +29,17 @@ impl OpenScene {
         let info = info(bytes)?;
         let scene = OpenStream::new(bytes)?.scene()?;
         let evaluator = MotionEvaluator::new(&scene)?;
-        let (description, digest) = (describe(&scene, &info), digest(&scene));
+        let description = describe(&scene, &info);
         let canonical = scene.gaussians;
-        let floats = FLOATS * canonical.len().next_multiple_of(PADDING);
+        let floats = FLOATS * canonical.len();
         Ok(Self {
             moved: canonical.clone(),
             canonical,
             evaluator,
             description,
-            digest,
             packed: vec![0.0; floats],
             pending: vec![0.0; floats],
-            order: DepthOrder::default(),
+            list: DrawList::default(),
         })
     }
 
@@ -56,13 +53,7 @@ impl OpenScene {
         &self.description
     }
 
-    /// [`digest()`] of what was decoded.
-    pub fn digest(&self) -> u64 {
-        self.digest
-    }
-
-    /// Computes the Gaussians `first` to `last` at a time, and whether harmonics move along. [`OpenScene::present`] shows
-    /// them when all are done.
+    /// Computes the Gaussians `first` to `last` at a time. [`OpenScene::present`] shows them when all are done.
     pub fn evaluate(&mut self, time: f32, first: usize, last: usize) {
         let last = last.min(self.count());
         let range = first.min(last)..last;
@@ -70,25 +61,14 @@ impl OpenScene {
         pack(&self.moved, range, &mut self.pending);
     }
 
-    /// The Gaussians that were computed last, for the texture: [`FLOATS`] numbers each, in whole rows.
-    pub fn present(&mut self) -> &[f32] {
+    /// Shows the Gaussians that were computed last.
+    pub fn present(&mut self) {
         std::mem::swap(&mut self.packed, &mut self.pending);
-        &self.packed
     }
 
-    /// Whether harmonics change with time.
-    pub fn changes_harmonics(&self) -> bool {
-        self.evaluator.changes_harmonics()
-    }
-
-    /// The harmonics at the time that was computed last, for the texture.
-    pub fn harmonics(&self) -> Vec<f32> {
-        pack_harmonics(&self.moved)
-    }
-
-    /// The Gaussians that are shown, back to front, by a row of the view matrix.
-    pub fn sort(&mut self, row: [f32; 4]) -> &[u32] {
-        self.order.sort(&self.packed, row)
+    /// The Gaussians that are shown, back to front, [`ENTRY`](crate::ENTRY) numbers each.
+    pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
+        self.list.make(&self.packed, &self.moved, viewpoint)
     }
 
     /// All attributes at a time, activated: centers `[N, 3]`, standard deviations `[N, 3]`, unit quaternions `(w, x, y, z)

@@ -45,6 +45,8 @@ export async function launch() {
 /** A page that notes what goes wrong on it: `page.problems`. */
 export async function open(browser, url, options = {}) {
   const context = await browser.newContext({ viewport: { width: 1000, height: 900 }, ...options });
+  // A machine may have other work.
+  context.setDefaultTimeout(120_000);
   const page = await context.newPage();
   page.problems = [];
   page.on("pageerror", (error) => page.problems.push(String(error)));
@@ -92,8 +94,8 @@ export function readPng(bytes) {
       const above = y > 0 ? pixels[(y - 1) * row + x] : 0;
       const corner = y > 0 && x >= channels ? pixels[(y - 1) * row + x - channels] : 0;
       const distances = [left, above, corner].map((value) => Math.abs(left + above - corner - value));
-      const paeth = distances[0] <= distances[1] && distances[0] <= distances[2] ? left : distances[1] <= distances[2] ? above : corner;
-      const predicted = [0, left, above, (left + above) >> 1, paeth][filter];
+      const nearest = distances[0] <= distances[1] && distances[0] <= distances[2] ? left : distances[1] <= distances[2] ? above : corner;
+      const predicted = [0, left, above, (left + above) >> 1, nearest][filter];
       pixels[y * row + x] = raw[y * (row + 1) + 1 + x] + predicted;
     }
   }

@@ -8,6 +8,7 @@ pub mod hostile;
 pub mod named;
 pub mod odd_scenes;
 pub mod program;
+pub mod pytorch;
 pub mod random;
 pub mod raster;
 pub mod splat_scene;

@@ -21,8 +21,11 @@ const CHEAPER: [(&str, &str); 9] = [
     ("compression.context.fit_iterations", "30"),
 ];
 
+/// Keys and their values.
+type Overrides = &'static [(&'static str, &'static str)];
+
 /// What else must be said where a value does not stand alone.
-const COMPANIONS: [(&str, &str, &[(&str, &str)]); 13] = [
+const COMPANIONS: [(&str, &str, Overrides); 13] = [
     ("train.coarse_iterations", "0", &[("train.fine_iterations", "3")]),
     ("train.fine_iterations", "0", &[("train.prune.iterations", "[]"), ("train.coarse_iterations", "3")]),
     ("train.densify.from", "", &[("train.densify.until", "9223372036854775807"), ("train.prune.fraction", "0.0")]),

@@ -35,7 +35,7 @@ fn scene(folder: &Path) -> PathBuf {
 fn checkpoint(folder: &Path) -> (Config, PathBuf) {
     let config = Config::from_toml(&tiny_with(&[]), "tiny").unwrap();
     let scene = scene(folder);
-    let run = RunFolder::create(&folder.join("run"), &scene, &config, false).unwrap();
+    let run = RunFolder::create(&folder.join("run"), Some(&scene), &config, false).unwrap();
     let data = Scene::open(&scene, &load_options(&config)).unwrap();
     let mut trainer = Trainer::builder(config.clone(), data).run_folder(run.clone()).build().unwrap();
     while trainer.step().unwrap().is_some() {}
@@ -115,7 +115,7 @@ fn numbers_that_are_not_finite_stop_a_run() {
     let overrides = [("train.fine_iterations", "6"), ("train.checkpoint_interval", "2"), ("train.log_interval", "1")];
     let config = Config::from_toml(&tiny_with(&overrides), "tiny").unwrap();
     for (name, of_the_gradient) in [("loss", false), ("gradient", true)] {
-        let run = RunFolder::create(&folder.path().join(name), &scene, &config, false).unwrap();
+        let run = RunFolder::create(&folder.path().join(name), Some(&scene), &config, false).unwrap();
         let data = Scene::open(&scene, &load_options(&config)).unwrap();
         let loss = move |view: LossInput| {
             let error = view.image - view.truth;

@@ -51,6 +51,7 @@ use steps::check_step;
 use crate::{
     CodecError, GaussianArrays, Limits,
     adaptive::{BitDecoder, BitEncoder, LARGEST_INDEX, index, reconstruct},
+    budget::Budget,
     limits::at_most,
     stream::{self, reader::Reader, sections::Section, writer::Writer},
 };
@@ -58,6 +59,13 @@ use crate::{
 const SECTION: &str = Section::Gaussians.name();
 /// Bytes that many Gaussians take at least: what a count must show before memory is taken for it.
 const GAUSSIANS_A_BYTE: usize = 8;
+
+/// Bytes that decoding takes for a Gaussian: 56 that stay, neighbors, and the integers of the largest attribute.
+const GAUSSIAN_BYTES: u64 = 136;
+/// Nanoseconds to find a Gaussian's neighbors and to read its attributes where they take next to no bits.
+const GAUSSIAN_NANOSECONDS: u64 = 3000;
+/// Nanoseconds of a level of the tree of positions.
+const LEVEL_NANOSECONDS: u64 = 12;
 
 /// The order in which an attribute's channels are coded.
 const AXES: [usize; 3] = [0, 1, 2];
@@ -130,9 +138,14 @@ pub fn encode(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<Enco
 /// Bytes that [`encode`] does not write, and more Gaussians than the limits allow. Memory is taken for at most eight
 /// Gaussians a byte.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GaussianArrays, CodecError> {
+    decode_within(bytes, &Budget::new(limits))
+}
+
+/// As [`decode`], at the cost of a budget.
+pub(crate) fn decode_within(bytes: &[u8], budget: &Budget) -> Result<GaussianArrays, CodecError> {
     let mut reader = Reader::new(SECTION, bytes);
     let head = Head::read(&mut reader)?;
-    at_most(SECTION, "count", head.count.into(), limits.gaussians)?;
+    at_most(SECTION, "count", head.count.into(), budget.limits.gaussians)?;
     let count = head.count as usize;
     if bytes.len() < count.div_ceil(GAUSSIANS_A_BYTE) {
         let expected = format!("at most {GAUSSIANS_A_BYTE} a byte, of which there are {}", bytes.len());
@@ -146,21 +159,32 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GaussianArrays, CodecErro
         reader.u32("length of sh_dc")?,
     ];
     let [means, log_scales, opacity_logits, quats, sh_dc] = lengths;
+    budget.stream(SECTION, bytes.len())?;
+    let nanoseconds = GAUSSIAN_NANOSECONDS + LEVEL_NANOSECONDS * u64::from(head.grid.code_bits());
+    budget.things(SECTION, count as u64, GAUSSIAN_BYTES, nanoseconds)?;
 
     let mut codes = vec![0; count];
     let stream = reader.take("means", means.into())?;
     positions::code(&mut BitDecoder::new(stream), &mut codes, head.grid.code_bits()).map_err(|_| damaged("means"))?;
     let cells: Vec<_> = codes.iter().map(|&code| morton_cell(code)).collect();
+    drop(codes);
+    let means = head.means(&cells);
     let neighbors = nearest_before(&cells);
+    drop(cells);
 
     let mut channels = |field, count, length: u32| read_channels(&mut reader, field, count, length, &neighbors);
-    let log_scales = channels("log_scales", 3, log_scales)?;
-    let opacity_logits = channels("opacity_logits", 1, opacity_logits)?;
-    let quats = channels("quats", 4, quats)?;
-    let sh_dc = channels("sh_dc", 3, sh_dc)?;
+    let [log_scale, opacity_logit, quaternion, dc] = head.steps;
+    // Each attribute's integers go before the next one's come.
+    let gaussians = GaussianArrays {
+        means,
+        log_scales: join(&channels("log_scales", 3, log_scales)?, log_scale, AXES),
+        opacity_logits: join(&channels("opacity_logits", 1, opacity_logits)?, opacity_logit, [0]).into_flattened(),
+        quats: join(&channels("quats", 4, quats)?, quaternion, COMPONENTS),
+        sh_dc: join(&channels("sh_dc", 3, sh_dc)?, dc, COLORS),
+        ..GaussianArrays::default()
+    };
     check_padding(reader, bytes.len(), count)?;
-    let attributes = [log_scales, opacity_logits, quats, sh_dc];
-    Ok(reconstructed(&head, &cells, &attributes))
+    Ok(gaussians)
 }
 
 /// What [`decode`] gives for what [`encode`] writes: the quantized Gaussians in their new order.
@@ -182,6 +206,11 @@ struct Head {
 }
 
 impl Head {
+    /// Centers of cells.
+    fn means(&self, cells: &[[i32; 3]]) -> Vec<[f32; 3]> {
+        cells.iter().map(|&cell| self.grid.mean(cell)).collect()
+    }
+
     fn write(&self, writer: &mut Writer) {
         writer.u32(self.count);
         self.grid.write(writer);
@@ -247,12 +276,12 @@ impl Quantized {
     }
 }
 
-/// Integers to Gaussians, for encoder and decoder both.
+/// Integers to Gaussians.
 fn reconstructed(head: &Head, cells: &[[i32; 3]], attributes: &[Vec<Vec<i32>>; 4]) -> GaussianArrays {
     let [log_scales, opacity_logits, quats, sh_dc] = attributes;
     let [log_scale, opacity_logit, quaternion, dc] = head.steps;
     GaussianArrays {
-        means: cells.iter().map(|&cell| head.grid.mean(cell)).collect(),
+        means: head.means(cells),
         log_scales: join(log_scales, log_scale, AXES),
         quats: join(quats, quaternion, COMPONENTS),
         opacity_logits: join(opacity_logits, opacity_logit, [0]).into_flattened(),

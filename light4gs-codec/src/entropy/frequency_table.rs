@@ -1,9 +1,12 @@
 //! A learned distribution of integers, as it travels in the stream.
 
+use std::convert::Infallible;
+
 use super::{Distribution, SYMBOL_LIMIT, TOTAL_BITS};
 use crate::{
     CodecError,
     adaptive::{AdaptiveInteger, BitCoder, BitDecoder, BitEncoder, Damaged},
+    budget::Budget,
 };
 
 /// Probability 1 in units of the weights.
@@ -12,6 +15,11 @@ const ONE: f64 = 65_536.0;
 const MOST_CODE: i32 = 112;
 /// Symbols of a table.
 const MOST_SYMBOLS: usize = 1 << 14;
+/// Bytes of a symbol in a table and in its [`Distribution`], and nanoseconds to read it and to place it.
+const SYMBOL_BYTES: u64 = 8;
+const SYMBOL_NANOSECONDS: u64 = 60;
+/// What a table takes besides, in symbols.
+const SYMBOLS_OF_A_TABLE: u64 = 100;
 /// Mass that is cut off on either side and left to the escape, since naming those symbols costs more than it saves.
 const CUT: f64 = 1.0 / 8192.0;
 
@@ -113,42 +121,63 @@ fn code_of(probability: f64) -> u8 {
 pub(crate) fn write_tables(tables: &[FrequencyTable]) -> Vec<u8> {
     let mut encoder = BitEncoder::default();
     let mut tables = tables.to_vec();
-    code_tables(&mut encoder, &mut tables).expect("an encoder does not run out of bytes");
-    encoder.finish()
+    match code_tables(&mut encoder, &mut tables, |_| Ok::<_, Infallible>(())) {
+        Ok(Ok(())) => encoder.finish(),
+        Ok(Err(Damaged)) => unreachable!("an encoder does not run out of bytes"),
+    }
 }
 
-/// Reads `count` tables.
-pub(crate) fn read_tables(bytes: &[u8], count: usize) -> Result<Vec<FrequencyTable>, Damaged> {
+/// Reads `count` tables; messages name `field`. Each may be long, though it takes few bytes.
+pub(crate) fn read_tables(
+    section: &'static str,
+    field: &'static str,
+    bytes: &[u8],
+    count: usize,
+    budget: &Budget,
+) -> Result<Vec<FrequencyTable>, CodecError> {
+    budget.stream(section, bytes.len())?;
     let mut tables = vec![FrequencyTable { first: 0, codes: Vec::new() }; count];
-    code_tables(&mut BitDecoder::new(bytes), &mut tables)?;
-    Ok(tables)
+    let ask = |symbols: u64| budget.things(section, symbols + SYMBOLS_OF_A_TABLE, SYMBOL_BYTES, SYMBOL_NANOSECONDS);
+    match code_tables(&mut BitDecoder::new(bytes), &mut tables, ask)? {
+        Ok(()) => Ok(tables),
+        Err(Damaged) => Err(CodecError::invalid(section, field, "damaged", "frequency tables")),
+    }
 }
 
 /// Codes the first symbol and the number of symbols of each table, then the codes, each as the difference from the
 /// one before; the one before the first is 0.
-fn code_tables(coder: &mut impl BitCoder, tables: &mut [FrequencyTable]) -> Result<(), Damaged> {
+///
+/// `ask` is told the symbols of each table before memory is taken for them.
+fn code_tables<E>(
+    coder: &mut impl BitCoder,
+    tables: &mut [FrequencyTable],
+    ask: impl Fn(u64) -> Result<(), E>,
+) -> Result<Result<(), Damaged>, E> {
     let mut ends = AdaptiveInteger::new(2);
     let mut differences = AdaptiveInteger::new(3);
     for FrequencyTable { first, codes } in tables {
-        coder.check()?;
+        if let Err(damaged) = coder.check() {
+            return Ok(Err(damaged));
+        }
         *first = ends.code(coder, 0, *first);
         let symbols = ends.code(coder, 1, codes.len() as i32 - 1);
         if first.unsigned_abs() > SYMBOL_LIMIT as u32 || !(1..=MOST_SYMBOLS as i32).contains(&symbols) {
-            return Err(Damaged);
+            return Ok(Err(Damaged));
         }
+        ask(symbols as u64)?;
         codes.resize(symbols as usize + 1, 0);
         let (mut last, mut context) = (0, 0);
         for code in codes {
             let difference = differences.code(coder, context, i32::from(*code) - last);
             last = last.wrapping_add(difference);
             if !(1..=MOST_CODE).contains(&last) {
-                return Err(Damaged);
+                return Ok(Err(Damaged));
             }
             *code = last as u8;
             context = if difference < 0 { 1 } else { 2 };
         }
     }
-    coder.check()
+    Ok(coder.check())
 }
 
 #[cfg(test)]
@@ -156,6 +185,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
+    use crate::Limits;
 
     #[test]
     fn weights_rise_and_are_near() {
@@ -204,12 +234,12 @@ mod tests {
                 })
                 .collect();
             let bytes = write_tables(&tables);
-            prop_assert_eq!(read_tables(&bytes, tables.len()).unwrap(), tables);
+            prop_assert_eq!(read_tables("t", "t", &bytes, tables.len(), &Budget::new(&Limits::default())).unwrap(), tables);
         }
 
         #[test]
         fn any_bytes_give_tables_or_an_error(bytes in prop::collection::vec(any::<u8>(), 0..60)) {
-            if let Ok(tables) = read_tables(&bytes, 3) {
+            if let Ok(tables) = read_tables("t", "t", &bytes, 3, &Budget::new(&Limits::default())) {
                 tables.iter().for_each(|table| drop(table.distribution()));
             }
         }

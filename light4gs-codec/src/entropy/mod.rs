@@ -15,5 +15,7 @@ pub(crate) use frequency_table::{read_tables, write_tables};
 pub(crate) use gaussian_table::gaussian_table;
 pub(crate) use symbol_coder::{SymbolCoder, SymbolReader, SymbolWriter};
 
+/// Nanoseconds to read a symbol that takes next to no bits: the level of its scale, its slot, and its value.
+pub(crate) const READ_NANOSECONDS: u64 = 80;
 /// The largest magnitude of a symbol. Integers up to here are exact in float32.
 pub(crate) const SYMBOL_LIMIT: i32 = 1 << 22;

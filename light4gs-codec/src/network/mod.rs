@@ -29,7 +29,7 @@
 //! | `check.rs` | what a network must be before it runs: channels, sizes, limits |
 //! | `description.rs` | a network without its weights as bytes |
 //! | `weights.rs`, `tensors.rs` | weights as bytes, quantized or float32 |
-//! | `program.rs` | a network ready to run, and what running it costs |
+//! | `program/` | a network ready to run, and what running it costs |
 //! | `kernels/` | the operations |
 
 mod check;
@@ -39,7 +39,7 @@ mod program;
 pub(crate) mod tensors;
 pub mod weights;
 
-pub(crate) use program::{Maps, Program, Workspace};
+pub(crate) use program::{Maps, Program, Workspace, blocks};
 
 use crate::{CodecError, Limits};
 
@@ -219,7 +219,7 @@ impl Network {
     /// A network that is not legal, or that looks at more than one place; inputs of other lengths.
     pub fn evaluate(&self, inputs: &[Vec<f32>]) -> Result<Vec<Vec<f32>>, CodecError> {
         const SECTION: &str = "network";
-        self.check(SECTION, "the network", &Limits::default())?;
+        self.check(SECTION, "the network", &Limits::large())?;
         self.check_pointwise(SECTION, "the network")?;
         let found: Vec<_> = inputs.iter().map(Vec::len).collect();
         if !found.iter().copied().eq(self.inputs.iter().map(|&channels| channels as usize)) {
@@ -230,7 +230,7 @@ impl Network {
         let mut workspace = program.workspace();
         for (index, values) in inputs.iter().enumerate() {
             let lanes = program.input_lanes(&mut workspace, index);
-            lanes.iter_mut().zip(values).for_each(|(lanes, &value)| lanes[0] = value);
+            lanes.iter_mut().zip(values).for_each(|(lanes, &value)| lanes[0] = kernels::kept(value));
         }
         program.run(&mut workspace);
         let outputs = (0..self.outputs.len()).map(|index| program.output_lanes(&workspace, index));

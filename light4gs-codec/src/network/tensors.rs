@@ -5,7 +5,8 @@ use super::{
     weights::{self, EncodedWeights, TensorLength, WeightPrecision, WeightTensor},
 };
 use crate::{
-    CodecError, Limits,
+    CodecError,
+    budget::Budget,
     limits::at_most,
     stream::{reader::Reader, sections::Encoding, writer::Writer},
 };
@@ -36,13 +37,14 @@ pub(crate) fn read_tensors(
     bytes: &[u8],
     encoding: Encoding,
     lengths: &[TensorLength<'_>],
-    limits: &Limits,
+    budget: &Budget,
 ) -> Result<Vec<Vec<f32>>, CodecError> {
     let total = lengths.iter().fold(0u64, |sum, tensor| sum.saturating_add(tensor.length));
-    at_most(section, "number of weights", total, limits.layer_weights)?;
+    at_most(section, "number of weights", total, budget.limits.layer_weights)?;
     if encoding == Encoding::Quantized {
-        return weights::decode(section, bytes, lengths, limits);
+        return weights::decode_within(section, bytes, lengths, budget);
     }
+    budget.things(section, total, 8, 4)?;
     let mut reader = Reader::new(section, bytes);
     let tensors = lengths.iter().map(|tensor| reader.f32s(tensor.name, tensor.length)).collect::<Result<_, _>>()?;
     reader.finish()?;
@@ -68,10 +70,13 @@ pub(crate) fn read_weights(
     networks: &mut [&mut Network],
     bytes: &[u8],
     encoding: Encoding,
-    limits: &Limits,
+    budget: &Budget,
 ) -> Result<(), CodecError> {
+    // What a mask hides is not in the stream, but in memory.
+    let whole = networks.iter().fold(0u64, |sum, network| sum.saturating_add(network.weights()));
+    budget.things(section, whole, 4, 4)?;
     let lengths: Vec<_> = networks.iter().flat_map(|network| network.tensor_lengths(NAME)).collect();
-    let mut tensors = read_tensors(section, bytes, encoding, &lengths, limits)?.into_iter();
+    let mut tensors = read_tensors(section, bytes, encoding, &lengths, budget)?.into_iter();
     networks.iter_mut().for_each(|network| network.set_stored_tensors(&mut tensors));
     Ok(())
 }

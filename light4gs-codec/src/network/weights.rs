@@ -30,11 +30,14 @@ use crate::{
         AdaptiveInteger, BitCoder, BitDecoder, BitEncoder, Damaged, LARGEST_INDEX, LARGEST_STEP, index,
         magnitude_level, reconstruct,
     },
+    budget::Budget,
     limits::at_most,
 };
 
 /// Weights that a byte stands for at most.
 const WEIGHTS_A_BYTE: u64 = 256;
+/// Nanoseconds to read a weight that takes next to no bits.
+const WEIGHT_NANOSECONDS: u64 = 300;
 /// The last level of the expected magnitude.
 const LAST_LEVEL: usize = 24;
 /// Fractional bits of the expected magnitude.
@@ -107,6 +110,17 @@ pub fn decode(
     lengths: &[TensorLength<'_>],
     limits: &Limits,
 ) -> Result<Vec<Vec<f32>>, CodecError> {
+    decode_within(section, bytes, lengths, &Budget::new(limits))
+}
+
+/// As [`decode`], at the cost of a budget.
+pub(crate) fn decode_within(
+    section: &'static str,
+    bytes: &[u8],
+    lengths: &[TensorLength<'_>],
+    budget: &Budget,
+) -> Result<Vec<Vec<f32>>, CodecError> {
+    let limits = &budget.limits;
     let most = 2 * u64::from(limits.networks) * u64::from(limits.nodes);
     at_most(section, "number of tensors", lengths.len() as u64, most)?;
     let weights = lengths.iter().fold(0_u64, |sum, tensor| sum.saturating_add(tensor.length));
@@ -114,6 +128,8 @@ pub fn decode(
         let expected = format!("at most {WEIGHTS_A_BYTE} a byte, of which there are {}", bytes.len());
         return Err(CodecError::invalid(section, "number of weights", weights, expected));
     }
+    budget.stream(section, bytes.len())?;
+    budget.things(section, weights, 8, WEIGHT_NANOSECONDS)?;
     let mut quantized: Vec<_> = lengths
         .iter()
         // No more than 256 times the bytes, so it fits.

@@ -1,6 +1,7 @@
 //! All planes: encode, decode.
 
 use super::{
+    cost,
     exact_model::ExactModel,
     plan::{stages, stream_order, sub_streams},
     plane_parameters::{Part, PlaneParameters},
@@ -9,6 +10,7 @@ use super::{
 use crate::{
     CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane,
     adaptive::Damaged,
+    budget::Budget,
     entropy::{SymbolCoder, SymbolReader, SymbolWriter, gaussian_table},
     network::kernels::AnchorMap,
     parallel,
@@ -36,7 +38,7 @@ pub(crate) fn encode(
     latent_symbols: &[Vec<i32>],
     limits: &Limits,
 ) -> Result<CodedPlanes, CodecError> {
-    let coder = PlaneCoder::new(model, hexplane, steps, limits)?;
+    let coder = PlaneCoder::new(model, hexplane, steps, &Budget::new(limits))?;
     let mut sub_streams = Vec::new();
     let decoded = coder.run(
         hexplane.clone(),
@@ -56,9 +58,10 @@ pub(crate) fn decode(
     model: &ContextModelArrays,
     steps: &[PerGroup],
     streams: &[&[u8]],
-    limits: &Limits,
+    budget: &Budget,
 ) -> Result<HexPlaneArrays, CodecError> {
-    let coder = PlaneCoder::new(model, &hexplane, steps, limits)?;
+    let coder = PlaneCoder::new(model, &hexplane, steps, budget)?;
+    streams.iter().try_for_each(|stream| budget.stream(SECTION, stream.len()))?;
     let order = stream_order(model, hexplane.multipliers.len());
     coder.run(
         hexplane,
@@ -80,7 +83,7 @@ pub(crate) fn check_cost(
     model: &ContextModelArrays,
     limits: &Limits,
 ) -> Result<(), CodecError> {
-    PlaneCoder::new(model, hexplane, &[], limits).map(drop)
+    PlaneCoder::new(model, hexplane, &[], &Budget::new(limits)).map(drop)
 }
 
 struct PlaneCoder<'a> {
@@ -95,12 +98,12 @@ impl<'a> PlaneCoder<'a> {
         model: &'a ContextModelArrays,
         hexplane: &HexPlaneArrays,
         steps: &'a [PerGroup],
-        limits: &Limits,
+        budget: &Budget,
     ) -> Result<Self, CodecError> {
         let stages = stages(model, hexplane.multipliers.len());
         let sizes: Vec<_> = hexplane.planes.iter().map(|plane| [plane.height, plane.width]).collect();
-        let model = ExactModel::new(model);
-        model.check_cost(&stages, &sizes, limits)?;
+        let model = ExactModel::new(model, budget)?;
+        cost::ask(&model, &stages, &sizes, budget)?;
         Ok(Self { model, stages, steps })
     }
 
@@ -199,7 +202,7 @@ pub(crate) fn parameters(
     index: usize,
     limits: &Limits,
 ) -> Result<(Vec<f32>, Vec<f32>), CodecError> {
-    let coder = PlaneCoder::new(model, hexplane, &[], limits)?;
+    let coder = PlaneCoder::new(model, hexplane, &[], &Budget::new(limits))?;
     let model = &coder.model;
     let plane = &hexplane.planes[index];
     let size = size_of(plane);

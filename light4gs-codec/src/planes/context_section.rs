@@ -5,6 +5,7 @@ use super::context_model::{
 };
 use crate::{
     CodecError, Limits, Network, PerGroup,
+    budget::Budget,
     entropy::{read_tables, write_tables},
     network::{
         tensors::{read_weights, write_weights},
@@ -117,18 +118,17 @@ pub(crate) fn read_description(reader: &mut Reader<'_>, limits: &Limits) -> Resu
 }
 
 /// Reads a model.
-pub(crate) fn read(bytes: &[u8], encoding: Encoding, limits: &Limits) -> Result<ContextModelArrays, CodecError> {
+pub(crate) fn read(bytes: &[u8], encoding: Encoding, budget: &Budget) -> Result<ContextModelArrays, CodecError> {
     let mut reader = Reader::new(SECTION, bytes);
-    let mut model = read_description(&mut reader, limits)?;
+    let mut model = read_description(&mut reader, &budget.limits)?;
     if let Some(latent) = &mut model.latent {
         let count = latent.medians.len();
         let block = reader.block("tables of the latent")?;
-        latent.tables = read_tables(block, count)
-            .map_err(|_| CodecError::invalid(SECTION, "tables of the latent", "damaged", "frequency tables"))?;
+        latent.tables = read_tables(SECTION, "tables of the latent", block, count, budget)?;
         latent.medians = reader.f32s("medians of the latent", count as u64)?;
     }
     let mut networks: Vec<_> = model.networks.iter_mut().collect();
-    read_weights(SECTION, &mut networks, reader.rest(), encoding, limits)?;
-    model.check(limits)?;
+    read_weights(SECTION, &mut networks, reader.rest(), encoding, budget)?;
+    model.check(&budget.limits)?;
     Ok(model)
 }

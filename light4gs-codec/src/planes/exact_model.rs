@@ -1,13 +1,13 @@
 //! The context model, ready for the exact executor.
 
-use super::context_model::{Condition, PlanePrior, PlaneSource, SECTION, network_name};
+use super::context_model::{Condition, PlanePrior, PlaneSource, SECTION};
 use crate::{
-    CodecError, ContextModelArrays, HexPlaneArrays, Limits,
+    CodecError, ContextModelArrays, HexPlaneArrays,
+    budget::Budget,
     entropy::Distribution,
-    limits::at_most,
     network::{
         Program,
-        kernels::{LANES, PaddedMap},
+        kernels::{PaddedMap, kept},
     },
     plane_layout::{PLANES_PER_SCALE, is_space_time, position_of, scale_of},
 };
@@ -17,17 +17,29 @@ use crate::{
 pub(super) struct ExactModel<'a> {
     pub(super) arrays: &'a ContextModelArrays,
     pub(super) latent_distributions: Vec<Distribution>,
-    /// The networks as conditions.
-    pub(super) conditions: Vec<Program>,
+    /// The networks as conditions; nothing for those that are none.
+    conditions: Vec<Option<Program>>,
     /// The distributions of each prior: for the anchors, who know less, and for the others, or all.
     pub(super) distributions: Vec<[Program; 2]>,
 }
 
 impl<'a> ExactModel<'a> {
-    pub(super) fn new(arrays: &'a ContextModelArrays) -> Self {
+    /// Refuses a model that takes more memory than there is.
+    pub(super) fn new(arrays: &'a ContextModelArrays, budget: &Budget) -> Result<Self, CodecError> {
+        let (mut as_distribution, mut as_condition) = (vec![0; arrays.networks.len()], vec![0; arrays.networks.len()]);
+        for prior in &arrays.priors {
+            // Two programs share the weights of one more.
+            as_distribution[prior.distribution as usize] += 1;
+            let conditions = prior.conditions.iter().flatten();
+            conditions.for_each(|condition| as_condition[condition.network as usize] = 1);
+        }
+        for (index, network) in arrays.networks.iter().enumerate() {
+            let bytes = network.program_bytes().saturating_mul(as_distribution[index].min(1) + as_condition[index]);
+            let plans = network.plan_bytes() * 2 * as_distribution[index];
+            budget.things(SECTION, bytes + plans, 1, 2)?;
+        }
         let all = arrays.networks.iter().enumerate().map(|(index, network)| {
-            let used = arrays.priors.iter().any(|prior| prior.distribution as usize == index);
-            used.then(|| Program::pointwise(network, &vec![true; network.inputs.len()]))
+            (as_distribution[index] > 0).then(|| Program::pointwise(network, &vec![true; network.inputs.len()]))
         });
         let all: Vec<Option<Program>> = all.collect();
         let distributions = arrays.priors.iter().map(|prior| {
@@ -36,13 +48,19 @@ impl<'a> ExactModel<'a> {
             [false, true].map(|with_anchors| whole.with_present(&arrays.networks[index], &present(prior, with_anchors)))
         });
         let latent = arrays.latent.as_ref();
-        Self {
+        let conditions = arrays.networks.iter().zip(as_condition);
+        Ok(Self {
             distributions: distributions.collect(),
-            conditions: arrays.networks.iter().map(Program::over_maps).collect(),
+            conditions: conditions.map(|(network, used)| (used > 0).then(|| Program::over_maps(network))).collect(),
             latent_distributions: latent
                 .map_or_else(Vec::new, |latent| latent.tables.iter().map(|table| table.distribution()).collect()),
             arrays,
-        }
+        })
+    }
+
+    /// A network of a [`Condition`] of this model.
+    pub(super) fn condition(&self, network: u32) -> &Program {
+        self.conditions[network as usize].as_ref().expect("made for every network that is a condition's")
     }
 
     /// The place of a plane's prior.
@@ -62,7 +80,7 @@ impl<'a> ExactModel<'a> {
         for (index, row) in symbols.chunks_exact(width).enumerate() {
             let (channel, y) = (index / height, index % height);
             for (target, &symbol) in map.row_mut(channel, y).iter_mut().zip(row) {
-                *target = symbol as f32 + medians[channel];
+                *target = kept(symbol as f32 + medians[channel]);
             }
         }
         map
@@ -73,40 +91,6 @@ impl<'a> ExactModel<'a> {
         let center = self.center_of(plane);
         let plane = &decoded.planes[plane];
         PaddedMap::centered(&plane.values, [plane.height as usize, plane.width as usize], center, border)
-    }
-
-    /// Refuses planes that are more work than the limits allow, and sizes that do not fit the networks.
-    pub(super) fn check_cost(
-        &self,
-        stages: &[Vec<usize>],
-        sizes: &[[u32; 2]],
-        limits: &Limits,
-    ) -> Result<(), CodecError> {
-        let mut work = 0u64;
-        for stage in stages {
-            let mut numbers = 0u64;
-            for &plane in stage {
-                let prior = &self.arrays.priors[self.prior_of(plane)];
-                let [height, width] = sizes[plane];
-                // Eight places of a row are computed at a time, in each pass.
-                let passes = if prior.has_anchors() { 2 } else { 1 };
-                let places = u64::from(height) * u64::from(passes * (width / passes).next_multiple_of(LANES as u32));
-                let own = self.distributions[self.prior_of(plane)][1].work().saturating_mul(places);
-                work = work.saturating_add(own);
-                for Condition { network, sources } in prior.conditions.iter().flatten() {
-                    let network = *network as usize;
-                    let inputs: Vec<_> = sources.iter().map(|&source| source_size(source, plane, sizes)).collect();
-                    let name = network_name(network);
-                    let all = self.arrays.networks[network].sizes(SECTION, &name, &inputs, sizes[plane], limits)?;
-                    let cost = self.conditions[network].cost(&all, sizes[plane]);
-                    work = work.saturating_add(cost.work.saturating_mul(passes.into()));
-                    numbers = numbers.saturating_add(cost.numbers);
-                }
-            }
-            let field = "number of values between layers";
-            at_most(SECTION, field, numbers, 4 * limits.coded_values)?;
-        }
-        at_most(SECTION, "number of multiplications", work, limits.multiplications)
     }
 }
 
@@ -120,7 +104,7 @@ fn present(prior: &PlanePrior, with_anchors: bool) -> Vec<bool> {
 }
 
 /// Height and width of a source of a plane.
-fn source_size(source: PlaneSource, plane: usize, sizes: &[[u32; 2]]) -> [u32; 2] {
+pub(super) fn source_size(source: PlaneSource, plane: usize, sizes: &[[u32; 2]]) -> [u32; 2] {
     match source {
         PlaneSource::Latent => sizes[plane].map(|side| side / 4),
         PlaneSource::Anchors => sizes[plane],

@@ -2,7 +2,8 @@
 
 use super::head::{Head, SECTION};
 use crate::{
-    CodecError, HexPlaneArrays, Limits, Plane,
+    CodecError, HexPlaneArrays, Plane,
+    budget::Budget,
     stream::{reader::Reader, writer::Writer},
 };
 
@@ -12,9 +13,10 @@ pub(crate) fn write(hexplane: &HexPlaneArrays, writer: &mut Writer) {
     hexplane.planes.iter().for_each(|plane| writer.f32s(&plane.values));
 }
 
-pub(crate) fn read(bytes: &[u8], limits: &Limits) -> Result<HexPlaneArrays, CodecError> {
+pub(crate) fn read(bytes: &[u8], budget: &Budget) -> Result<HexPlaneArrays, CodecError> {
+    budget.things(SECTION, bytes.len() as u64, 1, 1)?;
     let mut reader = Reader::new(SECTION, bytes);
-    let head = Head::read(&mut reader, limits)?;
+    let head = Head::read(&mut reader, &budget.limits)?;
     let mut planes = Vec::with_capacity(head.sizes.len());
     for (index, &[height, width]) in head.sizes.iter().enumerate() {
         let values = reader.f32s(&format!("planes[{index}].values"), head.values([height, width]))?;

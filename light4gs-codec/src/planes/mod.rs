@@ -9,6 +9,7 @@
 //! | `context_model.rs`, `context_section.rs` | the context model as data, and as bytes |
 //! | `plan.rs` | when each plane is coded |
 //! | `exact_model.rs` | the context model, ready to run |
+//! | `cost.rs` | what reading planes takes, before it is done |
 //! | `plane_parameters.rs` | scales and means of a row |
 //! | `walk.rs` | the symbols of one plane, in order |
 //! | `coder.rs`, `section.rs` | all planes: encode, decode; their bytes |
@@ -16,6 +17,7 @@
 mod coder;
 mod context_model;
 pub(crate) mod context_section;
+mod cost;
 mod exact_model;
 pub(crate) mod explicit;
 pub(crate) mod head;

@@ -72,7 +72,7 @@ impl<'a> PlaneParameters<'a> {
     ) -> Self {
         let prior = model.prior_of(plane);
         let known = |condition: &super::Condition| {
-            let program = &model.conditions[condition.network as usize];
+            let program = model.condition(condition.network);
             let map = |(input, &source): (usize, &PlaneSource)| {
                 let border = program.border(input);
                 match source {

@@ -6,8 +6,9 @@ use super::{
     plan::{stream_order, sub_streams},
 };
 use crate::{
-    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane, PlaneCoding, checks,
-    limits::at_most,
+    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane, PlaneCoding,
+    budget::Budget,
+    checks::{self, LEAST_STEP_IN_STREAM},
     plane_layout::SIZE_MULTIPLE,
     stream::{reader::Reader, writer::Writer},
 };
@@ -77,9 +78,9 @@ fn check_steps(steps: &[PerGroup], scales: usize) -> Result<(), CodecError> {
         let expected = format!("1, or {scales}, one a scale");
         return Err(CodecError::invalid(SECTION, "number of steps", steps.len(), expected));
     }
-    let is_step = |step: f32| step.is_normal() && step > 0.0;
+    let is_step = |step: f32| step.is_finite() && step >= LEAST_STEP_IN_STREAM;
     match steps.iter().flat_map(|step| [step.space_only, step.space_time]).find(|&step| !is_step(step)) {
-        Some(step) => Err(CodecError::invalid(SECTION, "step", step, "a positive normal number")),
+        Some(step) => Err(CodecError::invalid(SECTION, "step", step, "a number of 2^-60 or more")),
         None => Ok(()),
     }
 }
@@ -129,14 +130,12 @@ impl<'a> Parts<'a> {
     }
 }
 
-pub(crate) fn read(bytes: &[u8], model: &ContextModelArrays, limits: &Limits) -> Result<HexPlaneArrays, CodecError> {
-    let Parts { head, steps, sub_streams } = Parts::read(bytes, model, limits)?;
-    let values = head.sizes.iter().fold(0u64, |sum, &size| sum.saturating_add(head.values(size)));
-    at_most(SECTION, "number of values", values, limits.coded_values)?;
+pub(crate) fn read(bytes: &[u8], model: &ContextModelArrays, budget: &Budget) -> Result<HexPlaneArrays, CodecError> {
+    let Parts { head, steps, sub_streams } = Parts::read(bytes, model, &budget.limits)?;
     let Head { channels, resolution, multipliers, sizes } = head;
     let planes = sizes.iter().map(|&[height, width]| Plane { height, width, values: Vec::new() }).collect();
     let hexplane = HexPlaneArrays { channels, resolution, multipliers, planes };
-    coder::decode(hexplane, model, &steps, &sub_streams, limits)
+    coder::decode(hexplane, model, &steps, &sub_streams, budget)
 }
 
 /// Head, steps and the bytes of every plane, without decoding. The weights of the model are not looked at.

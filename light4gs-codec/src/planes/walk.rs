@@ -9,7 +9,7 @@ use crate::{
 };
 
 /// Rows whose parameters are computed together.
-const BATCH: usize = 16;
+pub(super) const BATCH: usize = 16;
 
 /// The grid that the values of a plane lie on: a value is `(symbol + mean) * step + center`, each operation rounded to
 /// float32.

@@ -1,7 +1,7 @@
 //! The Gaussians of a scene at any time: what a player runs for each frame.
 
 use super::{
-    GaussianArrays, MotionNetwork, MotionOutput, MotionSource, SceneData,
+    CoordinateMapping, GaussianArrays, MotionNetwork, MotionOutput, MotionSource, SceneData,
     query::{Between, multiply_by_sample, normalized},
     sh_rest_coefficients,
 };
@@ -40,6 +40,7 @@ struct Motion {
     program: Program,
     sources: Vec<MotionSource>,
     outputs: Vec<MotionOutput>,
+    mapping: CoordinateMapping,
     channels: usize,
     features: usize,
     /// Coordinates of the canonical centers along x, y, z, eight Gaussians at a time.
@@ -65,7 +66,7 @@ impl MotionEvaluator {
         let Some(MotionNetwork { network, sources, outputs }) = &scene.motion.network else {
             return Ok(Self { motion: None });
         };
-        let limits = Limits::default();
+        let limits = Limits::large();
         scene.motion.check(&limits)?;
         crate::planes::head::check(&scene.hexplane, &limits)?;
         scene.motion.check_features(scene.hexplane.features())?;
@@ -75,6 +76,7 @@ impl MotionEvaluator {
             program: Program::pointwise(network, &vec![true; sources.len()]),
             sources: sources.clone(),
             outputs: outputs.clone(),
+            mapping: scene.frame.mapping,
             channels,
             features,
             points: Vec::with_capacity(scene.gaussians.len().div_ceil(LANES)),
@@ -132,6 +134,7 @@ impl MotionEvaluator {
             moved.sh_dc[range.clone()].copy_from_slice(&canonical.sh_dc[range.clone()]);
             moved.sh_rest[rest.clone()].copy_from_slice(&canonical.sh_rest[rest]);
         }
+        let time = motion.mapping.time(time);
         let lines = motion.lines_at(time);
         let mut workspace = motion.program.workspace();
         let mut product = vec![0.0; motion.features];

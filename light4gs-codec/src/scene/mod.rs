@@ -99,12 +99,49 @@ pub struct SceneFrameArrays {
     pub axes: [[f32; 3]; 3],
     /// Standard deviation along each principal axis.
     pub std: [f32; 3],
+    /// From standardized coordinates to those of the hexplane.
+    pub mapping: CoordinateMapping,
 }
 
 impl Default for SceneFrameArrays {
-    /// The frame that changes nothing: mean 0, the world's axes, deviations 1.
+    /// The frame of the world itself: mean 0, the world's axes, deviations 1.
     fn default() -> Self {
-        Self { mean: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] }
+        Self {
+            mean: [0.0; 3],
+            axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+            std: [1.0; 3],
+            mapping: CoordinateMapping::default(),
+        }
+    }
+}
+
+/// How standardized coordinates become those of the hexplane, in [-1, 1], and how the time of the scene becomes that of
+/// the field, in [0, 1]. The default is the paper's; others belong to scenes that other programs have trained.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoordinateMapping {
+    /// Whether space is contracted into the ball of radius 2 first.
+    pub contracts: bool,
+    /// Then each coordinate is multiplied by this...
+    pub scale: [f32; 3],
+    /// ...and this is added.
+    pub offset: [f32; 3],
+    /// The time is multiplied by this...
+    pub time_scale: f32,
+    /// ...and this is added.
+    pub time_offset: f32,
+}
+
+impl Default for CoordinateMapping {
+    /// Contracted and halved; time as it is.
+    fn default() -> Self {
+        Self { contracts: true, scale: [0.5; 3], offset: [0.0; 3], time_scale: 1.0, time_offset: 0.0 }
+    }
+}
+
+impl CoordinateMapping {
+    /// The field's time at a time of the scene, both in [0, 1].
+    pub fn time(&self, time: f32) -> f32 {
+        time * self.time_scale + self.time_offset
     }
 }
 

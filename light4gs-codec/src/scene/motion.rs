@@ -1,7 +1,11 @@
 //! How the Gaussians move, as data; and where they are at a time.
 
 use super::MotionEvaluator;
-use crate::{CodecError, Limits, Network, SceneData, limits::at_most, stream::sections::Section};
+use crate::{
+    CodecError, Limits, Network, SceneData,
+    limits::at_most,
+    stream::{names::check_name, sections::Section},
+};
 
 const SECTION: &str = Section::Motion.name();
 /// The longest name of a kind.
@@ -134,7 +138,7 @@ impl MotionArrays {
         at_most(SECTION, "number of tensors", self.tensors.len() as u64, limits.nodes)?;
         let mut total = self.network.as_ref().map_or(0, |motion| motion.network.weights());
         for (index, tensor) in self.tensors.iter().enumerate() {
-            at_most(SECTION, "length of a tensor's name", tensor.name.len() as u64, limits.string_bytes)?;
+            check_name(SECTION, "a tensor's name", &tensor.name, limits)?;
             at_most(SECTION, format!("axes of {}", tensor.name), tensor.shape.len() as u64, 8u32)?;
             if self.tensors[..index].iter().any(|other| other.name == tensor.name) {
                 let found = format!("{:?} twice", tensor.name);

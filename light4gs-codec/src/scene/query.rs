@@ -3,20 +3,21 @@
 //! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
 //! hexplane-coupled harmonics are coded by these numbers.
 
-use crate::{Plane, SceneFrameArrays};
+use crate::{CoordinateMapping, Plane, SceneFrameArrays, network::kernels::kept};
 
-/// Coordinates in [-1, 1]: standardized along the principal axes, contracted into the ball of radius 2, halved (paper
-/// III-A).
+/// Coordinates in [-1, 1]: standardized along the principal axes, and by default contracted into the ball of radius 2 and
+/// halved (paper III-A).
 pub(crate) fn normalized(frame: &SceneFrameArrays, point: [f32; 3]) -> [f32; 3] {
     let offset: [f32; 3] = std::array::from_fn(|i| point[i] - frame.mean[i]);
     let [x, y, z] = std::array::from_fn(|j| {
         let axis = frame.axes[j];
         (offset[0] * axis[0] + offset[1] * axis[1] + offset[2] * axis[2]) / frame.std[j]
     });
+    let CoordinateMapping { contracts, scale, offset, .. } = frame.mapping;
     let square = x * x + y * y + z * z;
-    let inverse = if square > 1.0 { 1.0 / square.sqrt() } else { 1.0 };
-    let factor = (2.0 - inverse) * inverse * 0.5;
-    [x * factor, y * factor, z * factor]
+    let inverse = if contracts && square > 1.0 { 1.0 / square.sqrt() } else { 1.0 };
+    let factor = (2.0 - inverse) * inverse;
+    std::array::from_fn(|axis| [x, y, z][axis] * (factor * scale[axis]) + offset[axis])
 }
 
 /// Two samples of an axis and the share of the second.
@@ -53,8 +54,8 @@ pub(crate) fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product:
     for (product, channel) in product.iter_mut().zip(plane.values.chunks_exact(width * plane.height as usize)) {
         let row = |y: usize| {
             let row = &channel[y * width..(y + 1) * width];
-            x.between(row[x.low], row[x.high])
+            x.between(kept(row[x.low]), kept(row[x.high]))
         };
-        *product *= y.between(row(y.low), row(y.high));
+        *product = kept(*product * kept(y.between(row(y.low), row(y.high))));
     }
 }

@@ -1,8 +1,8 @@
 //! How spherical harmonics are coded, as data.
 
 use crate::{
-    CodecError, FrequencyTable, GaussianArrays, HexPlaneArrays, Limits, Network, SceneFrameArrays, limits::at_most,
-    sh_rest_coefficients, stream::sections::Section,
+    CodecError, FrequencyTable, GaussianArrays, HexPlaneArrays, Limits, Network, SceneFrameArrays,
+    checks::LEAST_STEP_IN_STREAM, limits::at_most, sh_rest_coefficients, stream::sections::Section,
 };
 
 pub(super) const SECTION: &str = Section::Sh.name();
@@ -112,8 +112,8 @@ impl ShCoding {
     /// Refuses a step, tables or networks that do not fit the degree and the features of the hexplane.
     pub(crate) fn check(&self, degree: u8, features: u64, limits: &Limits) -> Result<(), CodecError> {
         let step = self.step();
-        if !(step.is_normal() && step > 0.0) {
-            return Err(CodecError::invalid(SECTION, "step", step, "a positive normal number"));
+        if !(step.is_finite() && step >= LEAST_STEP_IN_STREAM) {
+            return Err(CodecError::invalid(SECTION, "step", step, "a number of 2^-60 or more"));
         }
         let channels = 3 * sh_rest_coefficients(degree);
         match self {

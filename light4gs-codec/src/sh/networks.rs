@@ -5,10 +5,17 @@ use crate::plane_layout::PLANE_AXES;
 use crate::{
     network::{
         Program, Workspace,
-        kernels::{LANES, Lanes},
+        kernels::{LANES, Lanes, kept},
     },
     scene::query::{multiply_by_sample, normalized},
 };
+
+/// Nanoseconds to take samples of three planes at eight Gaussians.
+const FEATURE_NANOSECONDS: u64 = 600;
+/// Nanoseconds to gather a channel of eight Gaussians.
+const INPUT_NANOSECONDS: u64 = 24;
+/// Nanoseconds of a prior for eight Gaussians, besides.
+const PRIOR_NANOSECONDS: u64 = 400;
 
 /// The networks of priors that are sound, and what they read.
 #[derive(Debug)]
@@ -44,10 +51,13 @@ impl<'a> Networks<'a> {
         Self { priors, conditions, reads_features, features: Vec::new() }
     }
 
-    /// Multiplications for one Gaussian, or work of that size.
-    pub(super) fn work(&self) -> u64 {
-        let features = if self.reads_features { 24 * self.conditions.features() } else { 0 };
-        self.priors.iter().fold(features, |sum, prior| sum.saturating_add(prior.program.work()))
+    /// Nanoseconds for eight Gaussians.
+    pub(super) fn nanoseconds(&self) -> u64 {
+        let features = if self.reads_features { FEATURE_NANOSECONDS * self.conditions.features() } else { 0 };
+        self.priors.iter().fold(features, |sum, prior| {
+            let inputs = prior.program.input_channels().saturating_mul(INPUT_NANOSECONDS);
+            sum.saturating_add(prior.program.nanoseconds()).saturating_add(inputs).saturating_add(PRIOR_NANOSECONDS)
+        })
     }
 
     pub(super) fn len(&self) -> usize {
@@ -99,7 +109,7 @@ impl<'a> Networks<'a> {
             for lane in 0..lanes {
                 let gaussian = first + lane;
                 let mut set =
-                    |known: &[f32]| inputs.iter_mut().zip(known).for_each(|(input, &value)| input[lane] = value);
+                    |known: &[f32]| inputs.iter_mut().zip(known).for_each(|(input, &value)| input[lane] = kept(value));
                 match source {
                     ShSource::Dc => set(&gaussians.sh_dc[gaussian]),
                     ShSource::Decoded => set(&values[gaussian * channels..gaussian * channels + *start]),

@@ -7,8 +7,8 @@ use super::{
 use crate::{
     CodecError, Distributions, GaussianArrays, Limits, Network,
     adaptive::Damaged,
-    entropy::{SymbolReader, SymbolWriter, read_tables, write_tables},
-    limits::at_most,
+    budget::Budget,
+    entropy::{READ_NANOSECONDS, SymbolReader, SymbolWriter, read_tables, write_tables},
     network::{
         kernels::LANES,
         tensors::{read_weights, write_weights},
@@ -116,20 +116,20 @@ impl ShCoding {
         (kind, encoding): (Kind, Encoding),
         degree: u8,
         features: u64,
-        limits: &Limits,
+        budget: &Budget,
     ) -> Result<Self, CodecError> {
+        let limits = &budget.limits;
         let step = reader.f32("step")?;
         let channels = 3 * sh_rest_coefficients(degree);
         if kind == Kind::ShTables {
             let block = reader.block("tables")?;
-            let tables = read_tables(block, channels)
-                .map_err(|Damaged| CodecError::invalid(SECTION, "tables", "damaged", "frequency tables"))?;
+            let tables = read_tables(SECTION, "tables", block, channels, budget)?;
             return Ok(Self::Tables { step, tables });
         }
         let mut priors = read_priors(reader, limits)?;
         check_priors(&priors, channels as u64, features, limits)?;
         let mut networks: Vec<_> = priors.iter_mut().map(|prior| &mut prior.network).collect();
-        read_weights(SECTION, &mut networks, reader.block("weights")?, encoding, limits)?;
+        read_weights(SECTION, &mut networks, reader.block("weights")?, encoding, budget)?;
         Ok(Self::Networks { step, priors })
     }
 }
@@ -195,8 +195,9 @@ pub(crate) fn read(
     bytes: &[u8],
     (kind, encoding): (Kind, Encoding),
     conditions: Conditions<'_>,
-    limits: &Limits,
+    budget: &Budget,
 ) -> Result<(Head, Vec<f32>), CodecError> {
+    let limits = &budget.limits;
     let mut reader = Reader::new(SECTION, bytes);
     let head = Head::read(&mut reader, limits)?;
     if head.count as usize != conditions.gaussians.len() {
@@ -204,13 +205,19 @@ pub(crate) fn read(
         return Err(CodecError::invalid(SECTION, "count", head.count, expected));
     }
     if kind == Kind::ShExplicit {
+        budget.things(SECTION, bytes.len() as u64, 1, 1)?;
         let values = reader.f32s("sh_rest", head.values())?;
         reader.finish()?;
         return Ok((head, values));
     }
-    at_most(SECTION, "number of values", head.values(), limits.coded_values)?;
-    let coding = ShCoding::read(&mut reader, (kind, encoding), head.degree, conditions.features(), limits)?;
+    budget.stream(SECTION, bytes.len())?;
+    budget.things(SECTION, head.values(), 4, READ_NANOSECONDS)?;
+    let coding = ShCoding::read(&mut reader, (kind, encoding), head.degree, conditions.features(), budget)?;
     coding.check(head.degree, conditions.features(), limits)?;
+    if let ShCoding::Networks { priors, .. } = &coding {
+        let programs = priors.iter().fold(0u64, |sum, prior| sum.saturating_add(prior.network.program_bytes()));
+        budget.things(SECTION, programs, 1, 2)?;
+    }
 
     let lengths = (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
     let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "what an encoder writes");
@@ -220,8 +227,7 @@ pub(crate) fn read(
     }
     reader.finish()?;
     let mut model = HarmonicsModel::new(&coding, conditions);
-    let work = model.work().saturating_mul(u64::from(head.count).next_multiple_of(8));
-    at_most(SECTION, "number of multiplications", work, limits.multiplications)?;
+    budget.time(SECTION, model.nanoseconds().saturating_mul(u64::from(head.count).div_ceil(LANES as u64)))?;
     let mut values = vec![0.0; head.values() as usize];
     walk(&mut model, coding.step(), head.degree, &mut values, &mut readers).map_err(damaged)?;
     readers.into_iter().try_for_each(SymbolReader::finish).map_err(damaged)?;

@@ -1,14 +1,15 @@
 //! A scene into a compressed stream.
 
 use super::{
+    OpenStream,
     container::{self, NewSection},
-    decode_with_limits, gaussians, motion, scene_frame,
+    gaussians, motion, scene_frame,
     sections::{Encoding, Kind},
     writer::Writer,
 };
 use crate::{
-    CodecError, CompressionInput, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, Profile, SceneData,
-    ShBytes,
+    CodecError, CompressionInput, Demand, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, Profile,
+    SceneData, ShBytes,
     attributes::{self, EncodedAttributes},
     checks, fields,
     network_weights::WeightPrecision,
@@ -38,6 +39,8 @@ pub struct CompressionReport {
     pub planes: Vec<PlaneBytes>,
     /// The spherical harmonics.
     pub sh: ShBytes,
+    /// What a reader must allow.
+    pub demand: Demand,
 }
 
 /// Compresses a scene.
@@ -71,7 +74,7 @@ pub fn encode_compressed_with_limits(
     push(&mut sections, Kind::MotionDescription, encoding_of(compact(input.weights.motion)), writer);
     let mut writer = Writer::default();
     scene_frame::write(&scene.frame, &mut writer);
-    push(&mut sections, Kind::SceneFramePrincipalAxes, Encoding::Float32, writer);
+    push(&mut sections, scene_frame::kind(&scene.frame), Encoding::Float32, writer);
     let precision = compact(input.weights.context_model);
     let (hexplane, planes) = write_planes(&scene.hexplane, input.planes.as_ref(), precision, limits, &mut sections)?;
 
@@ -96,7 +99,7 @@ pub fn encode_compressed_with_limits(
     sections.sort_by_key(|section| section.kind.place().0.id());
     let bytes = container::write(&scene.meta, &sections, limits)?;
 
-    let decoded = decode_with_limits(&bytes, limits)?;
+    let (decoded, demand) = OpenStream::with_limits(&bytes, limits)?.scene_and_demand()?;
     fields::check_same_bits(&expected, &decoded)?;
     let size = |section: NewSection| {
         let NewSection { kind, encoding, payload } = section;
@@ -104,7 +107,7 @@ pub fn encode_compressed_with_limits(
     };
     let sections: Vec<_> = sections.into_iter().map(size).collect();
     let header_bytes = bytes.len() as u64 - sections.iter().map(|section| section.3).sum::<u64>();
-    Ok(Encoded { bytes, decoded, report: CompressionReport { header_bytes, sections, planes, sh } })
+    Ok(Encoded { bytes, decoded, report: CompressionReport { header_bytes, sections, planes, sh, demand } })
 }
 
 fn push(sections: &mut Vec<NewSection>, kind: Kind, encoding: Encoding, writer: Writer) {

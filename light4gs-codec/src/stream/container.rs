@@ -120,6 +120,7 @@ impl<'a> Container<'a> {
 
         let entries = read_table(table, header_bytes as u64, stated)?;
         let meta = meta::read(meta_bytes, limits)?;
+        meta::check(&meta, limits)?;
         Ok(Self { bytes, prelude, meta, entries })
     }
 

@@ -5,7 +5,7 @@ use super::{
     sections::{Section, check_length},
     writer::Writer,
 };
-use crate::{CodecError, GaussianArrays, Limits, limits::at_most};
+use crate::{CodecError, GaussianArrays, Limits, budget::Budget, limits::at_most};
 
 const SECTION: &str = Section::Gaussians.name();
 
@@ -44,9 +44,10 @@ pub(crate) fn write(gaussians: &GaussianArrays, writer: &mut Writer) {
 }
 
 /// Everything but `sh_degree` and `sh_rest`, which are left empty.
-pub(crate) fn read(bytes: &[u8], limits: &Limits) -> Result<GaussianArrays, CodecError> {
+pub(crate) fn read(bytes: &[u8], budget: &Budget) -> Result<GaussianArrays, CodecError> {
+    budget.things(SECTION, bytes.len() as u64, 1, 1)?;
     let mut reader = Reader::new(SECTION, bytes);
-    let count = Head::read(&mut reader, limits)?.count.into();
+    let count = Head::read(&mut reader, &budget.limits)?.count.into();
     let gaussians = GaussianArrays {
         means: reader.groups("means", count)?,
         log_scales: reader.groups("log_scales", count)?,

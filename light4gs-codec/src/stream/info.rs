@@ -2,7 +2,7 @@
 
 use super::{
     container::Container,
-    gaussians, meta, motion,
+    gaussians, motion,
     reader::Reader,
     sections::{Encoding, Kind, Section},
 };
@@ -73,9 +73,15 @@ pub struct SectionInfo {
 /// # Errors
 /// As [`crate::decode`], but for what only decoded numbers can show.
 pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
-    let limits = Limits::default();
-    let container = Container::read(bytes, &limits)?;
-    meta::check(&container.meta, &limits)?;
+    info_with_limits(bytes, &Limits::default())
+}
+
+/// As [`info`], within limits of the caller's.
+///
+/// # Errors
+/// As [`info`].
+pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, CodecError> {
+    let container = Container::read(bytes, limits)?;
     for section in Section::ALL {
         if container.has(section) {
             container.section(section)?;

@@ -1,19 +1,30 @@
 //! The scene meta, which stands in the header.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, f32::consts::PI};
 
-use super::{reader::Reader, writer::Writer};
+use super::{
+    names::{check_name, check_text},
+    reader::Reader,
+    writer::Writer,
+};
 use crate::{CodecError, Limits, SceneMeta, limits::at_most};
 
 const SECTION: &str = "meta";
 
 /// Refuses what cannot be written or makes no sense. That numbers are finite is checked elsewhere.
 pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError> {
-    at_most(SECTION, "length of name", meta.name.len() as u64, limits.string_bytes)?;
+    check_name(SECTION, "name", &meta.name, limits)?;
     at_most(SECTION, "number of extra entries", meta.extra.len() as u64, limits.extras)?;
     for (key, value) in &meta.extra {
-        at_most(SECTION, "length of an extra key", key.len() as u64, limits.string_bytes)?;
+        check_name(SECTION, "extra key", key, limits)?;
         at_most(SECTION, format!("length of extra.{key}"), value.len() as u64, limits.string_bytes)?;
+        check_text(SECTION, &format!("extra.{key}"), value, |c| c != '\n' && c != '\t')?;
+    }
+    at_most(SECTION, "frame_count", meta.frame_count.into(), limits.frames)?;
+    limits.check_image(meta.width, meta.height)?;
+    // That numbers are finite is checked elsewhere.
+    if meta.fov_x >= PI && meta.fov_x.is_finite() {
+        return Err(CodecError::invalid(SECTION, "fov_x", meta.fov_x, "an angle below π"));
     }
     for (field, value) in [("fps", meta.fps), ("fov_x", meta.fov_x)] {
         if value < 0.0 {

@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `container.rs`, `sections.rs` | header and table; which sections there are and what they may hold |
 //! | `meta.rs`, `gaussians.rs`, `scene_frame.rs`, `motion.rs` | the simple parts; planes and harmonics have folders of their own |
+//! | `names.rs` | names that are safe to show |
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and doing it |
 //! | `open.rs`, `info.rs` | decoding section by section, and looking without decoding |
 
@@ -14,6 +15,7 @@ mod info;
 mod input;
 mod meta;
 mod motion;
+pub(crate) mod names;
 mod open;
 mod parts;
 pub(crate) mod reader;
@@ -22,7 +24,7 @@ pub(crate) mod sections;
 pub(crate) mod writer;
 
 pub use compressor::{CompressionReport, Encoded, encode_compressed, encode_compressed_with_limits};
-pub use info::{SectionInfo, StreamInfo, info};
+pub use info::{SectionInfo, StreamInfo, info, info_with_limits};
 pub use input::{CompressionInput, PerGroup, PlaneCoding, Profile, WeightPrecisions};
 pub use open::OpenStream;
 pub use parts::{Distributions, encode_planes, encode_sh, plane_distributions, sh_distributions};
@@ -53,7 +55,7 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
     let sections = [
         section(Kind::GaussiansExplicit, &|writer| gaussians::write(&scene.gaussians, writer)),
         section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
-        section(Kind::SceneFramePrincipalAxes, &|writer| scene_frame::write(&scene.frame, writer)),
+        section(scene_frame::kind(&scene.frame), &|writer| scene_frame::write(&scene.frame, writer)),
         section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
         section(Kind::HexPlanesExplicit, &|writer| planes::explicit::write(&scene.hexplane, writer)),
     ];
@@ -67,7 +69,7 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
 ///
 /// # Errors
 /// Whatever is wrong with the bytes; the message names the section. No input makes it panic, and none makes it take
-/// more memory than a small multiple of the input's length or of [`Limits::coded_values`], whichever is more.
+/// more memory or time than [`Limits`] says.
 pub fn decode(bytes: &[u8]) -> Result<SceneData, CodecError> {
     decode_with_limits(bytes, &Limits::default())
 }

@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     CodecError, Limits, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network,
+    budget::Budget,
     network::{
         tensors::{read_tensors, write_tensors},
         weights::{TensorLength, WeightPrecision},
@@ -55,7 +56,7 @@ fn set_tensors(motion: &mut MotionArrays, tensors: Vec<Vec<f32>>) {
 }
 
 fn read_text(reader: &mut Reader<'_>, field: &str, limits: &Limits) -> Result<String, CodecError> {
-    let length = reader.varint_at_most(&format!("length of {field}"), limits.string_bytes)?;
+    let length = reader.varint_at_most(&format!("length of {field}"), limits.name_bytes)?;
     let bytes = reader.take(field, length.into())?;
     let text = std::str::from_utf8(bytes).map_err(|error| CodecError::invalid(SECTION, field, error, "UTF-8"))?;
     Ok(text.to_owned())
@@ -97,13 +98,13 @@ pub(crate) fn read_description(reader: &mut Reader<'_>, limits: &Limits) -> Resu
 }
 
 /// Reads the arrays.
-pub(crate) fn read(bytes: &[u8], encoding: Encoding, limits: &Limits) -> Result<MotionArrays, CodecError> {
+pub(crate) fn read(bytes: &[u8], encoding: Encoding, budget: &Budget) -> Result<MotionArrays, CodecError> {
     let mut reader = Reader::new(SECTION, bytes);
-    let mut motion = read_description(&mut reader, limits)?;
+    let mut motion = read_description(&mut reader, &budget.limits)?;
     let network = motion.network.iter().flat_map(|motion| motion.network.tensor_lengths("weights"));
     let named = motion.tensors.iter().map(|tensor| TensorLength { name: &tensor.name, length: tensor.length() });
     let lengths: Vec<_> = network.chain(named).collect();
-    let tensors = read_tensors(SECTION, reader.rest(), encoding, &lengths, limits)?;
+    let tensors = read_tensors(SECTION, reader.rest(), encoding, &lengths, budget)?;
     set_tensors(&mut motion, tensors);
     Ok(motion)
 }

@@ -8,7 +8,9 @@ use super::{
 };
 use crate::{
     CodecError, GaussianArrays, HexPlaneArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
-    attributes, parallel, planes,
+    attributes,
+    budget::{Budget, Demand},
+    parallel, planes,
     sh::{self, coding::Conditions},
 };
 
@@ -47,6 +49,11 @@ impl<'a> OpenStream<'a> {
         Ok(Self { container: Container::read(bytes, limits)?, limits: limits.for_stream(bytes.len()) })
     }
 
+    /// A budget for one call.
+    fn budget(&self) -> Budget {
+        Budget::new(&self.limits)
+    }
+
     /// The scene meta.
     pub fn meta(&self) -> &SceneMeta {
         &self.container.meta
@@ -57,9 +64,13 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn gaussians(&self) -> Result<GaussianArrays, CodecError> {
+        self.gaussians_within(&self.budget())
+    }
+
+    fn gaussians_within(&self, budget: &Budget) -> Result<GaussianArrays, CodecError> {
         match self.container.section(Section::Gaussians)? {
-            (_, Encoding::Quantized, payload) => attributes::decode(payload, &self.limits),
-            (_, Encoding::Float32, payload) => gaussians::read(payload, &self.limits),
+            (_, Encoding::Quantized, payload) => attributes::decode_within(payload, budget),
+            (_, Encoding::Float32, payload) => gaussians::read(payload, budget),
         }
     }
 
@@ -68,7 +79,8 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn frame(&self) -> Result<SceneFrameArrays, CodecError> {
-        scene_frame::read(self.container.section(Section::SceneFrame)?.2)
+        let (kind, _, payload) = self.container.section(Section::SceneFrame)?;
+        scene_frame::read(payload, kind)
     }
 
     /// How the Gaussians move.
@@ -76,8 +88,12 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn motion(&self) -> Result<MotionArrays, CodecError> {
+        self.motion_within(&self.budget())
+    }
+
+    fn motion_within(&self, budget: &Budget) -> Result<MotionArrays, CodecError> {
         let (_, encoding, payload) = self.container.section(Section::Motion)?;
-        motion::read(payload, encoding, &self.limits)
+        motion::read(payload, encoding, budget)
     }
 
     /// The planes.
@@ -85,13 +101,17 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn hexplanes(&self) -> Result<HexPlaneArrays, CodecError> {
+        self.hexplanes_within(&self.budget())
+    }
+
+    fn hexplanes_within(&self, budget: &Budget) -> Result<HexPlaneArrays, CodecError> {
         let (kind, _, payload) = self.container.section(Section::HexPlanes)?;
         if kind == Kind::HexPlanesExplicit {
-            return planes::explicit::read(payload, &self.limits);
+            return planes::explicit::read(payload, budget);
         }
         let (_, encoding, model) = self.container.section(Section::ContextModel)?;
-        let model = planes::context_section::read(model, encoding, &self.limits)?;
-        planes::section::read(payload, &model, &self.limits)
+        let model = planes::context_section::read(model, encoding, budget)?;
+        planes::section::read(payload, &model, budget)
     }
 
     /// Whether [`OpenStream::sh`] looks at the planes it is given.
@@ -114,9 +134,19 @@ impl<'a> OpenStream<'a> {
         frame: &SceneFrameArrays,
         hexplane: &HexPlaneArrays,
     ) -> Result<GaussianArrays, CodecError> {
+        self.sh_within(gaussians, frame, hexplane, &self.budget())
+    }
+
+    fn sh_within(
+        &self,
+        gaussians: GaussianArrays,
+        frame: &SceneFrameArrays,
+        hexplane: &HexPlaneArrays,
+        budget: &Budget,
+    ) -> Result<GaussianArrays, CodecError> {
         let (kind, encoding, payload) = self.container.section(Section::Sh)?;
         let conditions = Conditions { gaussians: &gaussians, frame, hexplane };
-        let (head, sh_rest) = sh::section::read(payload, (kind, encoding), conditions, &self.limits)?;
+        let (head, sh_rest) = sh::section::read(payload, (kind, encoding), conditions, budget)?;
         Ok(GaussianArrays { sh_degree: head.degree, sh_rest, ..gaussians })
     }
 
@@ -125,24 +155,33 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn scene(&self) -> Result<SceneData, CodecError> {
+        self.scene_and_demand().map(|(scene, _)| scene)
+    }
+
+    /// Everything, and what it took.
+    pub(crate) fn scene_and_demand(&self) -> Result<(SceneData, Demand), CodecError> {
+        let budget = self.budget();
         self.check_sections()?;
         let frame = self.frame()?;
         let coupled = self.sh_needs_hexplanes()?;
         let (gaussians, hexplane) = parallel::join(
             || {
-                let gaussians = self.gaussians()?;
-                if coupled { Ok(gaussians) } else { self.sh(gaussians, &frame, &HexPlaneArrays::default()) }
+                let gaussians = self.gaussians_within(&budget)?;
+                if coupled {
+                    return Ok(gaussians);
+                }
+                self.sh_within(gaussians, &frame, &HexPlaneArrays::default(), &budget)
             },
-            || self.hexplanes(),
+            || self.hexplanes_within(&budget),
         );
         let (mut gaussians, hexplane) = (gaussians?, hexplane?);
         if coupled {
-            gaussians = self.sh(gaussians, &frame, &hexplane)?;
+            gaussians = self.sh_within(gaussians, &frame, &hexplane, &budget)?;
         }
-        let motion = self.motion()?;
+        let motion = self.motion_within(&budget)?;
         let scene = SceneData { meta: self.container.meta.clone(), gaussians, frame, hexplane, motion };
         check(&scene, &self.limits)?;
-        Ok(scene)
+        Ok((scene, budget.demand()))
     }
 
     /// Refuses a context model without coded planes, and the other way round.
@@ -153,5 +192,44 @@ impl<'a> OpenStream<'a> {
             return Err(CodecError::invalid(section, "section", "there", "none, since no plane is coded with it"));
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Instant;
+
+    use super::*;
+
+    /// What was asked for against what it took, on one thread: `LIGHT4GS_STREAMS=folder cargo test --release -p
+    /// light4gs-codec --lib calibration -- --ignored --nocapture`. The first must be more.
+    #[test]
+    #[ignore = "needs a folder of streams"]
+    fn calibration() {
+        let folder = std::env::var("LIGHT4GS_STREAMS").expect("a folder in LIGHT4GS_STREAMS");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool of one thread");
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let bytes = std::fs::read(&path).expect("a file");
+            let stream = OpenStream::with_limits(&bytes, &Limits::large()).expect("a stream");
+            let decode = || pool.install(|| (Instant::now(), stream.scene_and_demand(), Instant::now()));
+            let runs: Vec<_> = (0..3).map(|_| decode()).collect();
+            let took = runs.iter().map(|(begin, _, end)| *end - *begin).min().expect("three runs").as_secs_f64() * 1e3;
+            match &runs[0].1 {
+                Ok((scene, demand)) => {
+                    let (asked, mib) = (demand.nanoseconds as f64 / 1e6, demand.memory_bytes >> 20);
+                    println!(
+                        "{:5.2} asked {asked:7.1} ms took {took:7.1} ms, {mib} MiB, {} bytes, {} Gaussians, {} x {:?}: {}",
+                        asked / took,
+                        bytes.len(),
+                        scene.gaussians.len(),
+                        scene.hexplane.channels,
+                        scene.hexplane.resolution,
+                        path.display()
+                    );
+                }
+                Err(error) => println!("{error}: {}", path.display()),
+            }
+        }
     }
 }

@@ -62,6 +62,8 @@ pub enum Kind {
     ShNetworks,
     /// Mean, principal axes and deviations of a cloud.
     SceneFramePrincipalAxes,
+    /// The same, with a mapping of their coordinates other than the paper's.
+    SceneFrameMapped,
     /// A description of what moves the Gaussians; it says itself what it is.
     MotionDescription,
     /// Planes as they are.
@@ -73,12 +75,13 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 9] = [
+    const ALL: [Self; 10] = [
         Self::GaussiansExplicit,
         Self::ShExplicit,
         Self::ShTables,
         Self::ShNetworks,
         Self::SceneFramePrincipalAxes,
+        Self::SceneFrameMapped,
         Self::MotionDescription,
         Self::HexPlanesExplicit,
         Self::HexPlanesContextCoded,
@@ -93,6 +96,7 @@ impl Kind {
             Self::ShTables => (Section::Sh, 2),
             Self::ShNetworks => (Section::Sh, 3),
             Self::SceneFramePrincipalAxes => (Section::SceneFrame, 1),
+            Self::SceneFrameMapped => (Section::SceneFrame, 2),
             Self::MotionDescription => (Section::Motion, 1),
             Self::HexPlanesExplicit => (Section::HexPlanes, 1),
             Self::HexPlanesContextCoded => (Section::HexPlanes, 2),
@@ -109,7 +113,9 @@ impl Kind {
     /// The encodings that it may have.
     fn encodings(self) -> &'static [Encoding] {
         match self {
-            Self::ShExplicit | Self::SceneFramePrincipalAxes | Self::HexPlanesExplicit => &[Encoding::Float32],
+            Self::ShExplicit | Self::SceneFramePrincipalAxes | Self::SceneFrameMapped | Self::HexPlanesExplicit => {
+                &[Encoding::Float32]
+            }
             Self::ShTables | Self::HexPlanesContextCoded => &[Encoding::Quantized],
             _ => &[Encoding::Float32, Encoding::Quantized],
         }
@@ -122,6 +128,7 @@ impl Kind {
             Self::ShTables => "tables",
             Self::ShNetworks | Self::ContextModelNetworks => "networks",
             Self::SceneFramePrincipalAxes => "principal axes",
+            Self::SceneFrameMapped => "mapped principal axes",
             Self::MotionDescription => "description",
             Self::HexPlanesContextCoded => "context coded",
         }

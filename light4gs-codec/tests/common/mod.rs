@@ -5,8 +5,8 @@
 pub mod compression;
 
 use light4gs_codec::{
-    GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network,
-    Plane, SceneData, SceneFrameArrays, SceneMeta,
+    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource,
+    NamedTensor, Network, Plane, SceneData, SceneFrameArrays, SceneMeta,
     network::{Layer, Operation},
     sh_rest_coefficients,
 };
@@ -87,6 +87,7 @@ pub fn sample() -> SceneData {
             mean: [0.5, -0.25, 0.125],
             axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
             std: [1.0, 2.0, 0.5],
+            mapping: CoordinateMapping::default(),
         },
         hexplane: hexplane(1, [2, 1, 1, 3], &[1, 2]),
         motion: motion(2),

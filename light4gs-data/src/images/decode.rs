@@ -34,10 +34,13 @@ pub(super) fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, D
     let large = u64::from(found.size.0) * u64::from(found.size.1) > LARGE_PIXELS;
     let _alone = large.then(|| LARGE.lock().unwrap_or_else(PoisonError::into_inner));
     let source = (frame.source_width, frame.source_height);
-    if large && found.format == ImageFormat::Png && found.size == source && frame.lens.is_none() {
-        if let Some(image) = large::shrink_png(path, target, background)? {
-            return Ok(image);
-        }
+    if large
+        && found.format == ImageFormat::Png
+        && found.size == source
+        && frame.lens.is_none()
+        && let Some(image) = large::shrink_png(path, target, background)?
+    {
+        return Ok(image);
     }
     let rgba = decode_upright(path, source)?.into_rgba8().into_raw();
     let rgba = match &frame.lens {

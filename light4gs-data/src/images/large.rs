@@ -54,7 +54,7 @@ pub(super) fn shrink_png(
     let channels = reader.output_color_type().0.samples();
     let mut y = 0;
     while let Some(row) = reader.next_row().map_err(damaged)? {
-        let rgba: Vec<u8> = row.data().chunks_exact(channels).flat_map(|pixel| to_rgba(pixel)).collect();
+        let rgba: Vec<u8> = row.data().chunks_exact(channels).flat_map(to_rgba).collect();
         for (x, pixel) in composite(&rgba, background).chunks_exact(3).enumerate() {
             let sum = &mut sums[(x / factor as usize).min(columns as usize - 1)];
             for (total, value) in sum.iter_mut().zip(pixel) {

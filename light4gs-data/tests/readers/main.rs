@@ -3,3 +3,4 @@
 mod dnerf_errors;
 mod golden;
 mod large;
+mod real;

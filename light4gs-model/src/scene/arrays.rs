@@ -83,7 +83,7 @@ impl GaussianTensors {
 impl SceneCoordinates {
     fn to_arrays(&self) -> SceneFrameArrays {
         let Pca { mean, axes, std } = self.pca();
-        SceneFrameArrays { mean, axes, std }
+        SceneFrameArrays { mean, axes, std, mapping: self.mapping() }
     }
 }
 
@@ -157,10 +157,10 @@ impl<F: DeformationField> DynamicScene<F> {
             true => None,
             false => Some(HexPlane::from_arrays(&data.hexplane, device)?),
         };
-        let SceneFrameArrays { mean, axes, std } = data.frame;
+        let SceneFrameArrays { mean, axes, std, mapping } = data.frame;
         Ok(Self {
             gaussians: Gaussians::from_arrays(&data.gaussians, device),
-            coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device),
+            coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device).with_mapping(mapping),
             field: F::from_arrays(&data.motion, planes, device)?,
             differentiate_points: true,
         }

@@ -2,6 +2,7 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::CoordinateMapping;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::contraction::contract;
@@ -124,17 +125,36 @@ pub struct SceneCoordinates {
     axes: Param<Tensor<2>>,
     /// `[1, 3]`
     std: Param<Tensor<2>>,
+    /// From standardized coordinates to the hexplane's.
+    #[module(skip)]
+    mapping: CoordinateMapping,
 }
 
 impl SceneCoordinates {
-    /// The frame of an analysed cloud.
+    /// The frame of an analysed cloud, with the paper's mapping.
     pub fn new(pca: &Pca, device: &Device) -> Self {
         let columns: Vec<f32> = (0..9).map(|k| pca.axes[k % 3][k / 3]).collect();
         let constant = |values: Vec<f32>, rows: usize| {
             let tensor = Tensor::<2>::from_data(TensorData::new(values, [rows, 3]), device);
             Param::from_tensor(tensor).set_require_grad(false)
         };
-        Self { mean: constant(pca.mean.to_vec(), 1), axes: constant(columns, 3), std: constant(pca.std.to_vec(), 1) }
+        Self {
+            mean: constant(pca.mean.to_vec(), 1),
+            axes: constant(columns, 3),
+            std: constant(pca.std.to_vec(), 1),
+            mapping: CoordinateMapping::default(),
+        }
+    }
+
+    /// The same with another mapping, for scenes that other programs have trained.
+    pub fn with_mapping(mut self, mapping: CoordinateMapping) -> Self {
+        self.mapping = mapping;
+        self
+    }
+
+    /// From standardized coordinates to the hexplane's.
+    pub fn mapping(&self) -> CoordinateMapping {
+        self.mapping
     }
 
     /// Standardised coordinates along the principal axes: `[N, 3]` to `[N, 3]`.
@@ -142,9 +162,22 @@ impl SceneCoordinates {
         (points - self.mean.val()).matmul(self.axes.val() / self.std.val())
     }
 
-    /// Coordinates in [-1, 1]: standardised, contracted into the ball of radius 2, halved. `[N, 3]` to `[N, 3]`.
+    /// Coordinates in [-1, 1]: standardized, by default contracted into the ball of radius 2 and halved. `[N, 3]` to `[N, 3]`.
     pub fn normalize(&self, points: Tensor<2>) -> Tensor<2> {
-        contract(self.standardize(points)) * 0.5
+        let CoordinateMapping { contracts, scale, offset, .. } = self.mapping;
+        let standardized = self.standardize(points);
+        let points = if contracts { contract(standardized) } else { standardized };
+        if self.mapping == CoordinateMapping::default() {
+            return points * 0.5;
+        }
+        let device = points.device();
+        let row = |values: [f32; 3]| Tensor::<2>::from_floats([values], &device);
+        points * row(scale) + row(offset)
+    }
+
+    /// The field's time at a time of the scene, both in [0, 1].
+    pub fn field_time(&self, time: f32) -> f32 {
+        self.mapping.time(time)
     }
 
     /// The analysis that the frame was made from.

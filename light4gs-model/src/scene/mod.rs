@@ -15,6 +15,7 @@ pub(crate) mod hexplane;
 pub(crate) mod hexplane_field;
 pub mod regularizer;
 pub mod spherical_harmonics;
+mod still_field;
 
 pub use arrays::ModelError;
 pub use contraction::contract;
@@ -25,3 +26,4 @@ pub use field::{DeformationField, Offsets};
 pub use gaussians::{ActivatedGaussians, GaussianTensors, Gaussians, GaussiansConfig};
 pub use hexplane::{HexPlane, HexPlaneConfig, query_planes};
 pub use hexplane_field::{HexPlaneField, HexPlaneFieldConfig};
+pub use still_field::StillField;

@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use light4gs_codec::plane_layout::plane_name;
-use light4gs_codec::{SceneData, SceneMeta, StreamInfo, read_file, read_info};
+use light4gs_codec::{Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
 
 use super::check_output;
+use super::limits::LimitsArgument;
 use super::output::{say, say_json};
 use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
@@ -22,6 +23,7 @@ use crate::dataset::{image_store, load_options};
 use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::section_sizes;
+use crate::import::scene_around;
 use crate::run::Checkpoint;
 use crate::run::RunFolder;
 
@@ -62,7 +64,10 @@ impl Encode {
         };
         let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
         let checkpoint: Checkpoint = Checkpoint::load(&path, &config, &config.model.field(), &device)?;
-        let data = Scene::open(&record.scene, &load_options(&config))?;
+        let data = match &record.scene {
+            Some(dataset) => Scene::open(dataset, &load_options(&config))?,
+            None => scene_around(&checkpoint.scene.gaussians.to_arrays(), folder.root(), config.data.background)?,
+        };
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
             return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
@@ -75,7 +80,7 @@ impl Encode {
             compression: checkpoint.compression.as_ref().filter(|_| same_models),
             config: &changed,
             data: &data,
-            images: &images,
+            images: record.scene.is_some().then_some(&images),
             device: &device,
         };
         let mut bar = FitBar::new(self.json);
@@ -84,7 +89,7 @@ impl Encode {
             Ok(())
         })?;
         write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
-        print_info(&read_info(&self.out)?, self.json)?;
+        print_info(&read_info_with_limits(&self.out, &Limits::large())?, self.json)?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
@@ -109,15 +114,17 @@ pub(super) struct Info {
     /// Print as JSON.
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Info {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        print_info(&read_info(&self.file)?, self.json)
+        print_info(&read_info_with_limits(&self.file, &self.limits.get())?, self.json)
     }
 }
 
-fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
+pub(super) fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let SceneMeta { name, frame_count, fps, bounds, background, config_digest, width, height, fov_x, .. } = &info.meta;
     let digest: String = config_digest.iter().map(|byte| format!("{byte:02x}")).collect();
     if json {
@@ -178,12 +185,14 @@ pub(super) struct Decode {
     /// The safetensors file to write.
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), TrainError> {
         check_output(&self.out)?;
-        let data = read_file(&self.file)?;
+        let data = read_file_with_limits(&self.file, &self.limits.get())?;
         let tensors = plain_tensors(&data);
         let views = tensors.iter().map(|(name, (shape, bytes))| {
             (name, TensorView::new(Dtype::F32, shape.clone(), bytes).expect("shapes match their values"))

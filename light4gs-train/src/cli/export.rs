@@ -1,64 +1,167 @@
 //! `export`.
 
-use std::path::PathBuf;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_data::{DataError, GaussianPly};
+use light4gs_codec::{GaussianArrays, read_info};
+use light4gs_data::{DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb};
+use light4gs_model::{DeformationField, HexPlaneField, StillField};
+use light4gs_web::page::{Content, page};
 
-use super::limits::{MOST_FRAMES, frame_count};
+use super::check_output;
+use super::limits::LimitsArgument;
+use super::most::{MOST_FRAMES, frame_count};
 use super::output::say;
+use super::view::dataset_cameras;
 use crate::config::DeviceName;
 use crate::device;
 use crate::error::TrainError;
-use crate::evaluation::DecodedScene;
+use crate::evaluation::{DecodedScene, is_still};
+
+/// Cameras of each split that a page holds: enough to choose from, few enough to send.
+const MOST_CAMERAS: usize = 60;
 
 #[derive(Debug, Args)]
 pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
-    /// Folder for `0000.ply`, `0001.ply`, ...
-    #[arg(long)]
-    out: PathBuf,
+    /// A folder for `0000.ply`, `0001.ply`, ..., or a file: one moment as .ply or .glb (KHR_gaussian_splatting), the whole
+    /// motion as .4dgs.
+    #[arg(long, required_unless_present = "html")]
+    out: Option<PathBuf>,
+    /// One file that plays the scene in a browser and needs nothing else.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up"])]
+    html: Option<PathBuf>,
+    /// Dataset whose cameras the page offers; those of the run that the file lies in if not given.
+    #[arg(long, requires = "html")]
+    scene: Option<PathBuf>,
     /// Number of frames over time 0 to 1; as many as the file was made from if not given.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
+    /// The moment of a .ply or .glb file, in [0, 1].
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    time: f32,
+    /// Frames a second of a .4dgs file; the source's, or 30, if not given.
+    #[arg(long, allow_negative_numbers = true)]
+    fps: Option<f32>,
+    /// In a .glb: the scene's z axis points up, as in Blender. glTF's y axis does.
+    #[arg(long)]
+    z_up: bool,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
+    #[command(flatten)]
+    limits: LimitsArgument,
+}
+
+/// What is written.
+#[derive(Clone, Copy, Debug)]
+enum Target {
+    PlySequence,
+    Ply,
+    Glb,
+    FourDgs,
+}
+
+impl Target {
+    fn of(path: &Path) -> Self {
+        match path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase).as_deref() {
+            Some("ply") => Self::Ply,
+            Some("glb") => Self::Glb,
+            Some("4dgs") => Self::FourDgs,
+            _ => Self::PlySequence,
+        }
+    }
 }
 
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
-        let frames = frame_count(&decoded.data.meta, self.frames)?;
-        std::fs::create_dir_all(&self.out).map_err(|source| DataError::Io {
-            action: "create",
-            path: self.out.clone(),
-            source,
-        })?;
-        for k in 0..frames {
-            let time = if frames == 1 { 0.0 } else { k as f32 / (frames - 1) as f32 };
-            let arrays = decoded.model.at(time).to_arrays();
-            let per_gaussian = if arrays.is_empty() { 0 } else { arrays.sh_rest.len() / (3 * arrays.len()) };
-            let rest = |i: usize| {
-                std::array::from_fn(|coefficient| {
-                    if coefficient >= per_gaussian {
-                        return [0.0; 3];
-                    }
-                    let at = 3 * (i * per_gaussian + coefficient);
-                    [arrays.sh_rest[at], arrays.sh_rest[at + 1], arrays.sh_rest[at + 2]]
-                })
-            };
-            let ply = GaussianPly {
-                sh_rest: (0..arrays.means.len()).map(rest).collect(),
-                means: arrays.means,
-                sh_dc: arrays.sh_dc,
-                opacity_logits: arrays.opacity_logits,
-                log_scales: arrays.log_scales,
-                quats: arrays.quats,
-            };
-            ply.write(&self.out.join(format!("{k:04}.ply")))?;
+        if !(0.0..=1.0).contains(&self.time) {
+            return Err(TrainError::Input(format!("--time must be in [0, 1], not {}", self.time)));
         }
-        say(format_args!("wrote {frames} PLY files to {}", self.out.display()))
+        match (&self.html, &self.out) {
+            (Some(html), _) => self.write_page(html),
+            (None, Some(out)) if is_still(&self.file)? => self.export::<StillField>(out),
+            (None, Some(out)) => self.export::<HexPlaneField>(out),
+            (None, None) => unreachable!("one of the two is required"),
+        }
+    }
+
+    fn write_page(&self, html: &Path) -> Result<(), TrainError> {
+        check_output(html)?;
+        let name = read_info(&self.file)?.meta.name;
+        let io = |source| DataError::Io { action: "read", path: self.file.clone(), source };
+        let scene = std::fs::read(&self.file).map_err(io)?;
+        let cameras = dataset_cameras(&self.file, self.scene.as_deref(), MOST_CAMERAS)?;
+        let title = if name.is_empty() { "Scene" } else { &name };
+        let page = page(title, Content::Embedded { scene: &scene, cameras: &cameras }, None);
+        write_atomically(html, |file| file.write_all(page.as_bytes()))?;
+        say(format_args!("wrote {} ({:.2} MB)", html.display(), page.len() as f64 / 1e6))
+    }
+
+    fn export<F: DeformationField>(&self, path: &Path) -> Result<(), TrainError> {
+        let target = Target::of(path);
+        if !matches!(target, Target::PlySequence) {
+            check_output(path)?;
+        }
+        let decoded: DecodedScene<F> =
+            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
+        let at = |time: f32| plain_gaussians(decoded.model.at(time).to_arrays());
+        let meta = &decoded.data.meta;
+        let frames = frame_count(meta, self.frames)?;
+        let times = || (0..frames).map(|k| if frames == 1 { 0.0 } else { k as f32 / (frames - 1) as f32 });
+        let out = path.display();
+        match target {
+            Target::PlySequence => {
+                std::fs::create_dir_all(path).map_err(DataError::io("create", path))?;
+                for (k, time) in times().enumerate() {
+                    at(time).write(&path.join(format!("{k:04}.ply")))?;
+                }
+                say(format_args!("wrote {frames} PLY files to {out}"))
+            }
+            Target::Ply => {
+                at(self.time).write(path)?;
+                say(format_args!("wrote {out}"))
+            }
+            Target::Glb => {
+                let options = GlbOptions { sh_degree: decoded.data.gaussians.sh_degree, z_is_up: self.z_up };
+                write_glb(path, &at(self.time), &options)?;
+                say(format_args!("wrote {out}"))
+            }
+            Target::FourDgs => {
+                let source = Some(meta.fps).filter(|fps| *fps > 0.0);
+                let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
+                if !(fps > 0.0 && fps.is_finite()) {
+                    return Err(TrainError::Input(format!("--fps must be a positive number, not {fps}")));
+                }
+                let sample = |(k, time): (usize, f32)| MotionSample { begin: k as f64 / fps, gaussians: at(time) };
+                let samples: Vec<MotionSample> = times().enumerate().map(sample).collect();
+                write_four_dgs(path, &samples, f64::from(frames) / fps)?;
+                say(format_args!("wrote {out} ({frames} samples, {fps} a second)"))
+            }
+        }
+    }
+}
+
+/// For files of other programs, whose harmonics have degree 3.
+fn plain_gaussians(arrays: GaussianArrays) -> GaussianPly {
+    let per_gaussian = if arrays.is_empty() { 0 } else { arrays.sh_rest.len() / (3 * arrays.len()) };
+    let rest = |i: usize| {
+        std::array::from_fn(|coefficient| {
+            if coefficient >= per_gaussian {
+                return [0.0; 3];
+            }
+            let at = 3 * (i * per_gaussian + coefficient);
+            [arrays.sh_rest[at], arrays.sh_rest[at + 1], arrays.sh_rest[at + 2]]
+        })
+    };
+    GaussianPly {
+        sh_rest: (0..arrays.means.len()).map(rest).collect(),
+        means: arrays.means,
+        sh_dc: arrays.sh_dc,
+        opacity_logits: arrays.opacity_logits,
+        log_scales: arrays.log_scales,
+        quats: arrays.quats,
     }
 }

@@ -5,7 +5,9 @@ mod compare;
 mod container;
 mod export;
 mod gpu_errors;
+mod import;
 mod limits;
+mod most;
 mod output;
 mod prepare;
 mod progress;
@@ -15,6 +17,7 @@ mod signals;
 mod study;
 mod synth;
 mod train;
+mod view;
 
 use std::path::Path;
 use std::process::ExitCode;
@@ -51,9 +54,17 @@ enum Command {
     /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
     #[command(after_help = "Example:\n  light4gs eval runs/bouncing --json")]
     Eval(train::Eval),
-    /// Render a file over time along a camera path, to a GIF or to PNG frames.
+    /// Render a file over time along a camera path, to a GIF, an MP4 or PNG frames.
     #[command(after_help = "Example:\n  light4gs render runs/bouncing/scene.l4gs --out bouncing.gif --frames 60")]
     Render(render::Render),
+    /// Show a file or a run in the browser, and follow a run that is still training.
+    #[command(after_help = "Example:\n  light4gs view runs/bouncing --open")]
+    View(view::View),
+    /// Take over a scene that another program has trained: a checkpoint of 4DGaussians, or a PLY file of 3DGS.
+    #[command(
+        after_help = "Examples:\n  light4gs import output/bouncing --from 4dgaussians --out runs/bouncing\n  light4gs import scene.ply --from ply --out scene.l4gs"
+    )]
+    Import(import::Import),
     /// Write the newest checkpoint of a run as a .l4gs file.
     #[command(after_help = "Example:\n  light4gs encode runs/bouncing --out bouncing.l4gs")]
     Encode(container::Encode),
@@ -63,8 +74,11 @@ enum Command {
     /// Print what a .l4gs file holds, with sizes by section.
     #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
     Info(container::Info),
-    /// Write the Gaussians at successive times as PLY files that 3DGS viewers read.
-    #[command(after_help = "Example:\n  light4gs export bouncing.l4gs --out frames --frames 30")]
+    /// Write the Gaussians for other programs: PLY files at successive times, one moment as .ply or .glb, the motion as .4dgs;
+    /// or the scene as a page that plays it.
+    #[command(
+        after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
+    )]
     Export(export::Export),
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
@@ -98,6 +112,8 @@ impl Cli {
             Command::Resume(command) => command.run(),
             Command::Eval(command) => command.run(),
             Command::Render(command) => command.run(),
+            Command::View(command) => command.run(),
+            Command::Import(command) => command.run(),
             Command::Encode(command) => command.run(),
             Command::Decode(command) => command.run(),
             Command::Info(command) => command.run(),

@@ -3,16 +3,19 @@
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use light4gs_codec::SceneMeta;
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
+use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
 use super::check_output;
-use super::limits::{MOST_FRAMES, MOST_SIDE, image_size};
+use super::limits::LimitsArgument;
+use super::most::{MOST_FRAMES, MOST_SIDE, image_size};
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
 use crate::error::TrainError;
-use crate::evaluation::DecodedScene;
-use crate::video::{Looping, write_gif, write_png_sequence};
+use crate::evaluation::{DecodedScene, is_still};
+use crate::video::{Looping, write_gif, write_mp4, write_png_sequence};
 
 /// Radius in world units and elevation in degrees of the orbit, as the D-NeRF video path has them.
 const ORBIT: (f32, f32) = (4.0, 30.0);
@@ -31,7 +34,7 @@ enum Path {
 pub(super) struct Render {
     /// The .l4gs file.
     file: PathBuf,
-    /// A file that ends in .gif, or a folder for PNG frames.
+    /// A file that ends in .gif or .mp4 (needs the program ffmpeg), or a folder for PNG frames.
     #[arg(long)]
     out: PathBuf,
     /// Camera path.
@@ -55,12 +58,14 @@ pub(super) struct Render {
     /// Height of the orbit in degrees.
     #[arg(long, default_value_t = ORBIT.1, allow_negative_numbers = true)]
     elevation: f32,
-    /// Frames a second of a GIF.
+    /// Frames a second of a GIF or an MP4.
     #[arg(long, default_value_t = 20.0, allow_negative_numbers = true)]
     fps: f32,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t)]
     device: DeviceName,
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Render {
@@ -75,11 +80,23 @@ impl Render {
             return Err(TrainError::Input(format!("--elevation must be -90 to 90 degrees, not {}", self.elevation)));
         }
         check_output(&self.out)?;
-        let decoded: DecodedScene = DecodedScene::open(&self.file, &device::open(self.device)?)?;
-        let frames = self.camera_frames(&decoded)?;
+        match is_still(&self.file)? {
+            true => self.render::<StillField>(),
+            false => self.render::<HexPlaneField>(),
+        }
+    }
+
+    fn render<F: DeformationField>(self) -> Result<(), TrainError> {
+        let decoded: DecodedScene<F> =
+            DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
+        let frames = self.camera_frames(&decoded.data.meta)?;
         let images = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));
-        if self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case("gif")) {
-            let count = write_gif(&self.out, images, self.fps, Looping::Forever)?;
+        let has_extension = |name: &str| self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
+        if has_extension("gif") || has_extension("mp4") {
+            let count = match has_extension("gif") {
+                true => write_gif(&self.out, images, self.fps, Looping::Forever)?,
+                false => write_mp4(&self.out, images, self.fps)?,
+            };
             say(format_args!("wrote {} ({count} frames)", self.out.display()))?;
         } else {
             let files = write_png_sequence(&self.out, images)?;
@@ -88,8 +105,7 @@ impl Render {
         Ok(())
     }
 
-    fn camera_frames(&self, decoded: &DecodedScene) -> Result<Vec<Frame>, TrainError> {
-        let meta = &decoded.data.meta;
+    fn camera_frames(&self, meta: &SceneMeta) -> Result<Vec<Frame>, TrainError> {
         let (new_width, new_height) = image_size(meta, self.width)?;
         if let Some(scene) = &self.scene {
             let resolution = Resolution::Exact { width: new_width, height: new_height };

@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{Layouts, Scene};
-use light4gs_model::HexPlaneField;
+use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
+use super::limits::LimitsArgument;
 use super::output::{say, say_json, tell};
 use super::progress::ProgressBars;
 use super::signals::stop_flag;
@@ -18,7 +19,7 @@ use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::measure::Scores;
 use crate::evaluation::metrics::lpips::Lpips;
-use crate::evaluation::{DecodedScene, Evaluation};
+use crate::evaluation::{DecodedScene, Evaluation, is_still};
 use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
 use crate::trainer::{Trainer, TrainerBuilder};
@@ -92,7 +93,7 @@ pub(super) fn train(
     for note in check_inputs(&config, scene)?.notes {
         tell(format_args!("note: {note}"));
     }
-    let folder = RunFolder::create(out, scene, &config, overwrite)?;
+    let folder = RunFolder::create(out, Some(scene), &config, overwrite)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;
     finish(trainer, &folder, &config, output)
@@ -113,7 +114,7 @@ pub(super) fn train_to_evaluation(
     let fresh = !out.join("run.json").exists();
     if fresh {
         check_inputs(&config, scene)?;
-        let folder = RunFolder::create(out, scene, &config, false)?;
+        let folder = RunFolder::create(out, Some(scene), &config, false)?;
         if let Some(like) = like {
             folder.adopt(&RunFolder::open(like)?.0)?;
         }
@@ -121,7 +122,7 @@ pub(super) fn train_to_evaluation(
     }
     let (mut folder, record, found) = RunFolder::open(out)?;
     folder.lock()?;
-    if found != config || record.scene != std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned()) {
+    if found != config || record.dataset()? != std::path::absolute(scene).unwrap_or_else(|_| scene.to_owned()) {
         let out = out.display();
         return Err(TrainError::Input(format!(
             "{out} holds a run of another configuration or scene; name another folder, or remove that one"
@@ -132,7 +133,7 @@ pub(super) fn train_to_evaluation(
     if !folder.stream().exists() || (coded && !folder.path("bit_maps.json").exists()) {
         run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
-    let scene = Scene::open(&record.scene, &load_options(&config))?;
+    let scene = Scene::open(record.dataset()?, &load_options(&config))?;
     evaluate_run::<HexPlaneField>(&folder, &config, &scene)
 }
 
@@ -151,7 +152,7 @@ fn trainer(
     record: &RunRecord,
     output: &RunOutput,
 ) -> Result<TrainerBuilder, TrainError> {
-    let data = Scene::open(&record.scene, &load_options(config))?;
+    let data = Scene::open(record.dataset()?, &load_options(config))?;
     let bars = ProgressBars::new(output.quiet);
     Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars).stop_flag(stop_flag()))
 }
@@ -205,7 +206,7 @@ impl Resume {
         let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
         let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
-        check_inputs(&config, &record.scene)?;
+        check_inputs(&config, record.dataset()?)?;
         let mut builder = trainer(&config, &folder, &record, &self.output)?;
         if self.accept_changed_dataset {
             builder = builder.accept_changed_dataset();
@@ -235,6 +236,9 @@ pub(super) struct Eval {
     /// Print as JSON.
     #[arg(long)]
     json: bool,
+    /// Where a file is measured and not a run.
+    #[command(flatten)]
+    limits: LimitsArgument,
 }
 
 impl Eval {
@@ -254,24 +258,31 @@ impl Eval {
         if !self.lpips.is_empty() {
             config.eval.lpips = self.lpips;
         }
-        record.scene = self.scene.unwrap_or(record.scene);
-        let scene = Scene::open(&record.scene, &load_options(&config))?;
+        record.scene = self.scene.or(record.scene);
+        let scene = Scene::open(record.dataset()?, &load_options(&config))?;
         print_evaluation(&evaluate_run::<HexPlaneField>(&folder, &config, &scene)?, self.json)
     }
 
     fn eval_file(self) -> Result<(), TrainError> {
-        let Some(scene) = self.scene else {
+        let Some(scene) = self.scene.clone() else {
             return Err(TrainError::Input("a .l4gs file holds no images; name the dataset with --scene DIR".into()));
         };
+        match is_still(&self.run)? {
+            true => self.eval_decoded::<StillField>(&scene),
+            false => self.eval_decoded::<HexPlaneField>(&scene),
+        }
+    }
+
+    fn eval_decoded<F: DeformationField>(&self, scene: &Path) -> Result<(), TrainError> {
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;
-        let decoded: DecodedScene = DecodedScene::open(&self.run, &device)?;
+        let decoded: DecodedScene<F> = DecodedScene::open_with_limits(&self.run, &self.limits.get(), &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
-        config.eval.lpips = self.lpips;
+        config.eval.lpips = self.lpips.clone();
         let options = load_options(&config);
-        let scene = Scene::open(&scene, &options)?;
+        let scene = Scene::open(scene, &options)?;
         let images = image_store(&config);
         let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)

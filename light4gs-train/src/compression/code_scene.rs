@@ -10,13 +10,16 @@ use light4gs_data::{Frame, Scene};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::{BitEstimate, BitMap, Compression, EncodedScene, SearchImages, encode, fit};
-use crate::config::{Config, FileProfile};
+use super::{BitEstimate, BitMap, Compression, EncodedScene, SearchImages, encode, fit, frozen_steps};
+use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
 use crate::error::TrainError;
 
 /// Training views that the step search looks at.
 const SEARCH_VIEWS: usize = 8;
+
+/// PSNR in dB of a scene whose truth is not at hand: better than most are, so that the file is rather too good.
+pub const ASSUMED_PSNR: f64 = 40.0;
 
 /// How a file was coded: what the models expected of it and what it took, `coding.json` in a run's folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -91,10 +94,10 @@ pub struct TrainedScene<'a, F: DeformationField = HexPlaneField> {
     pub compression: Option<&'a Compression>,
     /// The run's.
     pub config: &'a Config,
-    /// The dataset.
+    /// The dataset, or cameras around a scene that came without one.
     pub data: &'a Scene,
-    /// Its images.
-    pub images: &'a dyn ImageSource,
+    /// Its images, if it has some. Without them the scene counts as [`ASSUMED_PSNR`] from the truth.
+    pub images: Option<&'a dyn ImageSource>,
     /// With autodiff.
     pub device: &'a Device,
 }
@@ -123,24 +126,32 @@ pub fn code_scene<F: DeformationField>(
     let Some(profile) = settings.profile.coded() else {
         return Ok(CodedScene { bytes: light4gs_codec::encode(&scene.to_arrays(meta))?, coding: None });
     };
-    let (compression, fit_seconds) = match trained.compression {
-        Some(compression) => (compression.clone(), None),
-        None => {
-            let begin = Instant::now();
-            let compression = fit(scene, config, device, progress)?;
-            (compression, Some(begin.elapsed().as_secs_f64()))
-        }
-    };
-    let begin = Instant::now();
     let views = search_views(data);
     let inner = (*device).clone().inner();
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
-    let images = if settings.attributes.search_tolerance > 0.0 && profile == Profile::Compact {
-        let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, trained.images)?;
-        Some(SearchImages { render: &render, error })
-    } else {
-        None
+    let images =
+        match (searches(settings, trained.compression.is_none()) && profile == Profile::Compact, trained.images) {
+            (false, _) => None,
+            (true, Some(images)) => {
+                let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, images)?;
+                Some(SearchImages { render: &render, error })
+            }
+            (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0) }),
+        };
+    let (compression, fit_seconds, settings) = match (trained.compression, &images) {
+        (Some(compression), _) => (compression.clone(), None, settings.clone()),
+        (None, images) => {
+            let mut config = (*config).clone();
+            if let Some(images) = images {
+                frozen_steps::search(&scene.to_arrays(meta.clone()), &mut config.compression, images);
+            }
+            let begin = Instant::now();
+            let compression = fit(scene, &config, device, progress)?;
+            (compression, Some(begin.elapsed().as_secs_f64()), config.compression)
+        }
     };
+    let settings = &settings;
+    let begin = Instant::now();
     let encoded = encode(scene, &compression, meta, settings, profile, images, device)?;
     let sizes = &encoded.coded.report;
     let hexplane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
@@ -154,6 +165,12 @@ pub fn code_scene<F: DeformationField>(
         planes: plane_records(&encoded, &compression),
     };
     Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
+}
+
+/// Whether renderings are needed to find steps. Those of planes and harmonics can change only before models are fitted.
+fn searches(settings: &CompressionConfig, fits: bool) -> bool {
+    let fitted = settings.steps.search_tolerance > 0.0 || settings.sh.search_tolerance > 0.0;
+    settings.attributes.search_tolerance > 0.0 || (fits && fitted)
 }
 
 fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {

@@ -6,14 +6,16 @@
 //! - `encoder`: a scene and its models into the bytes of a file
 //! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
 //! - `step_search`: how coarsely the other attributes may be quantized
+//! - `frozen_steps`: how coarsely planes and harmonics may be that never saw noise in training
 
 mod code_scene;
 mod encoder;
 mod fit;
+mod frozen_steps;
 mod rate;
 mod step_search;
 
-pub use code_scene::{CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
+pub use code_scene::{ASSUMED_PSNR, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
 pub use encoder::{
     BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, freeze_planes,
 };

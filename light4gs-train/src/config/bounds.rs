@@ -10,6 +10,7 @@ use serde_json::Value;
 use super::compression::{LEAST_WEIGHT_BITS, MOST_WEIGHT_BITS};
 use super::{
     Config, ContextArchitecture, DEVICES, EvalSplit, FileProfile, Problem, PruneScore, PruneVolume, RateWeighting,
+    Sampling,
 };
 
 /// What a key may hold. What keys may not hold together is said in `validate.rs`.
@@ -74,6 +75,8 @@ const THRESHOLD: Bounds = Number { least: 1e-30, most: 1e30 };
 const WEIGHT: Bounds = Number { least: 0.0, most: 1e6 };
 /// A quantization step that the encoder takes.
 const STEP: Bounds = Number { least: LEAST_STEP as f64, most: 1e3 };
+/// What a search for coarser steps may cost, dB.
+const TOLERANCE: Bounds = Number { least: 0.0, most: 100.0 };
 const WEIGHT_BITS: Bounds = Whole { least: LEAST_WEIGHT_BITS as u64, most: MOST_WEIGHT_BITS as u64 };
 
 /// Every key in the order of the configuration, and what it may hold.
@@ -107,6 +110,8 @@ pub const BOUNDS: &[(&str, Bounds)] = &[
     ("train.coarse_iterations", ITERATIONS),
     ("train.fine_iterations", ITERATIONS),
     ("train.batch_size", Whole { least: 1, most: 1024 }),
+    ("train.sampling", Word(Sampling::NAMES)),
+    ("train.coarse_times", ITERATION),
     ("train.lambda_dssim", SHARE),
     ("train.l2_until", ITERATION),
     ("train.sh_degree_interval", INTERVAL),
@@ -176,16 +181,18 @@ pub const BOUNDS: &[(&str, Bounds)] = &[
     ("compression.steps.refine", Flag),
     ("compression.steps.per_scale", Flag),
     ("compression.steps.learning_rate", RATE),
+    ("compression.steps.search_tolerance", TOLERANCE),
     ("compression.sh.model", Word(&ShKind::NAMES)),
     ("compression.sh.step", STEP),
     ("compression.sh.learning_rate_init", RATE),
     ("compression.sh.learning_rate_final", RATE),
+    ("compression.sh.search_tolerance", TOLERANCE),
     ("compression.attributes.position", STEP),
     ("compression.attributes.log_scale", STEP),
     ("compression.attributes.quaternion", STEP),
     ("compression.attributes.opacity_logit", STEP),
     ("compression.attributes.sh_dc", STEP),
-    ("compression.attributes.search_tolerance", Number { least: 0.0, most: 100.0 }),
+    ("compression.attributes.search_tolerance", TOLERANCE),
     ("compression.weights.deformation_bits", WEIGHT_BITS),
     ("compression.weights.context_bits", WEIGHT_BITS),
     ("eval.splits", List { element: &Word(EvalSplit::NAMES), length: None }),

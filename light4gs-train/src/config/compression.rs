@@ -141,6 +141,8 @@ pub struct StepsConfig {
     pub per_scale: bool,
     /// Learning rate of the steps' logarithms.
     pub learning_rate: f64,
+    /// Of a scene that was trained without a rate: how much PSNR the steps may cost, in dB; 0 takes the steps as they stand.
+    pub search_tolerance: f64,
 }
 
 /// The model of the spherical harmonics beyond degree 0.
@@ -155,6 +157,8 @@ pub struct ShConfig {
     pub learning_rate_init: f64,
     /// Learning rate of the model at the end of the fine stage.
     pub learning_rate_final: f64,
+    /// Of a scene that was trained without a rate: how much PSNR the step may cost, in dB; 0 takes the step as it stands.
+    pub search_tolerance: f64,
 }
 
 /// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. Which there are is said in the model crate.
@@ -284,13 +288,20 @@ impl Default for StepsConfig {
             refine: false,
             per_scale,
             learning_rate: 2e-3,
+            search_tolerance: 0.0,
         }
     }
 }
 
 impl Default for ShConfig {
     fn default() -> Self {
-        Self { model: ShModel(ShKind::Factorized), step: 0.02, learning_rate_init: 5e-3, learning_rate_final: 5e-4 }
+        Self {
+            model: ShModel(ShKind::Factorized),
+            step: 0.02,
+            learning_rate_init: 5e-3,
+            learning_rate_final: 5e-4,
+            search_tolerance: 0.0,
+        }
     }
 }
 

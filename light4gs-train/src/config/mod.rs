@@ -50,7 +50,7 @@ pub use eval::{EvalConfig, EvalSplit};
 pub use layering::presets::preset_names;
 pub use model::{CoordinatesConfig, DeformationConfig, HexPlaneConfig, ModelConfig};
 pub use prune::{PruneConfig, PruneScore, PruneVolume};
-pub use train::{DensifyConfig, LearningRates, RegularizerConfig, TrainConfig};
+pub use train::{DensifyConfig, LearningRates, RegularizerConfig, Sampling, TrainConfig};
 
 /// Files of configurations are far shorter.
 pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;

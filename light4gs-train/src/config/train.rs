@@ -3,6 +3,7 @@
 use light4gs_model::regularizer::PlaneRegularizer;
 use serde::{Deserialize, Serialize};
 
+use super::choice::choice;
 use super::{PruneConfig, optional};
 use crate::stage::Stage;
 
@@ -16,6 +17,11 @@ pub struct TrainConfig {
     pub fine_iterations: usize,
     /// Frames an iteration.
     pub batch_size: usize,
+    /// Which frames stand in a batch.
+    pub sampling: Sampling,
+    /// The coarse stage sees the frames of so many times from the beginning; `None` (0 in TOML) those of all times.
+    #[serde(with = "optional")]
+    pub coarse_times: Option<usize>,
     /// Weight of D-SSIM in the loss; L1 has the rest.
     pub lambda_dssim: f32,
     /// The loss is the squared difference until this iteration of the fine stage, and in the coarse stage if it is not 0.
@@ -37,6 +43,16 @@ pub struct TrainConfig {
     pub prune: PruneConfig,
     /// Weights of the space-time regularizers, used in the fine stage.
     pub regularizer: RegularizerConfig,
+}
+
+choice! {
+    /// Which frames stand in a batch.
+    pub enum Sampling: "sampling" {
+        /// Any, in an order that is shuffled anew when all have been seen.
+        Shuffled = "shuffled",
+        /// Different cameras at one time. Where a time has fewer cameras than a batch, the batch goes on with another one.
+        SameTime = "same_time",
+    }
 }
 
 impl TrainConfig {
@@ -155,6 +171,8 @@ impl Default for TrainConfig {
             coarse_iterations: 3000,
             fine_iterations: 30_000,
             batch_size: 1,
+            sampling: Sampling::Shuffled,
+            coarse_times: None,
             lambda_dssim: 0.0,
             l2_until: 0,
             sh_degree_interval: 1000,

@@ -2,6 +2,7 @@
 
 use std::fs;
 
+use light4gs_codec::Limits;
 use light4gs_data::{DataError, Scene};
 use light4gs_model::DeformationField;
 
@@ -12,11 +13,16 @@ use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
 use crate::observers::metrics_log::read_metrics;
-use crate::report::{CodingReport, Report, SectionBytes, SummaryTile, write_report};
+use crate::report::{CodingReport, PlayerReport, Report, SectionBytes, SummaryTile, write_report};
 use crate::run::RunFolder;
+use crate::view::cameras_json;
 
 /// Views a report shows.
 const REPORT_VIEWS: usize = 6;
+/// Cameras of each split that the player of a report offers.
+const PLAYER_CAMERAS: usize = 60;
+/// Bytes of the largest file that a report plays.
+const LARGEST_PLAYED_FILE: usize = 16 << 20;
 
 /// Measures the run's file on its own dataset and writes everything that depends on it.
 pub fn evaluate_run<F: DeformationField>(
@@ -25,7 +31,7 @@ pub fn evaluate_run<F: DeformationField>(
     scene: &Scene,
 ) -> Result<Evaluation, TrainError> {
     let device = device::open(config.device)?;
-    let decoded = DecodedScene::<F>::open(&folder.stream(), &device)?;
+    let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
     let images = image_store(config);
     let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
@@ -45,6 +51,7 @@ pub fn evaluate_run<F: DeformationField>(
             .iter()
             .map(|section| SectionBytes { name: section.name.clone(), bytes: section.bytes })
             .collect(),
+        player: player(folder, scene)?,
         coding: match &evaluation.coding {
             Some(record) => {
                 let bit_maps: Vec<BitMap> = folder.read_json("bit_maps.json")?.unwrap_or_default();
@@ -69,6 +76,14 @@ pub fn evaluate_run<F: DeformationField>(
     };
     write_report(&folder.path("report.html"), &report)?;
     Ok(evaluation)
+}
+
+/// The file for the report, unless it would make a page that nobody wants to send.
+fn player(folder: &RunFolder, scene: &Scene) -> Result<Option<PlayerReport>, TrainError> {
+    let path = folder.stream();
+    let bytes = fs::read(&path).map_err(|source| DataError::Io { action: "read", path, source })?;
+    let small = bytes.len() <= LARGEST_PLAYED_FILE;
+    Ok(small.then(|| PlayerReport { scene: bytes, cameras: cameras_json(scene, PLAYER_CAMERAS) }))
 }
 
 fn save_renders(folder: &RunFolder, views: &[RenderedView]) -> Result<(), TrainError> {

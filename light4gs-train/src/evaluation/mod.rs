@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use burn::tensor::Device;
-use light4gs_codec::{SceneData, StreamInfo};
+use light4gs_codec::{Limits, SceneData, StreamInfo};
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::Serialize;
@@ -18,8 +18,8 @@ use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::evaluation::measure::Scores;
-use crate::evaluation::metrics::image_tensor;
 use crate::evaluation::metrics::lpips::Lpips;
+use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
@@ -111,12 +111,17 @@ pub struct DecodedScene<F: DeformationField = HexPlaneField> {
 }
 
 impl<F: DeformationField> DecodedScene<F> {
-    /// Reads a file onto a device.
+    /// Reads a file onto a device, within the default [`Limits`].
     pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
+        Self::open_with_limits(path, &Limits::default(), device)
+    }
+
+    /// As [`DecodedScene::open`]; a file of one's own may have [`Limits::large`].
+    pub fn open_with_limits(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
-        let data = light4gs_codec::read_file(path)?;
+        let data = light4gs_codec::read_file_with_limits(path, limits)?;
         let decode_seconds = begin.elapsed().as_secs_f64();
-        let info = light4gs_codec::read_info(path)?;
+        let info = light4gs_codec::read_info_with_limits(path, limits)?;
         let model = DynamicScene::from_arrays(&data, device)?;
         Ok(Self { model, data, info, decode_seconds, device: device.clone() })
     }
@@ -177,7 +182,8 @@ impl<F: DeformationField> DecodedScene<F> {
                 let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
-                let scores = Scores::measure(&image, &truth_tensor, None, &lpips);
+                let mask = images.measured_pixels(frame)?.map(|mask| mask_tensor(&mask, &self.device));
+                let scores = Scores::measure(&image, &truth_tensor, mask.as_ref(), &lpips);
                 let (name, time, psnr) = (frame.name.clone(), frame.time, scores.psnr());
                 views.push(ViewScore { name: name.clone(), time, scores });
                 let (truth, render) = ((*truth).clone(), render.to_u8());
@@ -202,6 +208,14 @@ impl<F: DeformationField> DecodedScene<F> {
         };
         Ok((evaluation, rendered))
     }
+}
+
+/// Whether nothing moves in a file.
+///
+/// # Errors
+/// A file that cannot be read, or is damaged.
+pub fn is_still(path: &Path) -> Result<bool, TrainError> {
+    Ok(light4gs_codec::read_info(path)?.motion.kind.is_empty())
 }
 
 /// Sections of a file with the header in front; they add up to the file.

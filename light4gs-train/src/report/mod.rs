@@ -20,6 +20,7 @@ use std::path::Path;
 
 use light4gs_data::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
+use light4gs_web::page::{Content, PLAYER, Place, element};
 
 use crate::compression::{BitMap, CodingRecord};
 use crate::evaluation::measure::Scores;
@@ -51,6 +52,8 @@ pub struct Report {
     pub summary: Vec<SummaryTile>,
     /// Bytes of the file by section, in the order of the file.
     pub sections: Vec<SectionBytes>,
+    /// The file itself, to be played at the top of the page.
+    pub player: Option<PlayerReport>,
     /// How the file was coded.
     pub coding: Option<CodingReport>,
     /// Quality by split.
@@ -72,6 +75,15 @@ pub struct SummaryTile {
     pub value: String,
     /// A word on it: `20 views, decoded file`; may be empty.
     pub hint: String,
+}
+
+/// What a report plays.
+#[derive(Debug, Clone)]
+pub struct PlayerReport {
+    /// A `.l4gs` stream.
+    pub scene: Vec<u8>,
+    /// Cameras as JSON, see [`crate::view::cameras_json`].
+    pub cameras: String,
 }
 
 /// How a file was coded.
@@ -153,11 +165,20 @@ fn page(path: &Path, report: &Report) -> Result<String, DataError> {
             ("title", &escape(&report.title)),
             ("about", &about(report)),
             ("tiles", &tiles(&report.summary)),
+            ("player", &player(report.player.as_ref())),
             ("sections", &sections.concat()),
             ("style", STYLE),
             ("script", SCRIPT),
+            ("module", if report.player.is_some() { PLAYER } else { "" }),
         ],
     ))
+}
+
+/// The scene in motion; nothing if there is none.
+fn player(player: Option<&PlayerReport>) -> String {
+    let Some(PlayerReport { scene, cameras }) = player else { return String::new() };
+    let player = element(Content::Embedded { scene, cameras }, Place::Part);
+    format!("<section class=\"player\" aria-label=\"The scene in motion\">\n{player}\n</section>\n")
 }
 
 /// A page in the style of the report, with sections of one's own: pairs of an id-like heading and HTML.

@@ -37,6 +37,7 @@ fn sample() -> Report {
             SectionBytes { name: "gaussians".into(), bytes: 123_456 },
             SectionBytes { name: "planes".into(), bytes: 1_234_567 },
         ],
+        player: Some(PlayerReport { scene: b"\x89L4GS".to_vec(), cameras: "[]".into() }),
         coding: Some(CodingReport { record: coding_record(), bit_maps: vec![bit_map()] }),
         splits: vec![SplitQuality {
             name: "test".into(),
@@ -107,6 +108,8 @@ fn a_report_is_one_well_formed_file() {
     write_report(&path, &sample()).expect("a report");
     let html = std::fs::read_to_string(&path).expect("text");
     assert_balanced(&html);
+    assert!(html.contains(PLAYER) && html.contains("<script type=\"application/l4gs\">iUw0R1M=</script>"));
+    let html = html.replace(PLAYER, "");
     assert_eq!(html.matches("<img src=\"data:image/png;base64,").count(), 4);
     assert_eq!(html.matches("<svg ").count(), 5);
     assert!(!html.contains("http:") && !html.contains("https:") && !html.contains("//www"), "no request");

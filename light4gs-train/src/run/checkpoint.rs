@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::CoordinateMapping;
 use light4gs_data::{DataError, PointCloud, read_regular_file, write_atomically};
 use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField};
@@ -66,6 +67,25 @@ const TIME: &str = "time.";
 /// In front of the names of the density strategy's statistics.
 const DENSITY: &str = "density.";
 
+/// Key of the mapping of coordinates, where it is not the paper's.
+const MAPPING: &str = "coordinate_mapping";
+
+/// Contraction, scales, offsets, scale and offset of the time: nine numbers.
+fn mapping_text(mapping: &CoordinateMapping) -> String {
+    let CoordinateMapping { contracts, scale, offset, time_scale, time_offset } = *mapping;
+    let numbers =
+        [f32::from(u8::from(contracts))].into_iter().chain(scale).chain(offset).chain([time_scale, time_offset]);
+    numbers.map(|number| number.to_string()).collect::<Vec<_>>().join(" ")
+}
+
+fn parsed_mapping(text: &str) -> Option<CoordinateMapping> {
+    let numbers = text.split(' ').map(|word| word.parse().ok()).collect::<Option<Vec<f32>>>()?;
+    let [contracts, x, y, z, dx, dy, dz, time_scale, time_offset] = numbers[..] else { return None };
+    let finite = numbers.iter().all(|number| number.is_finite());
+    let (scale, offset) = ([x, y, z], [dx, dy, dz]);
+    finite.then_some(CoordinateMapping { contracts: contracts != 0.0, scale, offset, time_scale, time_offset })
+}
+
 impl<F: DeformationField> Checkpoint<F> {
     /// File name of a checkpoint.
     pub fn file_name(stage: Stage, iteration: usize) -> String {
@@ -107,6 +127,10 @@ impl<F: DeformationField> Checkpoint<F> {
             ("iteration".to_owned(), self.iteration.to_string()),
             ("seconds".to_owned(), self.seconds.to_string()),
         ]);
+        let mapping = self.scene.coordinates.mapping();
+        if mapping != CoordinateMapping::default() {
+            metadata.insert(MAPPING.to_owned(), mapping_text(&mapping));
+        }
         for (name, state) in &self.adam.states {
             metadata.insert(format!("{TIME}{name}"), state.time.to_string());
         }
@@ -140,6 +164,10 @@ impl<F: DeformationField> Checkpoint<F> {
         // A model of the right structure, whose tensors are then replaced.
         let cloud = PointCloud { positions: vec![[0.0; 3]], colors: vec![[0.5; 3]] };
         let mut scene = config.model.scene::<F>(field.clone()).init(&cloud, device);
+        if let Ok(text) = file.text(MAPPING) {
+            let wrong = || failed(format!("metadata `{MAPPING}` is `{text}`, expected nine numbers"));
+            scene.coordinates = scene.coordinates.with_mapping(parsed_mapping(text).ok_or_else(wrong)?);
+        }
         let mut compression = Compression::of_run(config, scene.planes(), device)?;
         let means = format!("{SCENE}.{}", GaussianAttribute::Means.path());
         let count = file.rows(&means).unwrap_or(0);

@@ -24,8 +24,8 @@ const MAX_JSON_BYTES: u64 = 1 << 30;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunRecord {
-    /// Absolute path of the dataset.
-    pub scene: PathBuf,
+    /// Absolute path of the dataset; an imported run may have none.
+    pub scene: Option<PathBuf>,
     /// Version of the program that began the run.
     pub version: String,
     /// Commit that it was built from, with `-dirty` behind it where files had been changed; `unknown` outside of the
@@ -47,18 +47,12 @@ pub struct RunRecord {
 }
 
 impl RunRecord {
-    /// Of a dataset that is there.
+    /// Of a dataset that is there, or of none.
     ///
     /// # Errors
     /// [`TrainError::Input`] if the path is not Unicode, which JSON cannot hold.
-    pub fn new(scene: &Path, config: &Config) -> Result<Self, TrainError> {
-        let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
-        if scene.to_str().is_none() {
-            return Err(TrainError::Input(format!(
-                "the dataset's path {} is not valid Unicode, so that {RECORD} cannot hold it; rename the folder, or link to it",
-                scene.display()
-            )));
-        }
+    pub fn new(scene: Option<&Path>, config: &Config) -> Result<Self, TrainError> {
+        let scene = scene.map(absolute).transpose()?;
         Ok(Self {
             scene,
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -69,6 +63,29 @@ impl RunRecord {
             configuration: config.digest_text(),
         })
     }
+
+    /// The dataset.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] if the run has none.
+    pub fn dataset(&self) -> Result<&Path, TrainError> {
+        self.scene.as_deref().ok_or_else(|| {
+            let remedy = "name one with `light4gs eval RUN --scene DIR`, or import it anew with --scene";
+            TrainError::Input(format!("this run was imported without a dataset; {remedy}"))
+        })
+    }
+}
+
+/// A path that JSON can hold.
+fn absolute(scene: &Path) -> Result<PathBuf, TrainError> {
+    let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
+    if scene.to_str().is_none() {
+        return Err(TrainError::Input(format!(
+            "the dataset's path {} is not valid Unicode, so that {RECORD} cannot hold it; rename the folder, or link to it",
+            scene.display()
+        )));
+    }
+    Ok(scene)
 }
 
 /// Paths of a run. A folder that is written to is locked: by [`RunFolder::create`], or by [`RunFolder::lock`]. The lock is
@@ -85,7 +102,7 @@ impl RunFolder {
     /// # Errors
     /// [`TrainError::RunExists`] if it holds a run and `overwrite` is not set; [`TrainError::RunInUse`] if another process
     /// writes into it; [`TrainError::Input`] if it holds anything else.
-    pub fn create(root: &Path, scene: &Path, config: &Config, overwrite: bool) -> Result<Self, TrainError> {
+    pub fn create(root: &Path, scene: Option<&Path>, config: &Config, overwrite: bool) -> Result<Self, TrainError> {
         let record = RunRecord::new(scene, config)?;
         let mut folder = Self { root: root.to_owned(), lock: None };
         // Before the lock, whose file says that the folder is one of ours.

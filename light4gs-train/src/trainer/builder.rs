@@ -4,17 +4,20 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use burn::module::Module;
 use burn::tensor::Device;
+use light4gs_codec::checks;
 use light4gs_data::Scene;
 use light4gs_model::{DeformationField, HexPlaneField};
 
 use super::Trainer;
 use super::divergence::EmptyImageWatch;
 use super::profile::Profile;
+use super::sampling::FrameSampler;
 use super::views::ViewPools;
-use crate::compression::Compression;
+use crate::compression::{Compression, compression_input};
 use crate::config::Config;
-use crate::dataset::{ImageSource, image_store};
+use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{AdaptiveDensityControl, DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
 use crate::error::TrainError;
@@ -23,7 +26,6 @@ use crate::observers::Observer;
 use crate::observers::metrics_log::MetricsLog;
 use crate::observers::tensorboard::TensorBoardLog;
 use crate::optimization::adam::Adam;
-use crate::randomness::FrameOrder;
 use crate::run::{Checkpoint, RunFolder};
 use crate::stage::Stage;
 
@@ -179,7 +181,23 @@ impl<F: DeformationField> TrainerBuilder<F> {
             iteration: 0,
             seconds: 0.0,
         };
+        self.check_encodable(&state)?;
         self.assemble(device, state, None)
+    }
+
+    /// Refuses now what the encoder would refuse in the end: it is asked about the scene and the models to start from.
+    fn check_encodable(&self, state: &Checkpoint<F>) -> Result<(), TrainError> {
+        let scene = state.scene.valid();
+        let arrays = scene.to_arrays(scene_meta(&self.config, &self.data));
+        let settings = &self.config.compression;
+        match (&state.compression, settings.profile.coded()) {
+            (Some(compression), Some(profile)) => {
+                let input = compression_input(&mut compression.valid(), &scene, &arrays, settings, profile)?;
+                checks::coding(&arrays, &input)?;
+            }
+            _ => checks::scene(&arrays)?,
+        }
+        Ok(())
     }
 
     /// `checkpoint` is the file that `state` is from.
@@ -215,6 +233,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             None => config.device.computes_on_processor(),
         };
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
+        let sampler = FrameSampler::new(&config.train, &data.train);
         Ok(Trainer {
             config,
             device,
@@ -227,8 +246,8 @@ impl<F: DeformationField> TrainerBuilder<F> {
             significance,
             observers: all,
             stop,
-            order: FrameOrder::default(),
-            order_ahead: FrameOrder::default(),
+            sampler_ahead: sampler.clone(),
+            sampler,
             profile: Profile::off(),
             view_pools,
             lap: None,

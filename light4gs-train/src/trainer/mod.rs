@@ -2,6 +2,7 @@
 //!
 //! - here: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
 //! - `builder`: what a trainer is made of
+//! - `sampling`: the frames of an iteration
 //! - `step`: one iteration
 //! - `views`: the views of an iteration, each with a tape of its own
 //! - `rate`: quantization noise, and the rate in the loss
@@ -17,6 +18,7 @@ pub(crate) mod divergence;
 pub mod profile;
 mod pruning;
 mod rate;
+mod sampling;
 mod step;
 mod views;
 
@@ -42,11 +44,11 @@ use crate::loss::Loss;
 use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
-use crate::randomness::FrameOrder;
 use crate::run::{Checkpoint, RunFolder, SaveError, list_checkpoints};
 use crate::stage::Stage;
 use divergence::{EmptyImageWatch, not_finite_in, remedy, unusual_key};
 use profile::Profile;
+use sampling::FrameSampler;
 use views::ViewPools;
 
 /// A run in progress.
@@ -110,9 +112,9 @@ pub struct Trainer<F: DeformationField = HexPlaneField> {
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
     stop: Arc<AtomicBool>,
-    order: FrameOrder,
-    /// The same order, asked for what comes later.
-    order_ahead: FrameOrder,
+    sampler: FrameSampler,
+    /// The same, asked for what comes later.
+    sampler_ahead: FrameSampler,
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,
@@ -211,7 +213,7 @@ impl<F: DeformationField> Trainer<F> {
             compression: self.state.compression.as_ref(),
             config: &self.config,
             data: &self.data,
-            images: &*self.images,
+            images: Some(&*self.images),
             device: &self.device,
         };
         let (observers, stop, folder) = (&mut self.observers, &self.stop, self.folder.as_ref());

@@ -23,10 +23,8 @@ impl<F: DeformationField> Trainer<F> {
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
         self.profile.begin_step();
         let batch = self.config.train.batch_size.max(1);
-        let count = self.data.train.len();
-        let indices: Vec<usize> =
-            (0..batch).map(|k| self.order.at(self.config.seed, stage, (iteration - 1) * batch + k, count)).collect();
-        self.prefetch(stage, iteration, batch);
+        let indices = self.sampler.batch(self.config.seed, stage, iteration);
+        self.prefetch(stage, iteration);
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
@@ -78,13 +76,10 @@ impl<F: DeformationField> Trainer<F> {
 
     /// Has the images of the next iterations decoded in the background. An iteration asks for as many as it uses, so that
     /// those before it are there already.
-    fn prefetch(&mut self, stage: Stage, iteration: usize, batch: usize) {
-        let count = self.data.train.len();
-        let first = (iteration - 1 + PREFETCHED_ITERATIONS) * batch;
-        // Another order: this one is asked for positions of the next pass while the first is still in the last.
-        let frames: Vec<Frame> = (first..first + batch)
-            .map(|position| self.data.train[self.order_ahead.at(self.config.seed, stage, position, count)].clone())
-            .collect();
+    fn prefetch(&mut self, stage: Stage, iteration: usize) {
+        // Another sampler: this one is asked for positions of the next pass while the first is still in the last.
+        let indices = self.sampler_ahead.batch(self.config.seed, stage, iteration + PREFETCHED_ITERATIONS);
+        let frames: Vec<Frame> = indices.into_iter().map(|frame| self.data.train[frame].clone()).collect();
         self.images.prefetch(&frames);
     }
 

@@ -1,8 +1,8 @@
 //! The views of a training step. Each has a tape of its own, so that they can be rendered and differentiated side by side.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_data::{Frame, PixelMask};
+use burn::tensor::{Device, Tensor};
+use light4gs_data::Frame;
 use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -10,7 +10,7 @@ use super::profile::Profile;
 use crate::dataset::ImageSource;
 use crate::density::ViewStatistics;
 use crate::error::TrainError;
-use crate::evaluation::metrics::image_tensor;
+use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::loss::{Loss, LossInput};
 use crate::optimization::gradients::GradientSums;
 use crate::stage::Stage;
@@ -123,7 +123,7 @@ impl ViewPass<'_> {
         let mut truth = truth;
         if let Some(mask) = self.images.trained_pixels(frame)? {
             // Black in both: such pixels are alike, whatever the loss.
-            let mask = mask_tensor(&mask, self.device);
+            let mask = mask_tensor(&mask, self.device).unsqueeze_dim::<3>(2);
             image = image * mask.clone();
             truth = truth * mask;
         }
@@ -156,12 +156,6 @@ impl ViewPass<'_> {
             truth: truth.inner(),
         })
     }
-}
-
-/// `[H, W, 1]`: 1 where a pixel counts.
-fn mask_tensor(mask: &PixelMask, device: &Device) -> Tensor<3> {
-    let values: Vec<f32> = mask.pixels.iter().map(|value| f32::from(*value)).collect();
-    Tensor::from_data(TensorData::new(values, [mask.height as usize, mask.width as usize, 1]), device)
 }
 
 #[cfg(test)]

@@ -1,6 +1,9 @@
 //! Convolutions with groups as in PyTorch.
 
-use super::{Columns, Lanes, PaddedMap, lanes::Matrix};
+use super::{
+    Columns, Lanes, PaddedMap,
+    lanes::{GATHER_NANOSECONDS, Matrix},
+};
 use crate::network::Layer;
 
 /// A convolution with an odd kernel and zeros beyond the border, which take part in the sums.
@@ -66,9 +69,25 @@ impl Convolution {
         self.groups.len() == 1
     }
 
-    /// Multiplications for one place.
-    pub(crate) fn work(&self) -> u64 {
-        let outputs: usize = self.groups.iter().map(Matrix::padded_outputs).sum();
-        (outputs * self.inputs_per_group * self.kernel * self.kernel) as u64
+    /// Nanoseconds of [`Convolution::apply_pointwise`].
+    pub(crate) fn pointwise_nanoseconds(&self) -> u64 {
+        self.groups.iter().map(Matrix::nanoseconds).sum()
+    }
+
+    /// Nanoseconds of [`Convolution::apply`].
+    pub(crate) fn nanoseconds(&self) -> u64 {
+        self.pointwise_nanoseconds() + GATHER_NANOSECONDS * self.groups.len() as u64 * self.window()
+    }
+
+    /// Inputs that an output looks at.
+    pub(crate) fn window(&self) -> u64 {
+        (self.inputs_per_group * self.kernel * self.kernel) as u64
+    }
+
+    /// Bytes of [`Convolution::new`].
+    pub(crate) fn bytes(layer: &Layer) -> u64 {
+        let groups = u64::from(layer.groups.max(1));
+        let window = u64::from(layer.inputs) / groups * u64::from(layer.kernel) * u64::from(layer.kernel);
+        groups.saturating_mul(Matrix::bytes(window, u64::from(layer.outputs) / groups))
     }
 }

@@ -1,6 +1,9 @@
 //! The checkerboard-masked convolution: what the decoded anchors say about the others (paper III-C).
 
-use super::{Columns, Lanes, PaddedMap, lanes::Matrix};
+use super::{
+    Columns, Lanes, PaddedMap, kept,
+    lanes::{GATHER_NANOSECONDS, Matrix},
+};
 use crate::network::Layer;
 
 /// The anchors of a plane, those positions whose row and column have an odd sum, packed to half the width.
@@ -25,7 +28,7 @@ impl AnchorMap {
             let y = index % height;
             let anchors = row[first_anchor(y)..].iter().step_by(2);
             for (target, &value) in packed.row_mut(index / height, y).iter_mut().zip(anchors) {
-                *target = value - center;
+                *target = kept(value - center);
             }
         }
         Self { packed }
@@ -97,9 +100,14 @@ impl MaskedConvolution {
         }
     }
 
-    /// Multiplications for one place.
-    pub(crate) fn work(&self) -> u64 {
-        let outputs: usize = self.groups.iter().map(Matrix::padded_outputs).sum();
-        (outputs * self.inputs_per_group * self.taps.len()) as u64
+    /// Nanoseconds of [`MaskedConvolution::apply`].
+    pub(crate) fn nanoseconds(&self) -> u64 {
+        let products: u64 = self.groups.iter().map(Matrix::nanoseconds).sum();
+        products + GATHER_NANOSECONDS * self.groups.len() as u64 * self.window()
+    }
+
+    /// Inputs that an output looks at.
+    pub(crate) fn window(&self) -> u64 {
+        (self.inputs_per_group * self.taps.len()) as u64
     }
 }

@@ -18,7 +18,7 @@ mod transposed;
 mod upsampling;
 
 pub(crate) use convolution::Convolution;
-pub(crate) use lanes::{LANES, Lanes};
+pub(crate) use lanes::{LANES, Lanes, kept};
 pub(crate) use masked::{AnchorMap, MaskedConvolution, first_anchor, masked_taps};
 pub(crate) use padded_map::{Columns, PaddedMap};
 pub(crate) use reductions::{mean_over_height, mean_over_width, transposed};

@@ -1,6 +1,6 @@
 //! Maps with a border of zeros, and windows of them.
 
-use super::{LANES, Lanes};
+use super::{LANES, Lanes, kept};
 
 /// Columns of a row that are computed together: `first`, `first + step`, ..., [`LANES`] of them.
 #[derive(Clone, Copy, Debug)]
@@ -38,7 +38,7 @@ impl PaddedMap {
         let mut map = Self::zeros(values.len() / (height * width), height, width, border);
         for (index, row) in values.chunks_exact(width).enumerate() {
             for (target, &value) in map.row_mut(index / height, index % height).iter_mut().zip(row) {
-                *target = value - center;
+                *target = kept(value - center);
             }
         }
         map
@@ -47,7 +47,8 @@ impl PaddedMap {
     /// Numbers that a map of this size takes.
     pub(crate) fn footprint(channels: u64, [height, width]: [u32; 2], border: usize) -> u64 {
         let side = |length: u32| u64::from(length) + 2 * border as u64;
-        channels.saturating_mul(side(height)).saturating_mul(side(width))
+        let beyond = (MOST_STEPS * LANES) as u64;
+        channels.saturating_mul(side(height)).saturating_mul(side(width)).saturating_add(beyond)
     }
 
     /// One row without its border.

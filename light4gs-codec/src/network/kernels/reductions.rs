@@ -1,6 +1,6 @@
 //! Means over rows and columns, and transposition.
 
-use super::PaddedMap;
+use super::{PaddedMap, kept};
 
 /// Means over the rows: `[C, 1, W]`. The sum runs down the rows; it is divided by their number at the end.
 pub(crate) fn mean_over_height(map: &PaddedMap, border: usize) -> PaddedMap {
@@ -10,7 +10,7 @@ pub(crate) fn mean_over_height(map: &PaddedMap, border: usize) -> PaddedMap {
         for y in 0..map.height {
             sums.iter_mut().zip(map.row(channel, y)).for_each(|(sum, &value)| *sum += value);
         }
-        sums.iter_mut().for_each(|sum| *sum /= map.height as f32);
+        sums.iter_mut().for_each(|sum| *sum = kept(*sum / map.height as f32));
     }
     means
 }
@@ -21,7 +21,7 @@ pub(crate) fn mean_over_width(map: &PaddedMap, border: usize) -> PaddedMap {
     for channel in 0..map.channels {
         for y in 0..map.height {
             let sum = map.row(channel, y).iter().fold(0.0, |sum, &value| sum + value);
-            means.row_mut(channel, y)[0] = sum / map.width as f32;
+            means.row_mut(channel, y)[0] = kept(sum / map.width as f32);
         }
     }
     means

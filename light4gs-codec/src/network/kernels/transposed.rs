@@ -1,6 +1,9 @@
 //! Transposed convolutions that double the size.
 
-use super::{Columns, LANES, Lanes, PaddedMap, lanes::Matrix};
+use super::{
+    Columns, LANES, Lanes, PaddedMap,
+    lanes::{GATHER_NANOSECONDS, Matrix},
+};
 use crate::network::Layer;
 
 /// A transposed convolution with kernel 5, stride 2, padding 2 and output padding 1: `[I, H, W]` to `[O, 2H, 2W]`.
@@ -63,8 +66,20 @@ impl TransposedConvolution {
         doubled
     }
 
-    /// Multiplications for one place, at most.
-    pub(crate) fn work(&self) -> u64 {
-        (self.phases[0][0].padded_outputs() * self.inputs * TAPS[0].len() * TAPS[0].len()) as u64
+    /// Nanoseconds for eight places of the output, at most.
+    pub(crate) fn nanoseconds(&self) -> u64 {
+        self.phases[0][0].nanoseconds() + GATHER_NANOSECONDS * self.window()
+    }
+
+    /// Inputs that an output looks at, at most.
+    pub(crate) fn window(&self) -> u64 {
+        (self.inputs * TAPS[0].len() * TAPS[0].len()) as u64
+    }
+
+    /// Bytes of [`TransposedConvolution::new`].
+    pub(crate) fn bytes(layer: &Layer) -> u64 {
+        let taps = TAPS.map(|rows| TAPS.map(|columns| rows.len() * columns.len()));
+        let phase = |&taps: &usize| Matrix::bytes(u64::from(layer.inputs) * taps as u64, layer.outputs.into());
+        taps.as_flattened().iter().map(phase).sum()
     }
 }

@@ -1,6 +1,6 @@
 //! A map at another size, bilinear with aligned corners.
 
-use super::PaddedMap;
+use super::{PaddedMap, kept};
 
 /// A sample between two others: `low` and `low + 1` (or `low` again at the end), `share` of the second.
 fn positions(from: usize, to: usize) -> impl Iterator<Item = (usize, usize, f32)> {
@@ -23,7 +23,7 @@ pub(crate) fn resized(lower: &PaddedMap, to: [usize; 2], border: usize) -> Padde
             let rows = [lower.row(channel, above), lower.row(channel, below)];
             for (target, &(left, right, across)) in map.row_mut(channel, y).iter_mut().zip(&columns) {
                 let [top, bottom] = rows.map(|row| row[left] * (1.0 - across) + row[right] * across);
-                *target = top * (1.0 - share) + bottom * share;
+                *target = kept(top * (1.0 - share) + bottom * share);
             }
         }
     }

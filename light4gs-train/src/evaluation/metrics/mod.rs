@@ -9,7 +9,7 @@ pub mod lpips;
 mod ssim;
 
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_data::RgbImage8;
+use light4gs_data::{PixelMask, RgbImage8};
 
 pub use ssim::{MS_SSIM_LEAST_SIDE, WINDOW, d_ssim, masked_ssim, ms_ssim, ssim, ssim_valid};
 
@@ -42,6 +42,12 @@ fn masked_mean(map: Tensor<3>, mask: Tensor<2>) -> Tensor<1> {
     let channels = map.dims()[2] as f32;
     let pixels = mask.clone().sum();
     (map * mask.unsqueeze_dim::<3>(2)).sum() / (pixels * channels)
+}
+
+/// Which pixels count as a tensor `[H, W]`: 1 where they do.
+pub fn mask_tensor(mask: &PixelMask, device: &Device) -> Tensor<2> {
+    let values: Vec<f32> = mask.pixels.iter().map(|value| f32::from(*value)).collect();
+    Tensor::from_data(TensorData::new(values, [mask.height as usize, mask.width as usize]), device)
 }
 
 /// An 8-bit image as a tensor `[H, W, 3]` in [0, 1].

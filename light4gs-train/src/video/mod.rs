@@ -1,6 +1,8 @@
-//! Frames over time: an animated GIF, or numbered PNG files.
+//! Frames over time: an animated GIF, an MP4 through the program `ffmpeg`, or numbered PNG files.
 //!
 //! Frames are taken one by one from an iterator, which may render them; none is kept. Files are complete or absent.
+
+mod mp4;
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -9,6 +11,8 @@ use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, RgbaImage};
 use light4gs_data::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
+
+pub use mp4::write_mp4;
 
 /// How often a GIF plays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

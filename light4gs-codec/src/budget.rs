@@ -1,0 +1,92 @@
+//! Memory and time that decoding takes, added up before it takes them.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::{CodecError, Limits, limits::at_most};
+
+/// What descriptions, tables, names and messages take at most, whose counts have limits of their own.
+const SMALL_THINGS: u64 = 16 << 20;
+/// Nanoseconds that a byte of a stream may take besides what counts and sizes ask for: each can hold some decisions.
+const NANOSECONDS_A_BYTE: u64 = 60;
+
+/// What the parts of a stream have asked for so far. Nothing is given back: what is refused must not depend on which part
+/// comes first.
+#[derive(Debug)]
+pub(crate) struct Budget {
+    pub(crate) limits: Limits,
+    memory: AtomicU64,
+    nanoseconds: AtomicU64,
+}
+
+impl Budget {
+    /// A budget of which nothing but a fixed amount is spent.
+    pub(crate) fn new(limits: &Limits) -> Self {
+        Self { limits: *limits, memory: AtomicU64::new(SMALL_THINGS), nanoseconds: AtomicU64::new(0) }
+    }
+
+    /// Asks for memory.
+    pub(crate) fn memory(&self, section: &'static str, bytes: u64) -> Result<(), CodecError> {
+        let field = "memory that decoding takes in bytes";
+        at_most(section, field, spend(&self.memory, bytes), self.limits.memory_bytes)
+    }
+
+    /// Asks for time.
+    pub(crate) fn time(&self, section: &'static str, nanoseconds: u64) -> Result<(), CodecError> {
+        let field = "time that decoding takes in nanoseconds";
+        at_most(section, field, spend(&self.nanoseconds, nanoseconds), self.limits.nanoseconds)
+    }
+
+    /// Asks for the memory of `count` things of so many bytes, and the time to make them.
+    pub(crate) fn things(
+        &self,
+        section: &'static str,
+        count: u64,
+        bytes: u64,
+        nanoseconds: u64,
+    ) -> Result<(), CodecError> {
+        self.memory(section, count.saturating_mul(bytes))?;
+        self.time(section, count.saturating_mul(nanoseconds))
+    }
+
+    /// Asks for what the bytes of an entropy-coded stream take.
+    pub(crate) fn stream(&self, section: &'static str, bytes: usize) -> Result<(), CodecError> {
+        self.things(section, bytes as u64, 1, NANOSECONDS_A_BYTE)
+    }
+
+    /// What was asked for.
+    pub(crate) fn demand(&self) -> Demand {
+        let (memory, nanoseconds) = (self.memory.load(Ordering::Relaxed), self.nanoseconds.load(Ordering::Relaxed));
+        Demand { memory_bytes: memory, nanoseconds }
+    }
+}
+
+/// What a reader must allow to decode a stream: see [`Limits::memory_bytes`] and [`Limits::nanoseconds`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Demand {
+    /// Memory in bytes, added up beforehand.
+    pub memory_bytes: u64,
+    /// Nanoseconds of one thread, likewise.
+    pub nanoseconds: u64,
+}
+
+/// Adds without overflow, and returns the sum.
+fn spend(spent: &AtomicU64, more: u64) -> u64 {
+    let add = |spent: u64| spent.saturating_add(more);
+    // The closure always gives a number.
+    let before = spent.fetch_update(Ordering::Relaxed, Ordering::Relaxed, |spent| Some(add(spent)));
+    add(before.unwrap_or(u64::MAX))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_do_not_overflow() {
+        let budget = Budget::new(&Limits::default());
+        assert!(budget.time("here", 1).is_ok());
+        assert!(budget.memory("here", u64::MAX).is_err());
+        assert!(budget.memory("here", 1).is_err());
+        assert!(budget.time("here", u64::MAX).unwrap_err().to_string().starts_with("here: time"));
+    }
+}

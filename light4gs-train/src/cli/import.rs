@@ -1,0 +1,129 @@
+//! `import`.
+
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+use clap::{Args, ValueEnum};
+use light4gs_codec::read_info;
+use light4gs_data::{Scene, write_atomically};
+
+use super::check_output;
+use super::container::print_info;
+use super::output::say;
+use super::progress::FitBar;
+use crate::compression::{TrainedScene, code_scene};
+use crate::config::{Config, DeviceName};
+use crate::dataset::{image_store, load_options};
+use crate::device;
+use crate::error::TrainError;
+use crate::import::{reference, scene_around, still};
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Source {
+    /// A checkpoint of 4DGaussians, or of the public code of Light4GS: the folder with `point_cloud.ply` and
+    /// `deformation.pth`, or one above it. Makes a run, which `encode` and `eval` take.
+    #[value(name = "4dgaussians")]
+    FourDGaussians,
+    /// A PLY file of 3DGS: Gaussians without motion. Makes a .l4gs file.
+    Ply,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Import {
+    /// The folder or the file.
+    source: PathBuf,
+    /// What it is.
+    #[arg(long, value_enum)]
+    from: Source,
+    /// Folder of the new run; for a PLY the .l4gs file to write.
+    #[arg(long)]
+    out: PathBuf,
+    /// Folder of the dataset that the scene was trained on. With it the coding looks at the training images; without, at
+    /// views around the scene.
+    #[arg(long)]
+    scene: Option<PathBuf>,
+    /// A preset or a TOML file: how the scene will be coded. What the model is like follows from the source.
+    #[arg(long, default_value = "imported", value_name = "PRESET|FILE")]
+    config: String,
+    /// Changes one key of the configuration; may be given more than once.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    #[arg(long)]
+    device: Option<DeviceName>,
+    /// Replace a run that is there already.
+    #[arg(long)]
+    overwrite: bool,
+    /// Print what was written as JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+impl Import {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        let mut overrides = self.overrides.clone();
+        overrides.extend(self.device.map(|device| format!("device={device}")));
+        let config = Config::load(&self.config, &overrides)?;
+        match self.from {
+            Source::FourDGaussians => self.import_reference(&config),
+            Source::Ply => self.import_still(config),
+        }
+    }
+
+    fn import_reference(&self, config: &Config) -> Result<(), TrainError> {
+        let imported = reference::read(&self.source, &device::open(config.device)?)?;
+        if let Some(dataset) = &self.scene {
+            // Before the run's folder is made, so that a wrong path leaves nothing behind.
+            Scene::open(dataset, &load_options(&imported.config(config)?))?;
+        }
+        let (count, source) = (imported.scene.gaussians.len(), imported.source.clone());
+        imported.write_run(&self.out, self.scene.as_deref(), config, self.overwrite)?;
+        let run = self.out.display();
+        if self.json {
+            return super::output::say_json(
+                &serde_json::json!({"run": self.out, "source": source, "gaussians": count}),
+            );
+        }
+        say(format_args!("{count} Gaussians from {} are a run in {run} now", source.display()))?;
+        say(format_args!("make them small: light4gs encode {run} --out scene.l4gs"))
+    }
+
+    fn import_still(&self, mut config: Config) -> Result<(), TrainError> {
+        if !self.out.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("l4gs")) {
+            let out = self.out.display();
+            return Err(TrainError::Input(format!("--out {out} must end in .l4gs: a PLY becomes a file, not a run")));
+        }
+        if self.out.exists() && !self.overwrite {
+            let out = self.out.display();
+            return Err(TrainError::Input(format!("{out} exists already; give --overwrite to replace it")));
+        }
+        check_output(&self.out)?;
+        let device = device::open(config.device)?.autodiff();
+        let scene = still::read(&self.source, &device)?;
+        config.model.sh_degree = scene.gaussians.sh_degree() as u8;
+        let folder = self.source.parent().unwrap_or(Path::new("."));
+        let mut data = match &self.scene {
+            Some(dataset) => Scene::open(dataset, &load_options(&config))?,
+            None => scene_around(&scene.gaussians.to_arrays(), folder, config.data.background)?,
+        };
+        if let Some(name) = self.source.file_stem() {
+            data.name = name.to_string_lossy().into_owned();
+        }
+        let images = image_store(&config);
+        let trained = TrainedScene {
+            scene: &scene,
+            compression: None,
+            config: &config,
+            data: &data,
+            images: self.scene.is_some().then_some(&images),
+            device: &device,
+        };
+        let mut bar = FitBar::new(self.json);
+        let coded = code_scene(&trained, &mut |done, iterations| {
+            bar.show(done, iterations);
+            Ok(())
+        })?;
+        write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
+        print_info(&read_info(&self.out)?, self.json)
+    }
+}

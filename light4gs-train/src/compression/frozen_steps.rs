@@ -1,0 +1,125 @@
+//! How coarsely planes and spherical harmonics may be quantized that were trained without noise: by another program, say.
+//!
+//! A scene that is trained for a rate gets used to its steps. One that was not may need finer ones; how fine, renderings
+//! tell. The error grows with the square of the step, so that a look at one step says nearly what to take.
+
+use light4gs_codec::SceneData;
+use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_TIME_PLANES};
+
+use super::SearchImages;
+use crate::config::CompressionConfig;
+
+/// A step grows by this factor at most: the squared-error model holds for small errors.
+const LARGEST_GROWTH: f64 = 4.0;
+/// A step shrinks to this share of itself at most.
+const LARGEST_SHRINKAGE: f64 = 1.0 / 256.0;
+/// Looks at a step before it is taken.
+const LOOKS: usize = 5;
+/// Aimed at a little below the budget, since looks are few.
+const MARGIN: f64 = 0.9;
+
+/// Sets the steps of planes and harmonics to what costs at most about their `search_tolerance` each, in dB on the images;
+/// 0 leaves them as they are.
+pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images: &SearchImages) {
+    let exact = (images.render)(scene);
+    let budget = |tolerance: f64| images.error * (10f64.powf(tolerance / 10.0) - 1.0);
+    let distortion = |scene: &SceneData| {
+        let rendered = (images.render)(scene);
+        let sum: f64 = rendered.iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        sum / exact.len().max(1) as f64
+    };
+    if settings.steps.search_tolerance > 0.0 && !scene.hexplane.planes.is_empty() {
+        let (space, time) = (settings.steps.space_only, settings.steps.space_time);
+        let factor = factor(budget(settings.steps.search_tolerance), |factor| {
+            let mut rounded = scene.clone();
+            for (index, plane) in rounded.hexplane.planes.iter_mut().enumerate() {
+                let is_time = SPACE_TIME_PLANES.contains(&(index % PLANES_PER_SCALE));
+                round(&mut plane.values, factor * if is_time { time } else { space });
+            }
+            distortion(&rounded)
+        });
+        (settings.steps.space_only, settings.steps.space_time) = (factor * space, factor * time);
+    }
+    if settings.sh.search_tolerance > 0.0 && !scene.gaussians.sh_rest.is_empty() {
+        let step = settings.sh.step;
+        let factor = factor(budget(settings.sh.search_tolerance), |factor| {
+            let mut rounded = scene.clone();
+            round(&mut rounded.gaussians.sh_rest, factor * step);
+            distortion(&rounded)
+        });
+        settings.sh.step = factor * step;
+    }
+}
+
+/// The largest factor, about, at which the distortion stays within a budget.
+fn factor(budget: f64, distortion: impl Fn(f64) -> f64) -> f64 {
+    let (mut factor, mut good) = (1.0, LARGEST_SHRINKAGE);
+    for _ in 0..LOOKS {
+        let found = distortion(factor);
+        if found <= budget {
+            good = good.max(factor);
+        }
+        if found <= budget && found >= budget / 2.0 {
+            break;
+        }
+        let next = factor * (MARGIN * budget / found.max(f64::MIN_POSITIVE)).sqrt();
+        factor = next.clamp(LARGEST_SHRINKAGE, LARGEST_GROWTH);
+    }
+    good
+}
+
+fn round(values: &mut [f32], step: f64) {
+    let step = step as f32;
+    values.iter_mut().for_each(|value| *value = (*value / step).round_ties_even() * step);
+}
+
+#[cfg(test)]
+mod tests {
+    use light4gs_codec::{GaussianArrays, HexPlaneArrays, Plane};
+
+    use super::*;
+
+    fn scene() -> SceneData {
+        let random = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
+        let plane = Plane { height: 8, width: 8, values: (0..64).map(random).collect() };
+        SceneData {
+            gaussians: GaussianArrays { sh_rest: (0..450).map(random).collect(), ..GaussianArrays::default() },
+            hexplane: HexPlaneArrays { planes: vec![plane; 6], ..HexPlaneArrays::default() },
+            ..SceneData::default()
+        }
+    }
+
+    /// "Images" that are ten times as sensitive to planes as to harmonics.
+    fn render(scene: &SceneData) -> Vec<f32> {
+        let planes = scene.hexplane.planes.iter().flat_map(|plane| plane.values.iter().map(|value| 10.0 * value));
+        planes.chain(scene.gaussians.sh_rest.iter().copied()).collect()
+    }
+
+    fn found(tolerance: f64, error: f64) -> CompressionConfig {
+        let mut settings = CompressionConfig::default();
+        (settings.steps.search_tolerance, settings.sh.search_tolerance) = (tolerance, tolerance);
+        search(&scene(), &mut settings, &SearchImages { render: &render, error });
+        settings
+    }
+
+    #[test]
+    fn steps_keep_to_the_budget() {
+        let (tolerance, error) = (0.05, 1e-3);
+        let settings = found(tolerance, error);
+        let exact = render(&scene());
+        let mut rounded = scene();
+        let step = settings.steps.space_only;
+        rounded.hexplane.planes.iter_mut().for_each(|plane| round(&mut plane.values, step));
+        let squares: f64 = render(&rounded).iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let budget = error * (10f64.powf(tolerance / 10.0) - 1.0);
+        let distortion = squares / exact.len() as f64;
+        assert!(distortion <= budget && distortion > 0.2 * budget, "{distortion} of {budget}");
+        assert!(found(0.01, error).steps.space_only < step);
+        assert!(settings.sh.step > settings.steps.space_only);
+    }
+
+    #[test]
+    fn no_tolerance_leaves_the_steps_alone() {
+        assert_eq!(found(0.0, 1e-3), CompressionConfig::default());
+    }
+}

@@ -1,0 +1,100 @@
+//! Scenes that other programs have trained.
+//!
+//! - here: what an import gives, and how it becomes a run
+//! - [`reference`]: checkpoints of 4DGaussians, and of the public code of Light4GS
+//! - [`still`]: plain Gaussians without motion, from a PLY file
+//! - `settings`: the switches in 4DGaussians' `cfg_args`
+//! - `views`: cameras around a scene that came without a dataset
+
+pub mod reference;
+mod settings;
+pub mod still;
+mod views;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use light4gs_model::{DynamicScene, HexPlaneField};
+
+pub use views::scene_around;
+
+use crate::config::Config;
+use crate::error::TrainError;
+use crate::optimization::adam::Adam;
+use crate::run::{Checkpoint, RunFolder, SaveError};
+use crate::stage::Stage;
+
+/// A scene with motion, as another program has trained it.
+#[derive(Debug)]
+pub struct ImportedScene {
+    /// The model, which renders as the program's own did.
+    pub scene: DynamicScene,
+    /// Color behind the Gaussians.
+    pub background: [f32; 3],
+    /// Folder of the files.
+    pub source: PathBuf,
+}
+
+impl ImportedScene {
+    /// The configuration of a run that has this model, over a base.
+    ///
+    /// # Errors
+    /// Sizes that a run cannot have, such as planes whose resolution is no multiple of 4.
+    pub fn config(&self, base: &Config) -> Result<Config, TrainError> {
+        let mut config = base.clone();
+        let planes = &self.scene.field.hexplane;
+        let arrays = planes.to_arrays();
+        let deformation = &self.scene.field.deformation;
+        config.model.sh_degree = self.scene.gaussians.sh_degree() as u8;
+        config.model.hexplane.channels = planes.feature_size() / planes.scales();
+        config.model.hexplane.resolution = arrays.resolution.map(|side| side as usize);
+        config.model.hexplane.multipliers = arrays.multipliers.iter().map(|multiplier| *multiplier as usize).collect();
+        let network = &mut config.model.deformation;
+        network.width = deformation.trunk[0].weight.dims()[1];
+        network.depth = deformation.trunk.len();
+        network.position = deformation.position.is_some();
+        network.scale = deformation.scale.is_some();
+        network.rotation = deformation.rotation.is_some();
+        network.opacity = deformation.opacity.is_some();
+        network.sh = deformation.sh.is_some();
+        network.differentiate_points = false;
+        config.data.background = self.background;
+        // The models of the training are fitted when the scene is encoded.
+        config.compression.rate.lambda = 0.0;
+        config.train.prune.fraction = 0.0;
+        config.validate()?;
+        Ok(config)
+    }
+
+    /// Writes a run that ends with this model: `encode` makes the file, and `eval` measures it.
+    ///
+    /// # Errors
+    /// As [`ImportedScene::config`] and [`RunFolder::create`].
+    pub fn write_run(
+        self,
+        root: &Path,
+        dataset: Option<&Path>,
+        base: &Config,
+        overwrite: bool,
+    ) -> Result<RunFolder, TrainError> {
+        let config = self.config(base)?;
+        let folder = RunFolder::create(root, dataset, &config, overwrite)?;
+        let iteration = config.train.fine_iterations;
+        let state = Checkpoint {
+            scene: self.scene,
+            compression: None,
+            adam: Adam::default(),
+            density: BTreeMap::new(),
+            stage: Stage::Fine,
+            iteration,
+            seconds: 0.0,
+        };
+        let name = Checkpoint::<HexPlaneField>::file_name(Stage::Fine, iteration);
+        let path = folder.checkpoints().join(name);
+        state.save(&path).map_err(|error| match error {
+            SaveError::Other(error) => error,
+            not_finite => TrainError::Checkpoint { path, problem: not_finite.to_string() },
+        })?;
+        Ok(folder)
+    }
+}

@@ -1,0 +1,101 @@
+import { Camera } from "./camera.js";
+import { Controls } from "./controls.js";
+import { SplatRenderer } from "./splat_renderer.js";
+export type DatasetCamera = import("./camera.js").DatasetCamera;
+export type Vector = import("./camera.js").Vector;
+export type Scene = import("./scene.js").Scene;
+export type View = import("./splat_renderer.js").View;
+export type PlayerOptions = {
+    /**
+     * begin to play; false
+     */
+    autoplay?: boolean;
+    /**
+     * begin again at the end; true
+     */
+    loop?: boolean;
+    /**
+     * of the dataset; the first one is where the view begins
+     */
+    cameras?: DatasetCamera[];
+    /**
+     * whether pointer and keys move the camera; true
+     */
+    controls?: boolean;
+    /**
+     * pixels of the image for one of the page; at most 2 where not given
+     */
+    pixelRatio?: number;
+};
+/**
+ * Plays a {@link Scene} on a canvas. Events: `timechange`, `statechange` (playing, loop, speed), `camerachange`, `error`.
+ */
+export declare class Player extends EventTarget {
+    #private;
+    canvas: HTMLCanvasElement;
+    scene: import("./scene.js").Scene;
+    cameras: import("./camera.js").DatasetCamera[];
+    pixelRatio: number | undefined;
+    loop: boolean;
+    speed: number;
+    /** Whether the camera goes along the training path while time runs. */
+    following: boolean;
+    /** Red, green, blue in [0, 1]. @type {number[]} */
+    background: number[];
+    renderer: SplatRenderer;
+    camera: Camera;
+    home: Camera;
+    /** What the last frames took, in milliseconds. */
+    timings: {
+        evaluate: number;
+        sort: number;
+        upload: number;
+        draw: number;
+    };
+    /** Resolves when the first image is on the canvas. @type {Promise<void>} */
+    ready: Promise<void>;
+    controls: Controls | null;
+    /**
+     * @param {HTMLCanvasElement} canvas
+     * @param {Scene} scene
+     * @param {PlayerOptions} [options]
+     */
+    constructor(canvas: HTMLCanvasElement, scene: Scene, options?: PlayerOptions);
+    /** What is seen now. @returns {View} */
+    get view(): View;
+    /** Time in [0, 1]. */
+    get time(): number;
+    set time(value: number);
+    /** Whether time runs. */
+    get playing(): boolean;
+    /** Lets time run, from the beginning where it is at the end. */
+    play(): void;
+    /** Stops time. */
+    pause(): void;
+    /** Back to where the view began. */
+    resetView(): void;
+    /**
+     * Takes the place of a camera of the dataset, at its time.
+     * @param {number} index
+     */
+    showCamera(index: number): void;
+    /** To be called after the camera was changed from outside. */
+    cameraMoved(): void;
+    /** The training cameras in the order of their times: the path that {@link following} takes. */
+    get path(): import("./camera.js").DatasetCamera[];
+    /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
+    get draftScale(): number;
+    /** Images a second over the last second; 0 where nothing changes. */
+    get fps(): number;
+    /** Draws again, as after {@link background} was changed. */
+    redraw(): void;
+    /**
+     * Draws one time from one place, exactly, and returns the image: `[height, width, 4]` bytes. Time and camera of the
+     * player go there and stay.
+     * @param {number} time @param {View} view
+     * @returns {Promise<Uint8Array>}
+     */
+    renderAt(time: number, view: View): Promise<Uint8Array>;
+    /** Stops, and gives back what the graphics card holds. The scene stays open. */
+    dispose(): void;
+}

@@ -1,0 +1,162 @@
+export type SceneInfo = {
+    /**
+     * for people
+     */
+    name: string;
+    /**
+     * frames of the source
+     */
+    frameCount: number;
+    /**
+     * frames a second of the source, 0 where it is not known
+     */
+    fps: number;
+    /**
+     * smallest and largest corner, world units
+     */
+    bounds: [number[], number[]];
+    /**
+     * red, green, blue in [0, 1]
+     */
+    background: [number, number, number];
+    /**
+     * of the source's default camera, pixels
+     */
+    width: number;
+    /**
+     * of the source's default camera, pixels
+     */
+    height: number;
+    /**
+     * its horizontal field of view, radians
+     */
+    fovX: number;
+    /**
+     * of the format
+     */
+    version: number;
+    /**
+     * of the file
+     */
+    bytes: number;
+    /**
+     * Gaussians
+     */
+    count: number;
+    /**
+     * of the spherical harmonics, 0 to 3
+     */
+    shDegree: number;
+    /**
+     * whether anything changes with time
+     */
+    moves: boolean;
+    /**
+     * name and bytes of each part of the file
+     */
+    sections: [string, number][];
+    /**
+     * free notes
+     */
+    extra: Record<string, string>;
+};
+export type GaussiansAt = {
+    /**
+     * N
+     */
+    count: number;
+    /**
+     * `[N, 3]`: centers, world units
+     */
+    means: Float32Array;
+    /**
+     * `[N, 3]`: standard deviations, world units
+     */
+    scales: Float32Array;
+    /**
+     * `[N, 4]`: `(w, x, y, z)` of unit length
+     */
+    quaternions: Float32Array;
+    /**
+     * `[N]` in [0, 1]
+     */
+    opacities: Float32Array;
+    /**
+     * d
+     */
+    shDegree: number;
+    /**
+     * `[N, (d + 1)², 3]`: a color is `max(0, 0.5 + Σ basis · coefficient)`
+     */
+    sh: Float32Array;
+};
+export type Viewpoint = {
+    /**
+     * the depth of a point is `row · (x, y, z, 1)`
+     */
+    row: ArrayLike<number>;
+    /**
+     * the camera's center, world units
+     */
+    eye: ArrayLike<number>;
+};
+export type Frame = {
+    /**
+     * back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
+     * color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
+     */
+    list: Float32Array;
+    /**
+     * what the motion took
+     */
+    evaluateMs: number;
+    /**
+     * what order and colors took
+     */
+    sortMs: number;
+};
+/** A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. */
+export declare class Scene {
+    #private;
+    /** @type {SceneInfo} */
+    info: SceneInfo;
+    /** What decoding took, in milliseconds. */
+    decodeMs: number;
+    /** Use {@link load}. */
+    constructor();
+    /** @param {ArrayBuffer} bytes */
+    open(bytes: ArrayBuffer): Promise<void>;
+    /** Number of Gaussians. */
+    get count(): number;
+    /** Length in seconds: the source's where it is known, else at 30 frames a second. */
+    get duration(): number;
+    /**
+     * The Gaussians at a time in [0, 1], activated, for a renderer of your own.
+     * @param {number} time
+     * @returns {Promise<GaussiansAt>}
+     */
+    gaussiansAt(time: number): Promise<GaussiansAt>;
+    /**
+     * What the renderer draws at a time from a viewpoint.
+     * @param {number | null} time  nothing: as before
+     * @param {Viewpoint} viewpoint
+     * @param {ArrayBuffer | null} [memory]  to be used again
+     * @returns {Promise<Frame>}
+     */
+    frame(time: number | null, viewpoint: Viewpoint, memory?: ArrayBuffer | null): Promise<Frame>;
+    /**
+     * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
+     * @param {ArrayBuffer} bytes
+     * @returns {Promise<string>}
+     */
+    digest(bytes: ArrayBuffer): Promise<string>;
+    /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
+    close(): void;
+}
+/**
+ * Decodes a `.l4gs` file.
+ * @param {ArrayBuffer | Uint8Array} bytes
+ * @returns {Promise<Scene>}
+ * @throws {SceneError} whose `kind` says what is wrong with the file
+ */
+export declare function load(bytes: ArrayBuffer | Uint8Array): Promise<Scene>;

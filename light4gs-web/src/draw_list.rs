@@ -1,0 +1,182 @@
+//! What is drawn: Gaussians in front of a camera, back to front, with the colors that are seen from there.
+
+use light4gs_codec::GaussianArrays;
+
+use crate::gaussians::FLOATS;
+
+/// Numbers of one entry, four texels: those of [`FLOATS`], then red, green, blue, and three that fill up.
+pub const ENTRY: usize = 16;
+/// Entries of a texture's row. Lists are filled up to whole rows with transparent ones.
+pub const ROW: usize = 256;
+
+/// What lies nearer along the view axis is not drawn, as in the renderer of the program.
+const NEAR: f32 = 0.2;
+/// What is fainter contributes nothing.
+const MIN_ALPHA: f32 = 1.0 / 255.0;
+const DIGIT_BITS: u32 = 11;
+const DIGITS: usize = 1 << DIGIT_BITS;
+
+/// Where a list is seen from.
+#[derive(Clone, Copy, Debug)]
+pub struct Viewpoint {
+    /// The depth of a point is `row · (x, y, z, 1)`.
+    pub row: [f32; 4],
+    /// The camera's center, world units.
+    pub eye: [f32; 3],
+}
+
+/// A list and the memory of making it.
+#[derive(Debug, Default)]
+pub(crate) struct DrawList {
+    keys: Vec<(u32, u32)>,
+    other: Vec<(u32, u32)>,
+    entries: Vec<f32>,
+}
+
+impl DrawList {
+    /// The Gaussians in front of the camera, farthest first, of equal ones the later first. `packed` has [`FLOATS`] numbers
+    /// for each Gaussian.
+    pub(crate) fn make(&mut self, packed: &[f32], gaussians: &GaussianArrays, viewpoint: &Viewpoint) -> &[f32] {
+        let Viewpoint { row, eye } = viewpoint;
+        self.keys.clear();
+        for (index, gaussian) in packed.chunks_exact(FLOATS).enumerate() {
+            let depth = gaussian[0] * row[0] + gaussian[1] * row[1] + gaussian[2] * row[2] + row[3];
+            if depth > NEAR && gaussian[3] >= MIN_ALPHA {
+                // Depths are positive, so their bits sort as they do.
+                self.keys.push((depth.to_bits(), index as u32));
+            }
+        }
+        self.sort();
+        self.entries.clear();
+        self.entries.reserve(ENTRY * self.keys.len().next_multiple_of(ROW));
+        for &(_, index) in self.keys.iter().rev() {
+            let index = index as usize;
+            let gaussian = &packed[FLOATS * index..][..FLOATS];
+            let color = seen_color(gaussians, index, std::array::from_fn(|axis| gaussian[axis] - eye[axis]));
+            if color.iter().all(|value| value.is_finite()) {
+                self.entries.extend_from_slice(gaussian);
+                self.entries.extend_from_slice(&color);
+                self.entries.extend_from_slice(&[0.0; ENTRY - FLOATS - 3]);
+            }
+        }
+        self.entries.resize(self.entries.len().next_multiple_of(ENTRY * ROW), 0.0);
+        &self.entries
+    }
+
+    /// By rising key, equal ones in their order.
+    fn sort(&mut self) {
+        self.other.resize(self.keys.len(), (0, 0));
+        // The sign is 0: 31 bits are left, three digits.
+        for digit in 0..3 {
+            let place = |key: u32| (key >> (digit * DIGIT_BITS)) as usize % DIGITS;
+            let mut starts = [0u32; DIGITS];
+            self.keys.iter().for_each(|&(key, _)| starts[place(key)] += 1);
+            let mut sum = 0;
+            for start in &mut starts {
+                sum += std::mem::replace(start, sum);
+            }
+            for &(key, index) in &self.keys {
+                let start = &mut starts[place(key)];
+                self.other[*start as usize] = (key, index);
+                *start += 1;
+            }
+            std::mem::swap(&mut self.keys, &mut self.other);
+        }
+    }
+}
+
+/// The color of a Gaussian seen along an offset from the camera: `max(0, 0.5 + Σ basis · coefficient)`.
+fn seen_color(gaussians: &GaussianArrays, index: usize, offset: [f32; 3]) -> [f32; 3] {
+    let length = offset.iter().map(|x| x * x).sum::<f32>().sqrt();
+    let direction = if length > 0.0 { offset.map(|x| x / length) } else { [0.0; 3] };
+    let mut color = gaussians.sh_dc[index].map(|value| 0.5 + 0.282_094_8 * value);
+    let rest = gaussians.sh_rest.len() / gaussians.len();
+    let coefficients = &gaussians.sh_rest[rest * index..][..rest];
+    for (basis, coefficient) in basis(direction).iter().zip(coefficients.chunks_exact(3)) {
+        color.iter_mut().zip(coefficient).for_each(|(sum, value)| *sum += basis * value);
+    }
+    color.map(|value| if value < 0.0 { 0.0 } else { value })
+}
+
+/// Real spherical harmonics of degrees 1 to 3, with the signs of the original 3DGS.
+fn basis([x, y, z]: [f32; 3]) -> [f32; 15] {
+    let (xx, yy, zz) = (x * x, y * y, z * z);
+    [
+        -0.488_602_5 * y,
+        0.488_602_5 * z,
+        -0.488_602_5 * x,
+        1.092_548_4 * x * y,
+        -1.092_548_4 * y * z,
+        0.315_391_57 * (2.0 * zz - xx - yy),
+        -1.092_548_4 * x * z,
+        0.546_274_2 * (xx - yy),
+        -0.590_043_6 * y * (3.0 * xx - yy),
+        2.890_611_4 * x * y * z,
+        -0.457_045_8 * y * (4.0 * zz - xx - yy),
+        0.373_176_34 * z * (2.0 * zz - 3.0 * xx - 3.0 * yy),
+        -0.457_045_8 * x * (4.0 * zz - xx - yy),
+        1.445_305_7 * z * (xx - yy),
+        -0.590_043_6 * x * (xx - 3.0 * yy),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Gaussians along z whose index is their red: `2 · index` before the harmonics' scale.
+    fn along_z(depths: &[f32]) -> (Vec<f32>, GaussianArrays) {
+        let count = depths.len();
+        let mut packed = vec![0.0; FLOATS * count];
+        for (gaussian, &z) in packed.chunks_exact_mut(FLOATS).zip(depths) {
+            (gaussian[2], gaussian[3]) = (z, 1.0);
+        }
+        let sh_dc = (0..count).map(|index| [index as f32 / 0.282_094_8, 0.0, -9.0]).collect();
+        (packed, GaussianArrays { means: vec![[0.0; 3]; count], sh_dc, ..GaussianArrays::default() })
+    }
+
+    fn order(list: &mut DrawList, scene: &(Vec<f32>, GaussianArrays), z: f32) -> Vec<usize> {
+        let viewpoint = Viewpoint { row: [0.0, 0.0, z, 0.0], eye: [0.0; 3] };
+        let entries = list.make(&scene.0, &scene.1, &viewpoint);
+        assert!(entries.len().is_multiple_of(ENTRY * ROW));
+        let drawn = entries.chunks_exact(ENTRY).filter(|entry| entry[3] > 0.0);
+        drawn.map(|entry| (entry[FLOATS] - 0.5).round() as usize).collect()
+    }
+
+    #[test]
+    fn farthest_first_ties_by_index_and_nothing_behind_the_camera() {
+        let mut scene = along_z(&[5.0, 0.2, 1.0, -3.0, 5.0, 1e20, 0.25, f32::NAN, 2.0]);
+        scene.0[FLOATS * 8 + 3] = 0.001;
+        let mut list = DrawList::default();
+        assert_eq!(order(&mut list, &scene, 1.0), [5, 4, 0, 2, 6]);
+        // The same memory again, seen from the other side.
+        assert_eq!(order(&mut list, &scene, -1.0), [3]);
+    }
+
+    #[test]
+    fn many_are_sorted_as_the_library_sorts() {
+        let mut state = 1u32;
+        let mut random = || {
+            state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+            (state >> 8) as f32 / (1 << 24) as f32
+        };
+        let depths: Vec<f32> =
+            (0..5000).map(|_| 0.3 + 10.0 * (random() * 64.0).floor() / 64.0 + 0.001 * random()).collect();
+        let mut expected: Vec<usize> = (0..5000).collect();
+        expected.sort_by(|&a, &b| depths[b].total_cmp(&depths[a]).then(b.cmp(&a)));
+        assert_eq!(order(&mut DrawList::default(), &along_z(&depths), 1.0), expected);
+    }
+
+    #[test]
+    fn colors_follow_the_direction_and_are_cut_at_black() {
+        let (_, mut gaussians) = along_z(&[1.0]);
+        (gaussians.sh_degree, gaussians.sh_rest) = (1, vec![0.0; 9]);
+        gaussians.sh_rest[3..6].copy_from_slice(&[1.0, 0.0, 0.0]); // along z
+        let seen = |z: f32| seen_color(&gaussians, 0, [0.0, 0.0, z]);
+        assert!(
+            (seen(3.0)[0] - (0.5 + 0.488_602_5)).abs() < 1e-6 && (seen(-2.0)[0] - (0.5 - 0.488_602_5)).abs() < 1e-6
+        );
+        assert_eq!(seen(1.0)[2], 0.0);
+        assert_eq!(seen(0.0)[0], 0.5);
+    }
+}

@@ -1,0 +1,145 @@
+//! Many hostile streams: `cargo run --release -p light4gs-hostile -- --inputs 1000000 --threads 2 --seed 1`.
+//!
+//! Prints what was found, and saves the bytes of each finding.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::PathBuf,
+    process::ExitCode,
+    sync::{
+        Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+    time::{Duration, Instant},
+};
+
+use light4gs_hostile::{
+    Inputs,
+    watch::{CountingAllocator, Decoder, Outcome},
+};
+
+#[global_allocator]
+static ALLOCATOR: CountingAllocator = CountingAllocator;
+
+const USAGE: &str = "usage: hostile-streams [--inputs N] [--threads N] [--seed N] [--first N] [--out FOLDER]";
+/// Inputs between two lines of progress.
+const REPORT: u64 = 50_000;
+
+/// What all inputs did.
+#[derive(Default)]
+struct Summary {
+    sound: u64,
+    refused: u64,
+    kinds: BTreeMap<&'static str, (u64, u64)>,
+    findings: Vec<String>,
+    most_bytes: (usize, u64),
+    most_time: (Duration, u64),
+    time: Duration,
+}
+
+impl Summary {
+    fn add(&mut self, number: u64, kind: &'static str, outcome: &Outcome) {
+        let sound = matches!(outcome.answer, Some(Ok(())));
+        self.sound += u64::from(sound);
+        self.refused += u64::from(!sound);
+        let (all, decoded) = self.kinds.entry(kind).or_default();
+        (*all, *decoded) = (*all + 1, *decoded + u64::from(sound));
+        self.most_bytes = self.most_bytes.max((outcome.bytes, number));
+        self.most_time = self.most_time.max((outcome.time, number));
+        self.time += outcome.time;
+    }
+
+    fn print(&self, seconds: f64) {
+        let (bytes, by_bytes) = self.most_bytes;
+        let (time, by_time) = self.most_time;
+        println!(
+            "{} inputs in {seconds:.0} s: {} decoded, {} refused, {} findings; most memory {:.1} MiB (input {by_bytes}), \
+             most time {:.3} s (input {by_time}), mean {:.2} ms",
+            self.sound + self.refused,
+            self.sound,
+            self.refused,
+            self.findings.len(),
+            bytes as f64 / f64::from(1 << 20),
+            time.as_secs_f64(),
+            self.time.as_secs_f64() * 1e3 / (self.sound + self.refused).max(1) as f64,
+        );
+    }
+}
+
+struct Arguments {
+    inputs: u64,
+    threads: u64,
+    seed: u64,
+    first: u64,
+    out: PathBuf,
+}
+
+fn arguments() -> Result<Arguments, String> {
+    let mut all = Arguments { inputs: 10_000, threads: 1, seed: 1, first: 0, out: "target/hostile-findings".into() };
+    let mut given = std::env::args().skip(1);
+    while let Some(name) = given.next() {
+        let value = given.next().ok_or_else(|| format!("{name} needs a value; {USAGE}"))?;
+        let number = || value.parse::<u64>().map_err(|_| format!("{name} {value} is no number; {USAGE}"));
+        match name.as_str() {
+            "--inputs" => all.inputs = number()?,
+            "--threads" => all.threads = number()?.clamp(1, 64),
+            "--seed" => all.seed = number()?,
+            "--first" => all.first = number()?,
+            "--out" => all.out = value.into(),
+            _ => return Err(format!("unknown argument {name}; {USAGE}")),
+        }
+    }
+    Ok(all)
+}
+
+fn main() -> ExitCode {
+    let Arguments { inputs, threads, seed, first, out } = match arguments() {
+        Ok(arguments) => arguments,
+        Err(problem) => {
+            eprintln!("{problem}");
+            return ExitCode::from(2);
+        }
+    };
+    std::panic::set_hook(Box::new(|_| ()));
+    let (made, next) = (Inputs::new(seed), AtomicU64::new(first));
+    let (summary, begin) = (Mutex::new(Summary::default()), Instant::now());
+    let work = || {
+        let decoder = Decoder::on_this_thread();
+        loop {
+            let number = next.fetch_add(1, Ordering::Relaxed);
+            if number >= first + inputs {
+                return;
+            }
+            let (kind, bytes) = made.input(number);
+            let outcome = decoder.run(&bytes);
+            let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
+            summary.add(number, kind, &outcome);
+            if let Some(fault) = outcome.fault() {
+                let file = out.join(format!("{seed}-{number}-{}.l4gs", fault.replace(' ', "-")));
+                let saved = fs::create_dir_all(&out).and_then(|()| fs::write(&file, &bytes));
+                let (mib, seconds) = (outcome.bytes >> 20, outcome.time.as_secs_f64());
+                let place = saved.map_or_else(|error| format!("not saved: {error}"), |()| file.display().to_string());
+                let line = format!("{fault}: {kind}, {} bytes, {mib} MiB, {seconds:.2} s, {place}", bytes.len());
+                println!("{line}");
+                summary.findings.push(line);
+            }
+            if (number + 1 - first).is_multiple_of(REPORT) {
+                summary.print(begin.elapsed().as_secs_f64());
+            }
+        }
+    };
+    thread::scope(|scope| {
+        (0..threads).for_each(|_| {
+            scope.spawn(work);
+        });
+    });
+    let summary = summary.into_inner().unwrap_or_else(PoisonError::into_inner);
+    println!("\nseed {seed}, inputs {first} to {}", first + inputs);
+    for (kind, (all, decoded)) in &summary.kinds {
+        println!("{all:9}  {kind} ({decoded} decoded)");
+    }
+    summary.print(begin.elapsed().as_secs_f64());
+    if summary.findings.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}

@@ -1,0 +1,30 @@
+//! Sound streams to begin with.
+
+use light4gs_codec::{CompressionInput, FrequencyTable, Profile, ShCoding, encode, encode_compressed};
+
+use crate::parts::Parts;
+
+#[path = "../../../light4gs-codec/tests/common/mod.rs"]
+mod common;
+
+use common::compression::{ALL_PARTS, ShKind, compact_shape, input, scene, sh_networks, tiny};
+
+/// Streams with something of everything: without loss, in both profiles, with every kind of harmonics, with many Gaussians,
+/// with long frequency tables.
+pub(crate) fn streams() -> Vec<Parts> {
+    let mut streams = vec![encode(&common::sample()).expect("sound")];
+    let mut add = |scene: &_, input: &_| streams.push(encode_compressed(scene, input).expect("sound").bytes);
+    for profile in [Profile::Compact, Profile::Paper] {
+        let (scene, input) = tiny(profile);
+        add(&scene, &input);
+        add(&scene, &CompressionInput { sh: sh_networks(ShKind::Everything, 2, 8), ..input.clone() });
+        add(&scene, &CompressionInput { planes: None, ..input });
+    }
+    let many = scene(400, 3, 4, [8, 8, 8, 4], &[1]);
+    let coding = input(&many, Profile::Compact, compact_shape(4, ALL_PARTS));
+    add(&many, &coding);
+    let flat = vec![1.0 / 16_384.0; 16_384];
+    let table = FrequencyTable::from_pmf(-8192, &flat).expect("a legal table");
+    add(&many, &CompressionInput { sh: ShCoding::Tables { step: 0.02, tables: vec![table; 45] }, ..coding });
+    streams.iter().map(|bytes| Parts::of(bytes)).collect()
+}

@@ -1,0 +1,44 @@
+//! The decoder as a WebAssembly module, for `.ci/wasm`: bytes in, the scene as a stream without loss out.
+//!
+//! Node puts a stream where [`input`] says, calls [`decode`], and finds the answer at [`answer`].
+
+use std::sync::Mutex;
+
+/// What goes in, and what comes out.
+static INPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+static ANSWER: Mutex<Vec<u8>> = Mutex::new(Vec::new());
+
+fn place(of: &Mutex<Vec<u8>>, make: impl FnOnce(&mut Vec<u8>)) -> *mut u8 {
+    let mut bytes = of.lock().expect("one thread, which has not panicked");
+    make(&mut bytes);
+    bytes.as_mut_ptr()
+}
+
+/// Memory for a stream of so many bytes.
+// SAFETY: no other symbol of this module is called so.
+#[unsafe(no_mangle)]
+pub extern "C" fn input(length: usize) -> *mut u8 {
+    place(&INPUT, |bytes| *bytes = vec![0; length])
+}
+
+/// Decodes what stands in that memory; returns the length of the answer, or minus that of a message.
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+pub extern "C" fn decode() -> i32 {
+    let input = INPUT.lock().expect("one thread, which has not panicked").clone();
+    let scene = light4gs_codec::decode(&input).and_then(|scene| light4gs_codec::encode(&scene));
+    let (bytes, sign) = match scene {
+        Ok(bytes) => (bytes, 1),
+        Err(error) => (error.to_string().into_bytes(), -1),
+    };
+    let length = bytes.len() as i32;
+    place(&ANSWER, |answer| *answer = bytes);
+    sign * length
+}
+
+/// Where the answer stands.
+// SAFETY: as above.
+#[unsafe(no_mangle)]
+pub extern "C" fn answer() -> *mut u8 {
+    place(&ANSWER, |_| ())
+}
