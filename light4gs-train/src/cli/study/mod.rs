@@ -5,7 +5,7 @@ mod local;
 mod slurm;
 mod task;
 
-use std::collections::BTreeMap;
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -122,7 +122,7 @@ struct Planned<'a> {
 }
 
 fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainError> {
-    let mut trained = BTreeMap::new();
+    let mut trained = BTreeSet::new();
     let mut rows = Vec::new();
     for run in &plan.runs {
         let path = out.as_ref().map(|out| out.join(&run.name));
@@ -132,7 +132,7 @@ fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainErr
             _ => "to do",
         };
         let train = &run.config.train;
-        let first = trained.insert(run.task, ()).is_none();
+        let first = trained.insert(run.task);
         let iterations = if first { train.coarse_iterations + train.fine_iterations } else { 0 };
         rows.push(Planned {
             task: run.task,
