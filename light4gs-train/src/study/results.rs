@@ -143,7 +143,9 @@ impl Results {
             let evaluation: EvaluationFile = run_folder
                 .read_json("eval.json")?
                 .ok_or_else(|| TrainError::Input(format!("{} has no eval.json", path.display())))?;
-            let frames = light4gs_codec::read_info_with_limits(&run_folder.stream(), &light4gs_codec::Limits::large()).ok().map(|info| info.meta.frame_count);
+            let frames = light4gs_codec::read_info_with_limits(&run_folder.stream(), &light4gs_codec::Limits::large())
+                .ok()
+                .map(|info| info.meta.frame_count);
             results.runs.push(result(run, evaluation, frames.filter(|count| *count > 0)));
         }
         Ok(results)

@@ -28,7 +28,10 @@ pub(super) fn values(
 ) -> Result<Option<Figure>, TrainError> {
     let mut all = Vec::new();
     for (label, run) in runs {
-        let data = light4gs_codec::read_file_with_limits(&folder.path(&run.run).join("scene.l4gs"), &light4gs_codec::Limits::large())?;
+        let data = light4gs_codec::read_file_with_limits(
+            &folder.path(&run.run).join("scene.l4gs"),
+            &light4gs_codec::Limits::large(),
+        )?;
         let values: Vec<f32> = data.hexplane.planes.into_iter().flat_map(|plane| plane.values).collect();
         all.push((label.clone(), values));
     }
