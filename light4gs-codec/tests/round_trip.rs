@@ -59,17 +59,20 @@ fn info_tells_what_is_inside() {
 
 prop_compose! {
     fn metas()(
-        name in ".{0,12}",
-        counts in prop::array::uniform3(any::<u32>()),
+        // No control characters, and none that turn the direction of text (general categories Cc and Cf).
+        name in "[^\\p{Cc}\\p{Cf}]{0,12}",
+        frame_count in 0u32..=100_000,
+        // 2^25 pixels are the most.
+        size_of_images in prop::array::uniform2(0u32..=5792),
         fps in 0.0f32..1e6,
         corner in prop::array::uniform3(-1e6f32..1e6),
         size in prop::array::uniform3(0.0f32..1e6),
         background in prop::array::uniform3(any::<f32>().prop_filter("finite", |x| x.is_finite())),
         config_digest in any::<[u8; 32]>(),
         fov_x in 0.0f32..3.0,
-        extra in btree_map(".{0,6}", ".{0,12}", 0..4),
+        extra in btree_map("[^\\p{Cc}\\p{Cf}]{0,6}", "[^\\p{Cc}\\p{Cf}]{0,12}", 0..4),
     ) -> SceneMeta {
-        let [frame_count, width, height] = counts;
+        let [width, height] = size_of_images;
         let high = std::array::from_fn(|axis| corner[axis] + size[axis]);
         SceneMeta {
             name, frame_count, fps, bounds: [corner, high], background, config_digest, width, height, fov_x, extra,

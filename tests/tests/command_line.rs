@@ -286,12 +286,27 @@ fn wrong_arguments() {
     assert_refused(&w.run(["bench", "--device", "abacus"]), &["abacus", "ndarray"]);
     assert_refused(&w.run(["bench", "--gaussians", "0"]), &["--gaussians", "between 1"]);
     assert_refused(&w.run(["synth", "scene"]), &["scene"]);
-    for command in
-        ["quickstart", "train", "resume", "eval", "render", "encode", "decode", "info", "export", "synth", "bench"]
-    {
+    for command in [
+        "quickstart",
+        "prepare",
+        "train",
+        "resume",
+        "eval",
+        "render",
+        "view",
+        "import",
+        "encode",
+        "decode",
+        "info",
+        "export",
+        "synth",
+        "study",
+        "compare",
+        "bench",
+    ] {
         let output = w.run([command, "--help"]);
         assert_success(&output);
-        assert!(String::from_utf8_lossy(&output.stdout).contains("Example:"), "{command} --help has no example");
+        assert!(String::from_utf8_lossy(&output.stdout).contains("\nExample"), "{command} --help has no example");
     }
 }
 

@@ -18,11 +18,15 @@ type Masked = (Arc<RgbImage8>, Option<Arc<PixelMask>>);
 /// An image file at a size.
 type Key = (PathBuf, u32, u32);
 
+/// Whether an image was decoded ahead and has not been asked for since, and when that was or it was last asked for. The
+/// smallest is dropped first: in a shuffled order, what has just been used is needed last of all.
+type Age = (bool, u64);
+
 /// A thread-safe store of the images of frames: `[H, W, 3]` bytes, on the background, at the size
 /// of the frame's camera.
 ///
-/// Images are decoded on demand and the least recently used are dropped when the bound is
-/// reached. Clones share one store. An image is decoded once even if several threads ask for it.
+/// Images are decoded on demand. When the bound is reached, the least recently used are dropped, and only after them those
+/// that were decoded ahead and still wait to be used. Clones share one store. An image is decoded once even if several threads ask for it.
 #[derive(Clone)]
 pub struct ImageStore {
     inner: Arc<Inner>,
@@ -37,10 +41,9 @@ struct Inner {
 
 #[derive(Default)]
 struct State {
-    /// The image and when it was last asked for.
-    kept: HashMap<Key, (Masked, u64)>,
-    /// When, to which: the first is the least recently used.
-    by_age: BTreeMap<u64, Key>,
+    kept: HashMap<Key, (Masked, Age)>,
+    /// The first is dropped first.
+    by_age: BTreeMap<Age, Key>,
     bytes: usize,
     clock: u64,
     /// Images that some thread is decoding right now.
@@ -89,7 +92,7 @@ impl ImageStore {
         let key = key(frame);
         let mut state = self.inner.lock();
         loop {
-            if let Some(image) = state.touch(&key) {
+            if let Some(image) = state.touch(&key, false) {
                 return Ok(image);
             }
             if !state.decoding.contains(&key) {
@@ -100,7 +103,7 @@ impl ImageStore {
         }
         state.decoding.insert(key.clone());
         drop(state);
-        self.inner.decode_claimed(frame, key)
+        self.inner.decode_claimed(frame, key, false)
     }
 
     /// The images of several frames, in their order, decoded in parallel.
@@ -120,7 +123,7 @@ impl ImageStore {
             if bytes > self.inner.limit {
                 break;
             }
-            if self.inner.lock().touch(&key(frame)).is_some() {
+            if self.inner.lock().touch(&key(frame), true).is_some() {
                 continue;
             }
             let inner = Arc::clone(&self.inner);
@@ -133,7 +136,7 @@ impl ImageStore {
                 }
                 drop(state);
                 // Said by `get`, to the caller who wants the image.
-                let _ = inner.decode_claimed(&frame, key);
+                let _ = inner.decode_claimed(&frame, key, true);
             });
         }
     }
@@ -174,7 +177,7 @@ impl Inner {
     }
 
     /// Decodes an image that this thread has marked in `decoding`, and keeps it if it fits.
-    fn decode_claimed(&self, frame: &Frame, key: Key) -> Result<Masked, DataError> {
+    fn decode_claimed(&self, frame: &Frame, key: Key, ahead: bool) -> Result<Masked, DataError> {
         /// Takes the mark back, also if a decoder panics: others would wait for ever.
         struct Claim<'a>(&'a Inner, Key);
         impl Drop for Claim<'_> {
@@ -185,23 +188,24 @@ impl Inner {
         }
         let claim = Claim(self, key);
         let image = (Arc::new(decode(frame, self.background)?), trained_pixels(frame)?.map(Arc::new));
-        self.lock().keep(claim.1.clone(), &image, self.limit);
+        self.lock().keep(claim.1.clone(), &image, self.limit, ahead);
         Ok(image)
     }
 }
 
 impl State {
-    fn touch(&mut self, key: &Key) -> Option<Masked> {
+    /// The image, if it is kept: asked for now, or wanted `ahead`.
+    fn touch(&mut self, key: &Key, ahead: bool) -> Option<Masked> {
         self.clock += 1;
-        let (image, used) = self.kept.get_mut(key)?;
-        self.by_age.remove(used);
-        *used = self.clock;
+        let (image, age) = self.kept.get_mut(key)?;
+        self.by_age.remove(age);
+        *age = (ahead, self.clock);
         let image = image.clone();
-        self.by_age.insert(self.clock, key.clone());
+        self.by_age.insert((ahead, self.clock), key.clone());
         Some(image)
     }
 
-    fn keep(&mut self, key: Key, image: &Masked, limit: usize) {
+    fn keep(&mut self, key: Key, image: &Masked, limit: usize, ahead: bool) {
         let size = size_of(image);
         if size > limit || self.kept.contains_key(&key) {
             return;
@@ -216,8 +220,8 @@ impl State {
         }
         self.clock += 1;
         self.bytes += size;
-        self.by_age.insert(self.clock, key.clone());
-        self.kept.insert(key, (image.clone(), self.clock));
+        self.by_age.insert((ahead, self.clock), key.clone());
+        self.kept.insert(key, (image.clone(), (ahead, self.clock)));
     }
 }
 

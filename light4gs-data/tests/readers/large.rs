@@ -101,5 +101,5 @@ fn images_decoded_ahead_are_there_when_they_are_asked_for() {
     waits[6..].sort();
     let median = waits[6 + 17];
     println!("an image takes {decoding:.1?} to decode; waited {median:.1?} in the median once warm");
-    assert!(median < decoding / 4, "{median:?} of {decoding:?}");
+    assert!(median < decoding / 10, "{median:?} of {decoding:?}");
 }

@@ -33,7 +33,8 @@ fn every_file_of_configs_is_a_preset() {
         paths
             .flat_map(|path| {
                 if path.is_dir() {
-                    return below(&path);
+                    // Studies have a list of their own.
+                    return if path.ends_with("studies") { Vec::new() } else { below(&path) };
                 }
                 let name = path.file_stem().and_then(|stem| stem.to_str()).expect("a name");
                 vec![name.to_owned()]

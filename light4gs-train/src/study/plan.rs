@@ -273,7 +273,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let alike = vec!["compression.rate.lambda=0.1".to_owned()];
         refused(study(LAMBDAS), PlanOptions { overrides: alike, ..good.clone() }, &["none", "strong", "--set"]);
         let wrong = study(&LAMBDAS.replace("lambda=0.05", "lambda=-1"));
-        refused(wrong, good.clone(), &["strong", "compression.rate.lambda", "at least 0"]);
+        refused(wrong, good.clone(), &["strong", "compression.rate.lambda", "must be 0 to"]);
         refused(study(&LAMBDAS.replace("rate.lambda=0.05", "rate.lamda=0.05")), good.clone(), &["strong", "lambda"]);
         refused(study(&format!("reference = \"weak\"\n{LAMBDAS}")), good.clone(), &["weak", "one of none"]);
         refused(study(LAMBDAS), PlanOptions { config: "dnerf-{scene}".into(), ..good }, &["dnerf-scene"]);

@@ -116,7 +116,7 @@ fn other_keys(config: &Config) -> [(&'static str, f64); 7] {
 }
 
 /// A key this many times above its default is to blame before any other. Presets stay below.
-const SUSPICIOUS: f64 = 8.0;
+const SUSPICIOUS: f64 = 12.0;
 
 /// Of the learning rates and the weights of the loss the one that is furthest above its default, and that default. None
 /// where all are about as usual.
