@@ -14,8 +14,8 @@ use serde_json::json;
 
 use super::check_output;
 use super::limits::LimitsArgument;
+use super::output::progress::FitBar;
 use super::output::{say, say_json};
-use super::progress::FitBar;
 use super::train::{coding_table, sections_table};
 use crate::compression::{TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};

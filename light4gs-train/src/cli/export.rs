@@ -11,7 +11,7 @@ use light4gs_web::page::{Content, page};
 
 use super::check_output;
 use super::limits::LimitsArgument;
-use super::most::{MOST_FRAMES, frame_count};
+use super::limits::most::{MOST_FRAMES, frame_count};
 use super::output::say;
 use super::view::dataset_cameras;
 use crate::config::DeviceName;

@@ -9,8 +9,8 @@ use light4gs_data::{Scene, write_atomically};
 
 use super::check_output;
 use super::container::print_info;
+use super::output::progress::FitBar;
 use super::output::say;
-use super::progress::FitBar;
 use crate::compression::{TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};

@@ -9,7 +9,7 @@ use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
 use super::check_output;
 use super::limits::LimitsArgument;
-use super::most::{MOST_FRAMES, MOST_SIDE, image_size};
+use super::limits::most::{MOST_FRAMES, MOST_SIDE, image_size};
 use super::output::say;
 use crate::config::DeviceName;
 use crate::device;

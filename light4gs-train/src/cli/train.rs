@@ -8,8 +8,8 @@ use light4gs_data::{Layouts, Scene};
 use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
 use super::limits::LimitsArgument;
+use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
-use super::progress::ProgressBars;
 use super::signals::stop_flag;
 use crate::compression::CodingRecord;
 use crate::config::{Config, DeviceName};

@@ -2,14 +2,14 @@
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::output::tell;
+use super::tell;
 use crate::Stage;
 use crate::error::TrainError;
 use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 
 /// A bar for each stage, and one for the fitting of entropy models.
-pub(super) struct ProgressBars {
+pub(in crate::cli) struct ProgressBars {
     hidden: bool,
     stage: ProgressBar,
     fit: FitBar,
@@ -17,7 +17,7 @@ pub(super) struct ProgressBars {
 
 impl ProgressBars {
     /// `quiet` shows nothing.
-    pub(super) fn new(quiet: bool) -> Self {
+    pub(in crate::cli) fn new(quiet: bool) -> Self {
         Self { hidden: quiet, stage: ProgressBar::hidden(), fit: FitBar::new(quiet) }
     }
 }
@@ -61,19 +61,19 @@ impl Observer for ProgressBars {
 }
 
 /// The bar of the fitting of entropy models, made when that begins.
-pub(super) struct FitBar {
+pub(in crate::cli) struct FitBar {
     hidden: bool,
     bar: Option<ProgressBar>,
 }
 
 impl FitBar {
     /// `quiet` shows nothing.
-    pub(super) fn new(quiet: bool) -> Self {
+    pub(in crate::cli) fn new(quiet: bool) -> Self {
         Self { hidden: quiet, bar: None }
     }
 
     /// So many of the iterations are done.
-    pub(super) fn show(&mut self, done: usize, iterations: usize) {
+    pub(in crate::cli) fn show(&mut self, done: usize, iterations: usize) {
         let template = "   fit {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}";
         let bar = self.bar.get_or_insert_with(|| bar(self.hidden, iterations, template));
         bar.set_position(done as u64);

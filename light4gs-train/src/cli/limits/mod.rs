@@ -1,4 +1,6 @@
-//! `--limits`: how much a file may ask for.
+//! `--limits`: how much a file may ask for, and how much a command makes at most.
+
+pub(super) mod most;
 
 use clap::{Args, ValueEnum};
 use light4gs_codec::Limits;

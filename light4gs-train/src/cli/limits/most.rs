@@ -5,17 +5,17 @@ use light4gs_codec::SceneMeta;
 use crate::error::TrainError;
 
 /// Width and height of an image.
-pub(super) const MOST_SIDE: u32 = 16_384;
+pub(in crate::cli) const MOST_SIDE: u32 = 16_384;
 /// Pixels of an image: 8K. Its rendering takes some hundred bytes for each.
 const MOST_PIXELS: u64 = 1 << 25;
 /// Frames of a video, files of an export.
-pub(super) const MOST_FRAMES: u32 = 100_000;
+pub(in crate::cli) const MOST_FRAMES: u32 = 100_000;
 
 /// Size of the images to render: the file's own, or of this width.
 ///
 /// # Errors
 /// [`TrainError::Input`] that names what the file says, and `--width` as the way around it.
-pub(super) fn image_size(meta: &SceneMeta, width: Option<u32>) -> Result<(u32, u32), TrainError> {
+pub(in crate::cli) fn image_size(meta: &SceneMeta, width: Option<u32>) -> Result<(u32, u32), TrainError> {
     let (own_width, own_height) = (meta.width.max(1), meta.height.max(1));
     let wanted = width.unwrap_or(own_width);
     let height = (u64::from(own_height) * u64::from(wanted)).div_ceil(u64::from(own_width)).max(1);
@@ -40,7 +40,7 @@ pub(super) fn image_size(meta: &SceneMeta, width: Option<u32>) -> Result<(u32, u
 ///
 /// # Errors
 /// [`TrainError::Input`] if the file says more than the command line may.
-pub(super) fn frame_count(meta: &SceneMeta, frames: Option<u32>) -> Result<u32, TrainError> {
+pub(in crate::cli) fn frame_count(meta: &SceneMeta, frames: Option<u32>) -> Result<u32, TrainError> {
     let count = frames.unwrap_or(meta.frame_count.max(1));
     if count > MOST_FRAMES {
         return Err(TrainError::Input(format!(

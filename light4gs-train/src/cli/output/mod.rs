@@ -1,5 +1,7 @@
 //! What a command prints.
 
+pub(super) mod progress;
+
 use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
