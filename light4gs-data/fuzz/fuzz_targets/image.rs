@@ -12,8 +12,7 @@ fuzz_target!(|data: &[u8]| {
     for name in ["image.png", "image.jpg"] {
         let path = folder.path().join(name);
         std::fs::write(&path, data).expect("a writable folder");
-        let blank = Frame::without_image("0".into(), camera, 0.0);
-        let frame = Frame { path, source_width: 16, source_height: 16, ..blank };
+        let frame = Frame::new("0", camera, 0.0, path, (16, 16));
         let _ = ImageStore::new(&options, 64 << 20).get(&frame);
     }
 });
