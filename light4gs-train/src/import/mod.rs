@@ -1,7 +1,7 @@
 //! Scenes that other programs have trained.
 //!
 //! - here: what an import gives, and how it becomes a run
-//! - [`reference`]: checkpoints of 4DGaussians, and of the public code of Light4GS
+//! - [`mod@reference`]: checkpoints of 4DGaussians, and of the public code of Light4GS
 //! - [`still`]: plain Gaussians without motion, from a PLY file
 //! - `settings`: the switches in 4DGaussians' `cfg_args`
 //! - `views`: cameras around a scene that came without a dataset
