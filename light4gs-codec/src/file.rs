@@ -14,7 +14,7 @@ use crate::{
 /// Reads a scene from a file.
 ///
 /// # Errors
-/// What the system refuses, and what [`decode`] refuses; the message names the file.
+/// What the system refuses, and what [`decode`](crate::decode) refuses; the message names the file.
 pub fn read_file(path: &Path) -> Result<SceneData, CodecError> {
     read_file_with_limits(path, &Limits::default())
 }
@@ -27,10 +27,10 @@ pub fn read_file_with_limits(path: &Path, limits: &Limits) -> Result<SceneData, 
     read_and(path, limits, |bytes| decode_with_limits(bytes, limits))
 }
 
-/// Reads what a file holds. See [`info`].
+/// Reads what a file holds. See [`info`](crate::info).
 ///
 /// # Errors
-/// What the system refuses, and what [`info`] refuses; the message names the file.
+/// What the system refuses, and what [`info`](crate::info) refuses; the message names the file.
 pub fn read_info(path: &Path) -> Result<StreamInfo, CodecError> {
     read_info_with_limits(path, &Limits::default())
 }

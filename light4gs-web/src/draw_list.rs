@@ -4,7 +4,7 @@ use light4gs_codec::GaussianArrays;
 
 use crate::gaussians::FLOATS;
 
-/// Numbers of one entry, four texels: those of [`FLOATS`], then red, green, blue, and three that fill up.
+/// Numbers of one entry, four texels: those of `FLOATS`, then red, green, blue, and three that fill up.
 pub const ENTRY: usize = 16;
 /// Entries of a texture's row. Lists are filled up to whole rows with transparent ones.
 pub const ROW: usize = 256;

@@ -26,7 +26,7 @@ pub(crate) fn check_text(
     Err(CodecError::invalid(section, field, format!("{start:?}"), "text without control characters"))
 }
 
-/// The name without what [`check_name`] refuses: for names of folders and files, which may hold anything.
+/// The name without what `check_name` refuses: for names of folders and files, which may hold anything.
 ///
 /// ```
 /// use light4gs_codec::legal_name;
