@@ -118,9 +118,8 @@ impl ViewPass<'_> {
         let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
         let rendering = self.splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
         profile.lap("splatting");
-        let truth = image_tensor(&*self.images.image(frame)?, self.device);
+        let mut truth = image_tensor(&*self.images.image(frame)?, self.device);
         let mut image = rendering.image;
-        let mut truth = truth;
         if let Some(mask) = self.images.trained_pixels(frame)? {
             // Black in both: such pixels are alike, whatever the loss.
             let mask = mask_tensor(&mask, self.device).unsqueeze_dim::<3>(2);
