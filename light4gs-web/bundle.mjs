@@ -8,7 +8,18 @@ import { gzipSync } from "node:zlib";
 const [wasm, folder] = process.argv.slice(2);
 const common = { bundle: true, minify: true, target: ["chrome100", "firefox113", "safari16.4"], legalComments: "none", write: false };
 
-const worker = await build({ ...common, entryPoints: ["player/worker.js"], format: "iife" });
+/** Modules made here rather than read: texts by name. */
+const virtual = (parts) => ({
+  name: "virtual",
+  setup(build) {
+    build.onResolve({ filter: /^virtual:/ }, ({ path }) => ({ path, namespace: "virtual" }));
+    build.onLoad({ filter: /.*/, namespace: "virtual" }, ({ path }) => ({ contents: parts[path], loader: "text" }));
+  },
+});
+// What a worker decodes before the first file, so that its code is compiled by then.
+const sample = readFileSync("../tests/golden-streams/compact.l4gs").toString("base64");
+const workerPlugins = [virtual({ "virtual:sample": sample })];
+const worker = await build({ ...common, entryPoints: ["player/worker.js"], format: "iife", plugins: workerPlugins });
 const packed = gzipSync(readFileSync(wasm), { level: 9 });
 packed[9] = 255; // the operating system: none
 const parts = {
@@ -16,14 +27,7 @@ const parts = {
   "virtual:decoder": packed.toString("base64"),
   "virtual:style": (await build({ ...common, entryPoints: ["player/style.css"] })).outputFiles[0].text,
 };
-const virtual = {
-  name: "virtual",
-  setup(build) {
-    build.onResolve({ filter: /^virtual:/ }, ({ path }) => ({ path, namespace: "virtual" }));
-    build.onLoad({ filter: /.*/, namespace: "virtual" }, ({ path }) => ({ contents: parts[path], loader: "text" }));
-  },
-};
-const main = await build({ ...common, entryPoints: ["player/index.js"], format: "esm", plugins: [virtual], charset: "utf8" });
+const main = await build({ ...common, entryPoints: ["player/index.js"], format: "esm", plugins: [virtual(parts)], charset: "utf8" });
 const code = main.outputFiles[0].text;
 // The module also stands inside of pages.
 if (/<\/script|<!--/i.test(code)) throw new Error("the bundle would end the script element that holds it");

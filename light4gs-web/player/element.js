@@ -5,7 +5,7 @@ import { icon, LAYOUT } from "./layout.js";
 import { explain } from "./messages.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "./player.js";
-import { load } from "./scene.js";
+import { load, prepare } from "./scene.js";
 
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
 
@@ -56,6 +56,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   connectedCallback() {
     if (this.#connected) return;
     this.#connected = true;
+    prepare();
     if (this.hasAttribute("page")) this.#acceptFiles();
     const query = this.hasAttribute("page") ? new URLSearchParams(location.search).get("url") : null;
     this.find("open").hidden = !this.hasAttribute("page");

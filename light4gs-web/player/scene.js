@@ -68,6 +68,8 @@ export class Scene {
   #worker;
   #url;
   #next = 0;
+  /** Fails where the browser has no decoder for us. @type {Promise<void>} */
+  #prepared;
 
   /** Use {@link load}. */
   constructor() {
@@ -83,6 +85,9 @@ export class Scene {
       event.preventDefault();
       this.#fail(new SceneError("fault", event.message || "the worker did not start"));
     };
+    // While the file is still on its way.
+    this.#prepared = decoderModule().then((module) => this.#ask({ type: "prepare", module }));
+    this.#prepared.catch(() => {});
     /** @type {SceneInfo} */
     this.info = /** @type {any} */ (null);
     /** What decoding took, in milliseconds. */
@@ -111,7 +116,8 @@ export class Scene {
 
   /** @param {ArrayBuffer} bytes */
   async open(bytes) {
-    const { info, milliseconds } = await this.#ask({ type: "open", module: await decoderModule(), bytes });
+    await this.#prepared;
+    const { info, milliseconds } = await this.#ask({ type: "open", bytes });
     this.info = info;
     this.decodeMs = milliseconds;
   }
@@ -161,7 +167,7 @@ export class Scene {
    * @returns {Promise<string>}
    */
   async digest(bytes) {
-    return (await this.#ask({ type: "digest", module: await decoderModule(), bytes })).digest;
+    return (await this.#ask({ type: "digest", bytes })).digest;
   }
 
   /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
@@ -174,6 +180,14 @@ export class Scene {
   }
 }
 
+/** A worker that waits for a file. @type {Scene | null} */
+let standby = null;
+
+/** Starts a decoder, so that it is ready when the bytes of a file arrive. {@link load} does so itself, but only then. */
+export function prepare() {
+  standby ??= new Scene();
+}
+
 /**
  * Decodes a `.l4gs` file.
  * @param {ArrayBuffer | Uint8Array} bytes
@@ -181,7 +195,8 @@ export class Scene {
  * @throws {SceneError} whose `kind` says what is wrong with the file
  */
 export async function load(bytes) {
-  const scene = new Scene();
+  const scene = standby ?? new Scene();
+  standby = null;
   try {
     await scene.open(bytes instanceof Uint8Array ? bytes.slice().buffer : bytes);
     return scene;

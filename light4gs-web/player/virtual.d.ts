@@ -13,3 +13,8 @@ declare module "virtual:style" {
   const css: string;
   export default css;
 }
+declare module "virtual:sample" {
+  /** A small scene, as base64. */
+  const base64: string;
+  export default base64;
+}

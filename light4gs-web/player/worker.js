@@ -1,5 +1,6 @@
 // The worker: one scene, decoded, moved and sorted off the main thread.
 
+import sampleBase64 from "virtual:sample";
 import { Decoder } from "./decoder.js";
 import { SceneError } from "./errors.js";
 
@@ -25,9 +26,16 @@ const send = (answer, transfer = []) => /** @type {any} */ (self).postMessage(an
 
 /** @type {Record<string, (request: any) => void | Promise<void>>} */
 const answers = {
-  open({ id, module, bytes }) {
-    const start = performance.now();
+  // Browsers compile a function when it is first called. A small scene calls those that every scene needs.
+  prepare({ id, module }) {
     decoder = new Decoder(module);
+    decoder.open(Uint8Array.from(atob(sampleBase64), (character) => character.charCodeAt(0)));
+    send({ id });
+  },
+
+  open({ id, bytes }) {
+    if (!decoder) throw new Error("there is no decoder");
+    const start = performance.now();
     const info = decoder.open(new Uint8Array(bytes));
     send({ id, info, milliseconds: performance.now() - start });
   },
@@ -47,8 +55,9 @@ const answers = {
     send({ id, numbers }, [numbers.buffer]);
   },
 
-  digest({ id, module, bytes }) {
-    send({ id, digest: new Decoder(module).digest(new Uint8Array(bytes)) });
+  digest({ id, bytes }) {
+    if (!decoder) throw new Error("there is no decoder");
+    send({ id, digest: decoder.digest(new Uint8Array(bytes)) });
   },
 };
 

@@ -8,6 +8,7 @@ use clap::Args;
 use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
+use light4gs_model::DeformationField;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
@@ -17,7 +18,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::FitBar;
 use super::output::{say, say_json};
 use super::train::{coding_table, sections_table};
-use crate::compression::{TrainedScene, code_scene};
+use crate::compression::{CodedScene, TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
 use crate::device;
@@ -83,13 +84,7 @@ impl Encode {
             images: record.scene.is_some().then_some(&images),
             device: &device,
         };
-        let mut bar = FitBar::new(self.json);
-        let coded = code_scene(&trained, &mut |done, iterations| {
-            bar.show(done, iterations);
-            Ok(())
-        })?;
-        write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
-        print_info(&read_info_with_limits(&self.out, &Limits::large())?, self.json)?;
+        let coded = code_to_file(&trained, &self.out, self.json)?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
@@ -98,6 +93,22 @@ impl Encode {
         }
         Ok(())
     }
+}
+
+/// Codes a scene, with a progress bar for what is fitted, writes the file, and prints what it holds.
+pub(super) fn code_to_file<F: DeformationField>(
+    trained: &TrainedScene<F>,
+    out: &Path,
+    json: bool,
+) -> Result<CodedScene, TrainError> {
+    let mut bar = FitBar::new(json);
+    let coded = code_scene(trained, &mut |done, iterations| {
+        bar.show(done, iterations);
+        Ok(())
+    })?;
+    write_atomically(out, |file| file.write_all(&coded.bytes))?;
+    print_info(&read_info_with_limits(out, &Limits::large())?, json)?;
+    Ok(coded)
 }
 
 /// Whether an output lies in a run's folder, where only one process may write. Its own folder exists.
@@ -124,7 +135,7 @@ impl Info {
     }
 }
 
-pub(super) fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
+fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let SceneMeta { name, frame_count, fps, bounds, background, config_digest, width, height, fov_x, .. } = &info.meta;
     let digest: String = config_digest.iter().map(|byte| format!("{byte:02x}")).collect();
     if json {

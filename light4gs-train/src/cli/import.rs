@@ -1,17 +1,14 @@
 //! `import`.
 
-use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
-use light4gs_codec::{Limits, read_info_with_limits};
-use light4gs_data::{Scene, write_atomically};
+use light4gs_data::Scene;
 
 use super::check_output;
-use super::container::print_info;
-use super::output::progress::FitBar;
+use super::container::code_to_file;
 use super::output::say;
-use crate::compression::{TrainedScene, code_scene};
+use crate::compression::TrainedScene;
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
 use crate::device;
@@ -118,12 +115,6 @@ impl Import {
             images: self.scene.is_some().then_some(&images),
             device: &device,
         };
-        let mut bar = FitBar::new(self.json);
-        let coded = code_scene(&trained, &mut |done, iterations| {
-            bar.show(done, iterations);
-            Ok(())
-        })?;
-        write_atomically(&self.out, |file| file.write_all(&coded.bytes))?;
-        print_info(&read_info_with_limits(&self.out, &Limits::large())?, self.json)
+        code_to_file(&trained, &self.out, self.json).map(|_| ())
     }
 }

@@ -21,6 +21,9 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::{Layer, SubscriberExt};
+use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::error::TrainError;
 
@@ -129,8 +132,11 @@ impl Cli {
 /// Parses the arguments of this process, runs the command, and reports an error on stderr. Exit codes: 0 done, 2 wrong
 /// input, 1 our fault, 75 stopped on request (SIGUSR1).
 pub fn main() -> ExitCode {
-    let filter = tracing_subscriber::EnvFilter::try_from_default_env().unwrap_or_else(|_| "warn".into());
-    tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr).init();
+    let wanted = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter))
+        .init();
     match gpu_errors::catch(|| Cli::parse().run()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

@@ -153,6 +153,8 @@ export declare class Scene {
     /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
     close(): void;
 }
+/** Starts a decoder, so that it is ready when the bytes of a file arrive. {@link load} does so itself, but only then. */
+export declare function prepare(): void;
 /**
  * Decodes a `.l4gs` file.
  * @param {ArrayBuffer | Uint8Array} bytes
