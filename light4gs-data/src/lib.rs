@@ -10,6 +10,8 @@
 //! (+x right, +y down, +z forward), time is in `[0, 1]`, images are `[H, W, 3]`, row-major,
 //! already composited on the background, in the byte values of the file (no gamma handling).
 
+#![forbid(unsafe_code)]
+
 mod atomic;
 mod camera;
 mod digest;
