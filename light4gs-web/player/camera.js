@@ -1,5 +1,7 @@
 // Cameras: an OpenCV pinhole that turns around a point, moves along its axes and takes the place of a dataset's camera.
 
+import { SceneError } from "./errors.js";
+
 /** @typedef {import("./splat_renderer.js").View} View */
 /** @typedef {[number, number, number]} Vector */
 
@@ -34,6 +36,43 @@ export function turn(v, axis, angle) {
   const along = dot(v, axis) * (1 - cosine);
   const across = cross(axis, v);
   return add(add([v[0] * cosine, v[1] * cosine, v[2] * cosine], across, sine), axis, along);
+}
+
+/** What a camera cannot do without, and how many numbers each has; 0 for a number by itself. */
+const FIELDS = { rotation: 9, translation: 3, fx: 0, fy: 0, cx: 0, cy: 0, width: 0, height: 0 };
+
+/**
+ * Cameras from JSON text.
+ * @param {string} text
+ * @param {string} where  its address or place, for messages
+ * @returns {DatasetCamera[]}
+ * @throws {SceneError} `cameras`, which names the camera and the field
+ */
+export function readCameras(text, where) {
+  const refuse = (/** @type {string} */ message) => new SceneError("cameras", `${where}: ${message}`);
+  let list;
+  try {
+    list = JSON.parse(text);
+  } catch (error) {
+    throw refuse(`no JSON: ${error instanceof Error ? error.message : error}`);
+  }
+  if (!Array.isArray(list)) throw refuse("expected a list of cameras");
+  list.forEach((camera, index) => {
+    for (const [field, length] of Object.entries(FIELDS)) {
+      const value = camera?.[field];
+      const numbers = length === 0 ? [value] : Array.isArray(value) && value.length === length ? value : [NaN];
+      if (!numbers.every(Number.isFinite)) {
+        throw refuse(`camera ${index}: ${field} is ${JSON.stringify(value)}, expected ${length === 0 ? "a number" : `${length} numbers`}`);
+      }
+    }
+    for (const field of ["fx", "fy", "width", "height"]) {
+      if (!(camera[field] > 0)) throw refuse(`camera ${index}: ${field} is ${camera[field]}, expected more than 0`);
+    }
+    if (camera.time !== undefined && !Number.isFinite(camera.time)) {
+      throw refuse(`camera ${index}: time is ${JSON.stringify(camera.time)}, expected a number in [0, 1], or nothing`);
+    }
+  });
+  return list;
 }
 
 /** Where a camera stands. @param {View} view @returns {Vector} */

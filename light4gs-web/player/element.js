@@ -1,11 +1,12 @@
 // <l4gs-player>: the player with its buttons.
 
+import { readCameras } from "./camera.js";
 import { SceneError } from "./errors.js";
 import { icon, LAYOUT } from "./layout.js";
 import { explain } from "./messages.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "./player.js";
-import { load, prepare } from "./scene.js";
+import { dismiss, load, prepare } from "./scene.js";
 
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
 
@@ -18,8 +19,18 @@ const PANEL_INTERVAL = 500;
 const toHex = (color) => `#${color.map((c) => Math.round(255 * Math.min(1, Math.max(0, c))).toString(16).padStart(2, "0")).join("")}`;
 /** @param {string} hex */
 const fromHex = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
+
 /** @param {string} text  base64 */
-const bytesOf = (text) => Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+function bytesOf(text) {
+  try {
+    return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
+  } catch {
+    throw new SceneError("damaged", "the scene in this page is no base64");
+  }
+}
+
+/** Elements that stand in the page. */
+let connected = 0;
 
 /**
  * Attributes: `src` (address of a scene), `cameras` (address of its cameras as JSON), `autoplay`, `loop`, `background` (a
@@ -37,6 +48,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   /** @type {DatasetCamera[]} */
   #cameras = [];
   #loading = 0;
+  /** Ends what an element does while it stands in the page: listening, downloads, looking at what is watched. */
   #abort = new AbortController();
   #connected = false;
   #panelTimer = 0;
@@ -56,6 +68,8 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   connectedCallback() {
     if (this.#connected) return;
     this.#connected = true;
+    this.#watched = "";
+    connected++;
     prepare();
     if (this.hasAttribute("page")) this.#acceptFiles();
     const query = this.hasAttribute("page") ? new URLSearchParams(location.search).get("url") : null;
@@ -63,17 +77,31 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     const embedded = this.querySelector('script[type="application/l4gs"]');
     const cameras = this.querySelector('script[type="application/json"]');
     const source = query ?? this.getAttribute("src");
-    if (embedded) this.open(bytesOf(embedded.textContent ?? ""), { cameras: cameras ? JSON.parse(cameras.textContent ?? "[]") : [] });
+    if (embedded) this.#openEmbedded(embedded.textContent ?? "", cameras?.textContent ?? "[]");
     else if (this.hasAttribute("watch")) this.#progress("Waiting for the scene", NaN);
     else if (source) this.load(source, this.getAttribute("cameras"));
     else if (this.hasAttribute("page")) this.#only("invitation");
-    if (this.hasAttribute("watch")) this.#watch();
+    if (this.hasAttribute("watch")) this.#watch(this.#abort.signal);
   }
 
   disconnectedCallback() {
+    if (!this.#connected) return;
     this.#connected = false;
+    this.#abort.abort();
+    this.#abort = new AbortController();
     clearTimeout(this.#watchTimer);
     this.close();
+    this.find("status").hidden = true;
+    if (--connected === 0) dismiss();
+  }
+
+  /** @param {string} scene  base64 @param {string} cameras  JSON */
+  #openEmbedded(scene, cameras) {
+    try {
+      this.open(bytesOf(scene), { cameras: readCameras(cameras, "the cameras in this page") });
+    } catch (error) {
+      this.#fail(error);
+    }
   }
 
   /** @param {string} name @param {string | null} before @param {string | null} value */
@@ -88,6 +116,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
    * Loads a scene from an address, and cameras from another.
    * @param {string} address @param {string | null} [cameras]
    * @param {{ keep?: boolean }} [options]  whether view and time stay as they are
+   * @returns {Promise<boolean>}  whether the bytes came; what was wrong is shown
    */
   async load(address, cameras, { keep = false } = {}) {
     const loading = ++this.#loading;
@@ -95,11 +124,13 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     try {
       const [bytes, list] = await Promise.all([
         this.#fetch(address, keep ? () => {} : (share) => loading === this.#loading && this.#progress("Loading", share)),
-        cameras ? this.#fetch(cameras, () => {}).then((bytes) => JSON.parse(new TextDecoder().decode(bytes))) : [],
+        cameras ? this.#fetch(cameras, () => {}).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : [],
       ]);
       if (loading === this.#loading) await this.open(bytes, { cameras: list, keep });
+      return true;
     } catch (error) {
       if (loading === this.#loading) this.#fail(error);
+      return false;
     }
   }
 
@@ -108,12 +139,18 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
    * @param {string} address @param {(share: number) => void} report
    */
   async #fetch(address, report) {
-    let response;
     try {
-      response = await fetch(address, { cache: "no-cache" });
+      return await this.#download(address, report);
     } catch (error) {
+      if (error instanceof SceneError) throw error;
+      // The connection may also end halfway.
       throw new SceneError("network", `${address}: ${error instanceof Error ? error.message : error}`);
     }
+  }
+
+  /** @param {string} address @param {(share: number) => void} report */
+  async #download(address, report) {
+    const response = await fetch(address, { cache: "no-cache", signal: this.#abort.signal });
     if (!response.ok || !response.body) throw new SceneError("network", `${address}: HTTP ${response.status} ${response.statusText}`);
     const total = Number(response.headers.get("content-length"));
     const parts = [];
@@ -150,17 +187,24 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       if (loading !== this.#loading) return scene.close();
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;
-      const { time = 0, speed = 1, background, camera, home, following } = before ?? {};
+      const { time, speed = 1, background, camera, home, following = false } = before ?? {};
+      const flying = before?.controls?.flying ?? false;
+      const chosen = before ? this.find("camera").value : "free";
       this.#end();
       this.#cameras = cameras;
-      this.player = new Player(this.canvas, scene, { cameras, loop: this.hasAttribute("loop"), autoplay: playing });
-      this.player.time = time;
+      const loop = before ? before.loop : this.hasAttribute("loop");
+      this.player = new Player(this.canvas, scene, { cameras, loop, autoplay: playing, time, camera, home });
       this.player.speed = speed;
+      this.player.following = following;
+      if (this.player.controls) this.player.controls.flying = flying;
       if (background) this.player.background = background;
       else if (this.getAttribute("background")) this.#setBackground(this.getAttribute("background") ?? "");
       await this.player.ready;
-      if (camera && home) Object.assign(this.player, { camera, home, following });
+      if (loading !== this.#loading) return;
       this.#begin();
+      // Where the list has it still.
+      this.find("camera").value = chosen;
+      if (!this.find("camera").value) this.#showCamera();
     } catch (error) {
       if (loading !== this.#loading) return scene?.close();
       this.#end();
@@ -358,6 +402,16 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.#showState();
   }
 
+  /** Keys that nothing in the page has asked for belong to a player that is the page. @param {KeyboardEvent} event */
+  #takeKey(event) {
+    const nobody = document.activeElement === document.body || document.activeElement === null;
+    // What is sent to the canvas here comes by again.
+    if (!nobody || event.defaultPrevented || !event.isTrusted) return;
+    if (this.canvas.dispatchEvent(new KeyboardEvent(event.type, event))) return;
+    event.preventDefault();
+    this.canvas.focus({ preventScroll: true });
+  }
+
   /** @param {KeyboardEvent} event */
   #key(event) {
     const target = /** @type {HTMLElement} */ (event.target);
@@ -365,11 +419,12 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       Space: "play", KeyK: "play", KeyL: "loop", KeyV: "fly", KeyR: "reset", KeyI: "info", KeyF: "full", KeyC: "camera",
       Comma: "back", Period: "forth",
     })[event.code];
-    if (event.code === "KeyO" && this.hasAttribute("page")) this.find("file").click();
-    if (!does || event.ctrlKey || event.metaKey || event.altKey) return;
+    const opens = event.code === "KeyO" && this.hasAttribute("page");
+    if (!(does || opens) || event.ctrlKey || event.metaKey || event.altKey) return;
     // A button, a list and a text keep their own keys.
     if (target.matches("select, input:not([type=range])") || (event.code === "Space" && target.matches("button, summary"))) return;
     event.preventDefault();
+    if (opens) return this.find("file").click();
     this.#do(does);
   }
 
@@ -395,6 +450,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   #acceptFiles() {
     const over = (/** @type {boolean} */ is) => this.classList.toggle("over", is);
     const options = { signal: this.#abort.signal };
+    document.addEventListener("keydown", (event) => this.#takeKey(event), options);
     addEventListener("dragover", (event) => (event.preventDefault(), over(true)), options);
     addEventListener("dragleave", (event) => event.relatedTarget === null && over(false), options);
     addEventListener("drop", (event) => {
@@ -408,31 +464,36 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   async #openFile(file) {
     if (!file) return;
     this.find("file").value = "";
+    // The file that was chosen last is the one that is shown, whichever is read first.
+    const loading = ++this.#loading;
     this.#progress("Reading", NaN);
     try {
-      await this.open(await file.arrayBuffer());
+      const bytes = await file.arrayBuffer();
+      if (loading === this.#loading) await this.open(bytes);
     } catch (error) {
-      this.#fail(new SceneError("network", `${file.name}: ${error instanceof Error ? error.message : error}`));
+      if (loading === this.#loading) this.#fail(new SceneError("network", `${file.name}: ${error instanceof Error ? error.message : error}`));
     }
   }
 
-  /** Looks at the watched text, and loads the scene again when it has changed. */
-  async #watch() {
+  /** Looks at the watched text, and loads the scene again when it has changed. @param {AbortSignal} signal */
+  async #watch(signal) {
     try {
-      const text = await (await fetch(this.getAttribute("watch") ?? "", { cache: "no-store" })).text();
+      const text = await (await fetch(this.getAttribute("watch") ?? "", { cache: "no-store", signal })).text();
+      if (signal.aborted) return;
       const { status, scene } = JSON.parse(text);
       this.find("status").textContent = status ?? "";
       this.find("status").hidden = !status;
       const address = this.getAttribute("src");
       if (scene && address && this.#watched !== String(scene)) {
-        this.#watched = String(scene);
-        await this.load(address, this.getAttribute("cameras"), { keep: this.player !== null });
+        // What did not come is asked for again.
+        if (await this.load(address, this.getAttribute("cameras"), { keep: this.player !== null })) this.#watched = String(scene);
       }
     } catch {
+      if (signal.aborted) return;
       this.find("status").textContent = "The server does not answer";
       this.find("status").hidden = false;
     }
-    if (this.#connected) this.#watchTimer = setTimeout(() => this.#watch(), WATCH_INTERVAL);
+    if (!signal.aborted) this.#watchTimer = setTimeout(() => this.#watch(signal), WATCH_INTERVAL);
   }
 }
 

@@ -2,7 +2,7 @@
 
 /**
  * A scene that was refused; `kind` is one of `not-l4gs`, `newer`, `too-large`, `damaged`, `memory`,
- * `network`, `closed`, `fault`.
+ * `network`, `cameras` (their JSON is none), `blocked` (the page or the browser lets no decoder start), `closed`, `fault`.
  */
 export class SceneError extends Error {
   /** @param {string} kind @param {string} message */

@@ -4,5 +4,5 @@ export { Camera } from "./camera.js";
 export { L4gsPlayer } from "./element.js";
 export { Player } from "./player.js";
 export { GraphicsError, SceneError } from "./errors.js";
-export { Scene, load, prepare } from "./scene.js";
+export { Scene, dismiss, load, prepare } from "./scene.js";
 export { SplatRenderer } from "./splat_renderer.js";

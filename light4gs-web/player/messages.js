@@ -8,6 +8,11 @@ const SCENE_MESSAGES = {
   "too-large": ["This scene is larger than the player accepts.", "Files from strangers may ask for any amount of memory, so there is a limit."],
   memory: ["There is not enough memory for this scene.", "Close other pages, or open it on a larger machine."],
   network: ["The scene cannot be loaded.", "Check the address and the connection."],
+  cameras: ["The cameras of this scene cannot be read.", "They are a JSON list, as docs/player.md says."],
+  blocked: [
+    "The decoder cannot start in this page.",
+    "The browser may be too old for it. A content security policy needs script-src 'wasm-unsafe-eval' and worker-src blob:.",
+  ],
   fault: ["The player failed.", "This is our fault: please report it with the details below."],
 };
 

@@ -4,7 +4,7 @@
 
 const number = new Intl.NumberFormat("en");
 /** @param {number} bytes */
-const size = (bytes) => (bytes < 1e6 ? `${number.format(Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(2)} MB`);
+const size = (bytes) => (bytes < 1e3 ? `${bytes} B` : bytes < 1e6 ? `${number.format(Math.round(bytes / 1e3))} kB` : `${(bytes / 1e6).toFixed(2)} MB`);
 /** @param {number} value */
 const ms = (value) => `${value.toFixed(value < 10 ? 1 : 0)} ms`;
 

@@ -15,6 +15,9 @@ import { SplatRenderer } from "./splat_renderer.js";
  * @property {boolean} [autoplay]  begin to play; false
  * @property {boolean} [loop]  begin again at the end; true
  * @property {DatasetCamera[]} [cameras]  of the dataset; the first one is where the view begins
+ * @property {Camera} [camera]  where the view begins in place of that
+ * @property {Camera} [home]  where {@link Player.resetView} goes in place of that
+ * @property {number} [time]  of the first image, in [0, 1]; 0
  * @property {boolean} [controls]  whether pointer and keys move the camera; true
  * @property {number} [pixelRatio]  pixels of the image for one of the page; at most 2 where not given
  */
@@ -23,6 +26,8 @@ import { SplatRenderer } from "./splat_renderer.js";
 const OUTLIERS = 0.03;
 /** Milliseconds of stillness after which a draft is drawn again in full. */
 const STILL = 150;
+/** What lies nearer to the camera is not drawn: as in shaders.js and draw_list.rs. */
+const NEAR = 0.2;
 /** A viewpoint that has everything before it. */
 const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
 
@@ -76,7 +81,8 @@ export class Player extends EventTarget {
     /** What the last frames took, in milliseconds. */
     this.timings = { evaluate: 0, sort: 0, upload: 0, draw: 0 };
     /** Resolves when the first image is on the canvas. @type {Promise<void>} */
-    this.ready = this.#begin(options.autoplay ?? false);
+    this.#time = Math.min(1, Math.max(0, Number(options.time) || 0));
+    this.ready = this.#begin(options);
     this.controls = options.controls === false ? null : new Controls(this);
     canvas.addEventListener("webglcontextlost", this.#lost);
     canvas.addEventListener("webglcontextrestored", this.#restored);
@@ -85,17 +91,25 @@ export class Player extends EventTarget {
   #lost = (/** @type {Event} */ event) => event.preventDefault();
 
   #restored = () => {
-    this.renderer.restore();
+    try {
+      this.renderer.restore();
+    } catch (error) {
+      return this.#fail(error);
+    }
+    // The marks of the lost images are never passed.
+    this.#drawing = null;
     this.#shownTime = -1;
   };
 
-  /** @param {boolean} autoplay */
-  async #begin(autoplay) {
+  /** @param {PlayerOptions} options */
+  async #begin({ autoplay = false, camera, home }) {
     this.#measure();
     const { list } = await this.scene.frame(0, EVERYWHERE);
     if (this.#disposed) return;
     this.#fitCamera(list);
-    await this.#show(0);
+    if (camera) this.camera = camera.clone();
+    if (home) this.home = home.clone();
+    await this.#show(this.#time);
     if (this.#disposed) return;
     this.#draw(1);
     this.#observers = [
@@ -133,7 +147,14 @@ export class Player extends EventTarget {
       return { middle: (at(OUTLIERS) + at(1 - OUTLIERS)) / 2, half: (at(1 - OUTLIERS) - at(OUTLIERS)) / 2 };
     });
     const middle = /** @type {Vector} */ (centers.map(({ middle }) => middle));
-    const radius = Math.max(Math.hypot(...centers.map(({ half }) => half)), 1e-3);
+    // Where the centers are close together, the Gaussians' own size counts: the variances stand at 4, 7 and 9.
+    const sizes = [];
+    for (let i = 0; i < list.length; i += 16 * Math.max(1, Math.floor(count / 5000))) {
+      if (list[i + 3] > 0.05) sizes.push(2 * Math.sqrt(Math.max(list[i + 4], list[i + 7], list[i + 9])));
+    }
+    sizes.sort((a, b) => a - b);
+    const size = sizes[Math.floor(0.5 * sizes.length)] ?? 0;
+    const radius = Math.max(Math.hypot(...centers.map(({ half }) => half)) + size, 1e-6);
     camera.up = commonUp(cameras);
     if (cameras.length > 0) {
       const target = commonTarget(cameras) ?? middle;
@@ -143,7 +164,11 @@ export class Player extends EventTarget {
     } else {
       const view = camera.view(this.canvas.width || 1, this.canvas.height || 1);
       const narrow = Math.min(view.width / 2 / view.fx, view.height / 2 / view.fy);
-      const distance = (1.15 * radius) / Math.sin(Math.atan(narrow));
+      const wanted = (1.15 * radius) / Math.sin(Math.atan(narrow));
+      // A scene so small that all of it would be too near is looked at from farther, through a longer lens.
+      const distance = Math.max(wanted, 1.5 * NEAR + radius);
+      camera.lens.fx *= distance / wanted;
+      camera.lens.fy *= distance / wanted;
       camera.lookAt(
         [middle[0], middle[1] - distance * Math.cos(Math.PI / 6), middle[2] + distance * Math.sin(Math.PI / 6)],
         middle,

@@ -58,7 +58,12 @@ function decoderModule() {
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
     return WebAssembly.compile(await new Response(stream).arrayBuffer());
   };
-  return (module ??= unpack());
+  module ??= unpack().catch((error) => {
+    // Whoever asks again may have more luck.
+    module = null;
+    throw new SceneError("blocked", error instanceof Error ? error.message : String(error));
+  });
+  return module;
 }
 
 /** A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. */
@@ -68,6 +73,10 @@ export class Scene {
   #worker;
   #url;
   #next = 0;
+  /** Whether the worker has answered: then it had started. */
+  #answered = false;
+  /** Why the worker answers no more. @type {SceneError | null} */
+  #failure = null;
   /** Fails where the browser has no decoder for us. @type {Promise<void>} */
   #prepared;
 
@@ -76,6 +85,7 @@ export class Scene {
     this.#url = URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" }));
     this.#worker = new Worker(this.#url);
     this.#worker.onmessage = ({ data: answer }) => {
+      this.#answered = true;
       const waiting = this.#waiting.get(answer.id);
       this.#waiting.delete(answer.id);
       if (answer.error) waiting?.reject(new SceneError(answer.error, answer.message));
@@ -83,7 +93,9 @@ export class Scene {
     };
     this.#worker.onerror = (event) => {
       event.preventDefault();
-      this.#fail(new SceneError("fault", event.message || "the worker did not start"));
+      // It may come before anything was asked: the decoder is still being compiled then.
+      this.#failure ??= new SceneError(this.#answered ? "fault" : "blocked", event.message || "the worker did not start");
+      this.#fail(this.#failure);
     };
     // While the file is still on its way.
     this.#prepared = decoderModule().then((module) => this.#ask({ type: "prepare", module }));
@@ -107,6 +119,7 @@ export class Scene {
    */
   #ask(request, transfer = []) {
     if (!this.#url) return Promise.reject(new SceneError("closed", "the scene was closed"));
+    if (this.#failure) return Promise.reject(this.#failure);
     return new Promise((resolve, reject) => {
       const id = this.#next++;
       this.#waiting.set(id, { resolve, reject });
@@ -186,6 +199,12 @@ let standby = null;
 /** Starts a decoder, so that it is ready when the bytes of a file arrive. {@link load} does so itself, but only then. */
 export function prepare() {
   standby ??= new Scene();
+}
+
+/** Ends the decoder that {@link prepare} started, where no file has come for it. */
+export function dismiss() {
+  standby?.close();
+  standby = null;
 }
 
 /**

@@ -12,12 +12,13 @@ export const scenePath = process.env.LIGHT4GS_WEB_SCENE ?? `${root}/light4gs-web
 
 const TYPES = { js: "text/javascript", html: "text/html", l4gs: "application/octet-stream", json: "application/json" };
 
-/** Serves a table of paths to bytes; `""` is an empty page. */
+/** Serves a table of paths to bytes, or to functions that answer by themselves; `""` is an empty page. */
 export async function serve(files) {
   const server = createServer((request, response) => {
     const name = decodeURIComponent(new URL(request.url, "http://localhost").pathname.slice(1));
     const content = files[name];
     if (content === undefined) return response.writeHead(404).end("not found");
+    if (typeof content === "function") return content(response);
     response.writeHead(200, { "content-type": TYPES[name.split(".").pop()] ?? "text/html", "content-length": Buffer.byteLength(content) });
     response.end(content);
   });

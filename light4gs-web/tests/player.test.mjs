@@ -25,6 +25,14 @@ const pageOf = (player) =>
   readFileSync(`${dist}/page.html`, "utf8").replace("{{title}}", "Test").replace("{{player}}", player)
     .replace("{{source}}", ' src="/light4gs-player.js"').replace("{{script}}", "");
 
+/** What the server of the watched page has. */
+const watched = { version: 1, broken: false };
+
+/** A page under a content security policy. */
+const guarded = (policy) => (response) =>
+  response.writeHead(200, { "content-type": "text/html", "content-security-policy": policy })
+    .end(pageOf('<l4gs-player page src="/scene.l4gs"></l4gs-player>'));
+
 /** A stream with other bytes somewhere. */
 const changed = (bytes, change) => {
   const copy = Buffer.from(bytes);
@@ -41,6 +49,21 @@ before(async () => {
     "scene.l4gs": scene,
     player: pageOf('<l4gs-player page autoplay loop src="/scene.l4gs" cameras="/cameras.json"></l4gs-player>'),
     drop: pageOf("<l4gs-player page></l4gs-player>"),
+    part: pageOf('<l4gs-player src="/never.l4gs"></l4gs-player>'),
+    watch: pageOf('<l4gs-player page autoplay loop src="/watched.l4gs" cameras="/cameras.json" watch="/state.json"></l4gs-player>'),
+    "never.l4gs": () => {},
+    "watched.l4gs": (response) => (watched.broken ? response.destroy() : response.end(sceneBytes())),
+    "state.json": (response) => response.end(JSON.stringify({ scene: watched.version, status: `version ${watched.version}` })),
+    "cut.l4gs": (response) => {
+      response.writeHead(200, { "content-length": scene.length });
+      response.write(scene.subarray(0, 1000), () => setTimeout(() => response.destroy(), 200));
+    },
+    "no-worker": guarded("worker-src 'none'"),
+    "no-wasm": guarded("script-src 'self'; worker-src blob:"),
+    "torn-page": pageOf('<l4gs-player page><script type="application/l4gs">@@@</script></l4gs-player>'),
+    "torn-cameras": pageOf('<l4gs-player page src="/scene.l4gs" cameras="/text.l4gs"></l4gs-player>'),
+    "odd-cameras": pageOf('<l4gs-player page src="/scene.l4gs" cameras="/odd.json"></l4gs-player>'),
+    "odd.json": '[{"name":"first","rotation":[1,0,0,0,1,0,0,0,1],"translation":[0,0,null]}]',
     "truncated.l4gs": scene.subarray(0, scene.length / 2),
     "empty.l4gs": Buffer.alloc(0),
     "flipped.l4gs": changed(scene, (bytes) => (bytes[scene.length - 1000] ^= 4)),
@@ -189,6 +212,31 @@ describe("files that are no good", () => {
       await page.waitForFunction(() => document.querySelector("l4gs-player").player?.scene.count > 0);
       assert.ok(await message.isHidden());
       await page.context().close();
+    });
+  }
+
+  // The browser itself notes what a policy forbids and what a connection loses: only exceptions count here.
+  const pages = {
+    "a page that forbids workers": ["no-worker", /cannot start in this page.*worker-src blob:/],
+    "a page that forbids WebAssembly": ["no-wasm", /cannot start in this page.*'wasm-unsafe-eval'/],
+    "a connection that ends halfway": ["drop?url=/cut.l4gs", /cannot be loaded.*cut\.l4gs/],
+    "a scene in the page that is no base64": ["torn-page", /damaged or incomplete.*in this page/],
+    "cameras that are no JSON": ["torn-cameras", /cameras of this scene cannot be read.*text\.l4gs: no JSON/],
+    "cameras without a field": ["odd-cameras", /odd\.json: camera 0: translation is \[0,0,null\], expected 3 numbers/],
+  };
+  for (const [name, [path, words]] of Object.entries(pages)) {
+    test(`${name} gets a message`, async () => {
+      const context = await browser.newContext();
+      context.setDefaultTimeout(60_000);
+      const page = await context.newPage();
+      const exceptions = [];
+      page.on("pageerror", (error) => exceptions.push(String(error)));
+      await page.goto(`${server.url}/${path}`);
+      const message = page.locator("l4gs-player").getByRole("alert");
+      await message.filter({ hasText: /\S/ }).waitFor();
+      assert.match(await message.textContent(), words);
+      assert.deepEqual(exceptions, []);
+      await context.close();
     });
   }
 
@@ -366,6 +414,180 @@ describe("the element", () => {
       }));
     }
     for (const id of ["canvas", "play", "time", "speed", "loop", "camera", "reset", "background", "info", "full"]) assert.ok(reached.has(id), id);
+    await page.context().close();
+  });
+
+  test("begins where all of a scene is seen, as small as it is and as large", async () => {
+    const page = await open(browser, server.url);
+    const shares = await page.evaluate(async () => {
+      const { load, Player } = await import("/light4gs-player.js");
+      const scene = await load(await (await fetch("/scene.l4gs")).arrayBuffer());
+      const frame = scene.frame.bind(scene);
+      const shares = {};
+      for (const [name, factor, only] of [["small", 1e-4], ["as it is", 1], ["large", 1e4], ["one Gaussian", 1, true], ["a small one", 1e-4, true]]) {
+        // The same scene, smaller and larger, as its worker would send it.
+        scene.frame = async (time, { row, eye }, memory) => {
+          const unscaled = { row: [row[0] * factor, row[1] * factor, row[2] * factor, row[3]], eye: eye.map((x) => x / factor) };
+          const answer = await frame(time, unscaled, memory);
+          const list = only ? new Float32Array(16 * 256) : answer.list;
+          if (only) list.set([0.5, 0.5, 0.5, 0.9, 0.04, 0, 0, 0.04, 0, 0.04, 1, 1, 1]);
+          for (let i = 0; i < list.length; i += 16) {
+            for (let k = 0; k < 3; k++) list[i + k] *= factor;
+            for (let k = 4; k < 10; k++) list[i + k] *= factor * factor;
+          }
+          return { ...answer, list };
+        };
+        const player = new Player(document.querySelector("canvas"), scene, { pixelRatio: 1 });
+        await player.ready;
+        player.background = [0, 0, 0];
+        player.renderer.draw(player.view, player.background);
+        const pixels = player.renderer.readPixels();
+        let seen = 0;
+        for (let i = 0; i < pixels.length; i += 4) if (pixels[i] + pixels[i + 1] + pixels[i + 2] > 24) seen++;
+        shares[name] = (4 * seen) / pixels.length;
+        player.dispose();
+      }
+      scene.close();
+      return shares;
+    });
+    for (const [name, share] of Object.entries(shares)) assert.ok(share > 0.02 && share < 0.9, `${name}: ${share}`);
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
+  test("goes on after the graphics card was lost while it played", async () => {
+    const page = await playerPage();
+    await page.evaluate(async () => {
+      const card = document.querySelector("l4gs-player").player.renderer.gl.getExtension("WEBGL_lose_context");
+      card.loseContext();
+      await new Promise((resolve) => setTimeout(resolve, 300));
+      card.restoreContext();
+      await new Promise((resolve) => setTimeout(resolve, 300));
+      // Images that were drawn afterwards: their moments.
+      const { player } = document.querySelector("l4gs-player");
+      const draw = player.renderer.draw.bind(player.renderer);
+      globalThis.drawn = 0;
+      player.renderer.draw = (...rest) => (globalThis.drawn++, draw(...rest));
+    });
+    await page.waitForFunction(() => globalThis.drawn > 3, null, { timeout: 60_000 });
+    assert.deepEqual(page.problems.filter((problem) => !problem.includes("CONTEXT_LOST")), []);
+    await page.context().close();
+  });
+
+  test("leaves nothing behind when it is taken out of the page, and comes back", async () => {
+    const page = await open(browser, `${server.url}/part`);
+    await page.waitForFunction(() => !document.querySelector("l4gs-player").find("progress").hidden);
+    await page.evaluate(() => document.querySelector("l4gs-player").remove());
+    // The decoder that waited for the file.
+    for (let i = 0; i < 50 && page.workers().length > 0; i++) await new Promise((resolve) => setTimeout(resolve, 100));
+    assert.equal(page.workers().length, 0);
+    await page.context().close();
+
+    const second = await open(browser, `${server.url}/drop`);
+    const opened = await second.evaluate(async () => {
+      const player = document.querySelector("l4gs-player");
+      const parent = player.parentNode;
+      let count = 0;
+      player.open = async () => void count++;
+      const drop = async () => {
+        count = 0;
+        const transfer = new DataTransfer();
+        transfer.items.add(new File([new Uint8Array(5)], "scene.l4gs"));
+        dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, cancelable: true }));
+        await new Promise((resolve) => setTimeout(resolve, 300));
+        return count;
+      };
+      player.remove();
+      const apart = await drop();
+      parent.append(player);
+      return [apart, await drop()];
+    });
+    assert.deepEqual(opened, [0, 1]);
+    await second.context().close();
+  });
+
+  test("follows what it watches with everything as it is, and asks again for what did not come", async () => {
+    const page = await playerPage("/watch");
+    const facts = () =>
+      page.evaluate(() => {
+        const { player, find } = document.querySelector("l4gs-player");
+        const { loop, speed, following } = player ?? {};
+        return { loop, speed, following, flying: player?.controls.flying, camera: find("camera").value, message: !find("message").hidden };
+      });
+    const scene = () => page.evaluateHandle(() => document.querySelector("l4gs-player").player.scene);
+    const next = (before) =>
+      page.waitForFunction((before) => {
+        const { player, find } = document.querySelector("l4gs-player");
+        return player && player.scene !== before && find("message").hidden;
+      }, before);
+    await page.getByRole("button", { name: "Loop" }).click();
+    await page.getByRole("button", { name: "Look around" }).click();
+    await page.getByRole("combobox", { name: "Speed" }).selectOption("0.1");
+    await page.getByRole("combobox", { name: "Camera" }).selectOption("path");
+    const wanted = { loop: false, speed: 0.1, following: true, flying: true, camera: "path", message: false };
+    assert.deepEqual(await facts(), wanted);
+    let before = await scene();
+    watched.version++;
+    await next(before);
+    assert.deepEqual(await facts(), wanted);
+    before = await scene();
+    watched.broken = true;
+    watched.version++;
+    await page.locator("l4gs-player").getByRole("alert").filter({ hasText: "cannot be loaded" }).waitFor();
+    watched.broken = false;
+    await next(before);
+    assert.deepEqual(await facts(), wanted);
+    // Moved within the page it begins anew.
+    await page.evaluate(() => {
+      const player = document.querySelector("l4gs-player");
+      const parent = player.parentNode;
+      player.remove();
+      parent.append(player);
+    });
+    await page.waitForFunction(() => document.querySelector("l4gs-player").player?.scene.count > 0);
+    await page.context().close();
+  });
+
+  test("takes keys before it was clicked where it is the page, but not those of the browser", async () => {
+    const page = await playerPage();
+    assert.ok((await state(page)).playing);
+    await page.keyboard.press("Space");
+    assert.ok(!(await state(page)).playing);
+    let choosers = 0;
+    page.on("filechooser", () => choosers++);
+    await page.keyboard.press("Control+o");
+    await page.getByRole("combobox", { name: "Speed" }).focus();
+    await page.keyboard.press("o");
+    await new Promise((resolve) => setTimeout(resolve, 300));
+    assert.equal(choosers, 0);
+    await page.getByRole("img").focus();
+    await Promise.all([page.waitForEvent("filechooser"), page.keyboard.press("o")]);
+    await page.context().close();
+  });
+
+  test("shows the file that was dropped last, whichever is read first", async () => {
+    const page = await open(browser, `${server.url}/drop`);
+    const counts = await page.evaluate(async () => {
+      const [large, small] = await Promise.all(["/scene.l4gs", "/compact.l4gs"].map(async (path) => (await fetch(path)).arrayBuffer()));
+      const read = File.prototype.arrayBuffer;
+      File.prototype.arrayBuffer = async function () {
+        if (this.name === "slow") await new Promise((resolve) => setTimeout(resolve, 1500));
+        return read.call(this);
+      };
+      const drop = (bytes, name) => {
+        const transfer = new DataTransfer();
+        transfer.items.add(new File([bytes], name));
+        dispatchEvent(new DragEvent("drop", { dataTransfer: transfer, cancelable: true }));
+      };
+      const { load } = await import("/light4gs-player.js");
+      const scene = await load(small);
+      scene.close();
+      drop(large, "slow");
+      drop(small, "quick");
+      await new Promise((resolve) => setTimeout(resolve, 4000));
+      return [document.querySelector("l4gs-player").player?.scene.count, scene.count];
+    });
+    assert.equal(counts[0], counts[1]);
     await page.context().close();
   });
 

@@ -39,6 +39,14 @@ export declare const normalize: (a: Vector) => Vector;
  * @returns {Vector}
  */
 export declare function turn(v: Vector, axis: Vector, angle: number): Vector;
+/**
+ * Cameras from JSON text.
+ * @param {string} text
+ * @param {string} where  its address or place, for messages
+ * @returns {DatasetCamera[]}
+ * @throws {SceneError} `cameras`, which names the camera and the field
+ */
+export declare function readCameras(text: string, where: string): DatasetCamera[];
 /** Where a camera stands. @param {View} view @returns {Vector} */
 export declare function center({ rotation: r, translation: t }: View): Vector;
 export declare class Camera {

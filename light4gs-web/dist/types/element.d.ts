@@ -29,10 +29,11 @@ export declare class L4gsPlayer extends L4gsPlayer_base {
      * Loads a scene from an address, and cameras from another.
      * @param {string} address @param {string | null} [cameras]
      * @param {{ keep?: boolean }} [options]  whether view and time stay as they are
+     * @returns {Promise<boolean>}  whether the bytes came; what was wrong is shown
      */
     load(address: string, cameras?: string | null, { keep }?: {
         keep?: boolean;
-    }): Promise<void>;
+    }): Promise<boolean>;
     /**
      * Shows a scene.
      * @param {ArrayBuffer | Uint8Array} bytes

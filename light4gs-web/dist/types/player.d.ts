@@ -19,6 +19,18 @@ export type PlayerOptions = {
      */
     cameras?: DatasetCamera[];
     /**
+     * where the view begins in place of that
+     */
+    camera?: Camera;
+    /**
+     * where {@link Player.resetView} goes in place of that
+     */
+    home?: Camera;
+    /**
+     * of the first image, in [0, 1]; 0
+     */
+    time?: number;
+    /**
      * whether pointer and keys move the camera; true
      */
     controls?: boolean;
@@ -52,7 +64,6 @@ export declare class Player extends EventTarget {
         upload: number;
         draw: number;
     };
-    /** Resolves when the first image is on the canvas. @type {Promise<void>} */
     ready: Promise<void>;
     controls: Controls | null;
     /**

@@ -155,6 +155,8 @@ export declare class Scene {
 }
 /** Starts a decoder, so that it is ready when the bytes of a file arrive. {@link load} does so itself, but only then. */
 export declare function prepare(): void;
+/** Ends the decoder that {@link prepare} started, where no file has come for it. */
+export declare function dismiss(): void;
 /**
  * Decodes a `.l4gs` file.
  * @param {ArrayBuffer | Uint8Array} bytes
