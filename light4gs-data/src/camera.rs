@@ -419,9 +419,8 @@ mod tests {
             assert!(matches!(camera, Err(PoseError::FieldOfView { .. })), "{fov}");
         }
         let usual = Intrinsics { width: 64, height: 48, fx: 70.0, fy: 70.0, cx: 32.0, cy: 24.0 };
-        let pose = |intrinsics: Intrinsics, center: f64| {
-            Camera::from_pose(DMat3::IDENTITY, DVec3::splat(center), &intrinsics)
-        };
+        let pose =
+            |intrinsics: Intrinsics, center: f64| Camera::from_pose(DMat3::IDENTITY, DVec3::splat(center), &intrinsics);
         assert!(pose(usual, 3e6).is_ok());
         assert!(pose(Intrinsics { cx: -6400.0, fx: 1e5, ..usual }, 0.0).is_ok(), "a crop");
         assert!(matches!(pose(usual, 1e20), Err(PoseError::TooFar { .. })));
