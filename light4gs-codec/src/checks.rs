@@ -16,7 +16,7 @@
 
 use crate::{
     CodecError, CompressionInput, GaussianArrays, Limits, PerGroup, Profile, SceneData, adaptive::LARGEST_STEP,
-    attributes, network_weights::WeightPrecision, planes, sh, stream, stream::sections::Section,
+    attributes, limits::at_most, network_weights::WeightPrecision, planes, sh, stream, stream::sections::Section,
 };
 
 /// The smallest step that the encoder takes. Under it the numbers of a trained scene, some tens on either side of 0, still
@@ -35,6 +35,37 @@ pub fn hexplane(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> Res
     crate::plane_layout::check_resolution(resolution.map(|side| side as usize)).map_err(|illegal| {
         CodecError::invalid(Section::HexPlanes.name(), "resolution", illegal, "what a latent can have")
     })
+}
+
+/// Refuses the sizes of a motion network that no stream can hold: a trunk of `depth` layers (0 means 1) of `width` channels over
+/// `features`, and a head of two layers for each of `outputs`, the channels that it has in the end.
+///
+/// # Errors
+/// More weights, or more channels of all values together, than a network may have.
+pub fn motion_network(features: u64, width: u64, depth: u64, outputs: &[u64]) -> Result<(), CodecError> {
+    motion_network_within(features, width, depth, outputs, &Limits::large())
+}
+
+fn motion_network_within(
+    features: u64,
+    width: u64,
+    depth: u64,
+    outputs: &[u64],
+    limits: &Limits,
+) -> Result<(), CodecError> {
+    // Weights and offsets.
+    let layer = |inputs: u64, outputs: u64| inputs.saturating_add(1).saturating_mul(outputs);
+    let sum = |numbers: &mut dyn Iterator<Item = u64>| numbers.fold(0, u64::saturating_add);
+    let depth = depth.max(1);
+    let inner = layer(width, width);
+    let heads = outputs.iter().map(|&channels| inner.saturating_add(layer(width, channels)));
+    let weights = sum(&mut [layer(features, width), inner.saturating_mul(depth - 1)].into_iter().chain(heads));
+    // Every layer but the last of a head has a ReLU behind it.
+    let hidden = (depth + outputs.len() as u64).saturating_mul(2).saturating_mul(width);
+    let channels = sum(&mut [features, hidden].into_iter().chain(outputs.iter().copied()));
+    let section = Section::Motion.name();
+    at_most(section, "channels of all values", channels, limits.layer_width)?;
+    at_most(section, "number of weights", weights, limits.layer_weights)
 }
 
 /// Refuses a quantization step of planes.
@@ -147,4 +178,46 @@ pub(crate) fn check_step(
     let expected =
         format!("{least:e} to {LARGEST_STEP:e}; make the step {}", if step > 1.0 { "smaller" } else { "larger" });
     Err(CodecError::invalid(section, field, step, expected))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::network::{Layer, Network};
+
+    /// The numbers are those of the network that a model writes.
+    #[test]
+    fn sizes_of_a_motion_network_are_counted_as_the_network_counts_them() {
+        let (features, width, outputs) = (5u64, 7u64, [3u64, 48]);
+        let linear = |inputs: u64, outputs: u64| {
+            Layer::linear(vec![0.0; (inputs * outputs) as usize], vec![0.0; outputs as usize])
+        };
+        for depth in [1, 3] {
+            let (mut network, [value]) = Network::new([features as u32]);
+            let mut hidden = network.layer(value, linear(features, width));
+            for _ in 1..depth {
+                let rectified = network.relu(hidden);
+                hidden = network.layer(rectified, linear(width, width));
+            }
+            let rectified = network.relu(hidden);
+            for channels in outputs {
+                let hidden = network.layer(rectified, linear(width, width));
+                let rectified = network.relu(hidden);
+                let value = network.layer(rectified, linear(width, channels));
+                network.output(value);
+            }
+            let weights = network.weights();
+            let channels = features + 2 * (depth + 2) * width + 51;
+            for (layer_weights, layer_width, fits) in
+                [(weights, channels, true), (weights - 1, channels, false), (weights, channels - 1, false)]
+            {
+                let limits = Limits { layer_weights, layer_width: layer_width as u32, ..Limits::large() };
+                assert_eq!(motion_network_within(features, width, depth, &outputs, &limits).is_ok(), fits);
+                assert_eq!(network.check("motion", "the network", &limits).is_ok(), fits);
+            }
+        }
+        assert!(motion_network(64, 4096, 1, &[3, 3, 4, 1, 48]).is_ok());
+        assert!(motion_network(32, 4096, 17, &[3, 3, 4, 1]).is_err());
+        assert!(motion_network(u64::MAX, u64::MAX, u64::MAX / 2, &[u64::MAX]).is_err());
+    }
 }

@@ -50,10 +50,16 @@ fn read_and<T>(
     parse: impl FnOnce(&[u8]) -> Result<T, CodecError>,
 ) -> Result<T, CodecError> {
     let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
-    let file = File::open(path).map_err(io)?;
-    if file.metadata().as_ref().is_ok_and(fs::Metadata::is_dir) {
+    // Before it is opened: a pipe would wait for its other end.
+    let kind = fs::metadata(path).map_err(io)?.file_type();
+    if kind.is_dir() {
         return Err(io(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a .l4gs file")));
     }
+    if !kind.is_file() {
+        let problem = "it is a pipe, a socket or a device, expected a .l4gs file";
+        return Err(io(io::Error::new(io::ErrorKind::InvalidInput, problem)));
+    }
+    let file = File::open(path).map_err(io)?;
     let mut bytes = Vec::new();
     (&file).take(PRELUDE as u64).read_to_end(&mut bytes).map_err(io)?;
     let in_file = |error| CodecError::InFile { path: path.to_owned(), error: Box::new(error) };

@@ -19,6 +19,21 @@ fn a_scene_through_a_file() {
     assert!(read_file(folder.path()).unwrap_err().to_string().contains("it is a folder"));
 }
 
+/// A pipe would wait for its other end, a device may never end.
+#[cfg(target_os = "linux")]
+#[test]
+fn only_regular_files_are_opened() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.l4gs");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    for path in [pipe.as_path(), "/dev/zero".as_ref()] {
+        for error in [read_file(path).unwrap_err(), read_info(path).unwrap_err()] {
+            assert!(error.to_string().contains("it is a pipe, a socket or a device"), "{error}");
+            assert!(!error.is_internal());
+        }
+    }
+}
+
 #[test]
 fn messages_name_the_file() {
     let folder = tempfile::tempdir().unwrap();

@@ -14,6 +14,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How names of temporary files begin.
 const PREFIX: &str = ".light4gs-";
 
+/// Refuses to put a file in the place of what is neither a file nor a folder: a rename would replace `/dev/null` itself, or
+/// cut a pipe off from its reader. A link into `/proc`, as `/dev/stdout` is, would be replaced as well.
+fn refuse_special_file(path: &Path) -> io::Result<()> {
+    let special = fs::metadata(path).is_ok_and(|metadata| !(metadata.is_file() || metadata.is_dir()));
+    let of_a_process = || fs::read_link(path).is_ok_and(|target| target.starts_with("/proc"));
+    if special || of_a_process() {
+        let problem = "it is a pipe, a socket or a device, which a file would replace; name a file";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
+    Ok(())
+}
+
 /// A name in the folder of `path` that no other call of this process uses.
 ///
 /// It does not contain the name of `path`, so that a name of the longest legal length still works.
@@ -115,12 +127,16 @@ pub(crate) fn make_folder_atomically(
 /// ```
 ///
 /// # Errors
-/// [`DataError::Io`] naming `path`, when `fill` fails, or the file cannot be created, flushed or renamed.
+/// [`DataError::Io`] naming `path`, when it is a pipe, a socket or a device, when `fill` fails, or the file cannot be created,
+/// flushed or renamed.
 pub fn write_atomically(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> Result<(), DataError> {
     let failed = DataError::io("write", path);
+    if let Err(source) = refuse_special_file(path) {
+        return Err(failed(source));
+    }
     let (part, file) = match create_sibling(path) {
         Ok(created) => created,
         Err(source) => return Err(failed(source)),
@@ -197,6 +213,28 @@ mod tests {
         let message = write_atomically(&taken, |_| Ok(())).unwrap_err().to_string();
         assert!(message.contains("a folder"), "{message}");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    /// `light4gs decode x.l4gs --out /dev/null` of a superuser has replaced the device by a file.
+    #[cfg(unix)]
+    #[test]
+    fn what_is_no_file_is_not_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("socket");
+        let _held = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(&socket, &link).unwrap();
+        let output = folder.path().join("output");
+        std::os::unix::fs::symlink("/proc/self/fd/1", &output).unwrap();
+        for path in [&socket, &link, &output] {
+            let message = write_atomically(path, |_| panic!("nothing is written")).unwrap_err().to_string();
+            assert!(message.contains("cannot write") && message.contains("device"), "{message}");
+        }
+        assert!(fs::metadata(&link).unwrap().file_type().is_socket());
+        assert!(fs::symlink_metadata(&output).unwrap().is_symlink());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
     }
 
     #[test]

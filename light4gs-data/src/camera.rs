@@ -5,6 +5,16 @@ use glam::{DMat3, DVec3, Mat3, Mat4, Vec3, Vec4};
 /// How far `R^T R` may be from the identity before a pose is refused.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
+/// How far from the origin a camera may be, world units. Coordinates of maps stay below 1e7; float32 numbers of a scene that is
+/// much larger do not stay finite in training.
+const MOST_DISTANCE: f64 = 1e8;
+
+/// Focal lengths in image sides: fields of view that float32 tells from 0 and from π.
+const FOCAL_SIDES: std::ops::RangeInclusive<f64> = 1e-5..=1e6;
+
+/// How far from the image's middle the principal point may be, in image sides: crops have it outside.
+const MOST_OFF_CENTER: f64 = 1e3;
+
 /// An OpenCV pinhole camera: +x right, +y down, +z forward; `x_cam = rotation * x_world + translation`.
 ///
 /// Pixel `(i, j)` sees `u = fx * x / z + cx - 0.5`, compared with the integer `i` (and `v` likewise
@@ -69,6 +79,12 @@ pub enum PoseError {
         /// The entry.
         value: f32,
     },
+    /// The camera is absurdly far from the origin.
+    #[error("the camera is {distance:e} world units from the origin, expected at most {MOST_DISTANCE:e}")]
+    TooFar {
+        /// From the origin, world units.
+        distance: f64,
+    },
     /// The upper left 3×3 part is not a rotation.
     #[error(
         "the upper left 3x3 part is not a rotation (determinant {determinant:.4}, largest error of R^T R {error:.4}); expected orthonormal columns and determinant 1"
@@ -91,9 +107,9 @@ pub enum PoseError {
         /// The angle that was given, radians.
         fov_x: f32,
     },
-    /// A focal length is not positive, or the principal point is not finite.
+    /// A focal length is not positive, or the principal point is not finite, or either is absurd for the image.
     #[error(
-        "focal lengths are {fx} x {fy} and the principal point is ({cx}, {cy}), expected positive focal lengths and finite numbers"
+        "focal lengths are {fx} x {fy} and the principal point is ({cx}, {cy}), expected focal lengths of {} to {:e} image sides and a principal point within {MOST_OFF_CENTER} of them", FOCAL_SIDES.start(), FOCAL_SIDES.end()
     )]
     Intrinsics {
         /// Horizontal focal length, pixels.
@@ -127,6 +143,13 @@ fn check_rotation(rotation: DMat3) -> Result<(), PoseError> {
     Err(PoseError::NotRotation { determinant, error })
 }
 
+/// Refuses a center from which float32 numbers would not stay finite.
+fn check_distance(center: DVec3) -> Result<(), PoseError> {
+    let distance = center.length();
+    // Written so that NaN is refused.
+    if distance <= MOST_DISTANCE { Ok(()) } else { Err(PoseError::TooFar { distance }) }
+}
+
 impl Camera {
     /// Center of projection in world units.
     pub fn center(&self) -> Vec3 {
@@ -139,8 +162,8 @@ impl Camera {
     /// `fov_x` is the full horizontal field of view in radians.
     ///
     /// # Errors
-    /// [`PoseError`] when an entry is not finite, the matrix is not a rigid motion, the field of
-    /// view is not in (0, pi), or the image is empty.
+    /// [`PoseError`] when an entry is not finite or absurdly large, the matrix is not a rigid motion, the field of
+    /// view is not in (0, pi) or too near to either, or the image is empty.
     pub fn from_camera_to_world_opengl(
         c2w: &[[f32; 4]; 4],
         fov_x: f32,
@@ -168,15 +191,20 @@ impl Camera {
         // OpenGL -> OpenCV: y and z change sign. The inverse of a rotation is its transpose.
         let rotation = DMat3::from_cols(column(0), -column(1), -column(2)).transpose();
         check_rotation(rotation)?;
+        check_distance(column(3))?;
         let translation = -(rotation * column(3));
-        Ok(Self::centered(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height))
+        let camera = Self::centered(rotation.as_mat3(), translation.as_vec3(), fov_x, width, height);
+        if !FOCAL_SIDES.contains(&(f64::from(camera.fx) / f64::from(width))) {
+            return Err(PoseError::FieldOfView { fov_x });
+        }
+        Ok(camera)
     }
 
     /// A camera from a rotation from world to camera (OpenCV axes), its center in world units, and intrinsics in pixels.
     ///
     /// # Errors
-    /// [`PoseError`] when a number is not finite as an `f32`, the matrix is not a rotation, a focal length is not
-    /// positive, or the image is empty.
+    /// [`PoseError`] when a number is not finite as an `f32` or absurdly large, the matrix is not a rotation, a focal length
+    /// is not positive or absurd for the image, or the image is empty.
     pub fn from_pose(rotation: DMat3, center: DVec3, intrinsics: &Intrinsics) -> Result<Self, PoseError> {
         let Intrinsics { width, height, fx, fy, cx, cy } = *intrinsics;
         let translation = -(rotation * center);
@@ -189,13 +217,18 @@ impl Camera {
             }
         }
         check_rotation(rotation)?;
-        let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(|value| value as f32);
-        let legal = [fx, fy, cx, cy].iter().all(|value| value.is_finite()) && fx > 0.0 && fy > 0.0;
-        if !legal {
-            return Err(PoseError::Intrinsics { fx, fy, cx, cy });
-        }
+        check_distance(center)?;
         if width == 0 || height == 0 {
             return Err(PoseError::EmptyImage { width, height });
+        }
+        let legal = |focal: f64, middle: f64, side: u32| {
+            let side = f64::from(side);
+            FOCAL_SIDES.contains(&(focal / side)) && (middle / side - 0.5).abs() <= MOST_OFF_CENTER
+        };
+        let both_legal = legal(fx, cx, width) && legal(fy, cy, height);
+        let [fx, fy, cx, cy] = [fx, fy, cx, cy].map(|value| value as f32);
+        if !both_legal {
+            return Err(PoseError::Intrinsics { fx, fy, cx, cy });
         }
         let (rotation, translation) = (rotation.as_mat3(), translation.as_vec3());
         Ok(Self { rotation, translation, fx, fy, cx, cy, width, height })
@@ -365,6 +398,48 @@ mod tests {
             ));
         }
         assert!(Camera::from_camera_to_world_opengl(&good, 0.7, 0, 8).is_err());
+    }
+
+    /// Finite numbers that no camera has: training on them ended in numbers that are not finite, or the encoder refused the
+    /// field of view after the old run had been replaced.
+    #[test]
+    fn absurd_cameras_are_refused() {
+        let far = |x: f32| {
+            let mut pose = example().camera_to_world_opengl();
+            pose[0][3] = x;
+            Camera::from_camera_to_world_opengl(&pose, 0.7, 64, 48)
+        };
+        assert!(far(6.4e6).is_ok(), "coordinates of the earth");
+        for x in [2e8, -1e20, f32::MAX] {
+            assert!(matches!(far(x), Err(PoseError::TooFar { .. })), "{x}");
+        }
+        let good = example().camera_to_world_opengl();
+        for fov in [1e-30, 1e-7, std::f32::consts::PI.next_down()] {
+            let camera = Camera::from_camera_to_world_opengl(&good, fov, 64, 48);
+            assert!(matches!(camera, Err(PoseError::FieldOfView { .. })), "{fov}");
+        }
+        let usual = Intrinsics { width: 64, height: 48, fx: 70.0, fy: 70.0, cx: 32.0, cy: 24.0 };
+        let pose =
+            |intrinsics: Intrinsics, center: f64| Camera::from_pose(DMat3::IDENTITY, DVec3::splat(center), &intrinsics);
+        assert!(pose(usual, 3e6).is_ok());
+        assert!(pose(Intrinsics { cx: -6400.0, fx: 1e5, ..usual }, 0.0).is_ok(), "a crop");
+        assert!(matches!(pose(usual, 1e20), Err(PoseError::TooFar { .. })));
+        for absurd in [
+            Intrinsics { fx: 1e-30, ..usual },
+            Intrinsics { fy: 1e30, ..usual },
+            Intrinsics { fx: -70.0, ..usual },
+            Intrinsics { fx: f64::NAN, ..usual },
+            Intrinsics { cx: 3e38, ..usual },
+            Intrinsics { cy: -1e30, ..usual },
+            Intrinsics { cy: f64::NAN, ..usual },
+        ] {
+            assert!(matches!(pose(absurd, 0.0), Err(PoseError::Intrinsics { .. })), "{absurd:?}");
+        }
+        // What is accepted has a field of view that a stream takes.
+        for fx in [1e-5 * 64.0, 1e6 * 64.0] {
+            let (x, _) = pose(Intrinsics { fx, ..usual }, 0.0).unwrap().fov();
+            assert!(x > 0.0 && x < std::f32::consts::PI, "{x}");
+        }
     }
 
     #[test]

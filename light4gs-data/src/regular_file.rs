@@ -4,22 +4,29 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Reads a file of at most `limit` bytes.
+/// Opens a file to read it.
 ///
 /// A pipe, a device or a folder is refused before it is opened: a pipe would wait for its other end, and a device may
 /// never end.
 ///
 /// # Errors
-/// As the system says; [`io::ErrorKind::InvalidInput`] for what is no regular file, [`io::ErrorKind::FileTooLarge`] for one
-/// that is longer than `limit`.
-pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
+/// As the system says; [`io::ErrorKind::InvalidInput`] for what is no regular file.
+pub fn open_regular_file(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     if !kind.is_file() {
         let what = if kind.is_dir() { "a folder" } else { "a pipe, a socket or a device" };
         return Err(io::Error::new(io::ErrorKind::InvalidInput, format!("it is {what}, expected a regular file")));
     }
+    File::open(path)
+}
+
+/// Reads a file of at most `limit` bytes, opened as [`open_regular_file`] does.
+///
+/// # Errors
+/// As [`open_regular_file`]; [`io::ErrorKind::FileTooLarge`] for a file that is longer than `limit`.
+pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
+    open_regular_file(path)?.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, format!("it is longer than {limit} bytes")));
     }
@@ -49,6 +56,19 @@ mod tests {
         assert_eq!(read_regular_file(folder.path(), 9).unwrap_err().kind(), io::ErrorKind::InvalidInput);
         fs::write(&path, [0xff]).unwrap();
         assert_eq!(read_regular_text(&path, 3).unwrap_err().kind(), io::ErrorKind::InvalidData);
+        #[cfg(target_os = "linux")]
+        {
+            // Readers of what others wrote, one by one.
+            let pipe = folder.path().join("pipe.ply");
+            assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+            let errors = [
+                crate::read_pytorch(&pipe).unwrap_err().to_string(),
+                crate::GaussianPly::read(&pipe).unwrap_err().to_string(),
+            ];
+            for text in errors {
+                assert!(text.contains("pipe.ply") && text.contains("expected a regular file"), "{text}");
+            }
+        }
         #[cfg(target_os = "linux")]
         assert_eq!(read_regular_file(Path::new("/dev/zero"), 9).unwrap_err().kind(), io::ErrorKind::InvalidInput);
     }

@@ -261,7 +261,32 @@ fn found_before() {
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let mut command = w.command(["train", "scene", "--config", "pipe.toml", "--out", "x"]);
         assert_refused(&run_within(&mut command, Duration::from_secs(10), "a pipe"), &["pipe.toml", "regular file"]);
+        // So did one in the place of a stream or of a point cloud, and one to write to was replaced.
+        for arguments in [
+            ["info", "pipe.toml", "--limits", "default"],
+            ["decode", "pipe.toml", "--out", "x"],
+            ["decode", "run/scene.l4gs", "--out", "pipe.toml"],
+        ] {
+            let output = run_within(&mut w.command(arguments), Duration::from_secs(10), "a pipe");
+            assert_refused(&output, &["pipe.toml", "a pipe, a socket or a device"]);
+        }
+        let mut command = w.command(["import", "pipe.toml", "--from", "ply", "--out", "x.l4gs"]);
+        assert_refused(&run_within(&mut command, Duration::from_secs(10), "a pipe"), &["pipe.toml", "regular file"]);
+        assert!(std::os::unix::fs::FileTypeExt::is_fifo(&fs::metadata(&pipe).unwrap().file_type()));
     }
+    // Outputs that replaced what was read, or what a run consists of.
+    fs::copy(w.path("run/scene.l4gs"), w.path("copy.l4gs")).unwrap();
+    let checkpoint = format!("run/checkpoints/{}", w.names("run/checkpoints").last().unwrap());
+    for (arguments, words) in [
+        (["decode", "copy.l4gs", "--out", "./copy.l4gs"], ["copy.l4gs", "reads this file"]),
+        (["export", "copy.l4gs", "--html", "copy.l4gs"], ["copy.l4gs", "reads this file"]),
+        (["encode", "run", "--out", "run/run.json"], ["run/run.json", "belongs to a run"]),
+        (["decode", "copy.l4gs", "--out", "run/config.toml"], ["run/config.toml", "belongs to a run"]),
+        (["decode", "copy.l4gs", "--out", checkpoint.as_str()], ["run/checkpoints", "belongs to a run"]),
+    ] {
+        assert_refused(&w.run(arguments), &words);
+    }
+    assert_eq!(fs::read(w.path("copy.l4gs")).unwrap(), fs::read(w.path("run/scene.l4gs")).unwrap());
     // What `extends` names was quoted.
     fs::write(w.path("secret.txt"), "root:secret-password:0").unwrap();
     fs::write(w.path("curious.toml"), "extends = \"./secret.txt\"").unwrap();
@@ -314,6 +339,68 @@ fn found_before() {
         assert_refused(&w.train("x", &[key_value]).output().unwrap(), &[key]);
         assert!(!w.path("x").exists());
     }
+    let wide = ["model.deformation.width=4096", "model.deformation.depth=64"];
+    assert_refused(&w.train("x", &wide).output().unwrap(), &["model.deformation.width", "at most"]);
+    assert!(!w.path("x").exists());
+}
+
+/// A finite number that no stream takes was found by the encoder, after the last iteration, without the tensor's name.
+#[test]
+fn numbers_beyond_what_the_encoder_takes_are_found_in_the_checkpoint() {
+    let folder = tempfile::tempdir().unwrap();
+    let (config, whole) = checkpoint(folder.path());
+    let parts = Parts::of(&fs::read(&whole).unwrap()).without_checksums();
+    let path = folder.path().join("huge.safetensors");
+    let of_a_gaussian =
+        |at: &usize| parts.tensors[*at].0.starts_with("scene.gaussians.") && !parts.tensors[*at].3.is_empty();
+    for at in (0..parts.tensors.len()).filter(of_a_gaussian) {
+        let mut parts = parts.clone();
+        let (name, _, _, bytes) = &mut parts.tensors[at];
+        let name = name.clone();
+        bytes[..4].copy_from_slice(&3e38f32.to_le_bytes());
+        fs::write(&path, parts.to_bytes()).unwrap();
+        let text = load(&path, &config).unwrap_err().to_string();
+        assert!(text.contains("huge.safetensors") && text.contains(&name) && text.contains("3e38"), "{text}");
+    }
+}
+
+/// What the encoder refuses, and cameras that no training survives, are refused before `--overwrite` removes anything.
+#[test]
+fn a_dataset_that_cannot_be_coded_costs_no_run() {
+    let w = Workspace::new(PROGRAM);
+    assert_success(&w.train("run", &[]).output().unwrap());
+    let before = w.names("run");
+    let bytes = fs::read(w.path("scene/transforms_train.json")).unwrap();
+    let mut frames = serde_json::from_slice::<serde_json::Value>(&bytes).unwrap()["frames"].take();
+    for frame in frames.as_array_mut().unwrap() {
+        let path = format!("{}.png", frame["file_path"].as_str().unwrap());
+        frame["file_path"] = path.into();
+    }
+    for split in ["train", "test", "val"] {
+        fs::remove_file(w.path(&format!("scene/transforms_{split}.json"))).unwrap();
+    }
+    let properties = ["x", "y", "z"].map(|axis| format!("property float {axis}\n")).concat();
+    let points = |first: &str| {
+        let rows: String = (0..20).map(|i| format!("0.{i} 0.1 0.2\n")).collect();
+        format!("ply\nformat ascii 1.0\nelement vertex 21\n{properties}end_header\n{first} 0 0\n{rows}")
+    };
+    let refused = |first: &str, focal: f64, x: f64, words: &[&str]| {
+        let mut frames = frames.clone();
+        frames[0]["transform_matrix"][0][3] = x.into();
+        let (side, middle) = (32, 16.0);
+        let transforms = serde_json::json!({
+            "fl_x": focal, "fl_y": focal, "cx": middle, "cy": middle, "w": side, "h": side,
+            "ply_file_path": "points.ply", "frames": frames,
+        });
+        fs::write(w.path("scene/transforms.json"), transforms.to_string()).unwrap();
+        fs::write(w.path("scene/points.ply"), points(first)).unwrap();
+        let mut command = w.train("run", &[]);
+        assert_refused(&command.arg("--overwrite").output().unwrap(), words);
+        assert_eq!(w.names("run"), before);
+    };
+    refused("3e38", 40.0, 1.0, &["point cloud", "3e38"]);
+    refused("0.1", 40.0, 1e20, &["transforms.json", "frames[0]", "world units"]);
+    refused("0.1", 1e-30, 1.0, &["transforms.json", "focal length"]);
 }
 
 /// Found by an odd configuration: planes frozen before spherical harmonics count left a rate without a gradient.

@@ -1,9 +1,9 @@
 //! The content of a file, sampled.
 
 use crate::error::DataError;
+use crate::regular_file::open_regular_file;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
@@ -27,7 +27,7 @@ impl Content {
 }
 
 fn sampled(path: &Path) -> io::Result<Content> {
-    let mut file = File::open(path)?;
+    let mut file = open_regular_file(path)?;
     let length = file.metadata()?.len();
     let mut hash = Sha256::new();
     if length <= BLOCKS * BLOCK {

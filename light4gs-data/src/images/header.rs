@@ -1,6 +1,7 @@
 //! What an image file says about itself before it is decoded: format, size, whether its end is there.
 
 use crate::error::DataError;
+use crate::regular_file::open_regular_file;
 use image::metadata::Orientation;
 use image::{ImageDecoder, ImageFormat, ImageReader};
 use rayon::prelude::*;
@@ -103,7 +104,7 @@ fn has_end(path: &Path, format: ImageFormat) -> std::io::Result<bool> {
         ImageFormat::Jpeg => b"\xff\xd9",
         _ => return Ok(true),
     };
-    let mut file = File::open(path)?;
+    let mut file = open_regular_file(path)?;
     let length = file.metadata()?.len();
     let mut tail = Vec::new();
     for reach in [mark.len() as u64, TAIL] {

@@ -4,8 +4,8 @@ use super::composite::composite;
 use super::resize::resize;
 use super::rgb::RgbImage8;
 use crate::error::DataError;
+use crate::regular_file::open_regular_file;
 use fast_image_resize::{FilterType, pixels::F32x3};
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -37,7 +37,7 @@ pub(super) fn shrink_png(
             "restore the file or remove its frame",
         )
     };
-    let file = File::open(path).map_err(DataError::io("read", path))?;
+    let file = open_regular_file(path).map_err(DataError::io("read", path))?;
     let mut decoder = png::Decoder::new(BufReader::new(file));
     decoder.set_transformations(png::Transformations::normalize_to_color8() | png::Transformations::ALPHA);
     let mut reader = decoder.read_info().map_err(damaged)?;

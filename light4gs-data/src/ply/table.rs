@@ -7,7 +7,7 @@ use super::header::{read_header, read_line, shorten};
 use super::property::{Encoding, Property};
 use crate::atomic::write_atomically;
 use crate::error::DataError;
-use std::fs::File;
+use crate::regular_file::open_regular_file;
 use std::io::{self, BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
 
@@ -74,7 +74,7 @@ impl VertexTable {
 /// truncated, or has a layout that is not supported (big endian, list properties of vertices,
 /// another element before the vertices).
 pub fn read(path: &Path) -> Result<VertexTable, DataError> {
-    let file = File::open(path).map_err(DataError::io("read", path))?;
+    let file = open_regular_file(path).map_err(DataError::io("read", path))?;
     let size = file.metadata().map_err(DataError::io("read", path))?.len();
     read_from(path, BufReader::new(file), size)
 }

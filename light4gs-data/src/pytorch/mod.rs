@@ -19,6 +19,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use crate::error::DataError;
+use crate::regular_file::read_regular_file;
 use pickle::{Arena, Id, Object};
 use storage::Storages;
 
@@ -50,7 +51,7 @@ fn problem(field: impl Into<String>, problem: impl Into<String>) -> Problem {
 /// [`DataError::Io`] when the file cannot be read; [`DataError::Field`] when it is no PyTorch file, is damaged, or calls
 /// anything but what rebuilds a tensor.
 pub fn read_pytorch(path: &Path) -> Result<BTreeMap<String, PlainTensor>, DataError> {
-    let bytes = std::fs::read(path).map_err(DataError::io("read", path))?;
+    let bytes = read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
     read_bytes(&bytes).map_err(|(field, problem)| DataError::field(path, field, problem, REMEDY))
 }
 

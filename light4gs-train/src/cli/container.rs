@@ -52,7 +52,7 @@ pub(super) struct Encode {
 
 impl Encode {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        check_output(&self.out)?;
+        check_output(&self.out, &self.run)?;
         let (mut folder, record, config) = RunFolder::open(&self.run)?;
         if is_inside(&self.out, folder.root()) {
             folder.lock()?;
@@ -84,7 +84,13 @@ impl Encode {
             images: record.scene.is_some().then_some(&images),
             device: &device,
         };
-        let coded = code_to_file(&trained, &self.out, self.json)?;
+        let coded = code_to_file(&trained, &self.out, self.json).map_err(|error| match error {
+            // What the encoder refuses came from this file.
+            TrainError::Codec(problem) if !problem.is_internal() => {
+                TrainError::Input(format!("checkpoint {}: {problem}", path.display()))
+            }
+            other => other,
+        })?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
             if let Some(seconds) = record.fit_seconds {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
@@ -202,7 +208,7 @@ pub(super) struct Decode {
 
 impl Decode {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        check_output(&self.out)?;
+        check_output(&self.out, &self.file)?;
         let data = read_file_with_limits(&self.file, &self.limits.get())?;
         let tensors = plain_tensors(&data);
         let views = tensors.iter().map(|(name, (shape, bytes))| {

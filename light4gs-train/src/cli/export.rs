@@ -89,7 +89,7 @@ impl Export {
     }
 
     fn write_page(&self, html: &Path) -> Result<(), TrainError> {
-        check_output(html)?;
+        check_output(html, &self.file)?;
         let name = read_info(&self.file)?.meta.name;
         let io = |source| DataError::Io { action: "read", path: self.file.clone(), source };
         let scene = std::fs::read(&self.file).map_err(io)?;
@@ -103,7 +103,7 @@ impl Export {
     fn export<F: DeformationField>(&self, path: &Path) -> Result<(), TrainError> {
         let target = Target::of(path);
         if !matches!(target, Target::PlySequence) {
-            check_output(path)?;
+            check_output(path, &self.file)?;
         }
         let decoded: DecodedScene<F> =
             DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;

@@ -94,7 +94,7 @@ impl Import {
             let out = self.out.display();
             return Err(TrainError::Input(format!("{out} exists already; give --overwrite to replace it")));
         }
-        check_output(&self.out)?;
+        check_output(&self.out, &self.source)?;
         let device = device::open(config.device)?.autodiff();
         let scene = still::read(&self.source, &device)?;
         config.model.sh_degree = scene.gaussians.sh_degree() as u8;

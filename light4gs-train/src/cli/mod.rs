@@ -26,6 +26,7 @@ use tracing_subscriber::layer::{Layer, SubscriberExt};
 use tracing_subscriber::util::SubscriberInitExt;
 
 use crate::error::TrainError;
+use crate::run::belongs_to_run;
 
 /// Learns dynamic scenes as deformable 3D Gaussians and stores each as one .l4gs file.
 #[derive(Debug, Parser)]
@@ -146,14 +147,23 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Refuses an output path whose folder does not exist, before any work is done.
-fn check_output(path: &Path) -> Result<(), TrainError> {
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-    match folder {
-        Some(folder) if !folder.is_dir() => {
-            let (path, folder) = (path.display(), folder.display());
-            Err(TrainError::Input(format!("cannot write {path}: the folder {folder} does not exist; make it first")))
-        }
-        _ => Ok(()),
+/// Refuses, before any work is done, an output path whose folder does not exist, that is a pipe or a device, or that would
+/// replace the file that the command reads or one that belongs to a run.
+fn check_output(path: &Path, source: &Path) -> Result<(), TrainError> {
+    let refuse = |problem: String| Err(TrainError::Input(format!("cannot write {}: {problem}", path.display())));
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return refuse(format!("the folder {} does not exist; make it first", folder.display()));
     }
+    if std::fs::metadata(path).is_ok_and(|metadata| !(metadata.is_file() || metadata.is_dir())) {
+        return refuse("it is a pipe, a socket or a device; name a file".to_owned());
+    }
+    let whole = |path: &Path| std::fs::canonicalize(path).ok();
+    if whole(path).is_some_and(|path| whole(source) == Some(path)) {
+        return refuse("the command reads this file; name another".to_owned());
+    }
+    if belongs_to_run(path) {
+        return refuse("the file belongs to a run, which needs it; name another".to_owned());
+    }
+    Ok(())
 }

@@ -79,7 +79,7 @@ impl Render {
         if !(-90.0..=90.0).contains(&self.elevation) {
             return Err(TrainError::Input(format!("--elevation must be -90 to 90 degrees, not {}", self.elevation)));
         }
-        check_output(&self.out)?;
+        check_output(&self.out, &self.file)?;
         match is_still(&self.file)? {
             true => self.render::<StillField>(),
             false => self.render::<HexPlaneField>(),

@@ -90,9 +90,12 @@ pub(super) fn train(
 ) -> Result<(), TrainError> {
     // From here on a request to stop is heard.
     stop_flag();
-    for note in check_inputs(&config, scene)?.notes {
+    let data = check_inputs(&config, scene)?;
+    for note in &data.notes {
         tell(format_args!("note: {note}"));
     }
+    // What the encoder would refuse, such as a point at 3e38, must not cost the run that --overwrite replaces.
+    Trainer::builder(config.clone(), data).check()?;
     let folder = RunFolder::create(out, Some(scene), &config, overwrite)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
     let trainer = trainer(&config, &folder, &record, output)?.build()?;
@@ -113,7 +116,8 @@ pub(super) fn train_to_evaluation(
 ) -> Result<Evaluation, TrainError> {
     let fresh = !out.join("run.json").exists();
     if fresh {
-        check_inputs(&config, scene)?;
+        let data = check_inputs(&config, scene)?;
+        Trainer::builder(config.clone(), data).check()?;
         let folder = RunFolder::create(out, Some(scene), &config, false)?;
         if let Some(like) = like {
             folder.adopt(&RunFolder::open(like)?.0)?;

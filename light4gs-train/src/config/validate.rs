@@ -6,14 +6,15 @@ use light4gs_data::Layouts;
 
 use super::bounds::{self, MOST_PLANE_RESOLUTION};
 use super::{
-    CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, Problem,
-    PruneConfig, TrainConfig,
+    CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, ModelConfig,
+    Problem, PruneConfig, TrainConfig,
 };
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     let mut check = Check { problems: bounds::problems(config) };
     data(&mut check, &config.data);
     hexplane(&mut check, &config.model.hexplane);
+    deformation(&mut check, &config.model);
     train(&mut check, &config.train);
     compression(&mut check, &config.compression);
     eval(&mut check, &config.eval);
@@ -52,6 +53,18 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
         let answer = checks::hexplane(narrow(planes.channels), planes.resolution.map(narrow), &multipliers);
         check.encodable("model.hexplane.multipliers", answer);
     }
+}
+
+/// Width and depth are legal by themselves and not together: the largest network would take 17 GB of memory before the
+/// encoder could be asked about it.
+fn deformation(check: &mut Check, model: &ModelConfig) {
+    let (planes, network) = (&model.hexplane, &model.deformation);
+    let features = planes.channels.saturating_mul(planes.multipliers.len());
+    let heads =
+        [(network.position, 3), (network.scale, 3), (network.rotation, 4), (network.opacity, 1), (network.sh, 48)];
+    let outputs: Vec<u64> = heads.into_iter().filter_map(|(has, channels)| has.then_some(channels)).collect();
+    let answer = checks::motion_network(features as u64, network.width as u64, network.depth as u64, &outputs);
+    check.encodable("model.deformation.width", answer);
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {

@@ -109,15 +109,20 @@ impl<F: DeformationField> Checkpoint<F> {
         entries
     }
 
-    /// Writes the file whole or not at all: a checkpoint whose numbers are not all finite is not written, so that the last
-    /// one that was is one to go on from.
+    /// Writes the file whole or not at all: a checkpoint whose numbers are not all finite, or of which [`Checkpoint::load`] would
+    /// refuse one as too large, is not written, so that the last one that was is one to go on from.
     ///
     /// # Errors
     /// [`SaveError::NotFinite`] with the tensor; what the system refuses.
     pub fn save(&self, path: &Path) -> Result<(), SaveError> {
         let entries = self.entries();
         for (name, (_, bytes)) in &entries {
-            if let Some((index, value)) = not_finite(floats(bytes)) {
+            let moment = [FIRST, SECOND, DENSITY].iter().any(|prefix| name.starts_with(prefix));
+            let too_large = || {
+                let found = floats(bytes).enumerate().find(|(_, value)| value.abs() > LARGEST_VALUE);
+                found.filter(|_| !moment)
+            };
+            if let Some((index, value)) = not_finite(floats(bytes)).or_else(too_large) {
                 return Err(SaveError::NotFinite { tensor: name.clone(), index, value });
             }
         }
@@ -198,14 +203,14 @@ impl<F: DeformationField> Checkpoint<F> {
 /// Why a checkpoint was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
-    /// A number is not finite.
+    /// A number is not finite, or beyond what the encoder takes.
     #[error("tensor `{tensor}` has {value} at index {index}")]
     NotFinite {
         /// Its name in the file.
         tensor: String,
         /// Of the flattened tensor.
         index: usize,
-        /// NaN or an infinity.
+        /// NaN, an infinity, or a number beyond 1e30.
         value: f32,
     },
     /// The file cannot be written.
@@ -310,6 +315,9 @@ impl ParameterMapper for Load<'_, '_> {
     }
 }
 
+/// The largest position and the largest weight that the encoder takes (see `light4gs_codec::checks::positions`).
+const LARGEST_VALUE: f32 = 1e30;
+
 /// What finite values may not be, by the path of their parameter.
 fn check_range(path: &str, values: &[f32]) -> Result<(), String> {
     let bad = |unit: usize, holds: &dyn Fn(&[f32]) -> bool| values.chunks(unit).position(|row| !holds(row));
@@ -320,6 +328,13 @@ fn check_range(path: &str, values: &[f32]) -> Result<(), String> {
         "coordinates.axes" => (bad(3, &|row| (length(row) - 1.0).abs() < 1e-3), "an axis of length 1"),
         _ => (None, ""),
     };
+    // Finite numbers that no stream takes: without this they would be found by the encoder, after the last iteration.
+    if let Some(index) = values.iter().position(|value| value.abs() > LARGEST_VALUE) {
+        return Err(format!(
+            "has {:e} at index {index}, expected at most {LARGEST_VALUE:e} on either side of 0",
+            values[index]
+        ));
+    }
     row.map_or(Ok(()), |row| Err(format!("has, in row {row}, something else than {expected}")))
 }
 

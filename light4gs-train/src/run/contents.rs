@@ -32,6 +32,20 @@ pub(super) const FILES: [&str; 9] = [
 /// Folders of a run; `--overwrite` removes them.
 pub(super) const FOLDERS: [&str; 3] = ["events", "checkpoints", "renders"];
 
+/// Whether this is the path of a file by which a run goes on or is known: of its record or configuration, of a log, of a
+/// checkpoint. Its `scene.l4gs` is what commands write.
+pub(crate) fn belongs_to_run(path: &Path) -> bool {
+    let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let Ok(folder) = fs::canonicalize(folder) else { return false };
+    let in_run = name != "scene.l4gs" && FILES.contains(&name) && folder.join(RECORD).exists();
+    let is_checkpoint = || {
+        let run = folder.parent().filter(|_| folder.file_name().is_some_and(|name| name == "checkpoints"));
+        name.ends_with(".safetensors") && run.is_some_and(|run| run.join(RECORD).exists())
+    };
+    in_run || is_checkpoint()
+}
+
 /// What a folder holds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Contents {
@@ -151,8 +165,19 @@ mod tests {
         assert_eq!(state(), Contents::Remains);
         fs::write(root.join("notes.txt"), "").unwrap();
         assert_eq!(state(), Contents::Foreign("notes.txt".into()));
+        assert!(!belongs_to_run(&root.join("config.toml")));
         fs::write(root.join(RECORD), "{}").unwrap();
         assert_eq!(state(), Contents::Run);
+        for (path, belongs) in [
+            (RECORD, true),
+            ("checkpoints/../config.toml", true),
+            ("checkpoints/fine_000001.safetensors", true),
+            ("scene.l4gs", false),
+            ("mine.l4gs", false),
+            ("missing/run.json", false),
+        ] {
+            assert_eq!(belongs_to_run(&root.join(path)), belongs, "{path}");
+        }
         sweep(root);
         assert!(!root.join(".light4gs-7-0.part").exists() && !root.join(".run.json.77.part").exists());
     }

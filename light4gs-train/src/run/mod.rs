@@ -8,5 +8,7 @@ mod run_folder;
 mod stored_tensors;
 
 pub use checkpoint::{Checkpoint, SaveError, list_checkpoints};
+pub(crate) use contents::belongs_to_run;
+
 pub use comparison::{Comparison, Difference};
 pub use run_folder::{RunFolder, RunRecord};

@@ -169,11 +169,28 @@ impl<F: DeformationField> TrainerBuilder<F> {
         Ok(device.autodiff())
     }
 
+    /// Whether a run can begin: answers what [`TrainerBuilder::build`] would, before there is a folder for it, or one is
+    /// emptied.
+    ///
+    /// # Errors
+    /// As [`TrainerBuilder::build`], but for what concerns the folder.
+    pub fn check(mut self) -> Result<(), TrainError> {
+        self.folder = None;
+        let device = self.open_device()?;
+        self.first_state(&device).map(|_| ())
+    }
+
     fn begin(self, device: Device) -> Result<Trainer<F>, TrainError> {
+        let state = self.first_state(&device)?;
+        self.assemble(device, state, None)
+    }
+
+    /// What training begins with.
+    fn first_state(&self, device: &Device) -> Result<Checkpoint<F>, TrainError> {
         device.seed(self.config.seed);
-        let scene = self.config.model.scene::<F>(self.field.clone()).init(&self.data.points, &device);
+        let scene = self.config.model.scene::<F>(self.field.clone()).init(&self.data.points, device);
         let state = Checkpoint {
-            compression: Compression::of_run(&self.config, scene.planes(), &device)?,
+            compression: Compression::of_run(&self.config, scene.planes(), device)?,
             scene,
             adam: Adam::default(),
             density: Default::default(),
@@ -182,7 +199,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             seconds: 0.0,
         };
         self.check_encodable(&state)?;
-        self.assemble(device, state, None)
+        Ok(state)
     }
 
     /// Refuses now what the encoder would refuse in the end: it is asked about the scene and the models to start from.

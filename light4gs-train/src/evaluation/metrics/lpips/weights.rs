@@ -98,7 +98,7 @@ impl WeightFile {
 }
 
 fn read_safetensors(path: &Path) -> Result<BTreeMap<String, PlainTensor>, DataError> {
-    let bytes = std::fs::read(path).map_err(DataError::io("read", path))?;
+    let bytes = light4gs_data::read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
     let remedy = "copy or download it again";
     let file = SafeTensors::deserialize(&bytes)
         .map_err(|error| DataError::field(path, "SafeTensors header", error.to_string(), remedy))?;
