@@ -1,5 +1,6 @@
 //! The one error type of this crate: it says what is wrong, where, and what to do.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Why a dataset, an image or a point cloud could not be read or written.
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 #[non_exhaustive]
 pub enum DataError {
     /// The operating system refused a read or a write.
-    #[error("cannot {action} {}: {source}", path.display())]
+    #[error("cannot {action} {}: {source}{}", path.display(), remedy_of(source))]
     Io {
         /// What was attempted: `read`, `write`, `create`...
         action: &'static str,
@@ -92,6 +93,17 @@ pub enum DataError {
         /// What was given and what was expected.
         problem: String,
     },
+}
+
+/// What to do about the system's reason, where that is plain.
+fn remedy_of(source: &std::io::Error) -> &'static str {
+    match source.kind() {
+        ErrorKind::NotFound => "; restore the file, or check the path",
+        ErrorKind::PermissionDenied => "; change its permissions, or name another place",
+        ErrorKind::InvalidData => "; save it as UTF-8",
+        ErrorKind::StorageFull => "; make room on the disk",
+        _ => "",
+    }
 }
 
 impl DataError {

@@ -15,6 +15,14 @@ pub enum Distortion {
         /// `p1`, `p2`.
         tangential: [f64; 2],
     },
+    /// The polynomial of Brown and Conrady as nerfstudio and Metashape continue it:
+    /// `1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸`, and tangential terms.
+    BrownConrady {
+        /// `k1` to `k4`.
+        radial: [f64; 4],
+        /// `p1`, `p2`.
+        tangential: [f64; 2],
+    },
     /// OpenCV's fisheye: the angle `a` to the axis becomes `a (1 + k1 a² + k2 a⁴ + k3 a⁶ + k4 a⁸)`.
     Fisheye {
         /// `k1` to `k4`.
@@ -45,6 +53,10 @@ impl Distortion {
                 let factor = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
                 point * factor + tangential_shift(point, tangential)
             }
+            Self::BrownConrady { radial: [k1, k2, k3, k4], tangential } => {
+                let factor = 1.0 + r2 * (k1 + r2 * (k2 + r2 * (k3 + r2 * k4)));
+                point * factor + tangential_shift(point, tangential)
+            }
             Self::Fisheye { radial: [k1, k2, k3, k4] } => {
                 let angle = r2.sqrt().atan();
                 let a2 = angle * angle;
@@ -71,6 +83,7 @@ impl Distortion {
     fn is_none(&self) -> bool {
         match self {
             Self::RadialTangential { radial, tangential } => radial.iter().chain(tangential).all(|k| *k == 0.0),
+            Self::BrownConrady { radial, tangential } => radial.iter().chain(tangential).all(|k| *k == 0.0),
             // Even without coefficients these are not perspective projections.
             Self::Fisheye { .. } | Self::ThinPrismFisheye { .. } => false,
             Self::FieldOfView { omega } => *omega == 0.0,

@@ -33,13 +33,17 @@ pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The same for text.
+/// The same for text. The mark with which some editors and programs of Windows begin a file (U+FEFF) is left out.
 ///
 /// # Errors
 /// As [`read_regular_file`]; [`io::ErrorKind::InvalidData`] for what is not UTF-8.
 pub fn read_regular_text(path: &Path, limit: u64) -> io::Result<String> {
-    String::from_utf8(read_regular_file(path, limit)?)
-        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))
+    let mut text = String::from_utf8(read_regular_file(path, limit)?)
+        .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))?;
+    if text.starts_with('\u{feff}') {
+        text.drain(..'\u{feff}'.len_utf8());
+    }
+    Ok(text)
 }
 
 #[cfg(test)]
@@ -54,6 +58,8 @@ mod tests {
         assert_eq!(read_regular_text(&path, 3).unwrap(), "abc");
         assert_eq!(read_regular_text(&path, 2).unwrap_err().kind(), io::ErrorKind::FileTooLarge);
         assert_eq!(read_regular_file(folder.path(), 9).unwrap_err().kind(), io::ErrorKind::InvalidInput);
+        fs::write(&path, "\u{feff}a\u{feff}").unwrap();
+        assert_eq!(read_regular_text(&path, 9).unwrap(), "a\u{feff}");
         fs::write(&path, [0xff]).unwrap();
         assert_eq!(read_regular_text(&path, 3).unwrap_err().kind(), io::ErrorKind::InvalidData);
         #[cfg(target_os = "linux")]

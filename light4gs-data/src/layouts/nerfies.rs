@@ -18,9 +18,10 @@ use crate::scene::{Scene, SplitFrames};
 use glam::{DMat3, DVec3};
 use serde_json::Value;
 use std::collections::HashSet;
+use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Folders of images that are tried, in this order: the reference trains at half size.
+/// Folders of images, of which the one with most images is used, of equal ones the first: the reference trains at half size.
 const SCALES: [&str; 5] = ["2x", "1x", "4x", "8x", "16x"];
 /// Without `val_ids`, of four images one trains and the one between it and the next tests, as in the reference.
 const STRIDE: usize = 4;
@@ -83,16 +84,19 @@ struct Entry {
 
 fn open(layout: &'static str, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
     let entries = read_entries(root)?;
-    let folder = image_folder(root)?;
+    let folder = image_folder(root, &entries)?;
     let mut notes = Vec::new();
     let dataset = root.join("dataset.json");
     let entries = posed::present(&dataset, entries, &mut notes, |entry| {
         let base = folder.join(format!("{}.png", entry.id));
-        let found = files::find_image(&base).or_else(|| files::find_image(&base.with_extension("jpg")));
+        let found = files::find_image(&base);
         (base, found)
     })?;
     let images: Vec<PosedImage> =
         entries.iter().map(|(entry, path)| read_camera(root, entry, path.clone())).collect::<Result<_, _>>()?;
+    if root.join("mask").is_dir() {
+        posed::note_unmasked(&images, &mut notes);
+    }
     let mut splits = SplitFrames::default();
     for ((entry, _), frame) in entries.iter().zip(posed::frames(&images, options)?) {
         // The path of the camera through the capture, for videos.
@@ -183,9 +187,14 @@ fn read_metadata(path: &Path, id: &str, entry: Option<&Value>) -> Result<(f64, u
 }
 
 /// The folder of images, of the scale that is there.
-fn image_folder(root: &Path) -> Result<PathBuf, DataError> {
+fn image_folder(root: &Path, entries: &[Entry]) -> Result<PathBuf, DataError> {
     let rgb = root.join("rgb");
-    SCALES.iter().map(|scale| rgb.join(scale)).find(|folder| folder.is_dir()).ok_or_else(|| {
+    let present = |folder: &PathBuf| {
+        entries.iter().filter(|entry| files::find_image(&folder.join(format!("{}.png", entry.id))).is_some()).count()
+    };
+    let folders = SCALES.iter().map(|scale| rgb.join(scale)).filter(|folder| folder.is_dir());
+    // Of equal ones `max_by_key` takes the last.
+    folders.rev().max_by_key(present).ok_or_else(|| {
         let expected = SCALES.map(|scale| format!("rgb/{scale}")).join(", ");
         DataError::field(
             root,
@@ -241,13 +250,16 @@ fn read_camera(root: &Path, entry: &Entry, image: PathBuf) -> Result<PosedImage,
 }
 
 /// The mask of an image, if there is one: `mask/Nx/ID.png.png` of NeRF-DS (0 where something moves), or
-/// `covisible/Nx/val/ID.png` of DyCheck (0 where no training camera sees the place).
+/// `covisible/Nx/val/ID.png` of DyCheck (0 where no training camera sees the place). One of the image's scale comes first.
 fn find_mask(root: &Path, image: &Path, id: &str) -> Option<Mask> {
-    let scale = image.parent()?.file_name()?;
-    let moving = ["png.png", "png"].map(|suffix| root.join("mask").join(scale).join(format!("{id}.{suffix}")));
-    let unseen = root.join("covisible").join(scale).join("val").join(format!("{id}.png"));
-    let found = moving.into_iter().map(|path| Mask { path, zero: MaskMeaning::Moving });
-    found.chain([Mask { path: unseen, zero: MaskMeaning::Ignored }]).find(|mask| mask.path.is_file())
+    let own = image.parent().and_then(Path::file_name).and_then(OsStr::to_str);
+    own.into_iter().chain(SCALES).find_map(|scale| {
+        let moving = ["png.png", "png"].map(|suffix| root.join("mask").join(scale).join(format!("{id}.{suffix}")));
+        let unseen = root.join("covisible").join(scale).join("val").join(format!("{id}.png"));
+        let found = |path: &Path, zero: MaskMeaning| files::find_image(path).map(|path| Mask { path, zero });
+        let mask = moving.iter().find_map(|path| found(path, MaskMeaning::Moving));
+        mask.or_else(|| found(&unseen, MaskMeaning::Ignored))
+    })
 }
 
 /// The points that come with the capture, or random ones in front of the cameras.

@@ -25,7 +25,8 @@ use std::path::{Path, PathBuf};
 /// What a malformed field is told.
 const REMEDY: &str = "export the capture again, or correct the field";
 /// Camera models, and whether they bend by the angle.
-const PINHOLES: [&str; 6] = ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "PERSPECTIVE"];
+const PINHOLES: [&str; 7] =
+    ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV", "PERSPECTIVE"];
 
 /// The layout `nerfstudio`: one `transforms.json` with intrinsics.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,6 +67,9 @@ impl DatasetLayout for Nerfstudio {
         let names = frame_names(&relative);
         for ((((i, _), path), place), name) in present.iter().zip(&places).zip(names) {
             images.push(PosedImage { name, ..file.image(&document, *i, &entries[*i], path, place)? });
+        }
+        if entries.iter().any(|entry| entry.get("mask_path").is_some_and(|path| !path.is_null())) {
+            posed::note_unmasked(&images, &mut notes);
         }
         let frames = posed::frames(&images, options)?;
         let splits = file.splits(&document, frames, &held_out(&places))?;
@@ -148,7 +152,7 @@ impl File<'_> {
             None => None,
             Some(name) => {
                 let path = files::inside(self.root, &self.path, &format!("frames[{i}].mask_path"), name)?;
-                path.is_file().then_some(Mask { path, zero: MaskMeaning::Ignored })
+                files::find_image(&path).map(|path| Mask { path, zero: MaskMeaning::Ignored })
             }
         };
         Ok(PosedImage {
@@ -209,6 +213,10 @@ impl File<'_> {
             return Err(DataError::field(&self.path, value("fl_x").0, problem, REMEDY));
         };
         let fy = down.unwrap_or(fx);
+        if !(fx > 0.0 && fy > 0.0) {
+            let problem = format!("focal lengths are {fx} x {fy}, expected positive numbers of pixels");
+            return Err(DataError::field(&self.path, value(if fx > 0.0 { "fl_y" } else { "fl_x" }).0, problem, REMEDY));
+        }
         let (cx, cy) = (number("cx")?.unwrap_or(width / 2.0), number("cy")?.unwrap_or(height / 2.0));
         let intrinsics = Intrinsics { width: width as u32, height: height as u32, fx, fy, cx, cy };
         let mut k = [0.0; 6];
@@ -217,10 +225,18 @@ impl File<'_> {
         }
         let tangential = [number("p1")?.unwrap_or(0.0), number("p2")?.unwrap_or(0.0)];
         let (field, model) = value("camera_model");
+        let model = model.filter(|model| !model.is_null());
+        // nerfstudio's `k4` is the next term of the polynomial; OpenCV's divides, in a model that always has `k5` and `k6`.
+        let divides = k[4] != 0.0 || k[5] != 0.0 || model.is_some_and(|model| model == "FULL_OPENCV");
+        let perspective = if divides || k[3] == 0.0 {
+            Distortion::RadialTangential { radial: k, tangential }
+        } else {
+            Distortion::BrownConrady { radial: [k[0], k[1], k[2], k[3]], tangential }
+        };
         let fisheye = matches!(entry.get("is_fisheye").or(document.get("is_fisheye")), Some(Value::Bool(true)));
         let distortion = match model.map(|model| model.as_str().unwrap_or("")) {
-            None if !fisheye => Distortion::RadialTangential { radial: k, tangential },
-            Some(name) if PINHOLES.contains(&name) => Distortion::RadialTangential { radial: k, tangential },
+            None if !fisheye => perspective,
+            Some(name) if PINHOLES.contains(&name) => perspective,
             None | Some("OPENCV_FISHEYE") => Distortion::Fisheye { radial: [k[0], k[1], k[2], k[3]] },
             Some(_) => {
                 let found = json::describe(model);
@@ -239,12 +255,23 @@ impl File<'_> {
     /// The splits that the file names, or those of `tests`.
     fn splits(&self, document: &Value, frames: Vec<Frame>, tests: &[bool]) -> Result<SplitFrames, DataError> {
         let mut named: HashMap<PathBuf, &str> = HashMap::new();
+        let paths: HashSet<PathBuf> = frames.iter().map(|frame| frame.path.clone()).collect();
         for split in ["train", "val", "test"] {
             let field = format!("{split}_filenames");
             let Some(list) = document.get(&field) else { continue };
-            for (i, name) in json::words(&self.path, &field, Some(list), REMEDY)?.iter().enumerate() {
+            let names = json::words(&self.path, &field, Some(list), REMEDY)?;
+            let mut known = names.is_empty();
+            for (i, name) in names.iter().enumerate() {
                 let path = files::inside(self.root, &self.path, &format!("{field}[{i}]"), name)?;
-                named.insert(files::find_image(&path).unwrap_or(path), split);
+                let path = files::find_image(&path).unwrap_or(path);
+                known |= paths.contains(&path);
+                named.insert(path, split);
+            }
+            // Some may be missing; if all are, the names are not those of this capture.
+            if !known {
+                let found = files::shorten(&names[0]);
+                let problem = format!("none of its {} names is that of a frame; the first is `{found}`", names.len());
+                return Err(DataError::field(&self.path, field, problem, "write them as in `file_path` of the frames"));
             }
         }
         if !named.values().any(|split| *split != "train") {

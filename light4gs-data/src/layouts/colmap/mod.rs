@@ -1,6 +1,7 @@
 //! COLMAP: a sparse model (binary or text) and the images that it was made from.
 //!
-//! The model lies in `sparse/0`, `sparse`, `colmap/sparse/0`, `distorted/sparse/0` or the folder itself, the images in
+//! The model lies in `sparse/0`, `sparse`, `colmap/sparse/0`, `distorted/sparse/0` or the folder itself; of several, one for
+//! each part of the capture that COLMAP could connect, the one with most images is taken. The images lie in
 //! `images`, or a smaller version of them in `images_2`, `images_4`, `images_8`. COLMAP knows no time: it comes from the
 //! images' names, see [`places`]. One folder of numbered frames is one moving camera; folders `cam00`, `cam01`... with the
 //! same numbers are a rig.
@@ -21,8 +22,8 @@ use model::Model;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Folders of models that are tried, in this order.
-const MODELS: [&str; 6] = ["sparse/0", "sparse", "colmap/sparse/0", "distorted/sparse/0", "dense/sparse", "."];
+/// Folders that are tried, in this order: they hold a model, or folders `0`, `1`... with one each.
+const MODELS: [&str; 5] = ["sparse", "colmap/sparse", "distorted/sparse", "dense/sparse", "."];
 /// Folders of images that are tried, in this order.
 const IMAGES: [&str; 7] = ["images", "images_2", "images_4", "images_8", "input", "dense/images", "rgb"];
 
@@ -36,25 +37,16 @@ impl DatasetLayout for Colmap {
     }
 
     fn signature(&self) -> &'static str {
-        "sparse/0/cameras.bin or .txt"
+        "sparse/0/cameras.bin and images.bin, or both as .txt"
     }
 
     fn detect(&self, root: &Path) -> bool {
-        model_folder(root).is_some()
+        !model_folders(root).is_empty()
     }
 
     fn open(&self, root: &Path, options: &LoadOptions) -> Result<Scene, DataError> {
-        let folder = model_folder(root).ok_or_else(|| {
-            let expected = MODELS.map(|folder| format!("{folder}/cameras.bin")).join(", ");
-            DataError::field(
-                root,
-                "sparse",
-                format!("no model, expected one of {expected} (or .txt)"),
-                "run COLMAP first",
-            )
-        })?;
-        let model = read_model(&folder)?;
         let mut notes = Vec::new();
+        let model = largest_model(root, &mut notes)?;
         let images_folder = find_images(root, &model)?;
         let posed = posed_images(&model, &images_folder, &mut notes)?;
         note_unposed(&images_folder, &posed, &mut notes);
@@ -96,19 +88,51 @@ pub(super) fn frame_name(path: &str) -> String {
     without_suffix.to_string_lossy().replace(['/', '\\'], "_")
 }
 
-/// The folder that holds a model, binary or text.
-fn model_folder(root: &Path) -> Option<PathBuf> {
-    let holds_one = |folder: &PathBuf| {
-        ["bin", "txt"]
-            .iter()
-            .any(|suffix| ["cameras", "images"].iter().all(|name| folder.join(format!("{name}.{suffix}")).is_file()))
+/// The folders that hold a model, binary or text, all of them in the same folder of the dataset.
+fn model_folders(root: &Path) -> Vec<PathBuf> {
+    let holds_one = |folder: &Path| ["bin", "txt"].iter().any(|suffix| holds_model(folder, suffix));
+    let is_number = |path: &Path| files::name_of(path).bytes().all(|c| c.is_ascii_digit());
+    let of = |place: &&str| {
+        let place = root.join(place);
+        let mut found = files::entries(&place, |path| is_number(path) && holds_one(path)).unwrap_or_default();
+        if found.is_empty() && holds_one(&place) {
+            found.push(place);
+        }
+        found
     };
-    MODELS.iter().map(|folder| root.join(folder)).find(holds_one)
+    MODELS.iter().map(of).find(|found| !found.is_empty()).unwrap_or_default()
+}
+
+/// Whether the files that every model has are there with this suffix.
+fn holds_model(folder: &Path, suffix: &str) -> bool {
+    ["cameras", "images"].iter().all(|name| folder.join(format!("{name}.{suffix}")).is_file())
+}
+
+/// The model with most images; of equal ones the first.
+fn largest_model(root: &Path, notes: &mut Vec<String>) -> Result<Model, DataError> {
+    let folders = model_folders(root);
+    let mut largest: Option<(&PathBuf, Model)> = None;
+    for folder in &folders {
+        let model = read_model(folder)?;
+        if largest.as_ref().is_none_or(|(_, known)| model.images.len() > known.images.len()) {
+            largest = Some((folder, model));
+        }
+    }
+    let Some((folder, model)) = largest else {
+        let expected = MODELS.map(|folder| format!("{folder}/0/cameras.bin")).join(", ");
+        let problem = format!("no model, expected one of {expected} with its images.bin (or both as .txt)");
+        return Err(DataError::field(root, "sparse", problem, "run COLMAP first"));
+    };
+    if folders.len() > 1 {
+        let (count, all, folder) = (model.images.len(), folders.len(), folder.display());
+        notes.push(format!("COLMAP left {all} models; {folder} is used, the largest, with {count} images"));
+    }
+    Ok(model)
 }
 
 /// Reads the model of a folder.
 pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
-    let is_binary = folder.join("cameras.bin").is_file();
+    let is_binary = holds_model(folder, "bin");
     let file = |name: &str| folder.join(format!("{name}.{}", if is_binary { "bin" } else { "txt" }));
     let images_file = file("images");
     let (cameras, images) = if is_binary {
@@ -143,7 +167,12 @@ fn find_images(root: &Path, model: &Model) -> Result<PathBuf, DataError> {
     let folders: Vec<PathBuf> = IMAGES.iter().chain(&["."]).map(|name| root.join(name)).collect();
     let best = folders.into_iter().rev().filter(|folder| folder.is_dir()).max_by_key(present);
     best.filter(|folder| present(folder) > 0).ok_or_else(|| {
-        let expected = root.join("images").join(model.images.first().map_or("", |image| image.name.as_str()));
+        let first = model.images.first().map_or("", |image| image.name.as_str());
+        let mut places = IMAGES.iter().chain(&["."]).map(|name| root.join(name).join(first));
+        if let Some(found) = places.find(|path| files::is_of_other_format(path)) {
+            return posed::other_format(&found);
+        }
+        let expected = root.join("images").join(first);
         DataError::image(
             &expected,
             format!("missing, with every image that {} names", model.images_file.display()),

@@ -96,10 +96,23 @@ pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, DataError> {
             .fold(whole, |rest, _| rest.trim_start().split_once(char::is_whitespace).map_or("", |(_, rest)| rest));
         let name = name.trim().to_owned();
         images.push(ModelImage::new(path, &line.field(), name, line.floats(1)?, line.floats(5)?, camera)?);
-        // The keypoints.
-        all.next();
+        if let Some((_, keypoints)) = all.next() {
+            check_keypoints(&keypoints)?;
+        }
     }
     Ok(images)
+}
+
+/// The second line of an image: coordinates and the number of a point, three by three. Programs that leave it out would
+/// make every other image disappear.
+fn check_keypoints(line: &Line) -> Result<(), DataError> {
+    let is_point = |words: &[&str]| words.len() == 3 && words[2].parse::<i64>().is_ok();
+    if line.words.chunks(3).all(is_point) {
+        return Ok(());
+    }
+    let remedy = "write two lines for each image; the second may be empty";
+    let problem = "keypoints `X Y POINT3D_ID` are expected in the line after an image";
+    Err(DataError::field(line.path, line.field(), problem, remedy))
 }
 
 /// The points, and their mean reprojection error in pixels.

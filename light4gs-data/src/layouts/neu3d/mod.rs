@@ -47,6 +47,13 @@ impl DatasetLayout for Neu3d {
         let rows = cameras::rows(&path, &cameras, table.rows)?;
         let poses = (0..table.rows).map(|i| Pose::read(&path, &table, i)).collect::<Result<Vec<_>, _>>()?;
         let mut notes = Vec::new();
+        if table.rows > cameras.len() {
+            notes.push(format!(
+                "poses_bounds.npy has {} rows for {} cameras: the number in a camera's name is taken for its row",
+                table.rows,
+                cameras.len()
+            ));
+        }
         let numbered = cameras::frames(root, &cameras, options.frames, &mut notes)?;
         let (images, instants) = images(&path, &poses, &cameras, &rows, &numbered, options);
         let mut splits = SplitFrames::default();

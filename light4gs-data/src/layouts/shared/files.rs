@@ -8,6 +8,8 @@ use std::path::{Component, Path, PathBuf};
 
 /// Suffixes of images that can be decoded, lower case.
 const SUFFIXES: [&str; 4] = ["png", "jpg", "jpeg", "gif"];
+/// Suffixes of images that cannot be decoded, lower case: cameras and other programs write them.
+const OTHER_SUFFIXES: [&str; 9] = ["tif", "tiff", "bmp", "webp", "heic", "heif", "avif", "exr", "jxl"];
 
 /// Whether a file's suffix is that of an image, in upper or lower case.
 pub(crate) fn is_image(path: &Path) -> bool {
@@ -104,10 +106,12 @@ pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Resul
     Ok(root.join(below))
 }
 
-/// The image of a path with or without suffix, in upper or lower case; `None` where there is none.
+/// The image of a path with or without suffix, in upper or lower case; `None` where there is none. Where the file of the
+/// name is not there, one of another suffix will do: the images may have been converted since their names were written.
 pub(crate) fn find_image(path: &Path) -> Option<PathBuf> {
-    if is_image(path) {
-        return with_any_case(path);
+    if is_image(path) || has_suffix(path, &OTHER_SUFFIXES) {
+        let converted = || SUFFIXES.iter().find_map(|suffix| with_any_case(&path.with_extension(suffix)));
+        return Some(path).filter(|path| is_image(path)).and_then(with_any_case).or_else(converted);
     }
     let added = |suffix: &str| {
         let mut name = path.as_os_str().to_owned();
@@ -126,16 +130,27 @@ fn with_any_case(path: &Path) -> Option<PathBuf> {
     if path.is_file() {
         return Some(path.to_path_buf());
     }
-    let suffix = path.extension()?.to_str()?;
-    [suffix.to_ascii_lowercase(), suffix.to_ascii_uppercase()]
+    let (lower, upper) = (path.extension()?.to_str()?.to_ascii_lowercase(), path.extension()?.to_ascii_uppercase());
+    let capitalized = lower.get(..1)?.to_ascii_uppercase() + lower.get(1..)?;
+    [lower.as_ref(), upper.as_os_str(), capitalized.as_ref()]
         .iter()
         .map(|suffix| path.with_extension(suffix))
         .find(|candidate| candidate.is_file())
 }
 
+/// Whether the file of this path, or the one whose suffix is written in the other case, is there in a format that cannot
+/// be decoded.
+pub(crate) fn is_of_other_format(path: &Path) -> bool {
+    has_suffix(path, &OTHER_SUFFIXES) && with_any_case(path).is_some()
+}
+
 /// Text from a file, short and without control characters, for messages.
 pub(crate) fn shorten(text: &str) -> String {
-    text.chars().take(80).flat_map(char::escape_debug).collect()
+    let visible = |c: char| {
+        let quote = matches!(c, '"' | '\'').then_some(c);
+        quote.into_iter().chain(c.escape_debug().filter(move |_| quote.is_none()))
+    };
+    text.chars().take(80).flat_map(visible).collect()
 }
 
 #[cfg(test)]
@@ -163,6 +178,12 @@ mod tests {
     }
 
     #[test]
+    fn text_for_messages_is_short_and_visible() {
+        assert_eq!(shorten("\"48\" it's ä\n\x1b"), "\"48\" it's ä\\n\\u{1b}");
+        assert_eq!(shorten(&"x".repeat(200)).len(), 80);
+    }
+
+    #[test]
     fn suffixes_in_any_case() {
         let folder = tempfile::tempdir().unwrap();
         for name in ["a.PNG", "b.Jpg", "c.jpeg", ".hidden.png", "notes.txt"] {
@@ -173,6 +194,10 @@ mod tests {
         assert_eq!(at("a").as_deref(), Some("a.PNG"));
         assert_eq!(at("c.jpeg").as_deref(), Some("c.jpeg"));
         assert_eq!(at("d.png"), None);
+        // Converted since.
+        assert_eq!(at("b.png").as_deref(), Some("b.Jpg"));
+        assert_eq!(at("c.tif").as_deref(), Some("c.jpeg"));
+        assert_eq!(at("a.JPG").as_deref(), Some("a.PNG"));
         let names: Vec<String> = images(folder.path()).unwrap().iter().map(|path| name_of(path)).collect();
         assert_eq!(names, ["a.PNG", "b.Jpg", "c.jpeg"]);
     }

@@ -1,5 +1,6 @@
 //! From images with poses, as a reader finds them, to the frames of a scene.
 
+use super::files;
 use crate::camera::{Camera, Intrinsics, PoseError};
 use crate::error::DataError;
 use crate::frame::{Frame, Mask};
@@ -107,6 +108,23 @@ fn upright_size(image: &PosedImage, header: ImageHeader) -> Result<(u32, u32), D
     ))
 }
 
+/// Says how many images have no mask, where a capture has masks.
+pub(in crate::layouts) fn note_unmasked(images: &[PosedImage], notes: &mut Vec<String>) {
+    let without: Vec<&PosedImage> = images.iter().filter(|image| image.mask.is_none()).collect();
+    if let Some(first) = without.first() {
+        let (count, all, first) = (without.len(), images.len(), first.path.display());
+        notes.push(format!("{count} of the {all} images have no mask and count as a whole; the first is {first}"));
+    }
+}
+
+/// The error about an image that is there, in a format that cannot be decoded.
+pub(in crate::layouts) fn other_format(path: &Path) -> DataError {
+    let problem = "this format cannot be decoded, expected a PNG, JPEG or GIF image";
+    let remedy = "convert the images, for example with `ffmpeg -i NAME.tif NAME.png`; the names may keep their old suffix in \
+                  the dataset's files";
+    DataError::image(path, problem, remedy)
+}
+
 /// Leaves out the images whose file is missing, and says so; more than half missing is an error.
 ///
 /// `file_of` gives the file that an image should have, and the one that it has.
@@ -129,6 +147,9 @@ pub(in crate::layouts) fn present<T>(
         return Ok(found);
     };
     let described_in = described_in.display();
+    if 2 * absent > count && files::is_of_other_format(&first) {
+        return Err(other_format(&first));
+    }
     if 2 * absent > count {
         return Err(DataError::image(
             &first,

@@ -192,3 +192,80 @@ fn damaged_models_are_named() {
     }
     refuses(root, &["frame_0000.png", "missing"]);
 }
+
+#[test]
+fn of_several_models_the_largest_is_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let whole = Capture::moving("frame_", 4, None);
+    let mut part = Capture::moving("frame_", 4, None);
+    part.shots.truncate(2);
+    write_images(root, &whole);
+    write_binary(root, &whole);
+    fs::rename(root.join("sparse/0"), root.join("sparse/1")).unwrap();
+    let alone = check(root, "colmap", &whole, by_name(&whole.shots));
+    assert!(alone.notes.is_empty(), "{:?}", alone.notes);
+    fs::create_dir(root.join("sparse/0")).unwrap();
+    write_text(root, &part);
+    let scene = check(root, "colmap", &whole, by_name(&whole.shots));
+    assert!(scene.notes[0].contains("2 models") && scene.notes[0].contains("sparse/1"), "{:?}", scene.notes);
+}
+
+#[test]
+fn text_with_a_mark_at_its_beginning_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 2, None);
+    write_images(folder.path(), &capture);
+    write_text(folder.path(), &capture);
+    for name in ["cameras.txt", "images.txt", "points3D.txt"] {
+        let path = folder.path().join("sparse/0").join(name);
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, format!("\u{feff}{}", text.replace('\n', "\r\n"))).unwrap();
+    }
+    check(folder.path(), "colmap", &capture, by_name(&capture.shots));
+}
+
+#[test]
+fn poses_without_the_lines_of_keypoints_are_an_error() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    for prefix in ["frame_", "my frame ", "my own frame "] {
+        let capture = Capture::moving(prefix, 4, None);
+        write_images(root, &capture);
+        write_text(root, &capture);
+        let path = root.join("sparse/0/images.txt");
+        let text = fs::read_to_string(&path).unwrap();
+        let poses: Vec<&str> = text.lines().filter(|line| line.ends_with(".png")).collect();
+        fs::write(&path, poses.join("\n")).unwrap();
+        refuses(root, &["images.txt", "line 2", "keypoints", "two lines"]);
+    }
+}
+
+#[test]
+fn images_of_a_format_that_is_not_read_are_named_and_converted_ones_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let capture = Capture::moving("frame_", 2, None);
+    write_images(root, &capture);
+    write_text(root, &capture);
+    let images = root.join("sparse/0/images.txt");
+    let text = fs::read_to_string(&images).unwrap();
+    fs::write(&images, text.replace(".png", ".TIF")).unwrap();
+    for shot in &capture.shots {
+        let path = root.join(format!("images/{}.png", shot.name));
+        fs::rename(&path, path.with_extension("tif")).unwrap();
+    }
+    refuses(root, &["frame_0000", "format", "PNG", "ffmpeg"]);
+    write_images(root, &capture);
+    check(root, "colmap", &capture, by_name(&capture.shots));
+}
+
+#[test]
+fn a_model_with_a_file_missing_names_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 2, None);
+    write_images(folder.path(), &capture);
+    write_binary(folder.path(), &capture);
+    fs::remove_file(folder.path().join("sparse/0/images.bin")).unwrap();
+    refuses(folder.path(), &["cameras.bin and images.bin"]);
+}

@@ -164,3 +164,45 @@ fn damaged_files_are_named() {
     fs::rename(root.join("rgb/2x"), root.join("rgb/3x")).unwrap();
     assert!(Scene::open(root, &options()).unwrap_err().to_string().contains("rgb/2x"));
 }
+
+#[test]
+fn the_scale_with_most_images_is_used() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let capture = Capture::moving("", 4, None);
+    write(root, &capture, &[1]);
+    // As after a copy that was stopped, and images that were converted.
+    fs::rename(root.join("rgb/2x"), root.join("rgb/4x")).unwrap();
+    fs::create_dir(root.join("rgb/2x")).unwrap();
+    fs::copy(root.join("rgb/4x/0000.png"), root.join("rgb/2x/0000.png")).unwrap();
+    let jpeg = root.join("rgb/4x/0001.JPEG");
+    image::open(root.join("rgb/4x/0001.png"))
+        .unwrap()
+        .into_rgb8()
+        .save_with_format(&jpeg, image::ImageFormat::Jpeg)
+        .unwrap();
+    fs::remove_file(root.join("rgb/4x/0001.png")).unwrap();
+    let scene = Scene::open(root, &options()).unwrap();
+    assert_eq!((scene.train.len(), scene.test.len(), scene.notes.len()), (3, 1, 0), "{:?}", scene.notes);
+    assert!(scene.train.iter().all(|frame| frame.path.starts_with(root.join("rgb/4x"))));
+    assert_eq!(scene.test[0].path, jpeg);
+}
+
+#[test]
+fn masks_of_another_scale_or_suffix_count_and_missing_ones_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let root = folder.path();
+    let plan = (0..4).map(|i| (format!("{i:06}_{}", ["left", "right"][i % 2]), i as f32 / 4.0, i as f32 / 3.0, None));
+    let capture = Capture::new(false, plan.collect());
+    write(root, &capture, &[]);
+    let mask = image::GrayImage::from_pixel(2 * SIZE.0, 2 * SIZE.1, image::Luma([255]));
+    for name in ["mask/1x/000000_left.png.PNG", "mask/4x/000001_right.png", "mask/2x/000002_left.png.png"] {
+        fs::create_dir_all(root.join(name).parent().unwrap()).unwrap();
+        mask.save(root.join(name)).unwrap();
+    }
+    let scene = Scene::open(root, &options()).unwrap();
+    assert!(scene.train.iter().all(|frame| frame.mask.is_some()));
+    assert_eq!(scene.test.iter().filter(|frame| frame.mask.is_some()).count(), 1);
+    let note = &scene.notes[0];
+    assert!(note.contains("1 of the 4 images have no mask") && note.contains("000003_right.png"), "{note}");
+}

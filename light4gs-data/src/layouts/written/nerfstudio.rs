@@ -125,6 +125,48 @@ fn damaged_files_are_named() {
     refuses(&|v| v["frames"][1]["file_path"] = json!("/etc/passwd"), &["frames[1].file_path", "leads out"]);
     refuses(&|v| drop(v["frames"][1].as_object_mut().unwrap().remove("file_path")), &["frames[1].file_path"]);
     refuses(&|v| v["frames"][1]["time"] = json!(0.5), &["frames[0].time", "missing"]);
+    refuses(&|v| v["test_filenames"] = json!(["x.png", "y.png"]), &[file, "test_filenames", "2 names", "`x.png`"]);
     refuses(&|v| v["test_filenames"] = json!("x"), &["test_filenames", "a list of names"]);
     refuses(&|v| v["ply_file_path"] = json!("../x.ply"), &["ply_file_path", "leads out"]);
+}
+
+#[test]
+fn the_fourth_coefficient_continues_the_polynomial() {
+    let folder = tempfile::tempdir().unwrap();
+    let lens = Distortion::BrownConrady { radial: [-0.1, 0.05, 0.02, 0.4], tangential: [0.001, -0.002] };
+    let capture = Capture::moving("frame_", 2, crate::lens::Lens::new(lens, 0.0));
+    let mut document = document(&capture, true);
+    for (key, value) in [("k1", -0.1), ("k2", 0.05), ("k3", 0.02), ("k4", 0.4), ("p1", 0.001), ("p2", -0.002)] {
+        document[key] = json!(value);
+    }
+    for model in [json!("OPENCV"), json!(null)] {
+        document["camera_model"] = model;
+        write(folder.path(), &capture, &document);
+        let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
+        assert_eq!(scene.train[0].lens.unwrap().distortion, lens);
+    }
+    // OpenCV's own model divides by it.
+    document["camera_model"] = json!("FULL_OPENCV");
+    write(folder.path(), &capture, &document);
+    let scene = Scene::open(folder.path(), &options()).unwrap();
+    assert!(matches!(scene.train[0].lens.unwrap().distortion, Distortion::RadialTangential { .. }));
+}
+
+#[test]
+fn masks_that_are_missing_are_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("frame_", 3, None);
+    let mut document = document(&capture, true);
+    for i in 0..3 {
+        document["frames"][i]["mask_path"] = json!(format!("masks/{i}.png"));
+    }
+    write(folder.path(), &capture, &document);
+    fs::create_dir(folder.path().join("masks")).unwrap();
+    let mask = image::GrayImage::from_pixel(SIZE.0, SIZE.1, image::Luma([255]));
+    for name in ["0.PNG", "2.png"] {
+        mask.save(folder.path().join("masks").join(name)).unwrap();
+    }
+    let scene = Scene::open(folder.path(), &options()).unwrap();
+    let note = &scene.notes[0];
+    assert!(note.contains("1 of the 3 images have no mask") && note.contains("frame_0001.png"), "{note}");
 }
