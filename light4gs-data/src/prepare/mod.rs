@@ -119,9 +119,9 @@ fn frames(
     let longest = infos.iter().fold(0.0f64, |longest, info| longest.max(info.duration));
     let fastest = infos.iter().fold(0.0f64, |fastest, info| fastest.max(info.rate));
     let needed = options.frames as f64 / longest.max(1e-3);
-    // Different rates are brought to one, however few frames there are.
-    let equal = infos.iter().all(|info| (info.rate - fastest).abs() < 1e-3);
-    let rate = (longest > 0.0 && (needed < 0.99 * fastest || !equal)).then_some(needed.min(fastest));
+    // Those of a rig are brought to one rate, however few frames there are: even at equal rates a phone leaves frames out.
+    let rig = infos.len() > 1;
+    let rate = (longest > 0.0 && (needed < 0.99 * fastest || rig)).then_some(needed.min(fastest));
     for (i, (video, camera)) in options.videos.iter().zip(cameras).enumerate() {
         progress(PrepareProgress { phase: "frames", done: i, total });
         let folder = options.out.join("images").join(camera);
