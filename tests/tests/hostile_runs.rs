@@ -64,7 +64,8 @@ fn damaged_checkpoints_are_refused_with_the_tensor() {
     fs::write(&path, parts.clone().without_checksums().to_bytes()).unwrap();
     load(&path, &config).expect("an older version's file");
 
-    for case in 0..cases(300) {
+    // Found once: in case 544 the means alone have a row more, and another tensor was blamed.
+    for case in (0..cases(300)).chain([544]) {
         let random = &mut generator(case);
         let (damaged, what) = match random.random_range(0..5) {
             0 => bytes::mutate(&bytes, random),

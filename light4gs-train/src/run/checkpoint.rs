@@ -174,10 +174,10 @@ impl<F: DeformationField> Checkpoint<F> {
             scene.coordinates = scene.coordinates.with_mapping(parsed_mapping(text).ok_or_else(wrong)?);
         }
         let mut compression = Compression::of_run(config, scene.planes(), device)?;
-        let means = format!("{SCENE}.{}", GaussianAttribute::Means.path());
-        let count = file.rows(&means).unwrap_or(0);
+        let count = gaussian_count(&file);
         if count == 0 {
-            return Err(failed(format!("tensor `{means}` has no rows, expected at least one Gaussian")));
+            let means = GaussianAttribute::Means.path();
+            return Err(failed(format!("tensor `{SCENE}.{means}` has no rows, expected at least one Gaussian")));
         }
         let mut load = Load { prefix: SCENE, count, file: &mut file, device, sizes: BTreeMap::new(), problem: None };
         scene = map_parameters(scene, &mut load);
@@ -221,6 +221,13 @@ pub enum SaveError {
 fn vector(values: Vec<f32>, device: &Device) -> Tensor<1> {
     let shape = [values.len()];
     Tensor::from_data(TensorData::new(values, shape), device)
+}
+
+/// The number of rows that most attributes of the Gaussians have, so that the error names the one that differs.
+fn gaussian_count(file: &StoredTensors) -> usize {
+    let rows = GaussianAttribute::ALL.map(|attribute| file.rows(&format!("{SCENE}.{}", attribute.path())).unwrap_or(0));
+    let having = |count: usize| rows.iter().filter(|rows| **rows == count).count();
+    rows.into_iter().max_by_key(|count| having(*count)).unwrap_or(0)
 }
 
 /// Where in its run a checkpoint is: on the schedule, and what the file's name says.
