@@ -3,6 +3,7 @@
 import { Camera, commonTarget, commonUp } from "./camera.js";
 import { Controls } from "./controls.js";
 import { Draft } from "./draft.js";
+import { NEAR } from "./shaders.js";
 import { SplatRenderer } from "./splat_renderer.js";
 
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
@@ -26,8 +27,6 @@ import { SplatRenderer } from "./splat_renderer.js";
 const OUTLIERS = 0.03;
 /** Milliseconds of stillness after which a draft is drawn again in full. */
 const STILL = 150;
-/** What lies nearer to the camera is not drawn: as in shaders.js and draw_list.rs. */
-const NEAR = 0.2;
 /** A viewpoint that has everything before it. */
 const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
 
@@ -80,8 +79,8 @@ export class Player extends EventTarget {
     this.#fitLens();
     /** What the last frames took, in milliseconds. */
     this.timings = { evaluate: 0, sort: 0, upload: 0, draw: 0 };
-    /** Resolves when the first image is on the canvas. @type {Promise<void>} */
     this.#time = Math.min(1, Math.max(0, Number(options.time) || 0));
+    /** Resolves when the first image is on the canvas. @type {Promise<void>} */
     this.ready = this.#begin(options);
     this.controls = options.controls === false ? null : new Controls(this);
     canvas.addEventListener("webglcontextlost", this.#lost);

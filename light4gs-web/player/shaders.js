@@ -1,6 +1,9 @@
 // The renderer's arithmetic: that of light4gs-model/src/cpu/project.rs, Gaussian by Gaussian, and blend.rs, pixel by pixel.
 // Order and colors come from the worker.
 
+/** What lies nearer to the camera is not drawn: as in draw_list.rs. */
+export const NEAR = 0.2;
+
 export const vertexShader = `#version 300 es
 precision highp float;
 precision highp int;
@@ -16,7 +19,7 @@ uniform highp sampler2D list;
 flat out vec4 color;
 out vec2 place;
 
-const float NEAR = 0.2;
+const float NEAR = ${NEAR};
 const float DILATION = 0.3;
 const float FRUSTUM_MARGIN = 1.3;
 const float MIN_ALPHA = 1.0 / 255.0;

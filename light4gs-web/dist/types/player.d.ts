@@ -64,6 +64,7 @@ export declare class Player extends EventTarget {
         upload: number;
         draw: number;
     };
+    /** Resolves when the first image is on the canvas. @type {Promise<void>} */
     ready: Promise<void>;
     controls: Controls | null;
     /**
