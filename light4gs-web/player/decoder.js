@@ -14,7 +14,6 @@ const SLICE = 8192;
  * @property {() => number} text_length
  * @property {() => bigint} digest
  * @property {(time: number, first: number, last: number) => void} evaluate
- * @property {() => void} present
  * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number) => number} draw_list
  * @property {() => number} list_length
  * @property {(time: number) => number} attributes_at
@@ -29,6 +28,8 @@ export class Decoder {
     this.wasm = /** @type {Exports} */ (/** @type {unknown} */ (new WebAssembly.Instance(module, {}).exports));
     /** @type {import("./scene.js").SceneInfo | null} */
     this.info = null;
+    /** Where the Gaussians are: NaN before the first evaluation. */
+    this.time = NaN;
   }
 
   /**
@@ -52,6 +53,7 @@ export class Decoder {
     const description = JSON.parse(new TextDecoder().decode(text));
     if (!opened) throw new SceneError(description.error, description.message);
     this.info = description;
+    this.time = NaN;
     return description;
   }
 
@@ -70,7 +72,7 @@ export class Decoder {
       if (first > 0) await pause();
       this.wasm.evaluate(time, first, first + SLICE);
     }
-    this.wasm.present();
+    this.time = time;
   }
 
   /**

@@ -3,7 +3,7 @@
 /** Shares of the pixels along each side. */
 const SCALES = [1, 0.7, 0.5, 0.35];
 /** Milliseconds of an image: above, the next smaller scale; below, a larger one is tried after a while. */
-const [SLOW, FAST] = [36, 20];
+const [SLOW, FAST] = [28, 14];
 /** Images that are measured before a scale is judged. */
 const SAMPLES = 4;
 /** Milliseconds until a larger scale is tried. */

@@ -1,17 +1,18 @@
 // <l4gs-player>: the player with its buttons.
 
 import { readCameras } from "./camera.js";
+import { fillCameras } from "./camera_list.js";
 import { SceneError } from "./errors.js";
+import { Layers } from "./layers.js";
 import { icon, LAYOUT } from "./layout.js";
-import { explain } from "./messages.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "./player.js";
 import { dismiss, load, prepare } from "./scene.js";
+import { bytesOf, download } from "./sources.js";
+import { watch } from "./watch.js";
 
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
 
-/** Milliseconds between two looks at what is watched. */
-const WATCH_INTERVAL = 1500;
 /** Milliseconds between two updates of the panel. */
 const PANEL_INTERVAL = 500;
 
@@ -20,14 +21,11 @@ const toHex = (color) => `#${color.map((c) => Math.round(255 * Math.min(1, Math.
 /** @param {string} hex */
 const fromHex = (hex) => [1, 3, 5].map((at) => parseInt(hex.slice(at, at + 2), 16) / 255);
 
-/** @param {string} text  base64 */
-function bytesOf(text) {
-  try {
-    return Uint8Array.from(atob(text), (character) => character.charCodeAt(0));
-  } catch {
-    throw new SceneError("damaged", "the scene in this page is no base64");
-  }
-}
+/** What keys do. @type {Record<string, string>} */
+const KEYS = {
+  Space: "play", KeyK: "play", KeyL: "loop", KeyV: "fly", KeyR: "reset", KeyI: "info", KeyF: "full", KeyC: "camera",
+  Comma: "back", Period: "forth",
+};
 
 /** Elements that stand in the page. */
 let connected = 0;
@@ -52,8 +50,6 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   #abort = new AbortController();
   #connected = false;
   #panelTimer = 0;
-  #watchTimer = 0;
-  #watched = "";
 
   constructor() {
     super();
@@ -61,6 +57,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     root.innerHTML = LAYOUT;
     /** @type {(id: string) => any} */
     this.find = (id) => root.getElementById(id);
+    this.layers = new Layers(this.find);
     this.canvas = /** @type {HTMLCanvasElement} */ (root.querySelector("canvas"));
     this.#listen();
   }
@@ -68,7 +65,6 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   connectedCallback() {
     if (this.#connected) return;
     this.#connected = true;
-    this.#watched = "";
     connected++;
     prepare();
     if (this.hasAttribute("page")) this.#acceptFiles();
@@ -78,10 +74,10 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     const cameras = this.querySelector('script[type="application/json"]');
     const source = query ?? this.getAttribute("src");
     if (embedded) this.#openEmbedded(embedded.textContent ?? "", cameras?.textContent ?? "[]");
-    else if (this.hasAttribute("watch")) this.#progress("Waiting for the scene", NaN);
+    else if (this.hasAttribute("watch")) this.layers.progress("Waiting for the scene");
     else if (source) this.load(source, this.getAttribute("cameras"));
-    else if (this.hasAttribute("page")) this.#only("invitation");
-    if (this.hasAttribute("watch")) this.#watch(this.#abort.signal);
+    else if (this.hasAttribute("page")) this.layers.show("invitation");
+    if (this.hasAttribute("watch")) this.#watch();
   }
 
   disconnectedCallback() {
@@ -89,7 +85,6 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.#connected = false;
     this.#abort.abort();
     this.#abort = new AbortController();
-    clearTimeout(this.#watchTimer);
     this.close();
     this.find("status").hidden = true;
     if (--connected === 0) dismiss();
@@ -120,11 +115,15 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
    */
   async load(address, cameras, { keep = false } = {}) {
     const loading = ++this.#loading;
-    if (!keep) this.#progress("Loading", 0);
+    const { signal } = this.#abort;
+    const report = (/** @type {number} */ share) => {
+      if (!keep && loading === this.#loading) this.layers.progress("Loading", share);
+    };
+    report(0);
     try {
       const [bytes, list] = await Promise.all([
-        this.#fetch(address, keep ? () => {} : (share) => loading === this.#loading && this.#progress("Loading", share)),
-        cameras ? this.#fetch(cameras, () => {}).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : [],
+        download(address, signal, report),
+        cameras ? download(cameras, signal).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : [],
       ]);
       if (loading === this.#loading) await this.open(bytes, { cameras: list, keep });
       return true;
@@ -135,44 +134,6 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   }
 
   /**
-   * The bytes at an address.
-   * @param {string} address @param {(share: number) => void} report
-   */
-  async #fetch(address, report) {
-    try {
-      return await this.#download(address, report);
-    } catch (error) {
-      if (error instanceof SceneError) throw error;
-      // The connection may also end halfway.
-      throw new SceneError("network", `${address}: ${error instanceof Error ? error.message : error}`);
-    }
-  }
-
-  /** @param {string} address @param {(share: number) => void} report */
-  async #download(address, report) {
-    const response = await fetch(address, { cache: "no-cache", signal: this.#abort.signal });
-    if (!response.ok || !response.body) throw new SceneError("network", `${address}: HTTP ${response.status} ${response.statusText}`);
-    const total = Number(response.headers.get("content-length"));
-    const parts = [];
-    let received = 0;
-    const reader = response.body.getReader();
-    for (;;) {
-      const { done, value } = await reader.read();
-      if (done) break;
-      parts.push(value);
-      received += value.length;
-      report(total > 0 ? Math.min(received / total, 1) : NaN);
-    }
-    const bytes = new Uint8Array(received);
-    let at = 0;
-    for (const part of parts) {
-      bytes.set(part, at);
-      at += part.length;
-    }
-    return bytes;
-  }
-
-  /**
    * Shows a scene.
    * @param {ArrayBuffer | Uint8Array} bytes
    * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
@@ -180,7 +141,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   async open(bytes, { cameras = [], keep = false } = {}) {
     const loading = ++this.#loading;
     const before = keep ? this.player : null;
-    if (!before) this.#progress("Decoding", NaN);
+    if (!before) this.layers.progress("Decoding");
     let scene;
     try {
       scene = await load(bytes);
@@ -217,7 +178,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   close() {
     this.#loading++;
     this.#end();
-    this.#only("");
+    this.layers.show("");
     this.find("bar").hidden = true;
   }
 
@@ -232,13 +193,14 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     const player = /** @type {Player} */ (this.player);
     const { info } = player.scene;
     if (player.controls) player.controls.wheelAlways = this.hasAttribute("page");
-    this.#only("");
+    this.layers.show("");
     this.find("bar").hidden = false;
     for (const id of ["play", "time", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
     this.find("background").value = toHex(player.background);
     this.find("speed").value = String(player.speed);
     this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
-    this.#fillCameras();
+    this.find("cameras").hidden = this.#cameras.length === 0;
+    fillCameras(this.find("camera"), this.#cameras, player.path.length > 1);
     player.addEventListener("timechange", this.#showTime);
     player.addEventListener("statechange", this.#showState);
     player.addEventListener("camerachange", this.#showCamera);
@@ -247,28 +209,6 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.#showState();
     this.#togglePanel(!this.find("panel").hidden);
     this.dispatchEvent(new Event("load"));
-  }
-
-  #fillCameras() {
-    const cameras = this.#cameras;
-    const select = this.find("camera");
-    this.find("cameras").hidden = cameras.length === 0;
-    const option = (/** @type {string} */ value, /** @type {string} */ text) => new Option(text, value);
-    select.replaceChildren(option("free", "Free view"));
-    if (this.player && this.player.path.length > 1) select.append(option("path", "Training path"));
-    /** @type {Map<string, HTMLOptGroupElement>} */
-    const groups = new Map();
-    cameras.forEach(({ name, split, time }, index) => {
-      const key = split ?? "cameras";
-      let group = groups.get(key);
-      if (!group) {
-        group = document.createElement("optgroup");
-        group.label = key;
-        groups.set(key, group);
-        select.append(group);
-      }
-      group.append(option(String(index), `${name ?? index}${time === undefined ? "" : ` · ${time.toFixed(2)}`}`));
-    });
   }
 
   #showTime = () => {
@@ -307,37 +247,10 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.player.redraw();
   }
 
-  /** Shows one of the layers over the canvas, or none. @param {string} id */
-  #only(id) {
-    for (const layer of ["progress", "message", "invitation"]) this.find(layer).hidden = layer !== id;
-  }
-
-  /** @param {string} what @param {number} share  NaN where it is not known */
-  #progress(what, share) {
-    this.#only("progress");
-    const progress = this.find("progress");
-    const bar = progress.querySelector("div");
-    if (Number.isNaN(share)) bar.removeAttribute("aria-valuenow");
-    else bar.setAttribute("aria-valuenow", String(Math.round(100 * share)));
-    bar.firstElementChild.style.width = Number.isNaN(share) ? "" : `${100 * share}%`;
-    progress.querySelector("span").textContent = Number.isNaN(share) ? `${what} …` : `${what} ${Math.round(100 * share)} %`;
-  }
-
   /** @param {any} error */
   #fail(error) {
     if (error?.kind === "closed") return;
-    const { title, advice, details } = explain(error);
-    const message = this.find("message");
-    const paragraph = (/** @type {string} */ tag, /** @type {string} */ text) => Object.assign(document.createElement(tag), { textContent: text });
-    const more = document.createElement("details");
-    more.append(paragraph("summary", "Details"), paragraph("p", details));
-    message.replaceChildren(paragraph("b", title), paragraph("p", advice), more);
-    if (this.hasAttribute("page")) {
-      const again = Object.assign(document.createElement("button"), { type: "button", id: "choose", textContent: "Choose another file" });
-      again.addEventListener("click", () => this.find("file").click());
-      message.append(again);
-    }
-    this.#only("message");
+    this.layers.message(error, this.hasAttribute("page") ? () => this.find("file").click() : null);
     this.find("bar").hidden = true;
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   }
@@ -415,10 +328,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   /** @param {KeyboardEvent} event */
   #key(event) {
     const target = /** @type {HTMLElement} */ (event.target);
-    const does = /** @type {Record<string, string>} */ ({
-      Space: "play", KeyK: "play", KeyL: "loop", KeyV: "fly", KeyR: "reset", KeyI: "info", KeyF: "full", KeyC: "camera",
-      Comma: "back", Period: "forth",
-    })[event.code];
+    const does = KEYS[event.code];
     const opens = event.code === "KeyO" && this.hasAttribute("page");
     if (!(does || opens) || event.ctrlKey || event.metaKey || event.altKey) return;
     // A button, a list and a text keep their own keys.
@@ -466,7 +376,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.find("file").value = "";
     // The file that was chosen last is the one that is shown, whichever is read first.
     const loading = ++this.#loading;
-    this.#progress("Reading", NaN);
+    this.layers.progress("Reading");
     try {
       const bytes = await file.arrayBuffer();
       if (loading === this.#loading) await this.open(bytes);
@@ -475,25 +385,16 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     }
   }
 
-  /** Looks at the watched text, and loads the scene again when it has changed. @param {AbortSignal} signal */
-  async #watch(signal) {
-    try {
-      const text = await (await fetch(this.getAttribute("watch") ?? "", { cache: "no-store", signal })).text();
-      if (signal.aborted) return;
-      const { status, scene } = JSON.parse(text);
-      this.find("status").textContent = status ?? "";
+  #watch() {
+    const say = (/** @type {string} */ status) => {
+      this.find("status").textContent = status;
       this.find("status").hidden = !status;
+    };
+    const show = async () => {
       const address = this.getAttribute("src");
-      if (scene && address && this.#watched !== String(scene)) {
-        // What did not come is asked for again.
-        if (await this.load(address, this.getAttribute("cameras"), { keep: this.player !== null })) this.#watched = String(scene);
-      }
-    } catch {
-      if (signal.aborted) return;
-      this.find("status").textContent = "The server does not answer";
-      this.find("status").hidden = false;
-    }
-    if (!signal.aborted) this.#watchTimer = setTimeout(() => this.#watch(signal), WATCH_INTERVAL);
+      return address !== null && this.load(address, this.getAttribute("cameras"), { keep: this.player !== null });
+    };
+    watch(this.getAttribute("watch") ?? "", this.#abort.signal, say, show);
   }
 }
 

@@ -38,7 +38,7 @@ export function fillPanel(panel, player) {
       ["Gaussians", number.format(info.count)],
       ["Harmonics", `degree ${info.shDegree}`],
       ["Frames", info.fps > 0 ? `${info.frameCount} at ${info.fps} a second` : String(info.frameCount)],
-      ["Image", `${player.canvas.width} × ${player.canvas.height}`],
+      ["Image", `${player.view.width} × ${player.view.height}`],
       ["While moving", player.draftScale < 1 ? `${Math.round(100 * player.draftScale)} % of each side` : "in full"],
     ]),
     body(info.sections.map(([name, bytes]) => [name.replaceAll("_", " "), size(bytes)])),

@@ -1,9 +1,9 @@
 // Plays a scene on a canvas: time, camera, drawing. No buttons: those are the element's.
 
-import { Camera, commonTarget, commonUp } from "./camera.js";
+import { Camera } from "./camera.js";
 import { Controls } from "./controls.js";
 import { Draft } from "./draft.js";
-import { NEAR } from "./shaders.js";
+import { sourceLens, stand } from "./framing.js";
 import { SplatRenderer } from "./splat_renderer.js";
 
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
@@ -20,15 +20,28 @@ import { SplatRenderer } from "./splat_renderer.js";
  * @property {Camera} [home]  where {@link Player.resetView} goes in place of that
  * @property {number} [time]  of the first image, in [0, 1]; 0
  * @property {boolean} [controls]  whether pointer and keys move the camera; true
- * @property {number} [pixelRatio]  pixels of the image for one of the page; at most 2 where not given
+ * @property {number} [pixelRatio]  pixels of the image for one of the page; at most 2 where not given. A canvas that the page
+ *   gives no size keeps its own
  */
 
-/** Shares of the Gaussians' coordinates that count as outliers, on either side. */
-const OUTLIERS = 0.03;
 /** Milliseconds of stillness after which a draft is drawn again in full. */
 const STILL = 150;
+/** Milliseconds between two looks at the graphics card. */
+const WATCH = 3;
 /** A viewpoint that has everything before it. */
 const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
+
+/**
+ * Whether the page gives a canvas its size, whatever the canvas's own is.
+ * @param {HTMLCanvasElement} canvas
+ */
+function isStretched(canvas) {
+  const { width, height, clientWidth, clientHeight } = canvas;
+  Object.assign(canvas, { width: width + 7, height: 2 * height + 1 });
+  const stretched = canvas.clientWidth === clientWidth && canvas.clientHeight === clientHeight;
+  Object.assign(canvas, { width, height });
+  return stretched;
+}
 
 /**
  * Plays a {@link Scene} on a canvas. Events: `timechange`, `statechange` (playing, loop, speed), `camerachange`, `error`.
@@ -38,6 +51,8 @@ export class Player extends EventTarget {
   #spare = null;
   #busy = false;
   #dirty = true;
+  /** Whether the renderer has a list that was not drawn yet. */
+  #undrawn = false;
   #disposed = false;
   #request = 0;
   #last = 0;
@@ -47,6 +62,8 @@ export class Player extends EventTarget {
   #shownFrom = "";
   #draft = new Draft();
   #wasDraft = false;
+  /** Pixels of the image in full. */
+  #size = { width: 1, height: 1 };
   #lastDraw = 0;
   /** The image that the graphics card is at. @type {{ fence: WebGLSync | null, since: number, moving: boolean } | null} */
   #drawing = null;
@@ -76,7 +93,7 @@ export class Player extends EventTarget {
     this.renderer = new SplatRenderer(canvas);
     this.camera = new Camera();
     this.home = this.camera.clone();
-    this.#fitLens();
+    this.camera.lens = sourceLens(scene.info);
     /** What the last frames took, in milliseconds. */
     this.timings = { evaluate: 0, sort: 0, upload: 0, draw: 0 };
     this.#time = Math.min(1, Math.max(0, Number(options.time) || 0));
@@ -105,10 +122,11 @@ export class Player extends EventTarget {
     this.#measure();
     const { list } = await this.scene.frame(0, EVERYWHERE);
     if (this.#disposed) return;
-    this.#fitCamera(list);
+    stand(this.camera, this.cameras, list, this.view);
+    this.home = this.camera.clone();
     if (camera) this.camera = camera.clone();
     if (home) this.home = home.clone();
-    await this.#show(this.#time);
+    await this.#show();
     if (this.#disposed) return;
     this.#draw(1);
     this.#observers = [
@@ -121,73 +139,19 @@ export class Player extends EventTarget {
     this.#request = requestAnimationFrame(this.#tick);
   }
 
-  #fitLens() {
-    const { width, height, fovX } = this.scene.info;
-    const [w, h] = width > 0 && height > 0 ? [width, height] : [800, 800];
-    const angle = fovX > 0 && fovX < 3 ? fovX : 0.7;
-    const focal = w / 2 / Math.tan(angle / 2);
-    this.camera.lens = { fx: focal, fy: focal, cx: w / 2, cy: h / 2, width: w, height: h };
-  }
-
-  /**
-   * Stands at the dataset's first camera, or where all Gaussians but outliers are seen.
-   * @param {Float32Array} list
-   */
-  #fitCamera(list) {
-    const { camera, cameras } = this;
-    const count = list.length / 16;
-    const centers = [0, 1, 2].map((axis) => {
-      /** @type {number[]} */
-      const values = [];
-      const stride = Math.max(1, Math.floor(count / 5000));
-      for (let i = 0; i < count; i += stride) if (list[16 * i + 3] > 0.05) values.push(list[16 * i + axis]);
-      values.sort((a, b) => a - b);
-      const at = (/** @type {number} */ share) => values[Math.floor(share * (values.length - 1))] ?? 0;
-      return { middle: (at(OUTLIERS) + at(1 - OUTLIERS)) / 2, half: (at(1 - OUTLIERS) - at(OUTLIERS)) / 2 };
-    });
-    const middle = /** @type {Vector} */ (centers.map(({ middle }) => middle));
-    // Where the centers are close together, the Gaussians' own size counts: the variances stand at 4, 7 and 9.
-    const sizes = [];
-    for (let i = 0; i < list.length; i += 16 * Math.max(1, Math.floor(count / 5000))) {
-      if (list[i + 3] > 0.05) sizes.push(2 * Math.sqrt(Math.max(list[i + 4], list[i + 7], list[i + 9])));
-    }
-    sizes.sort((a, b) => a - b);
-    const size = sizes[Math.floor(0.5 * sizes.length)] ?? 0;
-    const radius = Math.max(Math.hypot(...centers.map(({ half }) => half)) + size, 1e-6);
-    camera.up = commonUp(cameras);
-    if (cameras.length > 0) {
-      const target = commonTarget(cameras) ?? middle;
-      camera.take(cameras[0]);
-      const ahead = [0, 1, 2].reduce((sum, i) => sum + (target[i] - camera.position[i]) * camera.axes[2][i], 0);
-      camera.distance = ahead > 0.1 * radius ? ahead : Math.max(radius, 0.1);
-    } else {
-      const view = camera.view(this.canvas.width || 1, this.canvas.height || 1);
-      const narrow = Math.min(view.width / 2 / view.fx, view.height / 2 / view.fy);
-      const wanted = (1.15 * radius) / Math.sin(Math.atan(narrow));
-      // A scene so small that all of it would be too near is looked at from farther, through a longer lens.
-      const distance = Math.max(wanted, 1.5 * NEAR + radius);
-      camera.lens.fx *= distance / wanted;
-      camera.lens.fy *= distance / wanted;
-      camera.lookAt(
-        [middle[0], middle[1] - distance * Math.cos(Math.PI / 6), middle[2] + distance * Math.sin(Math.PI / 6)],
-        middle,
-      );
-    }
-    this.home = camera.clone();
-  }
-
-  /** Pixels of the canvas. */
+  /** Finds the pixels of the image. */
   #measure() {
-    const { canvas } = this;
+    const { canvas, renderer } = this;
+    const { clientWidth, clientHeight } = canvas;
+    if (renderer.stretched === null && clientWidth > 0 && clientHeight > 0) renderer.stretched = isStretched(canvas);
     const ratio = this.pixelRatio ?? Math.min(globalThis.devicePixelRatio || 1, 2);
-    const width = Math.max(1, Math.round(canvas.clientWidth * ratio) || canvas.width);
-    const height = Math.max(1, Math.round(canvas.clientHeight * ratio) || canvas.height);
-    if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
+    const [width, height] = renderer.stretched ? [ratio * clientWidth, ratio * clientHeight] : [canvas.width, canvas.height];
+    this.#size = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
   }
 
   /** What is seen now. @returns {View} */
   get view() {
-    return this.camera.view(this.canvas.width, this.canvas.height);
+    return this.camera.view(this.#size.width, this.#size.height);
   }
 
   /** Time in [0, 1]. */
@@ -273,30 +237,61 @@ export class Player extends EventTarget {
       this.cameraMoved();
     }
     if (this.following) this.#follow();
-    if (!this.#busy) {
-      const time = this.#time === this.#shownTime ? null : this.#time;
-      if (time !== null || this.#viewpointKey() !== this.#shownFrom) this.#show(time).catch(this.#fail);
-    }
-    // One image at a time: a queue of them would only make the player slow to answer.
-    if (this.#drawing && !this.renderer.isDone(this.#drawing.fence)) return;
-    if (this.#drawing?.moving) this.#draft.measure(now - this.#drawing.since, now);
-    this.#drawing = null;
+    this.#update();
+    this.#render(now);
+  };
+
+  /**
+   * Draws what has changed, as soon as the graphics card is done with the image before: a queue of images would only make
+   * the player slow to answer.
+   * @param {number} now
+   */
+  #render(now) {
+    if (this.#disposed || this.#isDrawing(now)) return;
     const moving = this.#dirty;
     if (moving) {
       this.#lastDraw = now;
       this.#measure();
       this.#draw(this.#draft.scale);
+      // The worker makes the next list while this one is drawn.
+      if (this.#playing) this.#update();
     } else if (this.#wasDraft && now - this.#lastDraw > STILL) {
       this.#draw(1);
     } else return;
     this.#drawing = { fence: this.renderer.fence(), since: now, moving };
-  };
+    this.#watch();
+  }
+
+  /** Looks after the graphics card between animation frames: an image need not wait for the next one. */
+  #watch() {
+    setTimeout(() => {
+      if (this.#disposed || !this.#drawing) return;
+      const now = performance.now();
+      if (this.#isDrawing(now)) this.#watch();
+      else if (this.#dirty) this.#render(now);
+    }, WATCH);
+  }
 
   #fail = (/** @type {any} */ error) => {
     if (this.#disposed || error?.kind === "closed") return;
     this.pause();
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   };
+
+  /** Has the worker make what is to be seen now, if that is not what it made last. */
+  #update() {
+    if (this.#busy || this.#undrawn) return;
+    if (this.#time !== this.#shownTime || this.#viewpointKey() !== this.#shownFrom) this.#show().catch(this.#fail);
+  }
+
+  /** Whether the graphics card is still at the last image. @param {number} now */
+  #isDrawing(now) {
+    if (!this.#drawing) return false;
+    if (!this.renderer.isDone(this.#drawing.fence)) return true;
+    if (this.#drawing.moving) this.#draft.measure(now - this.#drawing.since, now);
+    this.#drawing = null;
+    return false;
+  }
 
   /** @param {number} seconds */
   #advance(seconds) {
@@ -336,13 +331,11 @@ export class Player extends EventTarget {
     return this.#viewpoint().row.join() + this.camera.position.join();
   }
 
-  /**
-   * Has the worker make the list for a time, or for another view of the time before, and gives it to the renderer.
-   * @param {number | null} time
-   */
-  async #show(time) {
+  /** Has the worker make the list for what is to be seen now, and gives it to the renderer. */
+  async #show() {
     this.#busy = true;
     try {
+      const time = this.#time;
       const key = this.#viewpointKey();
       const memory = this.#spare;
       this.#spare = null;
@@ -353,21 +346,21 @@ export class Player extends EventTarget {
       this.#spare = /** @type {ArrayBuffer} */ (list.buffer);
       this.timings.upload = performance.now() - start;
       this.timings.sort = sortMs;
-      if (time !== null) {
-        this.timings.evaluate = evaluateMs;
-        this.#shownTime = time;
-      }
+      if (evaluateMs > 0) this.timings.evaluate = evaluateMs;
+      this.#shownTime = time;
       this.#shownFrom = key;
-      this.#dirty = true;
+      this.#dirty = this.#undrawn = true;
     } finally {
       this.#busy = false;
     }
+    if (!this.#playing || !this.#visible) return;
+    this.#render(performance.now());
   }
 
   /** @param {number} scale */
   #draw(scale) {
     const start = performance.now();
-    this.#dirty = false;
+    this.#dirty = this.#undrawn = false;
     this.#wasDraft = scale < 1;
     this.renderer.draw(this.view, this.background, scale);
     this.timings.draw = performance.now() - start;
@@ -405,7 +398,7 @@ export class Player extends EventTarget {
     while (this.#busy) await new Promise((resolve) => setTimeout(resolve, 1));
     this.camera.take(view);
     this.time = time;
-    await this.#show(this.#time);
+    await this.#show();
     this.renderer.draw(view, this.background);
     this.#dirty = false;
     this.#wasDraft = false;

@@ -44,7 +44,7 @@ import { SceneError } from "./errors.js";
  * @typedef {object} Frame  what the renderer draws
  * @property {Float32Array} list  back to front, 16 numbers a Gaussian: center (3), opacity, covariance xx, xy, xz, yy, yz, zz,
  *   color as seen from the viewpoint (3), three zeros; filled up to a multiple of 256 Gaussians with zeros
- * @property {number} evaluateMs  what the motion took
+ * @property {number} evaluateMs  what the motion took; 0 where the list before was for the same time
  * @property {number} sortMs  what order and colors took
  */
 
@@ -165,7 +165,7 @@ export class Scene {
 
   /**
    * What the renderer draws at a time from a viewpoint.
-   * @param {number | null} time  nothing: as before
+   * @param {number} time  in [0, 1]
    * @param {Viewpoint} viewpoint
    * @param {ArrayBuffer | null} [memory]  to be used again
    * @returns {Promise<Frame>}

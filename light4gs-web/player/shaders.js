@@ -15,6 +15,8 @@ uniform vec2 principal;
 uniform vec2 size;
 
 uniform highp sampler2D list;
+// Three corners a Gaussian, or four.
+uniform bool triangles;
 
 flat out vec4 color;
 out vec2 place;
@@ -27,8 +29,8 @@ const float MIN_ALPHA = 1.0 / 255.0;
 void main() {
   // Outside of the clip volume, until it is known to be seen.
   gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
-  // Four corners a Gaussian, four texels each, 256 Gaussians a row.
-  int gaussian = gl_VertexID >> 2;
+  // Four texels a Gaussian, 256 Gaussians a row.
+  int gaussian = triangles ? gl_VertexID / 3 : gl_VertexID >> 2;
   ivec2 at = ivec2(4 * (gaussian & 255), gaussian >> 8);
   vec4 first = texelFetch(list, at, 0);
   vec4 second = texelFetch(list, at + ivec2(1, 0), 0);
@@ -56,7 +58,11 @@ void main() {
   // With the covariance as L Lᵀ, the circle of radius reach becomes the ellipse where alpha falls below the threshold.
   float reach = sqrt(2.0 * log(opacity / MIN_ALPHA));
   float width = sqrt(xx);
-  vec2 corner = vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) * 2.0 - 1.0;
+  // A square around the circle of radius 1, or a triangle.
+  int number = gl_VertexID - 3 * gaussian;
+  vec2 corner = triangles
+    ? (number == 0 ? vec2(-1.7320508, -1.0) : number == 1 ? vec2(1.7320508, -1.0) : vec2(0.0, 2.0))
+    : vec2(gl_VertexID & 1, (gl_VertexID >> 1) & 1) * 2.0 - 1.0;
   place = reach * corner;
   vec2 offset = vec2(width * place.x, xy / width * place.x + sqrt(determinant / xx) * place.y);
   vec2 pixel = focal * position.xy / position.z + principal + offset;

@@ -24,6 +24,20 @@ const pause = () =>
  */
 const send = (answer, transfer = []) => /** @type {any} */ (self).postMessage(answer, transfer);
 
+/** What was asked for last, done or not. @type {Promise<void>} */
+let lastFrame = Promise.resolve();
+
+/** @param {any} request */
+async function frame({ id, time, viewpoint, memory }) {
+  if (!decoder) throw new Error("no scene is open");
+  const start = performance.now();
+  const moved = time !== decoder.time;
+  if (moved) await decoder.evaluate(time, pause);
+  const evaluated = performance.now();
+  const list = decoder.drawList(viewpoint, memory);
+  send({ id, list, evaluateMs: moved ? evaluated - start : 0, sortMs: performance.now() - evaluated }, [list.buffer]);
+}
+
 /** @type {Record<string, (request: any) => void | Promise<void>>} */
 const answers = {
   // Browsers compile a function when it is first called. A small scene calls those that every scene needs.
@@ -40,13 +54,11 @@ const answers = {
     send({ id, info, milliseconds: performance.now() - start });
   },
 
-  async frame({ id, time, viewpoint, memory }) {
-    if (!decoder) throw new Error("no scene is open");
-    const start = performance.now();
-    if (time !== null) await decoder.evaluate(time, pause);
-    const evaluated = performance.now();
-    const list = decoder.drawList(viewpoint, memory);
-    send({ id, list, evaluateMs: evaluated - start, sortMs: performance.now() - evaluated }, [list.buffer]);
+  // One after the other: the decoder moves the Gaussians to one time only, and pauses meanwhile.
+  frame(request) {
+    const turn = lastFrame.then(() => frame(request));
+    lastFrame = turn.catch(() => {});
+    return turn;
   },
 
   attributes({ id, time }) {

@@ -79,16 +79,9 @@ pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
     }
 }
 
-/// Shows what was computed.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
-pub extern "C" fn present() {
-    if let Some(scene) = &mut state().scene {
-        scene.present();
-    }
-}
-
 /// What is drawn, back to front: 16 numbers each, center, opacity, covariance xx, xy, xz, yy, yz, zz, color, and three zeros;
-/// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera stands at the eye. [`list_length`] says how many numbers.
+/// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera
+/// stands at the eye. [`list_length`] says how many numbers.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn draw_list(
     row_x: f32,

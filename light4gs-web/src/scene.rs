@@ -15,8 +15,6 @@ pub struct OpenScene {
     description: String,
     /// What is drawn: [`FLOATS`] numbers a Gaussian.
     packed: Vec<f32>,
-    /// The next of it, while that is being computed.
-    pending: Vec<f32>,
     list: DrawList,
 }
 
@@ -38,7 +36,6 @@ impl OpenScene {
             evaluator,
             description,
             packed: vec![0.0; floats],
-            pending: vec![0.0; floats],
             list: DrawList::default(),
         })
     }
@@ -53,20 +50,15 @@ impl OpenScene {
         &self.description
     }
 
-    /// Computes the Gaussians `first` to `last` at a time. [`OpenScene::present`] shows them when all are done.
+    /// Computes the Gaussians `first` to `last` at a time.
     pub fn evaluate(&mut self, time: f32, first: usize, last: usize) {
         let last = last.min(self.count());
         let range = first.min(last)..last;
         self.evaluator.apply(&self.canonical, time, range.clone(), &mut self.moved);
-        pack(&self.moved, range, &mut self.pending);
+        pack(&self.moved, range, &mut self.packed);
     }
 
-    /// Shows the Gaussians that were computed last.
-    pub fn present(&mut self) {
-        std::mem::swap(&mut self.packed, &mut self.pending);
-    }
-
-    /// The Gaussians that are shown, back to front, [`ENTRY`](crate::ENTRY) numbers each.
+    /// The Gaussians as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
     pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
         self.list.make(&self.packed, &self.moved, viewpoint)
     }

@@ -455,6 +455,72 @@ describe("the element", () => {
     await page.context().close();
   });
 
+  test("draws smaller while it moves where the page gives the canvas its size, and leaves another canvas as it is", async () => {
+    const page = await open(browser, server.url, { deviceScaleFactor: 2 });
+    const sizes = await page.evaluate(async () => {
+      const { load, Player } = await import("/light4gs-player.js");
+      const scene = await load(await (await fetch("/scene.l4gs")).arrayBuffer());
+      const sizes = {};
+      for (const [name, style] of [["stretched", "width: 700px; height: 500px"], ["as it is", ""]]) {
+        document.body.innerHTML = `<canvas width="700" height="500" style="${style}"></canvas>`;
+        const canvas = document.querySelector("canvas");
+        const player = new Player(canvas, scene, { loop: true });
+        await player.ready;
+        const draw = player.renderer.draw.bind(player.renderer);
+        // As on a slow machine.
+        player.renderer.draw = (view, background) => draw(view, background, 0.5);
+        player.play();
+        await new Promise((resolve) => setTimeout(resolve, 500));
+        player.pause();
+        const moving = [canvas.width, canvas.height, canvas.clientWidth, canvas.clientHeight];
+        player.renderer.draw = draw;
+        player.redraw();
+        await new Promise((resolve) => setTimeout(resolve, 1000));
+        sizes[name] = { moving, still: [canvas.width, canvas.height, canvas.clientWidth, canvas.clientHeight] };
+        player.dispose();
+      }
+      scene.close();
+      return sizes;
+    });
+    assert.deepEqual(sizes, {
+      stretched: { moving: [700, 500, 700, 500], still: [1400, 1000, 700, 500] },
+      "as it is": { moving: [700, 500, 700, 500], still: [700, 500, 700, 500] },
+    });
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
+  test("two players of one scene show different times", async () => {
+    const page = await open(browser, server.url);
+    const distances = await page.evaluate(async () => {
+      const { load, Player } = await import("/light4gs-player.js");
+      const scene = await load(await (await fetch("/scene.l4gs")).arrayBuffer());
+      const eye = [0, 0, 0];
+      const row = [0, 0, 0, 1];
+      const alone = [];
+      for (const time of [0, 0.5]) alone.push((await scene.frame(time, { row, eye })).list);
+      // Both at once, and the one again without its time having changed.
+      const [first, second] = await Promise.all([scene.frame(0, { row, eye }), scene.frame(0.5, { row, eye })]);
+      const again = await scene.frame(0, { row, eye });
+      const difference = (a, b) => a.reduce((sum, value, i) => sum + Math.abs(value - (b[i] ?? 0)), 0);
+      document.body.innerHTML = "<canvas width=200 height=200></canvas><canvas width=200 height=200></canvas>";
+      const players = [...document.querySelectorAll("canvas")].map((canvas, i) => new Player(canvas, scene, { time: 0.5 * i }));
+      await Promise.all(players.map(({ ready }) => ready));
+      for (const player of players) player.renderer.draw(player.view, player.background);
+      const images = players.map(({ renderer }) => renderer.readPixels());
+      players.forEach((player) => player.dispose());
+      scene.close();
+      return {
+        same: [difference(alone[0], first.list), difference(alone[1], second.list), difference(alone[0], again.list)],
+        other: [difference(alone[0], alone[1]), difference(images[0], images[1])],
+      };
+    });
+    assert.deepEqual(distances.same, [0, 0, 0]);
+    assert.ok(distances.other.every((distance) => distance > 100), JSON.stringify(distances));
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
   test("goes on after the graphics card was lost while it played", async () => {
     const page = await playerPage();
     await page.evaluate(async () => {

@@ -34,7 +34,7 @@ pub(super) const FOLDERS: [&str; 3] = ["events", "checkpoints", "renders"];
 
 /// Whether this is the path of a file by which a run goes on or is known: of its record or configuration, of a log, of a
 /// checkpoint. Its `scene.l4gs` is what commands write.
-pub(crate) fn belongs_to_run(path: &Path) -> bool {
+pub fn belongs_to_run(path: &Path) -> bool {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let Ok(folder) = fs::canonicalize(folder) else { return false };

@@ -8,7 +8,6 @@ mod run_folder;
 mod stored_tensors;
 
 pub use checkpoint::{Checkpoint, SaveError, list_checkpoints};
-pub(crate) use contents::belongs_to_run;
-
 pub use comparison::{Comparison, Difference};
+pub use contents::belongs_to_run;
 pub use run_folder::{RunFolder, RunRecord};

@@ -1,3 +1,4 @@
+import { Layers } from "./layers.js";
 import { Player } from "./player.js";
 export type DatasetCamera = import("./camera.js").DatasetCamera;
 declare const L4gsPlayer_base: {
@@ -16,6 +17,7 @@ export declare class L4gsPlayer extends L4gsPlayer_base {
     #private;
     /** @type {(id: string) => any} */
     find: (id: string) => any;
+    layers: Layers;
     canvas: HTMLCanvasElement;
     static observedAttributes: string[];
     /** @type {Player | null} */

@@ -35,7 +35,8 @@ export type PlayerOptions = {
      */
     controls?: boolean;
     /**
-     * pixels of the image for one of the page; at most 2 where not given
+     * pixels of the image for one of the page; at most 2 where not given. A canvas that the page
+     * gives no size keeps its own
      */
     pixelRatio?: number;
 };

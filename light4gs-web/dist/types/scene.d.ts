@@ -107,7 +107,7 @@ export type Frame = {
      */
     list: Float32Array;
     /**
-     * what the motion took
+     * what the motion took; 0 where the list before was for the same time
      */
     evaluateMs: number;
     /**
@@ -138,12 +138,12 @@ export declare class Scene {
     gaussiansAt(time: number): Promise<GaussiansAt>;
     /**
      * What the renderer draws at a time from a viewpoint.
-     * @param {number | null} time  nothing: as before
+     * @param {number} time  in [0, 1]
      * @param {Viewpoint} viewpoint
      * @param {ArrayBuffer | null} [memory]  to be used again
      * @returns {Promise<Frame>}
      */
-    frame(time: number | null, viewpoint: Viewpoint, memory?: ArrayBuffer | null): Promise<Frame>;
+    frame(time: number, viewpoint: Viewpoint, memory?: ArrayBuffer | null): Promise<Frame>;
     /**
      * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
      * @param {ArrayBuffer} bytes

@@ -49,6 +49,12 @@ export declare class SplatRenderer {
     gl: WebGL2RenderingContext;
     /** Whether sums are half floats; bytes lose faint layers. */
     halfFloats: boolean;
+    /**
+     * Whether the page gives the canvas its size, whatever its pixels are: a draft is a smaller canvas then, and nothing has
+     * to be enlarged here. Not known: null.
+     * @type {boolean | null}
+     */
+    stretched: boolean | null;
     parts: {
         splats: WebGLProgram;
         screen: WebGLProgram;
@@ -57,6 +63,7 @@ export declare class SplatRenderer {
         focal: WebGLUniformLocation | null;
         principal: WebGLUniformLocation | null;
         size: WebGLUniformLocation | null;
+        triangles: WebGLUniformLocation | null;
         target: WebGLTexture;
         framebuffer: WebGLFramebuffer;
         list: WebGLTexture;
