@@ -1,4 +1,4 @@
-//! A server for one page on this machine: GET, a few paths, nothing else.
+//! A server for one page on this machine: GET and HEAD, a few paths, nothing else.
 //!
 //! It listens on 127.0.0.1 only, and answers only those who call it by the name of this machine, so that a page from elsewhere
 //! cannot read the scene by a domain name that leads here.
@@ -59,13 +59,14 @@ impl Server {
 fn answer(mut stream: &TcpStream, respond: &dyn Fn(&str) -> Option<Answer>) -> Result<()> {
     stream.set_read_timeout(Some(PATIENCE))?;
     stream.set_write_timeout(Some(PATIENCE))?;
-    let (status, answer) = match request(stream)? {
-        Request::Get { path } => match respond(&path) {
+    let request = request(stream)?;
+    let (status, answer) = match &request {
+        Request::Get { path } | Request::Head { path } => match respond(path) {
             Some(answer) => ("200 OK", answer),
             None => ("404 Not Found", text("There is nothing at this address.")),
         },
         Request::Foreign => ("403 Forbidden", text("This server answers to 127.0.0.1 and localhost only.")),
-        Request::Other => ("405 Method Not Allowed", text("This server knows GET only.")),
+        Request::Other => ("405 Method Not Allowed", text("This server knows GET and HEAD only.")),
     };
     let Answer { content_type, body } = answer;
     let length = body.len();
@@ -74,7 +75,9 @@ fn answer(mut stream: &TcpStream, respond: &dyn Fn(&str) -> Option<Answer>) -> R
         "HTTP/1.1 {status}\r\nContent-Type: {content_type}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
          X-Content-Type-Options: nosniff\r\nCross-Origin-Resource-Policy: same-origin\r\nConnection: close\r\n\r\n"
     )?;
-    stream.write_all(&body)?;
+    if !matches!(request, Request::Head { .. }) {
+        stream.write_all(&body)?;
+    }
     stream.flush()
 }
 
@@ -85,6 +88,10 @@ fn text(body: &'static str) -> Answer {
 #[derive(Debug, PartialEq)]
 enum Request {
     Get {
+        path: String,
+    },
+    /// The answer is what GET would get, without its body.
+    Head {
         path: String,
     },
     /// It names another host.
@@ -110,15 +117,15 @@ fn request(stream: impl Read) -> Result<Request> {
     }
     let mut words = first.split(' ');
     let (method, target) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
-    if method != "GET" || !target.starts_with('/') {
+    if !matches!(method, "GET" | "HEAD") || !target.starts_with('/') {
         return Ok(Request::Other);
     }
     let name = host.as_deref().map(|host| host.rsplit_once(':').map_or(host, |(name, _)| name));
     if !matches!(name, Some("127.0.0.1" | "localhost")) {
         return Ok(Request::Foreign);
     }
-    let path = target.split(['?', '#']).next().unwrap_or_default();
-    Ok(Request::Get { path: path.to_owned() })
+    let path = target.split(['?', '#']).next().unwrap_or_default().to_owned();
+    Ok(if method == "HEAD" { Request::Head { path } } else { Request::Get { path } })
 }
 
 #[cfg(test)]
@@ -149,14 +156,17 @@ mod tests {
         let address = server.address().unwrap();
         assert!(address.ip().is_loopback() && address.port() != 0);
         std::thread::spawn(move || server.run(|path| (path == "/").then(|| text("hello"))));
-        let ask = |path: &str| {
+        let ask = |method: &str, path: &str| {
             let mut stream = TcpStream::connect(address).unwrap();
-            write!(stream, "GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+            write!(stream, "{method} {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
             let mut answer = String::new();
             stream.read_to_string(&mut answer).unwrap();
             answer
         };
-        assert!(ask("/").starts_with("HTTP/1.1 200 OK\r\n") && ask("/").ends_with("\r\n\r\nhello"));
-        assert!(ask("/x").starts_with("HTTP/1.1 404"));
+        let answer = ask("GET", "/");
+        assert!(answer.starts_with("HTTP/1.1 200 OK\r\n") && answer.ends_with("\r\n\r\nhello"));
+        assert_eq!(ask("HEAD", "/") + "hello", answer);
+        assert!(ask("GET", "/x").starts_with("HTTP/1.1 404"));
+        assert!(ask("POST", "/").starts_with("HTTP/1.1 405"));
     }
 }
