@@ -1,10 +1,11 @@
 //! Tells the program which commit it is built from.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 fn main() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    // Where it runs, not where it was compiled: checkouts may share a target folder.
+    let folder = &std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
     println!("cargo::rustc-env=LIGHT4GS_COMMIT={}", commit(folder).unwrap_or_else(|| "unknown".to_owned()));
     for name in ["src", "configs", "build.rs"] {
         println!("cargo::rerun-if-changed={name}");
