@@ -400,8 +400,7 @@ export class Player extends EventTarget {
     this.time = time;
     await this.#show();
     this.renderer.draw(view, this.background);
-    this.#dirty = false;
-    this.#wasDraft = false;
+    this.#dirty = this.#undrawn = this.#wasDraft = false;
     return this.renderer.readPixels();
   }
 

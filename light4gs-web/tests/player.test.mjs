@@ -490,6 +490,29 @@ describe("the element", () => {
     await page.context().close();
   });
 
+  test("plays on after an image was drawn exactly", async () => {
+    const page = await open(browser, server.url);
+    const lists = await page.evaluate(async () => {
+      const { load, Player } = await import("/light4gs-player.js");
+      const scene = await load(await (await fetch("/scene.l4gs")).arrayBuffer());
+      document.body.innerHTML = "<canvas width=200 height=200></canvas>";
+      const player = new Player(document.querySelector("canvas"), scene);
+      await player.renderAt(0.5, player.view);
+      let lists = 0;
+      const { setList } = player.renderer;
+      player.renderer.setList = (list) => (lists++, setList.call(player.renderer, list));
+      player.play();
+      const begin = performance.now();
+      while (lists < 3 && performance.now() - begin < 10_000) await new Promise((resolve) => setTimeout(resolve, 50));
+      player.dispose();
+      scene.close();
+      return lists;
+    });
+    assert.ok(lists >= 3, `${lists} lists`);
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
   test("two players of one scene show different times", async () => {
     const page = await open(browser, server.url);
     const distances = await page.evaluate(async () => {
