@@ -8,13 +8,16 @@ use serde_json::Value;
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
-/// `study NAME scene --out study` with runs of seconds.
+/// `study NAME scene` with runs of seconds, into `study` where nothing else is said.
 fn study(w: &Workspace, name: &str, more: &[&str]) -> Command {
-    let mut command = w.command(["study", name, "scene", "--out", "study", "--quiet", "--device", "flex"]);
+    let mut command = w.command(["study", name, "scene", "--quiet", "--device", "flex"]);
     // What a study varies must stay as it has it.
     let varied = ["compression.rate.lambda", "train.prune.fraction"];
     for key_value in TINY.iter().chain(&TINY_COMPRESSION).filter(|set| !varied.iter().any(|key| set.starts_with(key))) {
         command.args(["--set", key_value]);
+    }
+    if !more.contains(&"--out") {
+        command.args(["--out", "study"]);
     }
     command.args(more);
     command
@@ -81,6 +84,27 @@ fn a_study_from_plan_to_table() {
     assert_success(&run(study(&w, "sizes", &["--jobs", "2"])));
     assert_eq!(fs::read(lost.join("scene.l4gs")).unwrap(), bytes);
     assert_eq!(fs::read_to_string(w.path("study/table.md")).unwrap(), table);
+
+    // Another study takes over what this one has trained, and says so; its files are those of its own training.
+    let command = |more: &[&str]| study(&w, "latency", &[&["--out", "other", "--reuse", "study"], more].concat());
+    let plan = String::from_utf8(run(command(&["--dry-run"])).stdout).unwrap();
+    assert!(plan.contains("reused") && plan.contains("4 runs in 4 tasks, 0 iterations"), "{plan}");
+    assert_success(&run(command(&[])));
+    let other = |name: &str| fs::read(w.path(&format!("other/scene/small/seed-0/{name}"))).unwrap();
+    assert_eq!(other("metrics.jsonl"), log("small"));
+    assert_eq!(other("scene.l4gs"), bytes);
+    let record = |run: &str| json(&w, &format!("{run}/scene/small/seed-0/run.json"));
+    assert_eq!(record("other")["trained_by"], record("study"));
+    // But not from a dataset that was another one, although it lies in the same place.
+    fs::remove_dir_all(w.path("other/scene/small")).unwrap();
+    let image = fs::read_dir(w.path("scene/test")).unwrap().next().unwrap().unwrap().path();
+    let (original, replacement) = (fs::read(&image).unwrap(), fs::read(w.path("scene/train/r_000.png")).unwrap());
+    fs::write(&image, replacement).unwrap();
+    assert_success(&run(command(&[])));
+    assert_ne!(other("metrics.jsonl"), log("small"));
+    assert_eq!(record("other")["trained_by"], Value::Null);
+    fs::write(&image, original).unwrap();
+    assert_refused(&run(study(&w, "latency", &["--out", "third", "--reuse", "scene"])), &["scene", "not the folder"]);
 
     // Another configuration in the same folders is refused.
     let output = run(study(&w, "sizes", &["--set", "compression.sh.step=0.1"]));

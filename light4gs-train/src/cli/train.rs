@@ -120,7 +120,7 @@ pub(super) fn train_to_evaluation(
         Trainer::builder(config.clone(), data).check()?;
         let folder = RunFolder::create(out, Some(scene), &config, false)?;
         if let Some(like) = like {
-            folder.adopt(&RunFolder::open(like)?.0)?;
+            folder.adopt(like, &Scene::open(scene, &load_options(&config))?)?;
         }
         // Dropped here: the folder is locked again below.
     }

@@ -44,6 +44,9 @@ pub struct RunRecord {
     /// SHA-256 of the configuration that it began with.
     #[serde(default)]
     pub configuration: String,
+    /// Where only the file was written by this run: what began its training.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub trained_by: Option<Box<RunRecord>>,
 }
 
 impl RunRecord {
@@ -61,6 +64,7 @@ impl RunRecord {
             threads: rayon::current_num_threads(),
             begun: jiff::Timestamp::now().strftime("%F %T UTC").to_string(),
             configuration: config.digest_text(),
+            trained_by: None,
         })
     }
 
@@ -207,14 +211,27 @@ impl RunFolder {
         self.path("checkpoints")
     }
 
-    /// Takes over the newest checkpoint and the log of another run, to go on from there.
-    pub fn adopt(&self, other: &Self) -> Result<(), TrainError> {
-        let log = other.path("metrics.jsonl");
+    /// Takes over the newest checkpoint and the log of another run, to go on from there, and records what trained it.
+    /// Nothing happens where that run's dataset was not what it is now.
+    ///
+    /// # Errors
+    /// Another folder that holds no run; a file that cannot be read or written.
+    pub fn adopt(&self, other: &Path, data: &Scene) -> Result<(), TrainError> {
+        let (other, trained_by, _) = Self::open(other)?;
+        let dataset: Option<DatasetDigest> = other.read_json(DATASET)?;
+        let now = DatasetDigest::of(data)?;
+        if dataset.is_none_or(|before| !now.changes_since(&before).is_empty()) {
+            return Ok(());
+        }
+        let mut record: RunRecord = read_json(&self.path(RECORD))?;
+        record.trained_by = Some(trained_by.trained_by.clone().unwrap_or_else(|| Box::new(trained_by)));
+        self.write_json(RECORD, &record)?;
         let checkpoint = other.last_checkpoint().map(|from| {
             let to = self.checkpoints().join(from.file_name().expect("a checkpoint is a file"));
             (from, to)
         });
-        for (from, to) in checkpoint.into_iter().chain([(log, self.path("metrics.jsonl"))]) {
+        let log = (other.path("metrics.jsonl"), self.path("metrics.jsonl"));
+        for (from, to) in checkpoint.into_iter().chain([log]) {
             // Whole or not at all: half a checkpoint would stop the run from being resumed.
             let bytes = read_regular_file(&from, u64::MAX).map_err(DataError::io("read", &from))?;
             write_atomically(&to, |file| file.write_all(&bytes))?;

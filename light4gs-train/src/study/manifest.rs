@@ -36,6 +36,9 @@ pub struct Manifest {
     pub seeds: u64,
     /// Every run.
     pub runs: Vec<ManifestRun>,
+    /// Absolute paths of other studies: what they have trained alike is not trained again.
+    #[serde(default)]
+    pub reuse: Vec<PathBuf>,
 }
 
 /// A dataset.
@@ -91,6 +94,7 @@ impl Manifest {
             scenes: plan.scenes.iter().map(scene).collect(),
             seeds: plan.seeds,
             runs: plan.runs.iter().map(run).collect(),
+            reuse: plan.reuse.clone(),
         }
     }
 

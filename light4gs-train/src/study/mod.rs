@@ -4,7 +4,7 @@
 //! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs that train alike are trained once
 //! - [`manifest`]: `study.json`, which says what a study's folder is to hold
 //! - [`measure`]: what can be measured of a run, and the columns of tables
-//! - [`results`]: what the runs have come to so far, `results.json` and the CSV files
+//! - [`results`]: what the runs have come to so far, `results.json` and the CSV files; [`reuse`]: trainings of other studies
 //! - [`table`]: means, spreads and differences to the reference
 //! - [`rate_curves`]: runs as curves of quality over size
 //! - `plots`, `figures`: what is drawn, and the study's `report.html` (feature `cli`)
@@ -22,6 +22,7 @@ pub mod plan;
 pub mod plots;
 pub mod rate_curves;
 pub mod results;
+pub mod reuse;
 pub mod spread;
 pub mod table;
 

@@ -23,6 +23,8 @@ pub struct PlanOptions {
     pub overrides: Vec<String>,
     /// Runs of each variant on each scene, which differ in their seed. At least 1.
     pub seeds: u64,
+    /// Folders of other studies, whose trainings are taken over.
+    pub reuse: Vec<PathBuf>,
 }
 
 /// One combination of the axes' values.
@@ -75,6 +77,8 @@ pub struct Plan {
     pub seeds: u64,
     /// Scene by scene, seed by seed, variant by variant.
     pub runs: Vec<PlannedRun>,
+    /// Absolute paths of other studies, whose trainings are taken over.
+    pub reuse: Vec<PathBuf>,
 }
 
 impl Plan {
@@ -112,7 +116,9 @@ impl Plan {
                 }
             }
         }
-        Ok(Self { study, variants, scenes, seeds: options.seeds, runs })
+        let absolute = |path: &PathBuf| std::fs::canonicalize(path).map_err(DataError::io("read", path));
+        let reuse = options.reuse.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse })
     }
 
     /// How many tasks there are.
@@ -232,7 +238,13 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
 "#;
 
     fn options(scene: &Path) -> PlanOptions {
-        PlanOptions { config: "dnerf-small".into(), scenes: vec![scene.into()], overrides: Vec::new(), seeds: 1 }
+        PlanOptions {
+            config: "dnerf-small".into(),
+            scenes: vec![scene.into()],
+            overrides: Vec::new(),
+            seeds: 1,
+            reuse: Vec::new(),
+        }
     }
 
     #[test]

@@ -21,6 +21,7 @@ use crate::report::table::{Align, Table};
 use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::plan::{Plan, PlanOptions};
 use crate::study::results::is_finished;
+use crate::study::reuse::find_trained;
 use crate::study::{Study as Definition, catalog};
 
 /// What runs the tasks.
@@ -54,6 +55,9 @@ pub(super) struct Study {
     /// Runs of each variant on each scene, which differ in their seed: tables then show mean and spread.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
+    /// Folder of another study: what it has trained alike is not trained again. May be given more than once.
+    #[arg(long, value_name = "STUDY")]
+    reuse: Vec<PathBuf>,
     /// Print the runs, and do nothing.
     #[arg(long)]
     dry_run: bool,
@@ -81,8 +85,11 @@ impl Study {
         }
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
-        let options = PlanOptions { config: self.config, scenes: self.scenes, overrides, seeds: self.seeds };
-        let plan = Plan::new(Definition::load(&self.name)?, &options)?;
+        let (config, scenes, seeds, reuse) = (self.config, self.scenes, self.seeds, self.reuse);
+        let plan = Plan::new(Definition::load(&self.name)?, &PlanOptions { config, scenes, overrides, seeds, reuse })?;
+        for study in &plan.reuse {
+            StudyFolder::open(study)?;
+        }
         if self.dry_run {
             return dry_run(&plan, self.out, self.json);
         }
@@ -117,6 +124,8 @@ struct Planned<'a> {
     task: usize,
     run: &'a str,
     state: &'static str,
+    /// Whether another study has trained it.
+    reused: bool,
     iterations: usize,
     configuration: String,
 }
@@ -133,11 +142,13 @@ fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainErr
         };
         let train = &run.config.train;
         let first = trained.insert(run.task);
-        let iterations = if first { train.coarse_iterations + train.fine_iterations } else { 0 };
+        let reused = first && find_trained(&plan.reuse, &plan.scenes[run.scene].path, &run.config)?.is_some();
+        let iterations = if first && !reused { train.coarse_iterations + train.fine_iterations } else { 0 };
         rows.push(Planned {
             task: run.task,
             run: &run.name,
             state,
+            reused,
             iterations,
             configuration: run.config.digest_text(),
         });
@@ -154,7 +165,11 @@ fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainErr
     ];
     let mut table = Table::new(columns);
     for row in &rows {
-        let iterations = if row.iterations == 0 { "trained above".to_owned() } else { row.iterations.to_string() };
+        let iterations = match row.iterations {
+            0 if row.reused => "reused".to_owned(),
+            0 => "trained above".to_owned(),
+            iterations => iterations.to_string(),
+        };
         let configuration = row.configuration[..12].to_owned();
         table.row([row.task.to_string(), row.run.to_owned(), row.state.to_owned(), iterations, configuration]);
     }

@@ -11,6 +11,7 @@ use super::super::train::{RunOutput, train_to_evaluation};
 use crate::error::TrainError;
 use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::results::is_finished;
+use crate::study::reuse::find_trained;
 
 /// How often a run that another process holds is asked for.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -63,6 +64,9 @@ fn run_task(folder: &StudyFolder, manifest: &Manifest, task: usize, quiet: bool)
             let config = folder.config_of(run)?;
             let scene = &manifest.scenes[run.scene].path;
             let output = RunOutput { json: false, quiet, profile: false };
+            if trained.is_none() {
+                trained = find_trained(&manifest.reuse, scene, &config)?;
+            }
             let train = || train_to_evaluation(config.clone(), scene, &path, trained.as_deref(), &output).map(drop);
             when_free(&path, train)?;
         }
