@@ -156,6 +156,11 @@ impl Results {
         self.runs.iter().find(|run| (run.scene, run.variant, run.seed) == (scene, variant, seed))
     }
 
+    /// The finished runs of a variant on a scene, one a seed.
+    pub fn of_variant(&self, scene: usize, variant: usize) -> impl Iterator<Item = &RunResult> {
+        self.runs.iter().filter(move |run| (run.scene, run.variant) == (scene, variant))
+    }
+
     /// `results.csv` (times left out) or `times.csv` (nothing else).
     pub fn to_csv(&self, manifest: &Manifest, times: bool) -> String {
         let variants = manifest.variants();

@@ -36,10 +36,11 @@ pub(super) fn side_by_side(
             images.push((label.clone(), image));
         }
     }
+    let (view, seed) = (name.trim_end_matches(".png"), if manifest.seeds > 1 { " of the first seed" } else { "" });
     Ok(Some(Figure {
         section: "Images",
         name: format!("images-{}", named.name),
-        caption: format!("{}: test view {}, from the decoded files.", named.name, name.trim_end_matches(".png")),
+        caption: format!("{}: test view {view}, from the decoded files{seed}.", named.name),
         content: Content::Images(images),
     }))
 }

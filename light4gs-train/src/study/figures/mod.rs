@@ -17,6 +17,7 @@ use super::measure::Measure;
 use super::plots::{Bar, BarPlot, Drawing, Mark, ScatterPlot, Series, draw};
 use super::rate_curves::RateCurves;
 use super::results::{Results, RunResult};
+use super::spread::Spread;
 use crate::error::TrainError;
 use crate::report::{data_uri, escape};
 
@@ -67,16 +68,18 @@ pub fn figures(
             continue;
         }
         if study.shows(Output::Composition) {
-            let content = Content::Drawing(draw(&composition(&named.name, &runs))?);
+            let content = Content::Drawing(draw(&composition(&named.name, manifest, results, scene))?);
             let name = format!("composition-{}", named.name);
-            figures.push(Figure { section: "Composition", name, caption: String::new(), content });
+            let caption = mean_of_seeds(manifest);
+            figures.push(Figure { section: "Composition", name, caption, content });
         }
         if study.shows(Output::Latency) {
-            let content = Content::Drawing(draw(&latency(&named.name, &runs))?);
+            let content = Content::Drawing(draw(&latency(&named.name, manifest, results, scene))?);
             let caption =
-                "Coding is of the whole file, spread over the frames of the scene; rendering is of one frame.";
+                "Coding is of the whole file, spread over the frames of the scene; rendering is of one frame. ";
             let name = format!("latency-{}", named.name);
-            figures.push(Figure { section: "Latency", name, caption: caption.to_owned(), content });
+            let caption = caption.to_owned() + &mean_of_seeds(manifest);
+            figures.push(Figure { section: "Latency", name, caption, content });
         }
         if study.shows(Output::PlaneValues) {
             figures.extend(planes::values(folder, &named.name, &runs)?);
@@ -128,35 +131,48 @@ fn curves_plot(title: &str, curves: &RateCurves) -> ScatterPlot {
     }
 }
 
-fn composition(scene: &str, runs: &[(String, &RunResult)]) -> BarPlot {
-    let mut parts: Vec<String> = Vec::new();
-    for (name, _) in runs.iter().flat_map(|(_, run)| &run.sections) {
-        if !parts.contains(name) {
-            parts.push(name.clone());
-        }
-    }
-    let bytes = |run: &RunResult, part: &String| {
-        run.sections.iter().find(|(name, _)| name == part).map_or(0.0, |(_, bytes)| *bytes as f64)
-    };
-    let bar = |(label, run): &(String, &RunResult)| Bar {
-        label: label.clone(),
-        values: parts.iter().map(|part| bytes(run, part)).collect(),
-    };
-    let bars = runs.iter().map(bar).collect();
-    BarPlot { title: format!("Sections of the file: {scene}"), unit: "bytes".to_owned(), parts, bars }
+/// A bar for each variant with finished runs: the mean over their seeds.
+fn bars(
+    manifest: &Manifest,
+    results: &Results,
+    scene: usize,
+    values: impl Fn(&RunResult) -> Vec<f64>,
+) -> impl Iterator<Item = Bar> {
+    manifest.variants().into_iter().enumerate().filter_map(move |(index, variant)| {
+        let of_seeds: Vec<Vec<f64>> = results.of_variant(scene, index).map(&values).collect();
+        let mean = |part| Spread::of(&of_seeds.iter().map(|values| values[part]).collect::<Vec<_>>()).mean;
+        let values = (0..of_seeds.first()?.len()).map(mean).collect();
+        Some(Bar { label: variant.label, values })
+    })
 }
 
-fn latency(scene: &str, runs: &[(String, &RunResult)]) -> BarPlot {
-    let parts = [Measure::EncodePerFrame, Measure::DecodePerFrame, Measure::RenderMilliseconds];
-    let bar = |(label, run): &(String, &RunResult)| Bar {
-        label: label.clone(),
-        values: parts.iter().map(|part| part.of(run).unwrap_or(0.0)).collect(),
+fn mean_of_seeds(manifest: &Manifest) -> String {
+    if manifest.seeds > 1 { "Mean over the seeds.".to_owned() } else { String::new() }
+}
+
+fn composition(name: &str, manifest: &Manifest, results: &Results, scene: usize) -> BarPlot {
+    let mut parts: Vec<String> = Vec::new();
+    for (part, _) in results.runs.iter().filter(|run| run.scene == scene).flat_map(|run| &run.sections) {
+        if !parts.contains(part) {
+            parts.push(part.clone());
+        }
+    }
+    let bytes = |run: &RunResult| {
+        let of_part = |part: &String| run.sections.iter().find(|(name, _)| name == part);
+        parts.iter().map(|part| of_part(part).map_or(0.0, |(_, bytes)| *bytes as f64)).collect()
     };
+    let bars = bars(manifest, results, scene, bytes).collect();
+    BarPlot { title: format!("Sections of the file: {name}"), unit: "bytes".to_owned(), parts, bars }
+}
+
+fn latency(name: &str, manifest: &Manifest, results: &Results, scene: usize) -> BarPlot {
+    let parts = [Measure::EncodePerFrame, Measure::DecodePerFrame, Measure::RenderMilliseconds];
+    let times = |run: &RunResult| parts.iter().map(|part| part.of(run).unwrap_or(0.0)).collect();
     BarPlot {
-        title: format!("Time of a frame: {scene}"),
+        title: format!("Time of a frame: {name}"),
         unit: "ms".to_owned(),
         parts: ["encoding", "decoding", "rendering"].map(str::to_owned).into(),
-        bars: runs.iter().map(bar).collect(),
+        bars: bars(manifest, results, scene, times).collect(),
     }
 }
 
