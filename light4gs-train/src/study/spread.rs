@@ -25,15 +25,9 @@ impl Spread {
         Self { count, mean, deviation }
     }
 
-    /// Whether the difference to another mean is smaller than what seeds alone make: than the larger of both deviations.
-    /// None where neither was measured.
-    pub fn within_spread_of(&self, other: &Self) -> Option<bool> {
-        let deviation = match (self.deviation, other.deviation) {
-            (Some(a), Some(b)) => a.max(b),
-            (Some(a), None) | (None, Some(a)) => a,
-            (None, None) => return None,
-        };
-        Some((self.mean - other.mean).abs() < deviation)
+    /// Whether the mean is as near to 0 as the values are to each other. None of less than two.
+    pub fn is_within_deviation(&self) -> Option<bool> {
+        self.deviation.map(|deviation| self.mean.abs() <= deviation)
     }
 
     /// `12.34 ± 0.05`, with so many digits after the point.
@@ -60,10 +54,9 @@ mod tests {
     }
 
     #[test]
-    fn small_differences_are_within_the_spread() {
-        let a = Spread::of(&[1.0, 2.0, 3.0]);
-        assert_eq!(a.within_spread_of(&Spread::of(&[2.5])), Some(true));
-        assert_eq!(a.within_spread_of(&Spread::of(&[4.0])), Some(false));
-        assert_eq!(Spread::of(&[1.0]).within_spread_of(&Spread::of(&[4.0])), None);
+    fn small_means_are_within_the_deviation() {
+        assert_eq!(Spread::of(&[-1.0, 0.5, 1.0]).is_within_deviation(), Some(true));
+        assert_eq!(Spread::of(&[2.0, 3.0, 2.5]).is_within_deviation(), Some(false));
+        assert_eq!(Spread::of(&[2.0]).is_within_deviation(), None);
     }
 }

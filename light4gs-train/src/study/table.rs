@@ -80,7 +80,7 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     let variants = manifest.variants();
     let reference = study.reference.as_ref().and_then(|name| variants.iter().position(|variant| variant.name == *name));
     let reference = reference.unwrap_or(0);
-    let spread = |variant: usize, measure: Measure| over_seeds(manifest, results, scenes, variant, measure);
+    let of = |variant: usize, measure: Measure| by_seed(manifest, results, scenes, variant, measure);
     let rows = variants.iter().enumerate().map(|(index, variant)| StudyRow {
         label: variant.label.clone(),
         runs: [
@@ -91,11 +91,11 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
             .columns
             .iter()
             .map(|column| {
-                let own = spread(index, column.measure)?;
+                let own = of(index, column.measure);
                 match column.form {
-                    Form::Value => Some(value_cell(own, column)),
+                    Form::Value => value_cell(&own, column),
                     _ if index == reference => None,
-                    _ => difference_cell(own, spread(reference, column.measure)?, column),
+                    _ => difference_cell(&own, &of(reference, column.measure), column),
                 }
             })
             .collect(),
@@ -108,7 +108,23 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     }
 }
 
-/// The values of a measure by seed, each the mean over the scenes. Seeds that lack a scene are left out.
+/// The values of a measure by seed, each the mean over the scenes; None for seeds that lack a scene.
+fn by_seed(
+    manifest: &Manifest,
+    results: &Results,
+    scenes: &[usize],
+    variant: usize,
+    measure: Measure,
+) -> Vec<Option<f64>> {
+    let of_seed = |seed: u64| -> Option<f64> {
+        let values = scenes.iter().map(|scene| measure.of(results.get(*scene, variant, seed)?));
+        let values = values.collect::<Option<Vec<_>>>()?;
+        Some(values.iter().sum::<f64>() / values.len() as f64)
+    };
+    (0..manifest.seeds).map(of_seed).collect()
+}
+
+/// Mean and deviation of a measure over the seeds that have all scenes.
 pub(super) fn over_seeds(
     manifest: &Manifest,
     results: &Results,
@@ -116,40 +132,42 @@ pub(super) fn over_seeds(
     variant: usize,
     measure: Measure,
 ) -> Option<Spread> {
-    let of_seed = |seed: u64| -> Option<f64> {
-        let values = scenes.iter().map(|scene| measure.of(results.get(*scene, variant, seed)?));
-        let values = values.collect::<Option<Vec<_>>>()?;
-        Some(values.iter().sum::<f64>() / values.len() as f64)
-    };
-    let values: Vec<f64> = (0..manifest.seeds).filter_map(of_seed).collect();
+    spread_of(by_seed(manifest, results, scenes, variant, measure).into_iter())
+}
+
+fn spread_of(values: impl Iterator<Item = Option<f64>>) -> Option<Spread> {
+    let values: Vec<f64> = values.flatten().collect();
     (!values.is_empty()).then(|| Spread::of(&values))
 }
 
-fn value_cell(spread: Spread, column: &Column) -> Cell {
-    Cell {
-        value: spread.mean,
-        deviation: spread.deviation,
-        within_spread: None,
-        text: spread.to_text(column.measure.digits()),
-    }
+fn value_cell(by_seed: &[Option<f64>], column: &Column) -> Option<Cell> {
+    let spread = spread_of(by_seed.iter().copied())?;
+    let text = spread.to_text(column.measure.digits());
+    Some(Cell { value: spread.mean, deviation: spread.deviation, within_spread: None, text })
 }
 
-fn difference_cell(own: Spread, reference: Spread, column: &Column) -> Option<Cell> {
-    let (scale, digits) = match column.form {
-        Form::Percent if reference.mean == 0.0 => return None,
-        Form::Percent => (100.0 / reference.mean, 1.max(column.measure.digits())),
-        _ => (1.0, column.measure.digits()),
-    };
-    let value = (own.mean - reference.mean) * scale;
-    let within_spread = own.within_spread_of(&reference);
+/// Runs of one seed begin alike and see the same frames in the same order, so they are compared with each other.
+fn difference_cell(own: &[Option<f64>], reference: &[Option<f64>], column: &Column) -> Option<Cell> {
+    let percent = column.form == Form::Percent;
+    let digits = if percent { 1.max(column.measure.digits()) } else { column.measure.digits() };
+    let differences = own.iter().zip(reference).map(|(own, reference)| {
+        let (own, reference) = ((*own)?, (*reference)?);
+        match percent {
+            true => (reference != 0.0).then(|| 100.0 * (own / reference - 1.0)),
+            false => Some(own - reference),
+        }
+    });
+    let spread = spread_of(differences)?;
+    let within_spread = spread.is_within_deviation();
     let mark = if within_spread == Some(true) { format!(" {WITHIN_SPREAD}") } else { String::new() };
     // Zero has no sign.
+    let value = spread.mean;
     let shown = if value.abs() < 0.5 * 10f64.powi(-(digits as i32)) { 0.0 } else { value };
-    let text = match own.deviation {
-        Some(deviation) => format!("{shown:+.digits$} ± {:.digits$}{mark}", deviation * scale.abs()),
-        None => format!("{shown:+.digits$}{mark}"),
+    let text = match spread.deviation {
+        Some(deviation) => format!("{shown:+.digits$} ± {deviation:.digits$}{mark}"),
+        None => format!("{shown:+.digits$}"),
     };
-    Some(Cell { value, deviation: own.deviation.map(|deviation| deviation * scale.abs()), within_spread, text })
+    Some(Cell { value, deviation: spread.deviation, within_spread, text })
 }
 
 /// Published figures whose scenes and image size are those of the runs.
@@ -246,13 +264,16 @@ pub fn legend(manifest: &Manifest) -> String {
     let seeds = match manifest.seeds {
         1 => "One run each: how far runs that differ in their seed alone lie apart is not known.".to_owned(),
         seeds => format!(
-            "Means of {seeds} seeds ± their standard deviation. {WITHIN_SPREAD} marks a difference that is smaller than \
-             that of its row or of the reference."
+            "Means of {seeds} seeds ± their standard deviation. {WITHIN_SPREAD} marks a difference that is no larger \
+             than that."
         ),
     };
     let has_differences = manifest.study.columns.iter().any(|column| column.form != Form::Value);
-    let differences =
-        if has_differences { format!("Differences (Δ) are to \"{reference}\". ") } else { String::new() };
+    let differences = if has_differences {
+        format!("Differences (Δ) are to \"{reference}\" of the same seed. ")
+    } else {
+        String::new()
+    };
     format!("{differences}{seeds} Quality and size are those of the decoded file.")
 }
 
@@ -287,7 +308,8 @@ bytes = 2.2e6
         let study = Study::from_toml(text, "example").unwrap();
         let scenes: Vec<_> =
             scenes.iter().map(|name| ManifestScene { name: (*name).to_owned(), path: "/".into() }).collect();
-        let mut manifest = Manifest { version: String::new(), study, scenes, seeds, runs: Vec::new() };
+        let mut manifest =
+            Manifest { version: String::new(), study, scenes, seeds, runs: Vec::new(), reuse: Vec::new() };
         let mut results = Results { runs: Vec::new(), missing: Vec::new() };
         for scene in 0..manifest.scenes.len() {
             for seed in 0..seeds {
@@ -352,16 +374,21 @@ bytes = 2.2e6
     }
 
     #[test]
-    fn differences_within_the_spread_are_marked() {
+    fn differences_are_between_runs_of_one_seed() {
+        // Seeds lie far apart, both variants of each do not.
         let (manifest, results) =
-            example(&["y"], 3, |_, variant, seed| Some(20.0 + 0.1 * variant as f64 + seed as f64));
+            example(&["y"], 3, |_, variant, seed| Some(20.0 + 0.1 * variant as f64 + 20.0 * seed as f64));
         let table = &tables(&manifest, &results)[0];
-        assert_eq!(texts(table, 1)[1..4], ["21.10 ± 1.00", "+0.10 ± 1.00 ≈", "+0.48 ± 4.76 ≈"]);
-        assert!(table.published.is_empty(), "another scene");
-        let (manifest, results) =
-            example(&["y"], 2, |_, variant, seed| Some(20.0 + 9.0 * variant as f64 + seed as f64));
-        let table = &tables(&manifest, &results)[0];
+        assert_eq!(texts(table, 1)[1..4], ["40.10 ± 20.00", "+0.10 ± 0.00", "+0.31 ± 0.17"]);
         assert_eq!(table.rows[1].cells[1].as_ref().unwrap().within_spread, Some(false));
+        assert!(table.published.is_empty(), "another scene");
+        // One seed the one way, one the other.
+        let (manifest, results) = example(&["y"], 2, |_, variant, seed| Some(20.0 + (variant as u64 * seed) as f64));
+        assert_eq!(texts(&tables(&manifest, &results)[0], 1)[2], "+0.50 ± 0.71 ≈");
+        // Only the seeds that both variants have.
+        let psnr = |_: usize, variant: usize, seed: u64| (seed < 3 - variant as u64).then_some(20.0 + seed as f64);
+        let (manifest, results) = example(&["y"], 3, psnr);
+        assert_eq!(texts(&tables(&manifest, &results)[0], 1)[2], "+0.00 ± 0.00 ≈");
     }
 
     #[test]
@@ -372,7 +399,7 @@ bytes = 2.2e6
         assert_eq!(tables.len(), 3);
         let cell = tables[0].rows[0].cells[0].as_ref().unwrap();
         assert_eq!((cell.value, cell.deviation), (5.5, Some(0.5f64.sqrt())));
-        assert_eq!(texts(&tables[0], 1)[2], "0.00 ± 0.71 ≈".replace("0.00", "+0.00"));
+        assert_eq!(texts(&tables[0], 1)[2], "+0.00 ± 0.00 ≈");
     }
 
     #[test]
