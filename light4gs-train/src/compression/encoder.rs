@@ -113,12 +113,15 @@ pub fn encode<F: DeformationField>(
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
-/// Rounds in which [`freeze_planes`] looks for planes that stay as they are. The last round's are near enough if none do.
+/// Rounds in which [`freeze_planes`] looks for planes that stay as they are.
 const FREEZING_ROUNDS: usize = 8;
 
 /// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
-/// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn. None if
-/// there are no planes or no models of them. `device`, with autodiff, is where the result lives.
+/// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn. A hyperprior
+/// that answers strongly to rounding never settles, and rounding what has been rounded would carry the planes further away
+/// in every round: then they are those that are decoded first, and encoding them again rounds them once more.
+///
+/// None if there are no planes or no models of them. `device`, with autodiff, is where the result lives.
 ///
 /// Planes do not depend on Gaussians, so the scene that is coded here for their sake has none.
 ///
@@ -137,18 +140,21 @@ pub fn freeze_planes<F: DeformationField>(
     }
     let mut data = scene.to_arrays(SceneMeta::default());
     data.gaussians = GaussianArrays { sh_degree: data.gaussians.sh_degree, ..GaussianArrays::default() };
+    let mut first = None;
     for _ in 0..FREEZING_ROUNDS {
         let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
-        let decoded = encode_compressed(&data, &input)?.decoded;
-        if decoded.hexplane == data.hexplane {
+        let decoded = encode_compressed(&data, &input)?.decoded.hexplane;
+        if decoded == data.hexplane {
+            first = None;
             break;
         }
         if let Some(planes) = scene.planes_mut() {
-            *planes = HexPlane::from_arrays(&decoded.hexplane, &device.clone().inner())?;
+            *planes = HexPlane::from_arrays(&decoded, &device.clone().inner())?;
         }
-        data.hexplane = decoded.hexplane;
+        first.get_or_insert_with(|| decoded.clone());
+        data.hexplane = decoded;
     }
-    Ok(Some(HexPlane::from_arrays(&data.hexplane, device)?))
+    Ok(Some(HexPlane::from_arrays(&first.unwrap_or(data.hexplane), device)?))
 }
 
 /// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
