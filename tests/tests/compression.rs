@@ -215,16 +215,16 @@ fn freezing_does_not_carry_planes_away() {
         *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
     }
     let mut compression = Compression::new(&config, scene.planes(), &device).unwrap();
-    compression.start_from(scene.planes());
     let mut models = compression.planes.unwrap();
+    let steps = models.quantization.steps_without_gradient();
+    models.context = shaken(models.context, &scene.field.hexplane.tensors(), &steps);
     models.context.hyperprior = models.context.hyperprior.map(|mut hyperprior| {
         let [.., last] = &mut hyperprior.analysis;
         last.weight = burn::module::Param::from_tensor((last.weight.val() * 40.0).detach());
         let weight = &mut hyperprior.synthesis_out.weight;
-        *weight = burn::module::Param::from_tensor((weight.val() * 10.0).detach());
+        *weight = burn::module::Param::from_tensor((weight.val() * 100.0).detach());
         hyperprior
     });
-    let steps = models.quantization.steps_without_gradient();
     let steps: Vec<f32> = (0..scene.field.hexplane.planes.len()).map(|i| steps.of(i).into_scalar()).collect();
     compression.planes = Some(models);
     let before = scene.field.hexplane.to_arrays();
