@@ -15,6 +15,8 @@ use crate::study::results::RunResult;
 const BINS: usize = 120;
 /// Share of the values at each end that a histogram leaves out.
 const TAIL: f64 = 0.001;
+/// Share of the places of bit maps that are shown in the brightest color.
+const BRIGHTEST: f64 = 0.002;
 /// Pixels between two planes.
 const GAP: usize = 3;
 /// An image is enlarged to at least this height, by whole factors.
@@ -91,8 +93,10 @@ pub(super) fn bit_maps(
         }
         all.push((label.clone(), maps));
     }
-    let most =
-        all.iter().flat_map(|(_, maps)| maps).flat_map(|map| &map.bits).fold(0.0f32, |most, bits| most.max(*bits));
+    let mut bits: Vec<f32> = all.iter().flat_map(|(_, maps)| maps).flat_map(|map| map.bits.iter().copied()).collect();
+    bits.sort_unstable_by(f32::total_cmp);
+    // A few places with several times the bits of all others would leave those in the dark.
+    let most = bits.get((bits.len() as f64 * (1.0 - BRIGHTEST)) as usize).copied().unwrap_or(0.0);
     if most <= 0.0 {
         return Ok(None);
     }
@@ -105,8 +109,8 @@ pub(super) fn bit_maps(
         section: "Bit allocation",
         name: format!("bit-maps-{scene}"),
         caption: format!(
-            "{scene}: bits at each place of a plane, all channels together, from 0 (black) to {most:.1} (yellow), the same \
-             in all images."
+            "{scene}: bits at each place of a plane, all channels together, from 0 (black) to {most:.1} and more (yellow), \
+             the same in all images."
         ),
         content: Content::Images(images.collect()),
     }))

@@ -197,7 +197,7 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// 1, 2 and 5 times powers of ten, as logarithms; at most some twelve.
+/// 1, 2 and 5 times powers of ten, as logarithms, at most some twelve; over a short range, those of a linear axis.
 fn logarithmic_ticks((low, high): (f64, f64)) -> Vec<f64> {
     let powers = (low / std::f64::consts::LN_10).floor() as i32..=(high / std::f64::consts::LN_10).ceil() as i32;
     let ticks = |factors: &[f64]| -> Vec<f64> {
@@ -208,8 +208,8 @@ fn logarithmic_ticks((low, high): (f64, f64)) -> Vec<f64> {
     };
     let fine = ticks(&[1.0, 2.0, 5.0]);
     match fine.len() {
-        0 | 1 => vec![low, (low + high) / 2.0, high],
-        2..=12 => fine,
+        0..=2 => linear_ticks((low.exp(), high.exp())).into_iter().map(f64::ln).collect(),
+        3..=12 => fine,
         _ => ticks(&[1.0]),
     }
 }
@@ -235,4 +235,19 @@ fn short(value: f64) -> String {
     };
     let trimmed = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
     if trimmed == "-0" { "0".to_owned() } else { trimmed.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        let ticks = |low: f64, high: f64| -> Vec<String> {
+            logarithmic_ticks((low.ln(), high.ln())).into_iter().map(|tick| short(tick.exp())).collect()
+        };
+        assert_eq!(ticks(0.09, 3.9), ["0.1", "0.2", "0.5", "1", "2"]);
+        assert_eq!(ticks(0.0977, 0.195), ["0.1", "0.12", "0.14", "0.16", "0.18"]);
+        assert_eq!(ticks(1e-6, 1e6).len(), 13);
+    }
 }
