@@ -2,11 +2,10 @@
 
 use std::fs;
 
+use crate::PROGRAM;
 use light4gs_model::DynamicScene;
 use light4gs_tests::golden::devices;
 use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, assert_success};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
 #[test]
 fn a_scene_goes_all_the_way() {

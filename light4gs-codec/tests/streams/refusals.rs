@@ -1,6 +1,6 @@
 //! What the encoder does not write.
 
-mod common;
+use crate::common;
 
 use common::sample;
 use light4gs_codec::{

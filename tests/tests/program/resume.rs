@@ -3,9 +3,8 @@
 use std::fs;
 use std::time::Duration;
 
+use crate::PROGRAM;
 use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_success};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
 #[test]
 fn killed_and_resumed_runs_are_bit_identical() {

@@ -3,7 +3,7 @@
 //! Whatever the nodes say, a file that holds them decodes to what the encoder promises or is refused, soon and in little
 //! memory; it never brings the decoder down.
 
-mod common;
+use crate::common;
 
 use std::time::{Duration, Instant};
 

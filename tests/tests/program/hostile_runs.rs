@@ -5,6 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use crate::PROGRAM;
 use burn::tensor::Device;
 use light4gs_data::{ImageStore, Scene, SyntheticOptions, write_synthetic};
 use light4gs_tests::hostile::checkpoints::{self, Parts};
@@ -21,8 +22,6 @@ use light4gs_train::run::{Checkpoint, RunFolder};
 use light4gs_train::trainer::Trainer;
 use rand::Rng;
 use rand::seq::IndexedRandom;
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
 fn scene(folder: &Path) -> PathBuf {
     let path = folder.join("scene");

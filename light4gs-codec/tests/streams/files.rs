@@ -1,6 +1,6 @@
 //! Files.
 
-mod common;
+use crate::common;
 
 use std::fs;
 

@@ -2,17 +2,14 @@
 //!
 //! `LIGHT4GS_KILLS=100` spreads a hundred kills over a run; a short run has a few.
 
-#![cfg(unix)]
-
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::PROGRAM;
 use light4gs_data::is_temporary_name;
 use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, assert_success};
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
 fn kills(short: u32) -> u32 {
     std::env::var("LIGHT4GS_KILLS").map_or(short, |text| text.parse().expect("LIGHT4GS_KILLS is a number"))

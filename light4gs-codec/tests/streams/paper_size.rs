@@ -1,6 +1,6 @@
 //! Scenes of the paper's size stay within the default limits.
 
-mod common;
+use crate::common;
 
 use common::compression::{ALL_PARTS, ShKind, compact_shape, input, reference_shape, scene, sh_networks};
 use light4gs_codec::{CompressionInput, Limits, Profile, decode, encode_compressed};

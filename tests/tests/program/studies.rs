@@ -3,10 +3,9 @@
 use std::fs;
 use std::process::{Command, Output};
 
+use crate::PROGRAM;
 use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 use serde_json::Value;
-
-const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
 
 /// `study NAME scene` with runs of seconds, into `study` where nothing else is said.
 fn study(w: &Workspace, name: &str, more: &[&str]) -> Command {

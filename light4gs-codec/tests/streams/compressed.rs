@@ -1,6 +1,6 @@
 //! Compressed scenes: what comes back is what the encoder said, for every shape and every part.
 
-mod common;
+use crate::common;
 
 use common::compression::{
     ALL_PARTS, Parts, Random, ShKind, compact_shape, condition, distribution, input, model, plane_coding,

@@ -4,7 +4,7 @@ use light4gs_codec::{CompressionInput, FrequencyTable, Profile, ShCoding, encode
 
 use crate::parts::Parts;
 
-#[path = "../../../light4gs-codec/tests/common/mod.rs"]
+#[path = "../../../../light4gs-codec/tests/common/mod.rs"]
 mod common;
 
 use common::compression::{ALL_PARTS, ShKind, compact_shape, input, scene, sh_networks, tiny};

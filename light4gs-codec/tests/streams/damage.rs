@@ -1,6 +1,6 @@
 //! Damage by accident: always found.
 
-mod common;
+use crate::common;
 
 use common::sample;
 use light4gs_codec::{CodecError, decode, encode, info};

@@ -180,7 +180,7 @@ fn a_count_must_be_paid_for() {
     assert!(attributes::decode(&bytes, &few).unwrap_err().to_string().contains("at most 9"));
 }
 
-/// Bytes and times on trained scenes: `LIGHT4GS_SCENES="a.l4gs b.l4gs" cargo test --release -p light4gs-codec --test
+/// Bytes and times on trained scenes: `LIGHT4GS_SCENES="a.l4gs b.l4gs" cargo test --release -p light4gs-codec --test streams
 /// attributes -- --ignored --nocapture`.
 #[test]
 #[ignore = "needs trained scenes"]

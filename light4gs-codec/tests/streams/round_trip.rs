@@ -1,6 +1,6 @@
 //! What goes in comes out, to the last bit.
 
-mod common;
+use crate::common;
 
 use common::{gaussians, hexplane, motion, sample};
 use light4gs_codec::{CoordinateMapping, MotionArrays, SceneData, SceneMeta, decode, encode, info};

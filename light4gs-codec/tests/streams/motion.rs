@@ -1,6 +1,6 @@
 //! Positions at a time, on a scene small enough to do by hand.
 
-mod common;
+use crate::common;
 
 use common::{hexplane, sample};
 use light4gs_codec::{

@@ -1,12 +1,12 @@
 //! Streams of earlier days stay readable, and today's bytes are theirs.
 
-mod common;
+use crate::common;
 
 use common::{compression::tiny, sample};
 use light4gs_codec::{Profile, decode, encode, encode_compressed, info};
 
 /// A stream without loss. A change of its bytes is a change of the format, which is free until it is released.
-const FLOAT32: &[u8] = include_bytes!("../../tests/golden-streams/float32.l4gs");
+const FLOAT32: &[u8] = include_bytes!("../../../tests/golden-streams/float32.l4gs");
 
 #[test]
 fn float32_reads_and_writes_as_it_did() {
@@ -18,13 +18,13 @@ fn float32_reads_and_writes_as_it_did() {
 const COMPRESSED: [(Profile, &[u8], &[u8]); 2] = [
     (
         Profile::Compact,
-        include_bytes!("../../tests/golden-streams/compact.l4gs"),
-        include_bytes!("../../tests/golden-streams/compact.decoded.l4gs"),
+        include_bytes!("../../../tests/golden-streams/compact.l4gs"),
+        include_bytes!("../../../tests/golden-streams/compact.decoded.l4gs"),
     ),
     (
         Profile::Paper,
-        include_bytes!("../../tests/golden-streams/paper.l4gs"),
-        include_bytes!("../../tests/golden-streams/paper.decoded.l4gs"),
+        include_bytes!("../../../tests/golden-streams/paper.l4gs"),
+        include_bytes!("../../../tests/golden-streams/paper.decoded.l4gs"),
     ),
 ];
 

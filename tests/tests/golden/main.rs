@@ -1,0 +1,9 @@
+//! The golden vectors c01 to c13 on every back end. `tests/README.md` says what each is.
+
+mod context;
+mod dnerf;
+mod entropy;
+mod geometry;
+mod metrics;
+mod raster;
+mod training;

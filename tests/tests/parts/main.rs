@@ -1,0 +1,13 @@
+//! The parts of the crates together, inside one process: back ends against each other, modules against the codec,
+//! derivatives, imports, whatever the configuration allows.
+
+mod back_ends_agree;
+mod compression;
+mod context_model;
+mod every_legal_value;
+mod exact_networks;
+mod finite_differences;
+mod import;
+mod plane_convolutions;
+mod poisoned_scenes;
+mod sh_entropy;

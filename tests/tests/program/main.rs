@@ -1,0 +1,11 @@
+//! The program as its users run it: commands, damaged inputs, kills, resumed runs, studies.
+
+mod command_line;
+mod hostile_runs;
+#[cfg(unix)]
+mod kills;
+mod resume;
+mod studies;
+
+/// The program under test: Cargo builds it before these tests.
+const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
