@@ -97,7 +97,7 @@ pub mod include {
         TEAM_SUM_OF_MANY = "include/team_sum_of_many";
         /// A team is a workgroup of TEAM invocations that blends one cell.
         TEAM_WORKGROUP = "include/team_workgroup";
-        /// What is drawn, from where: one uniform for all stages of a image.
+        /// What is drawn, from where: one uniform for all stages of an image.
         VIEW = "include/view";
     }
 }

@@ -46,7 +46,7 @@ pub enum GpuError {
         limit: u64,
     },
     /// The image has more parts than a launch can name.
-    #[error("a image of {width}×{height} is too large for this adapter; at most {limit} cells of 16×16 pixels")]
+    #[error("an image of {width}×{height} is too large for this adapter; at most {limit} cells of 16×16 pixels")]
     Image {
         /// Pixels.
         width: u32,

@@ -7,7 +7,7 @@ use crate::{CodecError, adaptive::LARGEST_STEP, checks};
 ///
 /// Every step is the distance between two neighboring levels, so an attribute is off by half of it at most. Measured
 /// at 200 pixels, the defaults cost 0.1 dB of a scene that reaches 33 dB, and less of one that reaches 26; positions and
-/// scales are what a image feels most. Halving a step costs one bit for each of its numbers.
+/// scales are what an image feels most. Halving a step costs one bit for each of its numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttributeSteps {
     /// Step of the positions, as a fraction of the size of the typical Gaussian: the median over the Gaussians of the

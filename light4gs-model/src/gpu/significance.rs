@@ -66,7 +66,7 @@ mod tests {
 
     const SIDE: u32 = 8;
 
-    /// Faint dots, each in the middle of one pixel of a image that is one cell, no two at one depth: nothing hangs on
+    /// Faint dots, each in the middle of one pixel of an image that is one cell, no two at one depth: nothing hangs on
     /// the last bit.
     fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
         let camera = Camera::look_at(Vec3::new(0.3, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIDE, SIDE);

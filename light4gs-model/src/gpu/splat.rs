@@ -150,7 +150,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
         .uniform(&[gaussian_count as u32])
         .invocations(gaussian_count)?;
     let total = prefix_sum(gpu, &first_places, gaussian_count)?;
-    // The one read-back of a image: all further buffers are made to its measure.
+    // The one read-back of an image: all further buffers are made to its measure.
     let count = match gaussian_count {
         0 => 0,
         _ => gpu.read_word("the number of intersections", &total)? as usize,
@@ -273,7 +273,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
         .writes(&gradients)
         .uniform(&uniform)
         .invocations(frame.gaussians)?;
-    gpu.check("the gradients of a image", &[&gradients])?;
+    gpu.check("the gradients of an image", &[&gradients])?;
     let mut k = 0;
     Ok(SplatInputs::from_array(shapes.map(|shape| {
         k += 1;

@@ -26,8 +26,8 @@ const MOST_CAMERAS: usize = 60;
 pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
-    /// A folder for `0000.ply`, `0001.ply`, ..., or a file: one moment as .ply or .glb (KHR_gaussian_splatting), the whole
-    /// motion as .4dgs.
+    /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or a folder that is
+    /// there), or a file: one moment as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
     /// One file that plays the scene in a browser and needs nothing else.
@@ -65,12 +65,21 @@ enum Target {
 }
 
 impl Target {
-    fn of(path: &Path) -> Self {
-        match path.extension().and_then(|extension| extension.to_str()).map(str::to_ascii_lowercase).as_deref() {
-            Some("ply") => Self::Ply,
-            Some("glb") => Self::Glb,
-            Some("4dgs") => Self::FourDgs,
-            _ => Self::PlySequence,
+    /// What a path asks for: a folder that is there, a slash at the end or no suffix mean a folder.
+    fn of(path: &Path) -> Result<Self, TrainError> {
+        let asks_for_folder = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
+        let Some(suffix) = path.extension().filter(|_| !asks_for_folder && !path.is_dir()) else {
+            return Ok(Self::PlySequence);
+        };
+        match suffix.to_string_lossy().to_ascii_lowercase().as_str() {
+            "ply" => Ok(Self::Ply),
+            "glb" => Ok(Self::Glb),
+            "4dgs" => Ok(Self::FourDgs),
+            other => Err(TrainError::Input(format!(
+                "--out {}: no file of the kind `.{other}` is written, only .ply, .glb and .4dgs; for a folder of PLY files put a \
+                 slash at the end of the name",
+                path.display()
+            ))),
         }
     }
 }
@@ -101,7 +110,7 @@ impl Export {
     }
 
     fn export<F: DeformationField>(&self, path: &Path) -> Result<(), TrainError> {
-        let target = Target::of(path);
+        let target = Target::of(path)?;
         if !matches!(target, Target::PlySequence) {
             check_output(path, &self.file)?;
         }

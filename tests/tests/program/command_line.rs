@@ -45,6 +45,15 @@ fn a_scene_goes_all_the_way() {
     ]));
     assert_eq!(w.names("still"), ["0000.png", "0001.png"]);
     assert_success(&w.run(["export", "again.l4gs", "--out", "ply", "--frames", "2"]));
+    assert_success(&w.run(["export", "again.l4gs", "--out", "frames.v2/", "--frames", "1"]));
+    assert_eq!(w.names("frames.v2"), ["0000.ply"]);
+    for unknown in ["scene.splat", "scene.gltf", "frames.v3"] {
+        assert_refused(
+            &w.run(["export", "again.l4gs", "--out", unknown]),
+            &[unknown, ".ply", ".glb", ".4dgs", "slash"],
+        );
+        assert!(!w.path(unknown).exists());
+    }
     let ply = light4gs_data::GaussianPly::read(&w.path("ply/0001.ply")).unwrap();
     assert_eq!(ply.len() as u64, info["gaussians"].as_u64().unwrap());
 }
@@ -173,7 +182,7 @@ fn a_truncated_image() {
 }
 
 #[test]
-fn a_image_of_another_size() {
+fn an_image_of_another_size() {
     let w = Workspace::new(PROGRAM);
     let other = light4gs_data::RgbImage8 { width: 16, height: 8, pixels: vec![0; 16 * 8 * 3] };
     other.save_png(&w.path("scene/train/r_003.png")).unwrap();
