@@ -19,13 +19,13 @@ const virtual = (parts) => ({
 // What a worker decodes before the first file, so that its code is compiled by then.
 const sample = readFileSync("../tests/golden-streams/compact.l4gs").toString("base64");
 const workerPlugins = [virtual({ "virtual:sample": sample })];
-const worker = await build({ ...common, entryPoints: ["player/worker.js"], format: "iife", plugins: workerPlugins });
+const worker = await build({ ...common, entryPoints: ["player/scene/worker.js"], format: "iife", plugins: workerPlugins });
 const packed = gzipSync(readFileSync(wasm), { level: 9 });
 packed[9] = 255; // the operating system: none
 const parts = {
   "virtual:worker": worker.outputFiles[0].text,
   "virtual:decoder": packed.toString("base64"),
-  "virtual:style": (await build({ ...common, entryPoints: ["player/style.css"] })).outputFiles[0].text,
+  "virtual:style": (await build({ ...common, entryPoints: ["player/element/style.css"] })).outputFiles[0].text,
 };
 const main = await build({ ...common, entryPoints: ["player/index.js"], format: "esm", plugins: [virtual(parts)], charset: "utf8" });
 const code = main.outputFiles[0].text;

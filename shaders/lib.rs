@@ -1,7 +1,7 @@
-//! The WGSL kernels of Light4GS's wgpu back end, as strings: each constant is a file of this folder, named after it.
+//! The WGSL kernels of Light4GS's wgpu back end, as strings: each constant is a file of a folder here, named after it.
 //!
-//! `README.md` says what each stage does. The host's side, which puts a kernel together as constants, then includes, then
-//! the stage, is `light4gs_model::gpu`.
+//! `README.md` says what each stage does. The host's side, which puts a kernel together as constants (those of
+//! rendering from `light4gs_codec::rendering`), then includes, then the stage, is `light4gs_model::gpu`.
 
 #![no_std]
 
@@ -13,61 +13,61 @@ macro_rules! wgsl {
 
 wgsl! {
     /// One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
-    ADAM = "adam";
+    ADAM = "elementwise/adam";
     /// Puts the Gaussians' numbers of cells into the order of depths.
-    CELL_COUNTS = "cell_counts";
+    CELL_COUNTS = "splatting/cell_counts";
     /// Color of every Gaussian from its spherical harmonics, seen from the camera.
-    COLOR = "color";
+    COLOR = "splatting/color";
     /// Second half of the query's derivative: every cell gathers what the samples around it hand over.
-    HEXPLANE_GATHER = "hexplane_gather";
+    HEXPLANE_GATHER = "hexplane/hexplane_gather";
     /// Brings one plane from [C, H · W] to the layout of `include/hexplane.wgsl`.
-    HEXPLANE_PACK = "hexplane_pack";
+    HEXPLANE_PACK = "hexplane/hexplane_pack";
     /// Features at points: the product over six planes of their bilinear samples.
-    HEXPLANE_QUERY = "hexplane_query";
+    HEXPLANE_QUERY = "hexplane/hexplane_query";
     /// First half of the query's derivative: what every point hands to each of its six samples, and the points'
     /// own gradients.
-    HEXPLANE_QUERY_BACKWARD = "hexplane_query_backward";
+    HEXPLANE_QUERY_BACKWARD = "hexplane/hexplane_query_backward";
     /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
-    INTERSECT = "intersect";
+    INTERSECT = "splatting/intersect";
     /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
     /// (Ballé et al. 2018).
-    LOWER_BOUND_BACKWARD = "lower_bound_backward";
+    LOWER_BOUND_BACKWARD = "elementwise/lower_bound_backward";
     /// The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error
     /// everywhere (Press et al., Numerical Recipes, section 6.2): the coefficients and the order of operations of
     /// `light4gs-model/src/ops`.
-    NORMAL_CDF = "normal_cdf";
+    NORMAL_CDF = "elementwise/normal_cdf";
     /// Derivative of the standard normal distribution function: its density times the upstream gradient.
-    NORMAL_CDF_BACKWARD = "normal_cdf_backward";
+    NORMAL_CDF_BACKWARD = "elementwise/normal_cdf_backward";
     /// Exclusive prefix sum, in place.
-    PREFIX_SUM = "prefix_sum";
+    PREFIX_SUM = "sorting/prefix_sum";
     /// Projects every Gaussian to the screen and counts the cells that it touches.
-    PROJECT = "project";
+    PROJECT = "splatting/project";
     /// Adds up every Gaussian's sums over its cells and takes them through the projection to its attributes.
-    PROJECT_BACKWARD = "project_backward";
+    PROJECT_BACKWARD = "splatting/project_backward";
     /// First half of a pass of the radix sort: how often each digit occurs in each block.
-    RADIX_COUNT = "radix_count";
+    RADIX_COUNT = "sorting/radix_count";
     /// Second half of a pass of the radix sort: moves keys and values to their places.
-    RADIX_SCATTER = "radix_scatter";
+    RADIX_SCATTER = "sorting/radix_scatter";
     /// Where each of a number of groups begins among sorted keys.
-    RANGES = "ranges";
+    RANGES = "sorting/ranges";
     /// Blends the splats of every cell, front to back.
-    RASTERIZE = "rasterize";
+    RASTERIZE = "splatting/rasterize";
     /// Derivative of the blending by every splat, front to back like the forward pass.
-    RASTERIZE_BACKWARD = "rasterize_backward";
+    RASTERIZE_BACKWARD = "splatting/rasterize_backward";
     /// What every splat contributes to one image, without its color: the sums behind significance pruning
     /// (paper III-B).
-    SIGNIFICANCE = "significance";
+    SIGNIFICANCE = "splatting/significance";
     /// Adds up every Gaussian's sums over its cells.
-    SIGNIFICANCE_GATHER = "significance_gather";
+    SIGNIFICANCE_GATHER = "splatting/significance_gather";
     /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
-    SUBGROUPS = "subgroups";
+    SUBGROUPS = "elementwise/subgroups";
 }
 
 /// What several stages share.
 pub mod include {
     wgsl! {
-        /// Thresholds and units: those of `light4gs-model/src/cpu`, docs/design.md.
-        CONSTANTS = "include/constants";
+        /// Finite numbers, and sums of products term by term.
+        ARITHMETIC = "include/arithmetic";
         /// The steps of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian
         /// to the factor of its 2D covariance.
         COVARIANCE = "include/covariance";

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use crate::stream::container::VERSION;
+use crate::format::VERSION;
 
 /// What is wrong with a scene or a stream, where, and what to do about it.
 #[derive(Debug, thiserror::Error)]

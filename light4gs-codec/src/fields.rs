@@ -2,7 +2,7 @@
 
 use std::slice::from_ref;
 
-use crate::{CodecError, SceneData, stream::sections::Section};
+use crate::{CodecError, SceneData, bytes::Section};
 
 /// One array of numbers of a scene.
 struct Field<'a> {

@@ -69,41 +69,50 @@
 mod adaptive;
 pub mod attributes;
 mod budget;
+mod bytes;
 pub mod checks;
 mod entropy;
 mod error;
 mod fields;
 #[cfg(not(target_arch = "wasm32"))]
 mod file;
+mod format;
 mod limits;
+mod motion;
 pub mod network;
 mod parallel;
 pub mod plane_layout;
 mod planes;
+pub mod rendering;
 mod scene;
 mod sh;
+mod steps;
 mod stream;
 
 pub use budget::Demand;
-pub use entropy::FrequencyTable;
+pub use bytes::{
+    names::legal_name,
+    sections::{Encoding, Kind},
+};
+pub use entropy::{Distributions, FrequencyTable};
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
 pub use file::{read_file, read_file_with_limits, read_info, read_info_with_limits};
+pub use format::{MAGIC, VERSION};
 pub use limits::Limits;
+pub use motion::MotionEvaluator;
 pub use network::{Network, weights as network_weights};
-pub use planes::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, section::PlaneBytes};
+pub use planes::{
+    Condition, ContextModelArrays, LatentArrays, PlaneCoding, PlanePrior, PlaneSource, section::PlaneBytes,
+};
 pub use scene::{
-    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput,
-    MotionSource, NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
+    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource,
+    NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
-pub use stream::names::legal_name;
+pub use steps::PerGroup;
 pub use stream::{
-    CompressionInput, CompressionReport, Distributions, Encoded, OpenStream, PerGroup, PlaneCoding, Profile,
-    SectionInfo, StreamInfo, WeightPrecisions,
-    container::{MAGIC, VERSION},
+    CompressionInput, CompressionReport, Encoded, OpenStream, Profile, SectionInfo, StreamInfo, WeightPrecisions,
     decode, decode_with_limits, encode, encode_compressed, encode_compressed_with_limits, encode_planes, encode_sh,
-    info, info_with_limits, plane_distributions,
-    sections::{Encoding, Kind},
-    sh_distributions,
+    info, info_with_limits, plane_distributions, sh_distributions,
 };

@@ -30,11 +30,13 @@ pub mod entropy;
 #[cfg(feature = "wgpu")]
 mod gpu;
 mod gpu_error;
+mod kernels;
 pub mod ops;
 pub mod parameters;
 pub mod scene;
 pub mod sh;
 mod significance;
+pub mod spherical_harmonics;
 mod splatter;
 
 pub use context::*;

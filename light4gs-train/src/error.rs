@@ -7,7 +7,7 @@ use light4gs_data::DataError;
 use light4gs_model::{GpuError, ModelError};
 
 use crate::config::ConfigError;
-use crate::trainer::Divergence;
+use crate::divergence::Divergence;
 
 /// An error of training, evaluation or the command line.
 #[derive(Debug, thiserror::Error)]

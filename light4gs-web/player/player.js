@@ -1,15 +1,15 @@
 // Plays a scene on a canvas: time, camera, drawing. No buttons: those are the element's.
 
-import { Camera } from "./camera.js";
-import { Controls } from "./controls.js";
-import { Draft } from "./draft.js";
-import { sourceLens, stand } from "./framing.js";
-import { SplatRenderer } from "./splat_renderer.js";
+import { Camera } from "./views/camera.js";
+import { Controls } from "./views/controls.js";
+import { Draft } from "./views/draft.js";
+import { sourceLens, stand } from "./views/framing.js";
+import { SplatRenderer } from "./drawing/splat_renderer.js";
 
-/** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
-/** @typedef {import("./camera.js").Vector} Vector */
-/** @typedef {import("./scene.js").Scene} Scene */
-/** @typedef {import("./splat_renderer.js").View} View */
+/** @typedef {import("./views/camera.js").DatasetCamera} DatasetCamera */
+/** @typedef {import("./views/camera.js").Vector} Vector */
+/** @typedef {import("./scene/scene.js").Scene} Scene */
+/** @typedef {import("./drawing/splat_renderer.js").View} View */
 
 /**
  * @typedef {object} PlayerOptions

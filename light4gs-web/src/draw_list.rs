@@ -1,6 +1,7 @@
 //! What is drawn: Gaussians in front of a camera, back to front, with the colors that are seen from there.
 
 use light4gs_codec::GaussianArrays;
+use light4gs_codec::rendering::{MIN_ALPHA, NEAR};
 
 use crate::gaussians::FLOATS;
 
@@ -9,10 +10,6 @@ pub const ENTRY: usize = 16;
 /// Entries of a texture's row. Lists are filled up to whole rows with transparent ones.
 pub const ROW: usize = 256;
 
-/// What lies nearer along the view axis is not drawn, as in the renderer of the program.
-const NEAR: f32 = 0.2;
-/// What is fainter contributes nothing.
-const MIN_ALPHA: f32 = 1.0 / 255.0;
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 

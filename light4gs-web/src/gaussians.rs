@@ -1,12 +1,11 @@
 //! Activated Gaussians, and what the vertex shader takes of them.
 
 use light4gs_codec::GaussianArrays;
+use light4gs_codec::rendering::MAX_LOG_SCALE;
 
 /// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz.
 pub(crate) const FLOATS: usize = 10;
 
-/// The largest logarithm of a scale, as in the renderer of the program.
-const MAX_LOG_SCALE: f32 = 40.0;
 /// A quaternion that is shorter has no direction.
 const SHORTEST_QUATERNION: f32 = 1e-12;
 

@@ -36,6 +36,7 @@
 //! | zeros | as many as make `N / 8` bytes of all, so that a count can be trusted |
 
 mod channels;
+pub(crate) mod explicit;
 mod neighbors;
 mod position_grid;
 mod positions;
@@ -52,8 +53,8 @@ use crate::{
     CodecError, GaussianArrays, Limits,
     adaptive::{BitDecoder, BitEncoder, LARGEST_INDEX, index, reconstruct},
     budget::Budget,
+    bytes::{Reader, Section, Writer},
     limits::at_most,
-    stream::{self, reader::Reader, sections::Section, writer::Writer},
 };
 
 const SECTION: &str = Section::Gaussians.name();
@@ -241,7 +242,7 @@ struct Quantized {
 
 impl Quantized {
     fn of(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<Self, CodecError> {
-        stream::gaussians::check(gaussians, &Limits { gaussians: u32::MAX, ..Limits::default() })?;
+        explicit::check(gaussians, &Limits { gaussians: u32::MAX, ..Limits::default() })?;
         steps.check()?;
         let GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, .. } = gaussians;
         check_finite("means", means.as_flattened())?;

@@ -6,7 +6,7 @@ use super::{SECTION, steps::check_step};
 use crate::{
     CodecError,
     adaptive::{LARGEST_STEP, index, reconstruct},
-    stream::{reader::Reader, writer::Writer},
+    bytes::{Reader, Writer},
 };
 
 /// Most bits of a coordinate, so that three fit into a Morton code.

@@ -1,7 +1,7 @@
 //! How finely the attributes are quantized.
 
 use super::SECTION;
-use crate::{CodecError, adaptive::LARGEST_STEP, checks};
+use crate::{CodecError, adaptive::LARGEST_STEP, steps};
 
 /// How finely each attribute of a Gaussian is quantized.
 ///
@@ -33,18 +33,18 @@ impl Default for AttributeSteps {
 }
 
 impl AttributeSteps {
-    /// Refuses steps below [`checks::LEAST_STEP`] (a position's only where it is not positive) or above 1e30.
+    /// Refuses steps below [`LEAST_STEP`](crate::checks::LEAST_STEP) (a position's only where it is not positive) or above 1e30.
     ///
     /// # Errors
     /// Names the first one.
     pub fn check(&self) -> Result<(), CodecError> {
-        self.named().into_iter().try_for_each(|(attribute, step)| checks::attribute_step(attribute, step))
+        self.named().into_iter().try_for_each(|(attribute, step)| steps::attribute_step(attribute, step))
     }
 
     /// The nearest steps that [`AttributeSteps::check`] takes; NaN becomes the smallest.
     pub fn clamped(&self) -> Self {
         let nearest = |step: f32, least: f32| step.max(least).min(LARGEST_STEP);
-        let step = |step: f32| nearest(step, checks::LEAST_STEP);
+        let step = |step: f32| nearest(step, steps::LEAST_STEP);
         Self {
             position: nearest(self.position, f32::MIN_POSITIVE),
             log_scale: step(self.log_scale),
@@ -69,5 +69,5 @@ impl AttributeSteps {
 
 /// Refuses a step of a stream under which a decoded number could be infinite.
 pub(super) fn check_step(attribute: &str, step: f32) -> Result<(), CodecError> {
-    checks::check_step(SECTION, format!("step of {attribute}"), step, f32::MIN_POSITIVE)
+    steps::check_step(SECTION, format!("step of {attribute}"), step, f32::MIN_POSITIVE)
 }

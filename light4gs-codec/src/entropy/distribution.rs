@@ -60,6 +60,15 @@ impl Distribution {
     }
 }
 
+/// Gaussians that values are coded under, in units of the quantization step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Distributions {
+    /// Standard deviations as the networks give them; they are bounded below by 0.11 when they are used.
+    pub scales: Vec<f32>,
+    /// Means.
+    pub means: Vec<f32>,
+}
+
 impl EntropyModel<TOTAL_BITS> for &Distribution {
     type Symbol = usize;
     type Probability = u32;

@@ -9,6 +9,7 @@ mod gaussian_table;
 mod normal;
 mod symbol_coder;
 
+pub use distribution::Distributions;
 pub(crate) use distribution::{Distribution, TOTAL_BITS};
 pub use frequency_table::FrequencyTable;
 pub(crate) use frequency_table::{read_tables, write_tables};

@@ -3,8 +3,8 @@
 use super::{Layer, LayerKind, Network, Node, Operation, Value, kernels::masked_taps};
 use crate::{
     CodecError, Limits,
+    bytes::{Reader, Writer},
     network::weights::TensorLength,
-    stream::{reader::Reader, writer::Writer},
 };
 
 const LINEAR: u8 = 0;

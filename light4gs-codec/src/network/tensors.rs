@@ -7,8 +7,8 @@ use super::{
 use crate::{
     CodecError,
     budget::Budget,
+    bytes::{Reader, Writer, sections::Encoding},
     limits::at_most,
-    stream::{reader::Reader, sections::Encoding, writer::Writer},
 };
 
 /// A tensor's name in messages.

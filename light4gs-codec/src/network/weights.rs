@@ -32,6 +32,7 @@ use crate::{
     },
     budget::Budget,
     limits::at_most,
+    steps::check_step,
 };
 
 /// Weights that a byte stands for at most.
@@ -54,6 +55,17 @@ pub enum WeightPrecision {
     Bits(u8),
     /// A step in the units of the weights.
     Step(f32),
+}
+
+impl WeightPrecision {
+    /// Refuses bits beyond 2 to 16, and a step that is not positive or above 1e30.
+    pub(crate) fn check(self) -> Result<(), CodecError> {
+        match self {
+            Self::Bits(2..=16) => Ok(()),
+            Self::Bits(bits) => Err(CodecError::invalid("weights", "precision", bits, "2 to 16 bits")),
+            Self::Step(step) => check_step("weights", "step", step, f32::MIN_POSITIVE),
+        }
+    }
 }
 
 /// A tensor of a network.

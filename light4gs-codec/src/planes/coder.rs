@@ -11,11 +11,11 @@ use crate::{
     CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane,
     adaptive::Damaged,
     budget::Budget,
+    bytes::Section,
     entropy::{SymbolCoder, SymbolReader, SymbolWriter, gaussian_table},
     network::kernels::AnchorMap,
     parallel,
     plane_layout::{is_space_time, scale_of},
-    stream::sections::Section,
 };
 
 const SECTION: &str = Section::HexPlanes.name();

@@ -6,12 +6,12 @@ use super::context_model::{
 use crate::{
     CodecError, Limits, Network, PerGroup,
     budget::Budget,
+    bytes::{Reader, Writer, sections::Encoding},
     entropy::{read_tables, write_tables},
     network::{
         tensors::{read_weights, write_weights},
         weights::WeightPrecision,
     },
-    stream::{reader::Reader, sections::Encoding, writer::Writer},
 };
 
 const ANCHORS: u64 = 6;

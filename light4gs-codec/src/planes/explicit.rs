@@ -4,7 +4,7 @@ use super::head::{Head, SECTION};
 use crate::{
     CodecError, HexPlaneArrays, Plane,
     budget::Budget,
-    stream::{reader::Reader, writer::Writer},
+    bytes::{Reader, Writer},
 };
 
 /// Writes planes that [`super::head::check`] has passed.

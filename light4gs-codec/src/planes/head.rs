@@ -2,13 +2,9 @@
 
 use crate::{
     CodecError, HexPlaneArrays, Limits,
+    bytes::{Reader, Section, Writer, check_length},
     limits::at_most,
     plane_layout::{AXIS_NAMES, PLANE_AXES, TIME_AXIS},
-    stream::{
-        reader::Reader,
-        sections::{Section, check_length},
-        writer::Writer,
-    },
 };
 
 pub(super) const SECTION: &str = Section::HexPlanes.name();

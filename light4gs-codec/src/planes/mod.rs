@@ -6,6 +6,7 @@
 //! | file | what |
 //! |---|---|
 //! | `head.rs`, `explicit.rs` | sizes of planes; planes as plain numbers |
+//! | `coding.rs` | how planes are coded, as data |
 //! | `context_model.rs`, `context_section.rs` | the context model as data, and as bytes |
 //! | `plan.rs` | when each plane is coded |
 //! | `exact_model.rs` | the context model, ready to run |
@@ -15,6 +16,7 @@
 //! | `coder.rs`, `section.rs` | all planes: encode, decode; their bytes |
 
 mod coder;
+mod coding;
 mod context_model;
 pub(crate) mod context_section;
 mod cost;
@@ -27,5 +29,6 @@ pub(crate) mod section;
 mod walk;
 
 pub(crate) use coder::parameters;
+pub use coding::PlaneCoding;
 pub use context_model::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource};
 pub(crate) use plane_parameters::bounded_mean;

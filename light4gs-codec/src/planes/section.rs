@@ -8,9 +8,9 @@ use super::{
 use crate::{
     CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane, PlaneCoding,
     budget::Budget,
-    checks::{self, LEAST_STEP_IN_STREAM},
+    bytes::{Reader, Writer},
     plane_layout::SIZE_MULTIPLE,
-    stream::{reader::Reader, writer::Writer},
+    steps::{LEAST_STEP_IN_STREAM, plane_step},
 };
 
 /// Bytes of one plane.
@@ -41,7 +41,7 @@ pub(crate) fn check(hexplane: &HexPlaneArrays, coding: &PlaneCoding, limits: &Li
     check_model(&Head::of(hexplane), model)?;
     let scales = hexplane.multipliers.len();
     check_steps(steps, scales)?;
-    steps.iter().flat_map(|step| [step.space_only, step.space_time]).try_for_each(checks::plane_step)?;
+    steps.iter().flat_map(|step| [step.space_only, step.space_time]).try_for_each(plane_step)?;
     if latent_symbols.len() != hexplane.planes.len() {
         let expected = format!("{}, one list a plane", hexplane.planes.len());
         return Err(CodecError::invalid(SECTION, "lists of latent symbols", latent_symbols.len(), expected));

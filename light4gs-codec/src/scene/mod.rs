@@ -1,10 +1,7 @@
 //! What a file holds, as plain arrays.
 
-mod evaluator;
 mod motion;
-pub(crate) mod query;
 
-pub use evaluator::MotionEvaluator;
 pub use motion::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor};
 
 use std::collections::BTreeMap;

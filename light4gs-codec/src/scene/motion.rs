@@ -1,10 +1,9 @@
-//! How the Gaussians move, as data; and where they are at a time.
+//! How the Gaussians move, as data.
 
-use super::MotionEvaluator;
 use crate::{
-    CodecError, Limits, Network, SceneData,
+    CodecError, Limits, Network,
+    bytes::{Section, names::check_name},
     limits::at_most,
-    stream::{names::check_name, sections::Section},
 };
 
 const SECTION: &str = Section::Motion.name();
@@ -190,25 +189,5 @@ impl MotionNetwork {
             }
         }
         Ok(())
-    }
-}
-
-impl SceneData {
-    /// The centers of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves, or where
-    /// what moves them is no [`MotionNetwork`].
-    ///
-    /// For tools that want to look into a file without a back end; see [`MotionEvaluator`], which is made anew for each
-    /// call.
-    ///
-    /// # Errors
-    /// A network that contradicts itself or the hexplane.
-    pub fn positions_at(&self, time: f32) -> Result<Vec<[f32; 3]>, CodecError> {
-        let motion = self.motion.network.as_ref();
-        if !motion.is_some_and(|motion| motion.outputs.contains(&MotionOutput::Position)) {
-            return Ok(self.gaussians.means.clone());
-        }
-        let mut moved = self.gaussians.clone();
-        MotionEvaluator::new(self)?.apply(&self.gaussians, time, 0..moved.len(), &mut moved);
-        Ok(moved.means)
     }
 }

@@ -1,8 +1,8 @@
 //! How spherical harmonics are coded, as data.
 
 use crate::{
-    CodecError, FrequencyTable, GaussianArrays, HexPlaneArrays, Limits, Network, SceneFrameArrays,
-    checks::LEAST_STEP_IN_STREAM, limits::at_most, sh_rest_coefficients, stream::sections::Section,
+    CodecError, FrequencyTable, GaussianArrays, HexPlaneArrays, Limits, Network, SceneFrameArrays, bytes::Section,
+    limits::at_most, sh_rest_coefficients, steps::LEAST_STEP_IN_STREAM,
 };
 
 pub(super) const SECTION: &str = Section::Sh.name();

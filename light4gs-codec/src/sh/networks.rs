@@ -3,11 +3,11 @@
 use super::coding::{Conditions, ShPrior, ShSource};
 use crate::plane_layout::PLANE_AXES;
 use crate::{
+    motion::query::{multiply_by_sample, normalized},
     network::{
         Program, Workspace,
         kernels::{LANES, Lanes, kept},
     },
-    scene::query::{multiply_by_sample, normalized},
 };
 
 /// Nanoseconds to take samples of three planes at eight Gaussians.

@@ -8,6 +8,10 @@ use crate::{
     CodecError, Distributions, GaussianArrays, Limits, Network,
     adaptive::Damaged,
     budget::Budget,
+    bytes::{
+        Reader, Writer, check_length,
+        sections::{Encoding, Kind},
+    },
     entropy::{READ_NANOSECONDS, SymbolReader, SymbolWriter, read_tables, write_tables},
     network::{
         kernels::LANES,
@@ -16,11 +20,6 @@ use crate::{
     },
     planes::bounded_mean,
     sh_rest_coefficients,
-    stream::{
-        reader::Reader,
-        sections::{Encoding, Kind, check_length},
-        writer::Writer,
-    },
 };
 
 /// What stands before everything else.

@@ -3,15 +3,17 @@
 use super::{
     OpenStream,
     container::{self, NewSection},
-    gaussians, motion, scene_frame,
-    sections::{Encoding, Kind},
-    writer::Writer,
+    input::{CompressionInput, Profile},
+    scene_frame,
 };
 use crate::{
-    CodecError, CompressionInput, Demand, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, Profile,
-    SceneData, ShBytes,
-    attributes::{self, EncodedAttributes},
-    checks, fields,
+    CodecError, Demand, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, SceneData, ShBytes,
+    attributes::{self, EncodedAttributes, explicit},
+    bytes::{
+        Writer,
+        sections::{Encoding, Kind},
+    },
+    fields, motion,
     network_weights::WeightPrecision,
     planes,
     sh::{self, coding::Conditions},
@@ -64,13 +66,13 @@ pub fn encode_compressed_with_limits(
     input: &CompressionInput,
     limits: &Limits,
 ) -> Result<Encoded, CodecError> {
-    checks::coding_within(scene, input, limits)?;
+    input.check(scene, limits)?;
     let compact = |precision| (input.profile == Profile::Compact).then_some(precision);
 
     let mut sections = Vec::new();
     let (attributes, order) = write_gaussians(&scene.gaussians, input, &mut sections)?;
     let mut writer = Writer::default();
-    let motion = motion::write(&scene.motion, compact(input.weights.motion), &mut writer)?;
+    let motion = motion::section::write(&scene.motion, compact(input.weights.motion), &mut writer)?;
     push(&mut sections, Kind::MotionDescription, encoding_of(compact(input.weights.motion)), writer);
     let mut writer = Writer::default();
     scene_frame::write(&scene.frame, &mut writer);
@@ -130,7 +132,7 @@ fn write_gaussians(
         return Ok((attributes::quantized(gaussians, &input.attributes)?, order));
     }
     let mut writer = Writer::default();
-    gaussians::write(gaussians, &mut writer);
+    explicit::write(gaussians, &mut writer);
     push(sections, Kind::GaussiansExplicit, Encoding::Float32, writer);
     let order = (0..gaussians.len() as u32).collect();
     Ok((GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.clone() }, order))

@@ -3,19 +3,16 @@
 //! `docs/format.md` has the layout. Sections follow each other without gaps in the order of the table, so that every
 //! byte of a stream belongs to something that a checksum covers.
 
-use super::{
-    meta,
-    reader::Reader,
-    sections::{Encoding, Kind, Section},
-    writer::Writer,
+use super::meta;
+use crate::{
+    CodecError, Limits, SceneMeta,
+    bytes::{
+        Reader, Writer,
+        sections::{Encoding, Kind, Section},
+    },
+    format::{MAGIC, VERSION},
+    limits::at_most,
 };
-use crate::{CodecError, Limits, SceneMeta, limits::at_most};
-
-/// The first bytes of every stream. The first is not ASCII and two line ends follow, so that a transfer as text shows.
-pub const MAGIC: [u8; 8] = *b"\x89L4GS\r\n\x1a";
-
-/// The version of the format.
-pub const VERSION: u16 = 1;
 
 /// Bytes before the meta.
 pub(crate) const PRELUDE: usize = 32;

@@ -1,13 +1,15 @@
 //! What a stream holds, without decoding its numbers.
 
-use super::{
-    container::Container,
-    gaussians, motion,
-    reader::Reader,
-    sections::{Encoding, Kind, Section},
-};
+use super::{container::Container, input::Profile};
 use crate::{
-    CodecError, ContextModelArrays, Limits, MotionArrays, PerGroup, PlaneBytes, Profile, SceneMeta, planes, sh,
+    CodecError, ContextModelArrays, Limits, MotionArrays, PerGroup, PlaneBytes, SceneMeta,
+    attributes::explicit,
+    bytes::{
+        Reader, Section,
+        sections::{Encoding, Kind},
+    },
+    motion::section,
+    planes, sh,
 };
 
 /// What a stream holds.
@@ -93,10 +95,10 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
         Ok::<_, CodecError>((kind, encoding, Reader::new(section.name(), payload)))
     };
     let (_, gaussian_encoding, mut reader) = open(Section::Gaussians)?;
-    let gaussian_count = gaussians::Head::read(&mut reader, &limits)?.count;
+    let gaussian_count = explicit::Head::read(&mut reader, &limits)?.count;
     let (sh_kind, _, mut reader) = open(Section::Sh)?;
     let sh = sh::section::Head::read(&mut reader, &limits)?;
-    let motion = motion::read_description(&mut open(Section::Motion)?.2, &limits)?;
+    let motion = section::read_description(&mut open(Section::Motion)?.2, &limits)?;
     let (plane_kind, _, mut reader) = open(Section::HexPlanes)?;
     let (mut plane_bytes, mut plane_steps, mut context_model) = (Vec::new(), Vec::new(), None);
     let hexplane = if plane_kind == Kind::HexPlanesExplicit {

@@ -2,12 +2,14 @@
 
 use std::{collections::BTreeMap, f32::consts::PI};
 
-use super::{
-    names::{check_name, check_text},
-    reader::Reader,
-    writer::Writer,
+use crate::{
+    CodecError, Limits, SceneMeta,
+    bytes::{
+        Reader, Writer,
+        names::{check_name, check_text},
+    },
+    limits::at_most,
 };
-use crate::{CodecError, Limits, SceneMeta, limits::at_most};
 
 const SECTION: &str = "meta";
 

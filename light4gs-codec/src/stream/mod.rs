@@ -2,38 +2,37 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `container.rs`, `sections.rs` | header and table; which sections there are and what they may hold |
-//! | `meta.rs`, `gaussians.rs`, `scene_frame.rs`, `motion.rs` | the simple parts; planes and harmonics have folders of their own |
-//! | `names.rs` | names that are safe to show |
+//! | `container.rs` | header and table |
+//! | `meta.rs`, `scene_frame.rs` | the simple parts; the others have rooms of their own |
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and doing it |
 //! | `open.rs`, `info.rs` | decoding section by section, and looking without decoding |
 
 mod compressor;
 pub(crate) mod container;
-pub(crate) mod gaussians;
 mod info;
 mod input;
 mod meta;
-mod motion;
-pub(crate) mod names;
 mod open;
 mod parts;
-pub(crate) mod reader;
 mod scene_frame;
-pub(crate) mod sections;
-pub(crate) mod writer;
 
 pub use compressor::{CompressionReport, Encoded, encode_compressed, encode_compressed_with_limits};
 pub use info::{SectionInfo, StreamInfo, info, info_with_limits};
-pub use input::{CompressionInput, PerGroup, PlaneCoding, Profile, WeightPrecisions};
+pub use input::{CompressionInput, Profile, WeightPrecisions};
 pub use open::OpenStream;
-pub use parts::{Distributions, encode_planes, encode_sh, plane_distributions, sh_distributions};
+pub use parts::{encode_planes, encode_sh, plane_distributions, sh_distributions};
 
 use container::NewSection;
-use sections::{Encoding, Kind};
-use writer::Writer;
 
-use crate::{CodecError, Limits, SceneData, checks, fields, planes, sh};
+use crate::{
+    CodecError, Limits, SceneData,
+    attributes::explicit,
+    bytes::{
+        Writer,
+        sections::{Encoding, Kind},
+    },
+    fields, motion, planes, sh,
+};
 
 /// Turns a scene into a `.l4gs` stream without loss: all numbers float32.
 ///
@@ -44,16 +43,16 @@ use crate::{CodecError, Limits, SceneData, checks, fields, planes, sh};
 /// message names the section and the field.
 pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
     let limits = Limits::large();
-    checks::scene(scene)?;
+    check(scene, &limits)?;
     let section = |kind: Kind, write: &dyn Fn(&mut Writer)| {
         let mut writer = Writer::default();
         write(&mut writer);
         NewSection { kind, encoding: Encoding::Float32, payload: writer.bytes }
     };
     let mut motion_writer = Writer::default();
-    motion::write(&scene.motion, None, &mut motion_writer)?;
+    motion::section::write(&scene.motion, None, &mut motion_writer)?;
     let sections = [
-        section(Kind::GaussiansExplicit, &|writer| gaussians::write(&scene.gaussians, writer)),
+        section(Kind::GaussiansExplicit, &|writer| explicit::write(&scene.gaussians, writer)),
         section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
         section(scene_frame::kind(&scene.frame), &|writer| scene_frame::write(&scene.frame, writer)),
         section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
@@ -85,7 +84,7 @@ pub fn decode_with_limits(bytes: &[u8], limits: &Limits) -> Result<SceneData, Co
 /// Refuses a scene that contradicts itself, for the encoder and the decoder alike.
 pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError> {
     meta::check(&scene.meta, limits)?;
-    gaussians::check(&scene.gaussians, limits)?;
+    explicit::check(&scene.gaussians, limits)?;
     sh::section::check(&scene.gaussians)?;
     fields::check_finite(scene)?;
     scene.motion.check(limits)?;

@@ -1,16 +1,15 @@
 //! A stream whose sections are decoded one at a time.
 
-use super::{
-    check,
-    container::Container,
-    gaussians, motion, scene_frame,
-    sections::{Encoding, Kind, Section},
-};
+use super::{check, container::Container, scene_frame};
 use crate::{
     CodecError, GaussianArrays, HexPlaneArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
-    attributes,
+    attributes::{self, explicit},
     budget::{Budget, Demand},
-    parallel, planes,
+    bytes::{
+        Section,
+        sections::{Encoding, Kind},
+    },
+    motion, parallel, planes,
     sh::{self, coding::Conditions},
 };
 
@@ -70,7 +69,7 @@ impl<'a> OpenStream<'a> {
     fn gaussians_within(&self, budget: &Budget) -> Result<GaussianArrays, CodecError> {
         match self.container.section(Section::Gaussians)? {
             (_, Encoding::Quantized, payload) => attributes::decode_within(payload, budget),
-            (_, Encoding::Float32, payload) => gaussians::read(payload, budget),
+            (_, Encoding::Float32, payload) => explicit::read(payload, budget),
         }
     }
 
@@ -93,7 +92,7 @@ impl<'a> OpenStream<'a> {
 
     fn motion_within(&self, budget: &Budget) -> Result<MotionArrays, CodecError> {
         let (_, encoding, payload) = self.container.section(Section::Motion)?;
-        motion::read(payload, encoding, budget)
+        motion::section::read(payload, encoding, budget)
     }
 
     /// The planes.

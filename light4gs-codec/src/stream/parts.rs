@@ -2,9 +2,11 @@
 //!
 //! Decoding by parts is [`crate::OpenStream`]'s; the other attributes are in [`crate::attributes`].
 
-use super::{gaussians, sections::Section, writer::Writer};
 use crate::{
-    CodecError, GaussianArrays, HexPlaneArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding, planes,
+    CodecError, Distributions, GaussianArrays, HexPlaneArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding,
+    attributes::explicit,
+    bytes::{Section, Writer},
+    planes,
     sh::{self, coding::Conditions},
 };
 
@@ -32,22 +34,13 @@ pub fn encode_sh(
     hexplane: &HexPlaneArrays,
 ) -> Result<Vec<u8>, CodecError> {
     let limits = Limits::large();
-    gaussians::check(gaussians, &limits)?;
+    explicit::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(hexplane, &limits)?;
     let mut writer = Writer::default();
     let conditions = Conditions { gaussians, frame, hexplane };
     sh::section::write(gaussians, coding, None, conditions, &limits, &mut writer)?;
     Ok(writer.bytes)
-}
-
-/// Gaussians that values are coded under, in units of the quantization step.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Distributions {
-    /// Standard deviations as the networks give them; they are bounded below by 0.11 when they are used.
-    pub scales: Vec<f32>,
-    /// Means.
-    pub means: Vec<f32>,
 }
 
 /// What the exact executor gives for one plane of a decoded hexplane, `[M, height, width]`: the distributions that a
@@ -81,7 +74,7 @@ pub fn sh_distributions(
     hexplane: &HexPlaneArrays,
 ) -> Result<Distributions, CodecError> {
     let limits = Limits::large();
-    gaussians::check(gaussians, &limits)?;
+    explicit::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(hexplane, &limits)?;
     sh::section::distributions(gaussians, coding, Conditions { gaussians, frame, hexplane }, &limits)

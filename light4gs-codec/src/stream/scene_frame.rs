@@ -1,11 +1,9 @@
 //! The frame that normalizes positions.
 
-use super::{
-    reader::Reader,
-    sections::{Kind, Section},
-    writer::Writer,
+use crate::{
+    CodecError, CoordinateMapping, SceneFrameArrays,
+    bytes::{Reader, Section, Writer, sections::Kind},
 };
-use crate::{CodecError, CoordinateMapping, SceneFrameArrays};
 
 /// The kind that holds a frame: the mapping is written only where it is not the paper's.
 pub(crate) fn kind(frame: &SceneFrameArrays) -> Kind {

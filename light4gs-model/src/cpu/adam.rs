@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use crate::ops::adam::AdamStep;
+use crate::kernels::adam::AdamStep;
 
 const CHUNK: usize = 1 << 14;
 

@@ -10,13 +10,12 @@
 //! weight = T · alpha,  T *= 1 - alpha
 //! ```
 
-use super::lanes::{LANES, Lanes};
-use super::project::{MIN_ALPHA, Splat, TILE, View};
-use super::tiles::TileLists;
+use light4gs_codec::rendering::{MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, TILE};
 
-const MAX_ALPHA: f32 = 0.99;
-/// A pixel takes no splat that would leave it with less transmittance.
-const MIN_TRANSMITTANCE: f32 = 1e-4;
+use super::lanes::{LANES, Lanes};
+use super::project::Splat;
+use super::tiles::TileLists;
+use crate::kernels::splat::View;
 
 /// Groups of eight pixels in a tile's row.
 const ACROSS: usize = TILE / LANES;

@@ -2,20 +2,12 @@
 //! original 3DGS rasterizer), forward and backward, one Gaussian at a time.
 
 use glam::{Mat3, Vec2, Vec3};
+use light4gs_codec::rendering::{DILATION, FRUSTUM_MARGIN, MIN_ALPHA, NEAR, TILE};
 use light4gs_data::Camera;
 
-use crate::scene::spherical_harmonics::{basis, basis_gradient, coefficient_count};
+use crate::kernels::splat::View;
+use crate::spherical_harmonics::{basis, basis_gradient, coefficient_count};
 
-/// Gaussians nearer than this along the view axis are not drawn.
-const NEAR: f32 = 0.2;
-/// Variance in square pixels that every splat gets on top, so that none falls between pixels.
-const DILATION: f32 = 0.3;
-/// The Jacobian is taken no further out than this many half fields of view.
-pub(crate) const FRUSTUM_MARGIN: f32 = 1.3;
-/// Side of a tile in pixels.
-pub(crate) const TILE: usize = 16;
-/// Contributions below this opacity are skipped.
-pub(crate) const MIN_ALPHA: f32 = 1.0 / 255.0;
 /// Radius of a Gaussian that cannot be drawn: not finite, or without orientation.
 pub(crate) const INVALID_RADIUS: i32 = -1;
 
@@ -49,24 +41,6 @@ impl GaussianSlices<'_> {
 
     fn mean(&self, i: usize) -> Vec3 {
         Vec3::from_slice(&self.means[3 * i..])
-    }
-}
-
-/// What is drawn, from where.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
-    pub(crate) camera: Camera,
-    pub(crate) background: [f32; 3],
-    pub(crate) sh_degree: usize,
-}
-
-impl View {
-    pub(crate) fn tiles_across(&self) -> usize {
-        (self.camera.width as usize).div_ceil(TILE)
-    }
-
-    pub(crate) fn tiles_down(&self) -> usize {
-        (self.camera.height as usize).div_ceil(TILE)
     }
 }
 

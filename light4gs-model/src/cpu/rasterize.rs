@@ -1,11 +1,13 @@
 //! Alpha blending of sorted splats, one task a tile: `color += T · alpha · color_i, depth += T · alpha · z_i`.
 
+use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
 
 use super::blend::{Contribution, GROUPS, TilePlane, TileVisitor, group_and_lane, walk};
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
-use super::project::{Splat, TILE, View};
+use super::project::Splat;
 use super::tiles::TileLists;
+use crate::kernels::splat::View;
 
 /// Values a pixel of the output: red, green, blue, alpha, depth.
 pub(crate) const CHANNELS: usize = 5;

@@ -11,9 +11,10 @@ use rayon::prelude::*;
 
 use super::blend::{Contribution, GROUPS, TilePlane, TileVisitor, walk};
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
-use super::project::{GaussianSlices, Splat, SplatGradient, View, project_backward};
+use super::project::{GaussianSlices, Splat, SplatGradient, project_backward};
 use super::rasterize::{CHANNELS, TilePixels, tile_of};
 use super::tiles::TileLists;
+use crate::kernels::splat::View;
 
 /// Sums of one splat over one tile's pixels: gradients of color and depth, then the moments of
 /// `p = alpha · dS/dalpha`: p, p dx, p dy, p dx², p dx dy, p dy².

@@ -7,8 +7,9 @@ use rayon::prelude::*;
 
 use super::blend::{Contribution, TileVisitor, walk};
 use super::lanes::{LaneKernel, Lanes, dispatch};
-use super::project::{Splat, View};
+use super::project::Splat;
 use super::tiles::TileLists;
+use crate::kernels::splat::View;
 
 /// Sums over the pixels that blend a splat: pixels, `T · alpha`, `T`.
 type Sums = [f32; 3];

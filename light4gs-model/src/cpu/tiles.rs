@@ -1,8 +1,10 @@
 //! Which splats touch which tile, front to back.
 
+use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
 
-use super::project::{GaussianSlices, Splat, TILE, View, project};
+use super::project::{GaussianSlices, Splat, project};
+use crate::kernels::splat::View;
 
 /// Gaussians a parallel task projects: fixed, so that results do not depend on the number of threads.
 const CHUNK: usize = 512;

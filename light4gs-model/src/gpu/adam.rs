@@ -8,7 +8,7 @@ use super::context::{Gpu, buffer_of};
 use super::kernel::Launch;
 use super::stages::ADAM;
 use crate::gpu_error::GpuError;
-use crate::ops::adam::{AdamStep, AdamTensors};
+use crate::kernels::adam::{AdamStep, AdamTensors};
 
 fn step_on_gpu(
     tensors: AdamTensors<CubeBackend>,

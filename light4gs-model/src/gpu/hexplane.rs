@@ -11,7 +11,7 @@ use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
 use super::stages::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
 use crate::gpu_error::GpuError;
-use crate::ops::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
+use crate::kernels::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
 
 const PLANES: usize = 6;
 

@@ -9,8 +9,10 @@ use cubecl::device::DeviceId;
 use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim, ExecutionMode, KernelId};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
+use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, TILE};
 
 use super::stages::Stage;
+use crate::cpu::project::INVALID_RADIUS;
 use crate::gpu_error::GpuError;
 
 /// Invocations of a workgroup where nothing else is asked for.
@@ -31,12 +33,26 @@ struct Kernel {
     constants: Constants,
 }
 
+/// The constants of rendering for WGSL. Widened to float64, a number has the same bits after a compiler has read it.
+fn rendering_constants() -> String {
+    let numbers = [
+        ("NEAR", NEAR),
+        ("DILATION", DILATION),
+        ("MIN_ALPHA", MIN_ALPHA),
+        ("MAX_ALPHA", MAX_ALPHA),
+        ("MIN_TRANSMITTANCE", MIN_TRANSMITTANCE),
+    ];
+    let numbers = numbers.map(|(name, value)| format!("const {name}: f32 = {:?};\n", f64::from(value)));
+    numbers.concat() + &format!("const TILE: u32 = {TILE}u;\nconst INVALID_RADIUS: i32 = {INVALID_RADIUS};\n")
+}
+
 impl KernelSource for Kernel {
     fn source(&self) -> SourceTemplate {
-        let constants: String =
-            self.constants.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n")).collect();
+        let own = self.constants.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
         let includes = self.stage.includes.iter().chain(self.team).copied();
-        SourceTemplate::new(constants + &includes.collect::<String>() + self.stage.source)
+        SourceTemplate::new(
+            rendering_constants() + &own.collect::<String>() + &includes.collect::<String>() + self.stage.source,
+        )
     }
 
     fn id(&self) -> KernelId {

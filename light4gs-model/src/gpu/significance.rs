@@ -8,10 +8,9 @@ use super::context::{Gpu, first_words};
 use super::kernel::Launch;
 use super::splat::{Begun, begin};
 use super::stages::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
-use crate::cpu::project::View;
 use crate::cpu::significance::SCORES;
 use crate::gpu_error::GpuError;
-use crate::ops::splat::SplatInputs;
+use crate::kernels::splat::{SplatInputs, View};
 
 /// Values of an intersection's sums.
 const SUMS: usize = 3;

@@ -5,16 +5,16 @@ use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
+use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
 use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
 use super::team::{CHUNK, Team};
-use crate::cpu::project::{FRUSTUM_MARGIN, TILE, View};
 use crate::cpu::rasterize::CHANNELS;
 use crate::gpu_error::GpuError;
-use crate::ops::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
+use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView, View};
 
 /// Values of an intersection's sums.
 const SUMS: usize = 10;

@@ -1,6 +1,5 @@
 //! The hexplane query as a Burn operation: six bilinear samples and their product, one scale at a time.
 
-use std::fmt::Debug;
 use std::sync::Arc;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
@@ -8,7 +7,7 @@ use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, ExtensionType, TensorMetadata, backend_extension};
+use burn::backend::{Autodiff, Backend, TensorMetadata, backend_extension};
 #[cfg(feature = "wgpu")]
 use burn_fusion::{Fusion, FusionBackend};
 
@@ -17,57 +16,8 @@ use super::fusion::{leaf, resolve};
 use super::host::{HostBackend, HostTensor};
 use super::{for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::hexplane::{PackedPlanes, query, query_backward};
-
-/// Points and the planes of one scale.
-#[derive(ExtensionType)]
-pub struct QueryInputs<B: Backend> {
-    /// `[N, 4]`: x, y, z, t in [-1, 1]; what lies outside is clamped to the border.
-    pub points: FloatTensor<B>,
-    /// `[C, res y, res x]`.
-    pub xy: FloatTensor<B>,
-    /// `[C, res z, res x]`.
-    pub xz: FloatTensor<B>,
-    /// `[C, res t, res x]`.
-    pub xt: FloatTensor<B>,
-    /// `[C, res z, res y]`.
-    pub yz: FloatTensor<B>,
-    /// `[C, res t, res y]`.
-    pub yt: FloatTensor<B>,
-    /// `[C, res t, res z]`.
-    pub zt: FloatTensor<B>,
-}
-
-const INPUTS: usize = 7;
-
-impl<B: Backend> QueryInputs<B> {
-    pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.points, self.xy, self.xz, self.xt, self.yz, self.yt, self.zt]
-    }
-
-    pub(crate) fn from_array([points, xy, xz, xt, yz, yt, zt]: [FloatTensor<B>; INPUTS]) -> Self {
-        Self { points, xy, xz, xt, yz, yt, zt }
-    }
-}
-
-/// Gradients of a query.
-pub struct QueryGradients<B: Backend> {
-    /// `[N, 4]`, absent if it was not asked for.
-    pub points: Option<FloatTensor<B>>,
-    /// In the shapes of the planes.
-    pub planes: [FloatTensor<B>; 6],
-}
-
-/// A back end's kernels. [`HexPlaneOps`] adds the dispatch and the tape.
-pub trait HexPlaneKernels: Backend {
-    /// What the backward pass wants to see again.
-    type Saved: Clone + Debug + Send + 'static;
-
-    /// Features `[N, C]`.
-    fn query_forward(inputs: QueryInputs<Self>) -> (FloatTensor<Self>, Self::Saved);
-
-    /// Gradients of planes and, if `with_points`, of the points.
-    fn query_backward(saved: Self::Saved, gradient: FloatTensor<Self>, with_points: bool) -> QueryGradients<Self>;
-}
+use crate::kernels::hexplane_query::INPUTS;
+pub use crate::kernels::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
 
 /// The query on every back end that has [`HexPlaneKernels`], differentiable under [`Autodiff`].
 #[backend_extension(

@@ -23,7 +23,7 @@ use super::fusion::{leaf, resolve};
 #[cfg(feature = "wgpu")]
 use crate::gpu::{normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
 
-/// Of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first. `shaders/normal_cdf.wgsl` has them too.
+/// Of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first. `shaders/elementwise/normal_cdf.wgsl` has them too.
 const COEFFICIENTS: [f64; 10] = [
     -1.26551223,
     1.00002368,

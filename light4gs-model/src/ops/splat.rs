@@ -1,93 +1,27 @@
 //! Gaussian splatting as a Burn operation: project, bin, sort, blend, and the derivative of it all.
 
-use std::fmt::Debug;
 use std::sync::Arc;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::tensor::{FloatTensor, IntTensor};
-use burn::backend::{Autodiff, Backend, ExtensionType, TensorMetadata, backend_extension};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, TensorMetadata, backend_extension};
 use burn::tensor::TensorData;
 #[cfg(feature = "wgpu")]
 use burn_fusion::{Fusion, FusionBackend};
-use light4gs_data::Camera;
 
 #[cfg(feature = "wgpu")]
 use super::fusion::{int_leaf, leaf, resolve};
 use super::host::{HostBackend, HostTensor};
 use super::{for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::project::{GaussianSlices, View};
+use crate::cpu::project::GaussianSlices;
 use crate::cpu::rasterize::{CHANNELS, TilePixels, assemble, rasterize};
 use crate::cpu::rasterize_backward::splat_backward;
 use crate::cpu::tiles::TileLists;
-
-/// The differentiable inputs, in the order that gradients are registered in.
-#[derive(ExtensionType)]
-pub struct SplatInputs<B: Backend> {
-    /// `[N, 3]`, world units.
-    pub means: FloatTensor<B>,
-    /// `[N, 4]` as (w, x, y, z), normalized inside.
-    pub quats: FloatTensor<B>,
-    /// `[N, 3]`, standard deviations in world units.
-    pub scales: FloatTensor<B>,
-    /// `[N, 1]` in [0, 1].
-    pub opacities: FloatTensor<B>,
-    /// `[N, 1, 3]`.
-    pub sh_dc: FloatTensor<B>,
-    /// `[N, K, 3]`, K >= (degree + 1)^2 - 1.
-    pub sh_rest: FloatTensor<B>,
-    /// `[N, 2]`, added to the screen position in units of half the image.
-    pub screen_offsets: FloatTensor<B>,
-}
-
-pub(super) const INPUTS: usize = 7;
-
-impl<B: Backend> SplatInputs<B> {
-    pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.means, self.quats, self.scales, self.opacities, self.sh_dc, self.sh_rest, self.screen_offsets]
-    }
-
-    pub(crate) fn from_array(
-        [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets]: [FloatTensor<B>; INPUTS],
-    ) -> Self {
-        Self { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
-    }
-}
-
-/// What the operation returns.
-#[derive(ExtensionType)]
-pub struct SplatOutputs<B: Backend> {
-    /// `[5 · H · W]`: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
-    pub rendering: FloatTensor<B>,
-    /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
-    pub radii: IntTensor<B>,
-}
-
-/// A back end's kernels. [`SplatOps`] adds the dispatch and the tape.
-pub trait SplatKernels: Backend {
-    /// What the backward pass wants to see again.
-    type Saved: Clone + Debug + Send + 'static;
-
-    /// Draws the image.
-    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, Self::Saved);
-
-    /// Gradients of all inputs from that of the image `[5 · H · W]`.
-    fn splat_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self>;
-}
-
-/// Camera, background and active SH degree of one image.
-#[derive(Clone, Copy, Debug)]
-pub struct SplatView(pub(crate) View);
-
-impl SplatView {
-    /// The image of `camera` over `background` (red, green, blue). `sh_degree` (0 to 3) is the highest degree of the spherical
-    /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
-    pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
-        Self(View { camera, background, sh_degree })
-    }
-}
+use crate::kernels::splat::{INPUTS, View};
+pub use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
 /// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
 #[backend_extension(

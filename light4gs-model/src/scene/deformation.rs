@@ -6,7 +6,7 @@ use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::network::{Layer, Value};
-use light4gs_codec::{MotionNetwork, MotionOutput, MotionSource, Network};
+use light4gs_codec::{CodecError, MotionNetwork, MotionOutput, MotionSource, Network, checks};
 
 use super::arrays::ModelError;
 use super::field::Offsets;
@@ -44,6 +44,37 @@ fn linear(inputs: usize, outputs: usize, device: &Device) -> Linear {
 }
 
 impl DeformationConfig {
+    /// Each attribute's channels, and whether it changes.
+    fn outputs(&self) -> [(bool, usize); 5] {
+        [(self.position, 3), (self.scale, 3), (self.rotation, 4), (self.opacity, 1), (self.sh, 48)]
+    }
+
+    /// Refuses a network that no stream can hold, before it takes memory: the largest that `width` and `depth` allow by
+    /// themselves would take 17 GB.
+    ///
+    /// # Errors
+    /// More weights, or more channels of all values together, than a network may have.
+    pub fn check_size(&self) -> Result<(), CodecError> {
+        let (weights, channels) = self.size();
+        checks::network_size("motion", weights, channels)
+    }
+
+    /// Weights with biases, and channels of all values together.
+    fn size(&self) -> (u64, u64) {
+        let [features, width, depth] = [self.feature_size, self.width, self.depth.max(1)].map(|size| size as u64);
+        let outputs = self.outputs().into_iter().filter_map(|(changes, channels)| changes.then_some(channels as u64));
+        let outputs: Vec<u64> = outputs.collect();
+        let layer = |inputs: u64, outputs: u64| inputs.saturating_add(1).saturating_mul(outputs);
+        let sum = |numbers: &mut dyn Iterator<Item = u64>| numbers.fold(0, u64::saturating_add);
+        let inner = layer(width, width);
+        let heads = outputs.iter().map(|&channels| inner.saturating_add(layer(width, channels)));
+        let weights = sum(&mut [layer(features, width), inner.saturating_mul(depth - 1)].into_iter().chain(heads));
+        // Every layer but the last of a head has a ReLU behind it.
+        let hidden = depth.saturating_add(outputs.len() as u64).saturating_mul(2).saturating_mul(width);
+        let channels = sum(&mut [features, hidden].into_iter().chain(outputs.iter().copied()));
+        (weights, channels)
+    }
+
     /// Xavier-uniform weights.
     pub fn init(&self, device: &Device) -> Deformation {
         let trunk = (0..self.depth.max(1))
@@ -55,14 +86,8 @@ impl DeformationConfig {
                 output: linear(self.width, outputs, device),
             })
         };
-        Deformation {
-            trunk,
-            position: head(self.position, 3),
-            scale: head(self.scale, 3),
-            rotation: head(self.rotation, 4),
-            opacity: head(self.opacity, 1),
-            sh: head(self.sh, 48),
-        }
+        let [position, scale, rotation, opacity, sh] = self.outputs().map(|(wanted, channels)| head(wanted, channels));
+        Deformation { trunk, position, scale, rotation, opacity, sh }
     }
 }
 
@@ -230,4 +255,30 @@ fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
     // Copied, since a transposed view would be copied anew in every product.
     linear.weight = Param::from_tensor(Tensor::from_data(weight.transpose().into_data(), device));
     linear.bias = Some(Param::from_tensor(bias));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_those_of_the_network() {
+        for depth in [0, 1, 3] {
+            let config = DeformationConfig::new(5).with_width(7).with_depth(depth).with_rotation(false).with_sh(true);
+            let motion = config.init(&Device::flex()).to_motion();
+            // All layers but the last of the heads for positions, scales and harmonics have a ReLU behind them.
+            let layers: u64 = motion.network.layers().map(|layer| u64::from(layer.outputs)).sum();
+            assert_eq!(config.size(), (motion.network.weights(), 5 + 2 * layers - (3 + 3 + 48)), "depth {depth}");
+        }
+    }
+
+    #[test]
+    fn a_network_that_no_stream_can_hold_is_refused() {
+        let sizes = |features: usize, width: usize, depth: usize| {
+            DeformationConfig::new(features).with_width(width).with_depth(depth).with_opacity(true).check_size()
+        };
+        assert!(sizes(64, 4096, 1).is_ok());
+        assert!(sizes(32, 4096, 17).unwrap_err().to_string().contains("number of weights"));
+        assert!(sizes(usize::MAX, usize::MAX, usize::MAX).is_err());
+    }
 }

@@ -4,6 +4,7 @@ use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::rendering::MAX_LOG_SCALE;
 use light4gs_data::PointCloud;
 
 /// Configuration of [`Gaussians`].
@@ -92,10 +93,6 @@ pub struct ActivatedGaussians {
     /// `[N, (degree + 1)^2 - 1, 3]`.
     pub sh_rest: Tensor<3>,
 }
-
-/// Logarithms of scales are cut here before the exponential: far beyond any scene, and the exponential stays finite, so
-/// that the backward pass has no 0 · infinity.
-const MAX_LOG_SCALE: f32 = 40.0;
 
 impl GaussianTensors {
     /// The exponential of the logarithms, the sigmoid of the logits.

@@ -14,7 +14,6 @@ pub(crate) mod gaussians;
 pub(crate) mod hexplane;
 pub(crate) mod hexplane_field;
 pub mod regularizer;
-pub mod spherical_harmonics;
 mod still_field;
 
 pub use arrays::ModelError;

@@ -20,7 +20,7 @@ use crate::compression::Compression;
 use crate::config::{Config, DeviceName};
 use crate::device::adapter_name;
 use crate::error::TrainError;
-use crate::evaluation::metrics::l1;
+use crate::metrics::l1;
 use crate::optimization::adam::Adam;
 use crate::optimization::gradients::GradientSums;
 use crate::report::table::{Align, Table};

@@ -5,6 +5,8 @@ use light4gs_model::{DeformationField, DynamicScene};
 
 use super::Compression;
 use crate::config::Config;
+use crate::divergence::Divergence;
+use crate::divergence::{not_finite_parameter, remedy};
 use crate::error::TrainError;
 use crate::optimization::adam::Adam;
 use crate::optimization::gradients::GradientSums;
@@ -12,8 +14,6 @@ use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
 use crate::optimization::schedule::ExponentialDecay;
 use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
-use crate::trainer::Divergence;
-use crate::trainer::divergence::{not_finite_parameter, remedy};
 
 /// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told the iterations
 /// done, and those that there are, after each.

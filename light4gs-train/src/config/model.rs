@@ -127,14 +127,15 @@ impl ModelConfig {
             .with_channels(channels)
             .with_resolution(resolution)
             .with_multipliers(multipliers);
-        let deformation = light4gs_model::DeformationConfig::new(channels * self.hexplane.multipliers.len())
-            .with_width(network.width)
-            .with_depth(network.depth)
-            .with_position(network.position)
-            .with_scale(network.scale)
-            .with_rotation(network.rotation)
-            .with_opacity(network.opacity)
-            .with_sh(network.sh);
+        let deformation =
+            light4gs_model::DeformationConfig::new(channels.saturating_mul(self.hexplane.multipliers.len()))
+                .with_width(network.width)
+                .with_depth(network.depth)
+                .with_position(network.position)
+                .with_scale(network.scale)
+                .with_rotation(network.rotation)
+                .with_opacity(network.opacity)
+                .with_sh(network.sh);
         HexPlaneFieldConfig::new(hexplane, deformation)
     }
 }

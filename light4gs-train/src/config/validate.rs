@@ -55,16 +55,9 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
     }
 }
 
-/// Width and depth are legal by themselves and not together: the largest network would take 17 GB of memory before the
-/// encoder could be asked about it.
+/// Width and depth are legal by themselves and not together.
 fn deformation(check: &mut Check, model: &ModelConfig) {
-    let (planes, network) = (&model.hexplane, &model.deformation);
-    let features = planes.channels.saturating_mul(planes.multipliers.len());
-    let heads =
-        [(network.position, 3), (network.scale, 3), (network.rotation, 4), (network.opacity, 1), (network.sh, 48)];
-    let outputs: Vec<u64> = heads.into_iter().filter_map(|(has, channels)| has.then_some(channels)).collect();
-    let answer = checks::motion_network(features as u64, network.width as u64, network.depth as u64, &outputs);
-    check.encodable("model.deformation.width", answer);
+    check.encodable("model.deformation.width", model.field().deformation.check_size());
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {

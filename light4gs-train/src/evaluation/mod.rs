@@ -1,8 +1,6 @@
 //! Measuring a decoded file: quality on held-out views, speed, size.
 
 pub mod finish;
-pub mod measure;
-pub mod metrics;
 
 use std::path::Path;
 use std::time::Instant;
@@ -17,9 +15,9 @@ use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
-use crate::evaluation::measure::Scores;
-use crate::evaluation::metrics::lpips::Lpips;
-use crate::evaluation::metrics::{image_tensor, mask_tensor};
+use crate::metrics::lpips::Lpips;
+use crate::metrics::measure::Scores;
+use crate::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.

@@ -4,7 +4,7 @@ use burn::tensor::Tensor;
 
 use super::{Loss, LossInput};
 use crate::config::TrainConfig;
-use crate::evaluation::metrics::{l1, l2, ssim};
+use crate::metrics::{l1, l2, ssim};
 use crate::stage::Stage;
 
 /// `(1 - lambda) · L1 + lambda · (1 - SSIM)`, or the squared difference in the first iterations. The default.

@@ -6,7 +6,7 @@ use super::SplitQuality;
 use super::chart::{Chart, Mark, Series};
 use super::format::{count, fixed};
 use super::html::escape;
-use crate::evaluation::measure::{Measure, Scores};
+use crate::metrics::measure::{Measure, Scores};
 
 pub(super) fn section(splits: &[SplitQuality]) -> String {
     if splits.is_empty() {

@@ -11,7 +11,6 @@ use light4gs_data::Scene;
 use light4gs_model::{DeformationField, HexPlaneField};
 
 use super::Trainer;
-use super::divergence::EmptyImageWatch;
 use super::profile::Profile;
 use super::sampling::FrameSampler;
 use super::views::ViewPools;
@@ -20,6 +19,7 @@ use crate::config::Config;
 use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{AdaptiveDensityControl, DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
+use crate::divergence::EmptyImageWatch;
 use crate::error::TrainError;
 use crate::loss::{Loss, PhotometricLoss};
 use crate::observers::Observer;

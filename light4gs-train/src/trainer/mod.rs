@@ -7,14 +7,12 @@
 //! - `views`: the views of an iteration, each with a tape of its own
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `pruning`: pruning by significance
-//! - `divergence`: numbers that are no longer finite, renderings that are no better than nothing
 //!
 //! What a researcher may want to replace are traits: [`Loss`],
 //! [`DensityStrategy`], [`SignificanceScore`],
 //! [`Observer`] and [`ImageSource`].
 
 mod builder;
-pub(crate) mod divergence;
 pub mod profile;
 mod pruning;
 mod rate;
@@ -32,21 +30,20 @@ use light4gs_data::{Scene, Split};
 use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneField, Splatter};
 
 pub use builder::TrainerBuilder;
-pub use divergence::{Divergence, NotFinite, Remedy};
 
 use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
 use crate::config::Config;
 use crate::dataset::ImageSource;
 use crate::density::{DensityStrategy, SignificanceScore};
+use crate::divergence::{Divergence, EmptyImageWatch, NotFinite, not_finite_in, remedy, unusual_key};
 use crate::error::TrainError;
-use crate::evaluation::metrics::{image_tensor, psnr};
 use crate::loss::Loss;
+use crate::metrics::{image_tensor, psnr};
 use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
 use crate::run::{Checkpoint, RunFolder, SaveError, list_checkpoints};
 use crate::stage::Stage;
-use divergence::{EmptyImageWatch, not_finite_in, remedy, unusual_key};
 use profile::Profile;
 use sampling::FrameSampler;
 use views::ViewPools;

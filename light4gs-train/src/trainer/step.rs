@@ -5,9 +5,9 @@ use light4gs_data::Frame;
 use light4gs_model::{DeformationField, HexPlane};
 
 use super::Trainer;
-use super::divergence::{NotFinite, not_finite_in};
 use super::views::ViewPass;
 use crate::density::{GaussianEditor, Moment, ViewStatistics};
+use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
 use crate::observers::StepReport;
 use crate::optimization::gradients::GradientSums;

@@ -10,8 +10,8 @@ use super::profile::Profile;
 use crate::dataset::ImageSource;
 use crate::density::ViewStatistics;
 use crate::error::TrainError;
-use crate::evaluation::metrics::{image_tensor, mask_tensor};
 use crate::loss::{Loss, LossInput};
+use crate::metrics::{image_tensor, mask_tensor};
 use crate::optimization::gradients::GradientSums;
 use crate::stage::Stage;
 

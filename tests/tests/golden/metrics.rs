@@ -4,11 +4,9 @@ use std::path::PathBuf;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_tests::golden::{Golden, assert_close, cpu_devices, devices, values_of};
-use light4gs_train::evaluation::measure::{Measure, Scores};
-use light4gs_train::evaluation::metrics::lpips::{Lpips, LpipsNetwork};
-use light4gs_train::evaluation::metrics::{
-    MS_SSIM_LEAST_SIDE, d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid,
-};
+use light4gs_train::metrics::lpips::{Lpips, LpipsNetwork};
+use light4gs_train::metrics::measure::{Measure, Scores};
+use light4gs_train::metrics::{MS_SSIM_LEAST_SIDE, d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid};
 
 /// An image of bytes as `[H, W, 3]` in [0, 1]; `channels_first` says how the file has it.
 fn bytes_image(golden: &Golden, key: &str, channels_first: bool, device: &Device) -> Tensor<3> {

@@ -9,8 +9,8 @@ use light4gs_train::density::clone_and_split::{
     DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors,
 };
 use light4gs_train::density::{DensityStatistics, GaussianEditor};
-use light4gs_train::evaluation::metrics::{l1, l2, psnr, ssim};
 use light4gs_train::loss::photometric;
+use light4gs_train::metrics::{l1, l2, psnr, ssim};
 use light4gs_train::optimization::adam::{Adam, AdamState};
 use light4gs_train::optimization::schedule::ExponentialDecay;
 

@@ -10,4 +10,5 @@ mod finite_differences;
 mod import;
 mod plane_convolutions;
 mod poisoned_scenes;
+mod rooms;
 mod sh_entropy;

@@ -4,8 +4,10 @@
 //! - here: L1, squared differences, PSNR
 //! - `ssim`: SSIM in the field's two conventions, MS-SSIM and the D-SSIM of the tables
 //! - [`lpips`]: the learned distance, with weights from a file
+//! - [`measure`]: what is measured of an image, by name, and the numbers that were found
 
 pub mod lpips;
+pub mod measure;
 mod ssim;
 
 use burn::tensor::{Device, Tensor, TensorData};

@@ -1,12 +1,4 @@
-// Thresholds and units: those of `light4gs-model/src/cpu`, docs/design.md.
-
-const NEAR: f32 = 0.2;
-const DILATION: f32 = 0.3;
-const TILE: u32 = 16u;
-const MIN_ALPHA: f32 = 1.0 / 255.0;
-const MAX_ALPHA: f32 = 0.99;
-const MIN_TRANSMITTANCE: f32 = 1e-4;
-const INVALID_RADIUS: i32 = -1;
+// Finite numbers, and sums of products term by term.
 
 // By bits: WGSL lets a compiler assume that there are neither infinities nor NaN.
 fn is_finite(value: f32) -> bool {

@@ -1,6 +1,6 @@
 // The WebAssembly module behind plain functions. Everything here runs in the worker.
 
-import { SceneError } from "./errors.js";
+import { SceneError } from "../errors.js";
 
 /** Gaussians that are computed before the worker looks for messages. */
 const SLICE = 8192;

@@ -3,8 +3,8 @@
 use burn::tensor::Tensor;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 
-use super::metrics::lpips::{Lpips, LpipsNetwork};
-use super::metrics::{d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid};
+use super::lpips::{Lpips, LpipsNetwork};
+use super::{d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid};
 
 /// A measure of how alike two images are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

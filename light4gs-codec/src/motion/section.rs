@@ -1,13 +1,9 @@
 //! How the Gaussians move, as bytes.
 
-use super::{
-    reader::Reader,
-    sections::{Encoding, Section},
-    writer::Writer,
-};
 use crate::{
     CodecError, Limits, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network,
     budget::Budget,
+    bytes::{Reader, Section, Writer, sections::Encoding},
     network::{
         tensors::{read_tensors, write_tensors},
         weights::{TensorLength, WeightPrecision},

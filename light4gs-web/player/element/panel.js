@@ -1,6 +1,6 @@
 // The panel with facts about the scene and what a frame takes.
 
-/** @typedef {import("./player.js").Player} Player */
+/** @typedef {import("../player.js").Player} Player */
 
 const number = new Intl.NumberFormat("en");
 /** @param {number} bytes */

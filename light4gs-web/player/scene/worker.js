@@ -2,7 +2,7 @@
 
 import sampleBase64 from "virtual:sample";
 import { Decoder } from "./decoder.js";
-import { SceneError } from "./errors.js";
+import { SceneError } from "../errors.js";
 
 /** @type {Decoder | null} */
 let decoder = null;

@@ -2,7 +2,7 @@
 
 import wasmBase64 from "virtual:decoder";
 import workerSource from "virtual:worker";
-import { SceneError } from "./errors.js";
+import { SceneError } from "../errors.js";
 
 /**
  * @typedef {object} SceneInfo  what a file says of itself

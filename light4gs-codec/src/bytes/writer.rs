@@ -23,7 +23,7 @@ impl Writer {
         self.bytes.extend_from_slice(&value.to_le_bytes());
     }
 
-    /// See [`super::reader::Reader::varint`].
+    /// See [`super::Reader::varint`].
     pub(crate) fn varint(&mut self, mut value: u64) {
         while value >= 0x80 {
             self.u8(value as u8 | 0x80);

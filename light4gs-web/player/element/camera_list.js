@@ -1,6 +1,6 @@
 // The list of the dataset's cameras, in groups by split.
 
-/** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
+/** @typedef {import("../views/camera.js").DatasetCamera} DatasetCamera */
 
 /**
  * @param {HTMLSelectElement} select

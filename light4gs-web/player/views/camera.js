@@ -1,8 +1,8 @@
 // Cameras: an OpenCV pinhole that turns around a point, moves along its axes and takes the place of a dataset's camera.
 
-import { SceneError } from "./errors.js";
+import { SceneError } from "../errors.js";
 
-/** @typedef {import("./splat_renderer.js").View} View */
+/** @typedef {import("../drawing/splat_renderer.js").View} View */
 /** @typedef {[number, number, number]} Vector */
 
 /**

@@ -1,12 +1,8 @@
 // Draws sorted Gaussians with WebGL2: one quad each, back to front, premultiplied, into half floats where the browser can.
 
-import { GraphicsError } from "./errors.js";
+import { GraphicsError } from "../errors.js";
+import { ENTRY, ROW } from "./constants.js";
 import { fragmentShader, screenFragmentShader, screenVertexShader, vertexShader } from "./shaders.js";
-
-/** Numbers of a Gaussian in a list: four texels. */
-const ENTRY = 16;
-/** Gaussians of a texture's row. */
-const ROW = 256;
 
 /**
  * @typedef {object} View  an OpenCV pinhole: +x right, +y down, +z forward
@@ -90,7 +86,7 @@ export class SplatRenderer {
     return program;
   }
 
-  /** @param {Float32Array} list  what is drawn, as {@link import("./scene.js").Scene.frame} gives it */
+  /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
   setList(list) {
     const { gl, parts } = this;
     const rows = list.length / (ENTRY * ROW);

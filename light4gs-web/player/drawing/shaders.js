@@ -1,8 +1,10 @@
 // The renderer's arithmetic: that of light4gs-model/src/cpu/project.rs, Gaussian by Gaussian, and blend.rs, pixel by pixel.
 // Order and colors come from the worker.
 
-/** What lies nearer to the camera is not drawn: as in draw_list.rs. */
-export const NEAR = 0.2;
+import { DILATION, ENTRY, FRUSTUM_MARGIN, MAX_ALPHA, MIN_ALPHA, NEAR, ROW } from "./constants.js";
+
+/** A number for GLSL, which wants a point or an exponent in it. @param {number} value */
+const float = (value) => (Number.isInteger(value) ? value.toFixed(1) : String(value));
 
 export const vertexShader = `#version 300 es
 precision highp float;
@@ -21,17 +23,17 @@ uniform bool triangles;
 flat out vec4 color;
 out vec2 place;
 
-const float NEAR = ${NEAR};
-const float DILATION = 0.3;
-const float FRUSTUM_MARGIN = 1.3;
-const float MIN_ALPHA = 1.0 / 255.0;
+const float NEAR = ${float(NEAR)};
+const float DILATION = ${float(DILATION)};
+const float FRUSTUM_MARGIN = ${float(FRUSTUM_MARGIN)};
+const float MIN_ALPHA = ${float(MIN_ALPHA)};
 
 void main() {
   // Outside of the clip volume, until it is known to be seen.
   gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
-  // Four texels a Gaussian, 256 Gaussians a row.
+  // Texels of four numbers, some for each Gaussian, and rows of some Gaussians.
   int gaussian = triangles ? gl_VertexID / 3 : gl_VertexID >> 2;
-  ivec2 at = ivec2(4 * (gaussian & 255), gaussian >> 8);
+  ivec2 at = ivec2(${ENTRY / 4} * (gaussian & ${ROW - 1}), gaussian >> ${Math.log2(ROW)});
   vec4 first = texelFetch(list, at, 0);
   vec4 second = texelFetch(list, at + ivec2(1, 0), 0);
   vec4 third = texelFetch(list, at + ivec2(2, 0), 0);
@@ -79,9 +81,9 @@ in vec2 place;
 out vec4 contribution;
 
 void main() {
-  float alpha = min(0.99, color.a * exp(-0.5 * dot(place, place)));
+  float alpha = min(${float(MAX_ALPHA)}, color.a * exp(-0.5 * dot(place, place)));
   // Nothing in place of a discard, which costs software a third more.
-  contribution = alpha < 1.0 / 255.0 ? vec4(0.0) : vec4(color.rgb * alpha, alpha);
+  contribution = alpha < ${float(MIN_ALPHA)} ? vec4(0.0) : vec4(color.rgb * alpha, alpha);
 }
 `;
 

@@ -1,13 +1,12 @@
-//! The canonical Gaussians, but for the higher spherical harmonics.
+//! Attributes as plain numbers.
 
-use super::{
-    reader::Reader,
-    sections::{Section, check_length},
-    writer::Writer,
+use super::SECTION;
+use crate::{
+    CodecError, GaussianArrays, Limits,
+    budget::Budget,
+    bytes::{Reader, Writer, check_length},
+    limits::at_most,
 };
-use crate::{CodecError, GaussianArrays, Limits, budget::Budget, limits::at_most};
-
-const SECTION: &str = Section::Gaussians.name();
 
 /// What stands before the numbers.
 #[derive(Clone, Copy, Debug)]

@@ -1,6 +1,6 @@
 // Pointer, touch, wheel and keys on the canvas, as movements of the camera.
 
-/** @typedef {import("./player.js").Player} Player */
+/** @typedef {import("../player.js").Player} Player */
 
 /** Radians for a pixel of the page. */
 const TURN = 0.008;

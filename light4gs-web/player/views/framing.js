@@ -1,12 +1,12 @@
 // Where a view begins: at the dataset's first camera, or where all Gaussians but outliers are seen.
 
 import { commonTarget, commonUp } from "./camera.js";
-import { NEAR } from "./shaders.js";
+import { ENTRY, NEAR } from "../drawing/constants.js";
 
 /** @typedef {import("./camera.js").Camera} Camera */
 /** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
 /** @typedef {import("./camera.js").Vector} Vector */
-/** @typedef {import("./splat_renderer.js").View} View */
+/** @typedef {import("../drawing/splat_renderer.js").View} View */
 
 /** Shares of the Gaussians' coordinates that count as outliers, on either side. */
 const OUTLIERS = 0.03;
@@ -15,7 +15,7 @@ const SAMPLES = 5000;
 
 /**
  * The lens of the source's default camera.
- * @param {import("./scene.js").SceneInfo} info
+ * @param {import("../scene/scene.js").SceneInfo} info
  */
 export function sourceLens({ width, height, fovX }) {
   const [w, h] = width > 0 && height > 0 ? [width, height] : [800, 800];
@@ -26,11 +26,11 @@ export function sourceLens({ width, height, fovX }) {
 
 /**
  * Middle and radius of a scene, world units.
- * @param {Float32Array} list  as {@link import("./scene.js").Scene.frame} gives it
+ * @param {Float32Array} list  as {@link import("../scene/scene.js").Scene.frame} gives it
  * @returns {{ middle: Vector, radius: number }}
  */
 function extent(list) {
-  const stride = 16 * Math.max(1, Math.floor(list.length / 16 / SAMPLES));
+  const stride = ENTRY * Math.max(1, Math.floor(list.length / ENTRY / SAMPLES));
   /** @type {number[]} */
   const entries = [];
   for (let at = 0; at < list.length; at += stride) if (list[at + 3] > 0.05) entries.push(at);

@@ -1,17 +1,17 @@
 // <l4gs-player>: the player with its buttons.
 
-import { readCameras } from "./camera.js";
+import { readCameras } from "../views/camera.js";
 import { fillCameras } from "./camera_list.js";
-import { SceneError } from "./errors.js";
+import { SceneError } from "../errors.js";
 import { Layers } from "./layers.js";
 import { icon, LAYOUT } from "./layout.js";
 import { fillPanel } from "./panel.js";
-import { Player } from "./player.js";
-import { dismiss, load, prepare } from "./scene.js";
+import { Player } from "../player.js";
+import { dismiss, load, prepare } from "../scene/scene.js";
 import { bytesOf, download } from "./sources.js";
 import { watch } from "./watch.js";
 
-/** @typedef {import("./camera.js").DatasetCamera} DatasetCamera */
+/** @typedef {import("../views/camera.js").DatasetCamera} DatasetCamera */
 
 /** Milliseconds between two updates of the panel. */
 const PANEL_INTERVAL = 500;

@@ -1,6 +1,6 @@
 // Where the bytes of a scene come from: an address, or the page itself.
 
-import { SceneError } from "./errors.js";
+import { SceneError } from "../errors.js";
 
 /**
  * The bytes at an address.

@@ -1,17 +1,14 @@
 //! The Gaussians of a scene at any time: what a player runs for each frame.
 
-use super::{
-    CoordinateMapping, GaussianArrays, MotionNetwork, MotionOutput, MotionSource, SceneData,
-    query::{Between, multiply_by_sample, normalized},
-    sh_rest_coefficients,
-};
+use super::query::{Between, multiply_by_sample, normalized};
 use crate::{
-    CodecError, Limits, Plane,
+    CodecError, CoordinateMapping, GaussianArrays, Limits, MotionNetwork, MotionOutput, MotionSource, Plane, SceneData,
     network::{
         Program,
         kernels::{LANES, Lanes},
     },
     plane_layout::{PLANE_AXES, PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES},
+    planes, sh_rest_coefficients,
 };
 
 /// A scene's motion, ready to be run at one time after the other.
@@ -68,7 +65,7 @@ impl MotionEvaluator {
         };
         let limits = Limits::large();
         scene.motion.check(&limits)?;
-        crate::planes::head::check(&scene.hexplane, &limits)?;
+        planes::head::check(&scene.hexplane, &limits)?;
         scene.motion.check_features(scene.hexplane.features())?;
         let channels = scene.hexplane.channels as usize;
         let features = scene.hexplane.features() as usize;
@@ -235,5 +232,25 @@ fn add(output: MotionOutput, offsets: &[Lanes], gaussian: usize, moved: &mut Gau
             let rest = 3 * sh_rest_coefficients(moved.sh_degree);
             add_to(&mut moved.sh_rest[gaussian * rest..][..rest], &offsets[3..]);
         }
+    }
+}
+
+impl SceneData {
+    /// The centers of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves, or where
+    /// what moves them is no [`MotionNetwork`].
+    ///
+    /// For tools that want to look into a file without a back end; see [`MotionEvaluator`], which is made anew for each
+    /// call.
+    ///
+    /// # Errors
+    /// A network that contradicts itself or the hexplane.
+    pub fn positions_at(&self, time: f32) -> Result<Vec<[f32; 3]>, CodecError> {
+        let motion = self.motion.network.as_ref();
+        if !motion.is_some_and(|motion| motion.outputs.contains(&MotionOutput::Position)) {
+            return Ok(self.gaussians.means.clone());
+        }
+        let mut moved = self.gaussians.clone();
+        MotionEvaluator::new(self)?.apply(&self.gaussians, time, 0..moved.len(), &mut moved);
+        Ok(moved.means)
     }
 }

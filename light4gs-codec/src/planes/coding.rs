@@ -1,0 +1,29 @@
+//! How planes are coded, as data.
+
+use super::ContextModelArrays;
+use crate::{plane_layout::PLANES_PER_SCALE, steps::PerGroup};
+
+/// How the hexplane is coded.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PlaneCoding {
+    /// The networks that give distributions. They are used as the stream holds them, that is, quantized in the compact
+    /// profile.
+    pub model: ContextModelArrays,
+    /// Quantization steps, for all scales or one entry a scale.
+    pub steps: Vec<PerGroup>,
+    /// For each plane that has a latent its symbols `[N, H/4, W/4]` row-major, an empty list for the others. Any
+    /// integers within ±2^22 are legal; good ones are `round(h_a(P / step) - median)`.
+    pub latent_symbols: Vec<Vec<i32>>,
+}
+
+impl PlaneCoding {
+    /// Channels, height and width of the latent of each plane of a hexplane with these plane sizes `[height, width]`;
+    /// nothing for planes that have none.
+    ///
+    /// This says where [`PlaneCoding::latent_symbols`] must not be empty.
+    pub fn latent_shapes(model: &ContextModelArrays, sizes: &[[u32; 2]]) -> Vec<Option<[u32; 3]>> {
+        let have = model.have_latents(sizes.len() / PLANES_PER_SCALE);
+        let shape = |&[height, width]: &[u32; 2]| [model.latent_channels(), height / 4, width / 4];
+        have.into_iter().zip(sizes).map(|(has_latent, size)| has_latent.then(|| shape(size))).collect()
+    }
+}

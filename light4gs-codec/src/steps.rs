@@ -1,0 +1,72 @@
+//! Quantization steps: which an encoder takes, and which a decoder takes.
+
+use crate::{CodecError, adaptive::LARGEST_STEP, bytes::Section};
+
+/// The smallest step that the encoder takes. Under it the numbers of a trained scene, some tens on either side of 0, still
+/// fit into the 2^22 steps that a symbol can count.
+pub const LEAST_STEP: f32 = 1e-5;
+
+/// The smallest step that a decoder takes: a value is never a subnormal number, which takes long.
+pub(crate) const LEAST_STEP_IN_STREAM: f32 = 1.0 / (1u64 << 60) as f32;
+
+/// A number for the planes over space and one for the planes over an axis and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PerGroup {
+    /// For xy, xz and yz.
+    pub space_only: f32,
+    /// For xt, yt and zt.
+    pub space_time: f32,
+}
+
+impl PerGroup {
+    pub(crate) fn of(self, space_time: bool) -> f32 {
+        if space_time { self.space_time } else { self.space_only }
+    }
+}
+
+/// Refuses a quantization step of planes.
+///
+/// # Errors
+/// A step below [`LEAST_STEP`], above 1e30, or NaN.
+pub fn plane_step(step: f32) -> Result<(), CodecError> {
+    check_step(Section::HexPlanes.name(), "step", step, LEAST_STEP)
+}
+
+/// The nearest steps that [`plane_step`] takes: learned steps are not bounded by anything else.
+pub fn nearest_plane_steps(steps: PerGroup) -> PerGroup {
+    // NaN becomes the smallest, which `clamp` would keep.
+    let nearest = |step: f32| if step > LEAST_STEP { step.min(LARGEST_STEP) } else { LEAST_STEP };
+    PerGroup { space_only: nearest(steps.space_only), space_time: nearest(steps.space_time) }
+}
+
+/// Refuses a quantization step of the spherical harmonics beyond degree 0.
+///
+/// # Errors
+/// As [`plane_step`].
+pub fn sh_step(step: f32) -> Result<(), CodecError> {
+    check_step(Section::Sh.name(), "step", step, LEAST_STEP)
+}
+
+/// Refuses a step of one of the [`AttributeSteps`](crate::attributes::AttributeSteps), by the name of its field.
+///
+/// # Errors
+/// As [`plane_step`]; a position's step, which is relative, may be any normal number up to 1e30.
+pub fn attribute_step(attribute: &str, step: f32) -> Result<(), CodecError> {
+    let least = if attribute == "position" { f32::MIN_POSITIVE } else { LEAST_STEP };
+    check_step(Section::Gaussians.name(), format!("step of {attribute}"), step, least)
+}
+
+/// Refuses a step outside of a range.
+pub(crate) fn check_step(
+    section: &'static str,
+    field: impl Into<String>,
+    step: f32,
+    least: f32,
+) -> Result<(), CodecError> {
+    if (least..=LARGEST_STEP).contains(&step) {
+        return Ok(());
+    }
+    let expected =
+        format!("{least:e} to {LARGEST_STEP:e}; make the step {}", if step > 1.0 { "smaller" } else { "larger" });
+    Err(CodecError::invalid(section, field, step, expected))
+}

@@ -1,0 +1,93 @@
+//! Splatting: Gaussians and a view, image and radii, gradients.
+
+use std::fmt::Debug;
+
+use burn::backend::tensor::{FloatTensor, IntTensor};
+use burn::backend::{Backend, ExtensionType};
+use light4gs_codec::rendering::TILE;
+use light4gs_data::Camera;
+
+/// The differentiable inputs, in the order that gradients are registered in.
+#[derive(ExtensionType)]
+pub struct SplatInputs<B: Backend> {
+    /// `[N, 3]`, world units.
+    pub means: FloatTensor<B>,
+    /// `[N, 4]` as (w, x, y, z), normalized inside.
+    pub quats: FloatTensor<B>,
+    /// `[N, 3]`, standard deviations in world units.
+    pub scales: FloatTensor<B>,
+    /// `[N, 1]` in [0, 1].
+    pub opacities: FloatTensor<B>,
+    /// `[N, 1, 3]`.
+    pub sh_dc: FloatTensor<B>,
+    /// `[N, K, 3]`, K >= (degree + 1)^2 - 1.
+    pub sh_rest: FloatTensor<B>,
+    /// `[N, 2]`, added to the screen position in units of half the image.
+    pub screen_offsets: FloatTensor<B>,
+}
+
+/// Tensors of [`SplatInputs`].
+pub(crate) const INPUTS: usize = 7;
+
+impl<B: Backend> SplatInputs<B> {
+    pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.means, self.quats, self.scales, self.opacities, self.sh_dc, self.sh_rest, self.screen_offsets]
+    }
+
+    pub(crate) fn from_array(
+        [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets]: [FloatTensor<B>; INPUTS],
+    ) -> Self {
+        Self { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
+    }
+}
+
+/// What the operation returns.
+#[derive(ExtensionType)]
+pub struct SplatOutputs<B: Backend> {
+    /// `[5 · H · W]`: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+    pub rendering: FloatTensor<B>,
+    /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
+    pub radii: IntTensor<B>,
+}
+
+/// A back end's kernels. [`SplatOps`](crate::ops::splat::SplatOps) adds the dispatch and the tape.
+pub trait SplatKernels: Backend {
+    /// What the backward pass wants to see again.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Draws the image.
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, Self::Saved);
+
+    /// Gradients of all inputs from that of the image `[5 · H · W]`.
+    fn splat_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self>;
+}
+
+/// Camera, background and active SH degree of one image.
+#[derive(Clone, Copy, Debug)]
+pub struct SplatView(pub(crate) View);
+
+impl SplatView {
+    /// The image of `camera` over `background` (red, green, blue). `sh_degree` (0 to 3) is the highest degree of the spherical
+    /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
+    pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
+        Self(View { camera, background, sh_degree })
+    }
+}
+
+/// What is drawn, from where.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct View {
+    pub(crate) camera: Camera,
+    pub(crate) background: [f32; 3],
+    pub(crate) sh_degree: usize,
+}
+
+impl View {
+    pub(crate) fn tiles_across(&self) -> usize {
+        (self.camera.width as usize).div_ceil(TILE)
+    }
+
+    pub(crate) fn tiles_down(&self) -> usize {
+        (self.camera.height as usize).div_ceil(TILE)
+    }
+}
