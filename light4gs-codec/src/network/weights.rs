@@ -32,7 +32,7 @@ use crate::{
     },
     budget::Budget,
     limits::at_most,
-    steps::check_step,
+    steps,
 };
 
 /// Weights that a byte stands for at most.
@@ -63,7 +63,7 @@ impl WeightPrecision {
         match self {
             Self::Bits(2..=16) => Ok(()),
             Self::Bits(bits) => Err(CodecError::invalid("weights", "precision", bits, "2 to 16 bits")),
-            Self::Step(step) => check_step("weights", "step", step, f32::MIN_POSITIVE),
+            Self::Step(step) => steps::check_step("weights", "step", step, f32::MIN_POSITIVE),
         }
     }
 }
