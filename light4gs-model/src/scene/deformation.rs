@@ -268,7 +268,8 @@ mod tests {
             let motion = config.init(&Device::flex()).to_motion();
             // All layers but the last of the heads for positions, scales and harmonics have a ReLU behind them.
             let layers: u64 = motion.network.layers().map(|layer| u64::from(layer.outputs)).sum();
-            assert_eq!(config.size(), (motion.network.weights(), 5 + 2 * layers - (3 + 3 + 48)), "depth {depth}");
+            let weights: usize = motion.network.layers().map(|layer| layer.weight.len() + layer.bias.len()).sum();
+            assert_eq!(config.size(), (weights as u64, 5 + 2 * layers - (3 + 3 + 48)), "depth {depth}");
         }
     }
 
