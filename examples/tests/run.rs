@@ -36,12 +36,17 @@ fn every_example_succeeds() {
     assert!(failures.is_empty(), "{}", failures.join("\n"));
 }
 
-/// The index of the examples names each of them, and only those.
+/// The index of the examples names each of them, and only those; the table of docs/extending.md has a row for each.
 #[test]
 fn the_index_is_complete() {
     let index = include_str!("../README.md");
+    let table = include_str!("../../docs/extending.md");
     for name in names() {
         assert!(index.contains(&format!("(examples/{name}.rs)")), "examples/README.md does not name {name}");
+        assert!(
+            table.contains(&format!("[{name}](../examples/examples/{name}.rs)")),
+            "docs/extending.md has no row for {name}"
+        );
     }
     assert_eq!(index.matches("(examples/").count(), names().len());
 }
