@@ -16,12 +16,12 @@ const LONGEST_KIND: usize = 64;
 /// makes of these arrays. A kind that a program does not know still decodes.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionArrays {
-    /// What the arrays are, such as `deformation`: at most 64 lower-case letters, digits, `-`, `_` and `.`; empty where
+    /// What the arrays are, such as `hexplane`: at most 64 lower-case letters, digits, `-`, `_` and `.`; empty where
     /// nothing moves.
     pub kind: String,
     /// What moves each Gaussian from features at its place, where there is such a network.
     pub network: Option<MotionNetwork>,
-    /// What else a kind needs, such as control nodes.
+    /// What else a field consists of. The built-in ones have none.
     pub tensors: Vec<NamedTensor>,
 }
 
