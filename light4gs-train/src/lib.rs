@@ -23,6 +23,7 @@ pub mod run;
 mod stage;
 pub mod study;
 pub mod trainer;
+mod utc;
 pub mod video;
 pub mod view;
 

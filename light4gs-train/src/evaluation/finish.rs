@@ -15,6 +15,7 @@ use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
 use crate::observers::metrics_log::read_metrics;
 use crate::report::{CodingReport, PlayerReport, Report, SectionBytes, SummaryTile, write_report};
 use crate::run::RunFolder;
+use crate::utc;
 use crate::view::cameras_json;
 
 /// Views a report shows.
@@ -43,7 +44,7 @@ pub fn evaluate_run<F: DeformationField>(
     }
     let report = Report {
         title: scene.name.clone(),
-        created: created(),
+        created: utc::now_to_the_minute(),
         device: evaluation.device.clone(),
         summary: summary(&evaluation),
         sections: evaluation
@@ -93,10 +94,6 @@ fn save_renders(folder: &RunFolder, views: &[RenderedView]) -> Result<(), TrainE
         view.render.save_png(&path.join(format!("{}.png", view.name)))?;
     }
     Ok(())
-}
-
-fn created() -> String {
-    jiff::Timestamp::now().strftime("%Y-%m-%d %H:%M UTC").to_string()
 }
 
 fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {

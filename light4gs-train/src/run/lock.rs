@@ -8,6 +8,7 @@ use std::sync::Arc;
 use light4gs_data::DataError;
 
 use crate::error::TrainError;
+use crate::utc;
 
 /// The file that is locked. It stays where it is: its lock counts, not that it is there, and it says that the folder is one
 /// of ours.
@@ -38,7 +39,7 @@ impl RunLock {
             Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {}
             Err(TryLockError::Error(error)) => return Err(failed("lock")(error).into()),
         }
-        let holder = format!("process {} since {}\n", std::process::id(), jiff::Timestamp::now().strftime("%F %T UTC"));
+        let holder = format!("process {} since {}\n", std::process::id(), utc::now());
         let written = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(holder.as_bytes()));
         written.map_err(failed("write"))?;
         Ok(Self(Arc::new(file)))

@@ -16,6 +16,7 @@ use super::list_checkpoints;
 use super::lock::RunLock;
 use crate::config::Config;
 use crate::error::TrainError;
+use crate::utc;
 
 /// JSON files of a run are far shorter.
 const MAX_JSON_BYTES: u64 = 1 << 30;
@@ -62,7 +63,7 @@ impl RunRecord {
             commit: env!("LIGHT4GS_COMMIT").to_owned(),
             device: config.device.to_string(),
             threads: rayon::current_num_threads(),
-            begun: jiff::Timestamp::now().strftime("%F %T UTC").to_string(),
+            begun: utc::now(),
             configuration: config.digest_text(),
             trained_by: None,
         })
