@@ -1,70 +1,96 @@
-//! The WGSL kernels of Light4GS's wgpu back end, as strings: each constant is a file of a folder here, named after it.
+//! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with what it includes.
 //!
 //! `README.md` says what each stage does. The host's side, which puts a kernel together as constants (those of
 //! rendering from `light4gs_codec::rendering`), then includes, then the stage, is `light4gs_model::gpu`.
 
 #![no_std]
 
-macro_rules! wgsl {
-    ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
-        $($(#[$doc])* pub const $name: &str = include_str!(concat!($file, ".wgsl"));)*
+use include::{
+    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, HEXPLANE, PIXELS, QUATERNION, SPHERICAL_HARMONICS, SPLAT,
+    VIEW,
+};
+
+/// One kernel: a file of a folder here, with what it includes.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage {
+    /// The file's name without its ending.
+    pub name: &'static str,
+    /// What comes before it, in this order.
+    pub includes: &'static [&'static str],
+    /// The file.
+    pub source: &'static str,
+}
+
+macro_rules! stages {
+    ($($(#[$doc:meta])* $constant:ident = $folder:literal / $name:literal [$($include:ident),*];)*) => {
+        $($(#[$doc])* pub const $constant: Stage = Stage {
+            name: $name,
+            includes: &[DISPATCH, $($include),*],
+            source: include_str!(concat!($folder, "/", $name, ".wgsl")),
+        };)*
     };
 }
 
-wgsl! {
+stages! {
     /// One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
-    ADAM = "elementwise/adam";
+    ADAM = "elementwise" / "adam" [];
     /// Puts the Gaussians' numbers of cells into the order of depths.
-    CELL_COUNTS = "splatting/cell_counts";
+    CELL_COUNTS = "splatting" / "cell_counts" [];
     /// Color of every Gaussian from its spherical harmonics, seen from the camera.
-    COLOR = "splatting/color";
+    COLOR = "splatting" / "color" [ARITHMETIC, VIEW, COVARIANCE, QUATERNION, SPHERICAL_HARMONICS];
     /// Second half of the query's derivative: every cell gathers what the samples around it hand over.
-    HEXPLANE_GATHER = "hexplane/hexplane_gather";
+    HEXPLANE_GATHER = "hexplane" / "hexplane_gather" [HEXPLANE];
     /// Brings one plane from [C, H · W] to the layout of `include/hexplane.wgsl`.
-    HEXPLANE_PACK = "hexplane/hexplane_pack";
+    HEXPLANE_PACK = "hexplane" / "hexplane_pack" [];
     /// Features at points: the product over six planes of their bilinear samples.
-    HEXPLANE_QUERY = "hexplane/hexplane_query";
+    HEXPLANE_QUERY = "hexplane" / "hexplane_query" [HEXPLANE];
     /// First half of the query's derivative: what every point hands to each of its six samples, and the points'
     /// own gradients.
-    HEXPLANE_QUERY_BACKWARD = "hexplane/hexplane_query_backward";
+    HEXPLANE_QUERY_BACKWARD = "hexplane" / "hexplane_query_backward" [HEXPLANE];
     /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
-    INTERSECT = "splatting/intersect";
+    INTERSECT = "splatting" / "intersect" [ARITHMETIC, VIEW, SPLAT];
     /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
     /// (Ballé et al. 2018).
-    LOWER_BOUND_BACKWARD = "elementwise/lower_bound_backward";
+    LOWER_BOUND_BACKWARD = "elementwise" / "lower_bound_backward" [];
     /// The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error
     /// everywhere (Press et al., Numerical Recipes, section 6.2): the coefficients and the order of operations of
     /// `light4gs-model/src/ops`.
-    NORMAL_CDF = "elementwise/normal_cdf";
+    NORMAL_CDF = "elementwise" / "normal_cdf" [EXPONENTIAL];
     /// Derivative of the standard normal distribution function: its density times the upstream gradient.
-    NORMAL_CDF_BACKWARD = "elementwise/normal_cdf_backward";
+    NORMAL_CDF_BACKWARD = "elementwise" / "normal_cdf_backward" [EXPONENTIAL];
     /// Exclusive prefix sum, in place.
-    PREFIX_SUM = "sorting/prefix_sum";
+    PREFIX_SUM = "sorting" / "prefix_sum" [];
     /// Projects every Gaussian to the screen and counts the cells that it touches.
-    PROJECT = "splatting/project";
+    PROJECT = "splatting" / "project" [ARITHMETIC, VIEW, SPLAT, QUATERNION, COVARIANCE];
     /// Adds up every Gaussian's sums over its cells and takes them through the projection to its attributes.
-    PROJECT_BACKWARD = "splatting/project_backward";
+    PROJECT_BACKWARD = "splatting" / "project_backward" [ARITHMETIC, VIEW, QUATERNION, COVARIANCE, SPHERICAL_HARMONICS];
     /// First half of a pass of the radix sort: how often each digit occurs in each block.
-    RADIX_COUNT = "sorting/radix_count";
+    RADIX_COUNT = "sorting" / "radix_count" [];
     /// Second half of a pass of the radix sort: moves keys and values to their places.
-    RADIX_SCATTER = "sorting/radix_scatter";
+    RADIX_SCATTER = "sorting" / "radix_scatter" [];
     /// Where each of a number of groups begins among sorted keys.
-    RANGES = "sorting/ranges";
+    RANGES = "sorting" / "ranges" [];
     /// Blends the splats of every cell, front to back.
-    RASTERIZE = "splatting/rasterize";
+    RASTERIZE = "splatting" / "rasterize" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Derivative of the blending by every splat, front to back like the forward pass.
-    RASTERIZE_BACKWARD = "splatting/rasterize_backward";
+    RASTERIZE_BACKWARD = "splatting" / "rasterize_backward" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// What every splat contributes to one image, without its color: the sums behind significance pruning
     /// (paper III-B).
-    SIGNIFICANCE = "splatting/significance";
+    SIGNIFICANCE = "splatting" / "significance" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Adds up every Gaussian's sums over its cells.
-    SIGNIFICANCE_GATHER = "splatting/significance_gather";
+    SIGNIFICANCE_GATHER = "splatting" / "significance_gather" [];
     /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
-    SUBGROUPS = "elementwise/subgroups";
+    SUBGROUPS = "elementwise" / "subgroups" [];
 }
 
 /// What several stages share.
 pub mod include {
+    macro_rules! wgsl {
+        ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
+            $($(#[$doc])* pub const $name: &str = include_str!(concat!($file, ".wgsl"));)*
+        };
+    }
+
     wgsl! {
         /// Finite numbers, and sums of products term by term.
         ARITHMETIC = "include/arithmetic";

@@ -3,10 +3,10 @@
 use burn::backend::TensorMetadata;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
+use light4gs_shaders::ADAM;
 
 use super::context::{Gpu, buffer_of};
 use super::kernel::Launch;
-use super::stages::ADAM;
 use crate::gpu_error::GpuError;
 use crate::kernels::adam::{AdamStep, AdamTensors};
 

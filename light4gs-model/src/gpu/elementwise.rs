@@ -2,10 +2,10 @@
 
 use burn::backend::TensorMetadata;
 use burn_wgpu::CubeTensor;
+use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Stage};
 
 use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Launch;
-use super::stages::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Stage};
 use crate::gpu_error::GpuError;
 
 /// Launches a stage that reads tensors of one shape and writes another one. Its uniform is their size, then `numbers`.

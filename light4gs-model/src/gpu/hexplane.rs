@@ -5,11 +5,11 @@ use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
+use light4gs_shaders::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
-use super::stages::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
 use crate::gpu_error::GpuError;
 use crate::kernels::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
 

@@ -10,8 +10,8 @@ use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim, ExecutionMode, KernelId};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, TILE};
+use light4gs_shaders::Stage;
 
-use super::stages::Stage;
 use crate::cpu::project::INVALID_RADIUS;
 use crate::gpu_error::GpuError;
 

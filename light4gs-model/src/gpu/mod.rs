@@ -8,7 +8,6 @@ mod kernel;
 mod significance;
 mod sort;
 mod splat;
-mod stages;
 mod team;
 
 pub(crate) use adam::adam_on_gpu;

@@ -3,11 +3,11 @@
 use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
+use light4gs_shaders::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 
 use super::context::{Gpu, first_words};
 use super::kernel::Launch;
 use super::splat::{Begun, begin};
-use super::stages::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 use crate::cpu::significance::SCORES;
 use crate::gpu_error::GpuError;
 use crate::kernels::splat::{SplatInputs, View};

@@ -1,10 +1,10 @@
 //! Prefix sums, a stable radix sort, and ranges of equal keys.
 
 use cubecl::server::Handle;
+use light4gs_shaders::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES};
 
 use super::context::Gpu;
 use super::kernel::Launch;
-use super::stages::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES};
 use crate::gpu_error::GpuError;
 
 /// Values of one workgroup of the prefix sum.

@@ -6,11 +6,11 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
+use light4gs_shaders::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
-use super::stages::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
 use super::team::{CHUNK, Team};
 use crate::cpu::rasterize::CHANNELS;
 use crate::gpu_error::GpuError;
@@ -300,7 +300,7 @@ mod tests {
     use light4gs_data::Camera;
 
     use super::super::context::tests::gpu;
-    use super::super::stages::{TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+    use super::super::team::{TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
     use super::*;
 
     const COUNT: usize = 300;

@@ -4,11 +4,19 @@ use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex};
 
 use cubecl::device::DeviceId;
+use light4gs_shaders::include::{TEAM_SUBGROUP, TEAM_SUM_OF_FEW, TEAM_SUM_OF_MANY, TEAM_WORKGROUP};
+use light4gs_shaders::{SUBGROUPS, Stage};
 
 use super::context::Gpu;
 use super::kernel::Launch;
-use super::stages::{SUBGROUPS, Stage, TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
 use crate::gpu_error::GpuError;
+
+/// Members of a team meet through subgroup operations; they are few.
+pub(super) const TEAM_OF_FEW: &[&str] = &[TEAM_SUBGROUP, TEAM_SUM_OF_FEW];
+/// Members of a team meet through subgroup operations; they are many.
+pub(super) const TEAM_OF_MANY: &[&str] = &[TEAM_SUBGROUP, TEAM_SUM_OF_MANY];
+/// Members of a team meet in workgroup memory.
+pub(super) const TEAM_WITHOUT_SUBGROUPS: &[&str] = &[TEAM_WORKGROUP];
 
 /// Intersections of a cell that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
 /// graphics driver may stop a launch that runs for seconds.
