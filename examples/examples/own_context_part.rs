@@ -1,31 +1,39 @@
 //! A part of the context model of one's own: the plane xz is predicted from what the plane xy, decoded before, is like on
-//! average at each x. Nothing of Light4GS is edited, and the codec runs the part exactly.
+//! average at each x. Trained beside a scene with the rate in its loss, resumed, coded, decoded. Nothing of Light4GS is
+//! edited, and the codec runs the part exactly.
 //!
 //! A [`PriorPart`] says the same thing twice: `prior` computes it with Burn, for training; `describe` gives it to the codec
-//! as a list of layers. A model is a list of parts, and for each plane the first that applies speaks.
+//! as a list of layers. A model is a list of parts ([`PlaneEntropy`]), and for each plane the first that applies speaks.
+//! [`EntropyModels`] makes the model for a trainer.
 
 use burn::module::Module;
-use burn::optim::{AdamConfig, GradientsParams};
-use burn::tensor::{Device, Distribution, Tensor};
+use burn::tensor::{Device, Tensor};
 use light4gs_codec::network::Operation;
-use light4gs_codec::{Network, PlaneCoding, PlaneSource, encode_planes, plane_distributions};
-use light4gs_examples::{Outcome, first_and_last};
+use light4gs_codec::{Network, PlaneCoding, PlaneSource, decode, plane_distributions};
+use light4gs_data::Scene;
+use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    CenteredPlanes, ContextModel, ContextModelConfig, DescribedCondition, DescribedPrior, HexPlane, HexPlaneConfig,
-    Latent, Passes, PlaneConv, PlaneConvConfig, PlaneSteps, Prior, PriorPart,
+    CenteredPlanes, ContextModel, DescribedCondition, DescribedPrior, HexPlane, Latent, Passes, PlaneConv,
+    PlaneConvConfig, PlaneEntropy, Prior, PriorPart, ShEntropyModel,
 };
+use light4gs_train::compression::{ConfiguredModels, EntropyModels, PlaneModels};
+use light4gs_train::config::{ContextConfig, ShConfig};
+use light4gs_train::dataset::load_options;
+use light4gs_train::error::TrainError;
+use light4gs_train::run::RunFolder;
+use light4gs_train::trainer::Trainer;
 
 /// Places of these planes among the six of a scale.
 const XY: usize = 0;
 const XZ: usize = 1;
-/// Channels of a plane.
-const CHANNELS: usize = 4;
 
 /// xz from the mean of xy over y.
 #[derive(Module, Debug)]
 struct ProfileAlongX {
     /// `[M, H, W]` to `[2 M, H, W]`: scales and means.
     conv: PlaneConv,
+    /// M.
+    channels: usize,
 }
 
 impl PriorPart for ProfileAlongX {
@@ -45,7 +53,7 @@ impl PriorPart for ProfileAlongX {
         if plane != XZ {
             return None;
         }
-        let (mut network, [xy]) = Network::new([CHANNELS as u32]);
+        let (mut network, [xy]) = Network::new([self.channels as u32]);
         let profile = network.node(Operation::MeanOverHeight, &[xy]);
         let profile = network.node(Operation::Spread, &[profile]);
         let parameters = network.layer(profile, self.conv.to_layer());
@@ -62,7 +70,15 @@ struct ModelWithProfile {
     profile: ProfileAlongX,
 }
 
-impl ModelWithProfile {
+impl PlaneEntropy for ModelWithProfile {
+    fn base(&self) -> &ContextModel {
+        &self.usual
+    }
+
+    fn base_mut(&mut self) -> &mut ContextModel {
+        &mut self.usual
+    }
+
     fn parts(&self) -> Vec<Box<dyn PriorPart + '_>> {
         let mut parts = self.usual.parts();
         parts.insert(0, Box::new(&self.profile));
@@ -70,69 +86,80 @@ impl ModelWithProfile {
     }
 }
 
-/// Planes of one scale in which xz repeats, with a little noise, the profile of xy along x.
-fn planes(device: &Device) -> Vec<Tensor<3>> {
-    let hexplane = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([16, 12, 20, 8]);
-    let mut planes = hexplane.with_multipliers(vec![1]).init(device).tensors();
-    let normal = |shape, width| Tensor::<3>::random(shape, Distribution::Normal(0.0, width), device);
-    let profile = normal([CHANNELS, 1, 16], 0.5);
-    planes[XY] = profile.clone().expand([CHANNELS, 12, 16]) + normal([CHANNELS, 12, 16], 0.1);
-    planes[XZ] = profile.expand([CHANNELS, 20, 16]) + normal([CHANNELS, 20, 16], 0.1);
-    planes
+/// What a trainer makes its entropy models with: ours for the planes, the configured one for the spherical harmonics.
+#[derive(Debug)]
+struct WithProfile;
+
+impl EntropyModels for WithProfile {
+    type Planes = ModelWithProfile;
+    type Sh = ShEntropyModel;
+
+    fn planes(&self, settings: &ContextConfig, channels: usize, device: &Device) -> Result<Self::Planes, TrainError> {
+        let usual = ConfiguredModels.planes(settings, channels, device)?;
+        let conv = PlaneConvConfig::new(channels, 2 * channels, 1).init(device);
+        Ok(ModelWithProfile { usual, profile: ProfileAlongX { conv, channels } })
+    }
+
+    fn sh(&self, settings: &ShConfig, feature_size: usize, device: &Device) -> Result<Self::Sh, TrainError> {
+        ConfiguredModels.sh(settings, feature_size, device)
+    }
+}
+
+/// The weights of our part, as they are in a training.
+fn weights(trainer: &Trainer<light4gs_model::HexPlaneField, WithProfile>) -> Vec<f32> {
+    let models = trainer.compression().and_then(|models| models.planes.as_ref()).expect("the rate is in the loss");
+    models.context.profile.conv.to_layer().weight
 }
 
 fn main() -> Outcome {
-    let device = Device::flex();
-    device.seed(0);
-    let planes = planes(&device);
-    let steps = PlaneSteps::fixed(&[0.05; 6], &device);
+    let folder = tempfile::tempdir()?;
+    let mut config = tiny_config()?;
+    config.compression.rate.lambda = 0.03;
+    config.compression.rate.from = 10;
+    config.train.checkpoint_interval = 50;
+    let scene = tiny_scene(folder.path())?;
+    let data = Scene::open(&scene, &load_options(&config))?;
 
-    // Trained: the bits of xz under the usual model and under ours. (A training of a scene adds them to its loss.)
-    let tape = device.clone().autodiff();
-    let usual = ContextModelConfig::compact(CHANNELS).init(&tape);
-    let profile = ProfileAlongX { conv: PlaneConvConfig::new(CHANNELS, 2 * CHANNELS, 1).init(&tape) };
-    let mut model = ModelWithProfile { usual, profile };
-    let on_tape: Vec<Tensor<3>> = planes.iter().cloned().map(Tensor::from_inner).collect();
-    let steps_on_tape = PlaneSteps::fixed(&[0.05; 6], &tape);
-    model.usual.start_from(&on_tape, &steps_on_tape);
-    let mut optimizer = AdamConfig::new().init();
-    let mut history = Vec::new();
-    for _ in 0..200 {
-        let noisy = model.usual.centered(&steps_on_tape.add_noise(&on_tape), &steps_on_tape);
-        let bits = model.usual.rate_with(&model.parts(), &noisy, XZ, Latent::Noise).total();
-        history.push(bits.clone().into_scalar::<f32>());
-        let gradients = GradientsParams::from_grads(bits.backward(), &model);
-        model = optimizer.step(1e-2, model, gradients);
+    // Trained: the part learns in the loop, from the rate in the loss.
+    let run = RunFolder::create(&folder.path().join("run"), Some(&scene), &config, false)?;
+    let builder = |data: &Scene| Trainer::builder(config.clone(), data.clone()).entropy_models(WithProfile);
+    let mut trainer = builder(&data).run_folder(run.clone()).build()?;
+    let before = weights(&trainer);
+    while trainer.position() != (light4gs_train::Stage::Fine, 70) {
+        trainer.step()?;
     }
-    let mut model = model.valid();
-    model.usual.update_quantiles();
-    let values = planes[XZ].shape().num_elements() as f32;
-    let (first, last) = first_and_last(&history);
-    println!("xz: {:.2} bits a value at first, {:.2} in the end", first / values, last / values);
-    assert!(last < 0.8 * first);
+    assert_ne!(weights(&trainer), before, "our part learns nothing");
+    drop(trainer);
 
-    // Coded: the composition as data, and the planes as a decoder will have them.
-    let quantized = model.usual.quantize_with(&model.parts(), &planes, &steps);
-    let expected = quantized[XZ].rate.values_bits.clone().into_scalar::<f32>();
-    let decoded: Vec<Tensor<3>> = quantized.into_iter().map(|plane| plane.decoded).collect();
+    // Resumed: the checkpoint holds the part, at iteration 50.
+    let mut trainer = builder(&data).run_folder(run).resume()?;
+    assert_eq!(trainer.position(), (light4gs_train::Stage::Fine, 50));
+    trainer.run()?;
+
+    // Coded: the file is as large as the model expects, and any decoder reads it: the composition travels as data.
+    let coded = trainer.encode()?;
+    let (record, _) = coded.coding.expect("the profile is a coded one");
+    let [planes, _] = record.parts();
+    println!("planes: {:.0} bits expected, {:.0} in the file", planes.expected, planes.coded);
+    assert!((planes.expected / planes.coded - 1.0).abs() < 0.02);
+    let decoded = decode(&coded.bytes)?;
+
+    // The codec's exact executor says what the Burn module says, to float tolerance.
+    let PlaneModels { context: mut model, quantization } =
+        trainer.compression().cloned().and_then(|models| models.planes).expect("the rate is in the loss").valid();
+    model.base_mut().update_quantiles();
+    let steps = quantization.steps_without_gradient();
+    let arrays = &decoded.hexplane;
+    let planes = HexPlane::from_arrays(arrays, &Device::flex())?.tensors();
     let symbols = |latent: Tensor<3>| latent.into_data().iter::<f32>().map(|symbol| symbol as i32).collect();
-    let latents = model.usual.latent_symbols(&planes, &steps).into_iter();
+    let latents = model.latent_symbols(&planes, &steps).into_iter();
     let coding = PlaneCoding {
-        model: model.usual.to_arrays_with(&model.parts())?,
+        model: model.to_arrays()?,
         steps: steps.to_groups(),
         latent_symbols: latents.map(|latent| latent.map_or_else(Vec::new, symbols)).collect(),
     };
-    let arrays = HexPlane::from_planes(decoded.clone()).to_arrays();
-    println!(
-        "{} bytes for all planes; {:.2} bits expected for a value of xz",
-        encode_planes(&arrays, &coding)?.len(),
-        expected / values
-    );
-
-    // The codec's exact executor says what the Burn module says, to float tolerance.
-    let exact = plane_distributions(&arrays, &coding, XZ)?;
-    let known = model.usual.centered(&decoded, &steps);
-    let (ours, _) = model.usual.parameters_with(&model.parts(), &known, XZ, Latent::Rounded);
+    let exact = plane_distributions(arrays, &coding, XZ)?;
+    let ours = model.plane_parameters(&planes, &steps, &[XZ], Latent::Rounded).remove(0);
     for (ours, exact) in [(ours.means, exact.means), (ours.scales, exact.scales)] {
         let ours: Vec<f32> = ours.into_data().iter::<f32>().collect();
         let worst = ours.iter().zip(&exact).map(|(a, b)| (a - b).abs() / b.abs().max(1.0)).fold(0.0, f32::max);

@@ -1,26 +1,24 @@
 //! An entropy model of the spherical harmonics of one's own: how wide a Gaussian's view-dependent colors are follows from
-//! its constant color and its place. Trained, coded and decoded; nothing of Light4GS is edited.
+//! its constant color and its place. Trained beside a scene with the rate in its loss, coded and decoded; nothing of
+//! Light4GS is edited.
 //!
 //! [`ShEntropy`] is the seam. A model gives the bits of each value for training, and describes the network behind them for
-//! the codec, which runs it exactly.
+//! the codec, which runs it exactly. [`EntropyModels`] makes the model for a trainer.
 
 use burn::module::Module;
-use burn::optim::{AdamConfig, GradientsParams};
-use burn::tensor::{Device, Distribution, Tensor, TensorData};
-use light4gs_codec::{
-    CompressionInput, Network, Profile, SceneMeta, ShCoding, ShPrior, ShSource, WeightPrecisions,
-    attributes::AttributeSteps, decode, encode_compressed, encode_sh, network::Operation,
-};
-use light4gs_data::PointCloud;
-use light4gs_examples::{Outcome, first_and_last};
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::{Network, ShPrior, ShSource, decode, network::Operation};
+use light4gs_data::Scene;
+use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    DeformationConfig, DynamicScene, DynamicSceneConfig, Gaussians, GaussiansConfig, HexPlaneConfig, HexPlaneField,
-    HexPlaneFieldConfig, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first, channels_last, counted_sh_coding,
-    gaussian_bits, round_around,
+    ContextModel, DynamicScene, HexPlaneField, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first,
+    channels_last, gaussian_bits, round_around,
 };
-
-/// Distance between the values of neighboring symbols.
-const STEP: f32 = 0.02;
+use light4gs_train::compression::{ConfiguredModels, EntropyModels};
+use light4gs_train::config::{ContextConfig, FileProfile, ShConfig};
+use light4gs_train::dataset::load_options;
+use light4gs_train::error::TrainError;
+use light4gs_train::trainer::Trainer;
 
 /// From what a decoder knows of a Gaussian to a Gaussian distribution for each of its 45 coefficients.
 #[derive(Module, Debug)]
@@ -67,20 +65,21 @@ impl ShEntropy for FromColorAndPlace {
     }
 }
 
-/// A scene of 600 Gaussians whose view-dependent colors are small on one side and large on the other: what a model that
-/// looks at positions can learn, and one table a channel cannot.
-fn scene(device: &Device) -> DynamicScene {
-    let cloud = PointCloud::random(600, 1.0, 0);
-    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]).with_multipliers(vec![1]);
-    let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(8));
-    let mut scene = DynamicSceneConfig::<HexPlaneField>::new(GaussiansConfig::new(), field).init(&cloud, device);
-    let widths: Vec<f32> = cloud.positions.iter().map(|p| if p[0] > 0.0 { 0.5 } else { 0.02 }).collect();
-    let widths = Tensor::<3>::from_data(TensorData::new(widths, [600, 1, 1]), device);
-    let normal = Tensor::random([600, 15, 3], Distribution::Normal(0.0, 1.0), device);
-    let mut tensors = scene.gaussians.tensors();
-    tensors.sh_rest = normal * widths;
-    scene.gaussians = Gaussians::from_tensors(tensors);
-    scene
+/// What a trainer makes its entropy models with: the configured one for the planes, ours for the spherical harmonics.
+#[derive(Debug)]
+struct WithColorAndPlace;
+
+impl EntropyModels for WithColorAndPlace {
+    type Planes = ContextModel;
+    type Sh = FromColorAndPlace;
+
+    fn planes(&self, settings: &ContextConfig, channels: usize, device: &Device) -> Result<Self::Planes, TrainError> {
+        ConfiguredModels.planes(settings, channels, device)
+    }
+
+    fn sh(&self, settings: &ShConfig, _feature_size: usize, device: &Device) -> Result<Self::Sh, TrainError> {
+        Ok(FromColorAndPlace::new(settings.step as f32, device))
+    }
 }
 
 /// What the decoder has before it reads `sh_rest`.
@@ -90,54 +89,45 @@ fn known(scene: &DynamicScene) -> ShKnown {
 }
 
 fn main() -> Outcome {
-    let device = Device::flex();
-    device.seed(0);
-    let scene = scene(&device);
+    let folder = tempfile::tempdir()?;
+    let mut config = tiny_config()?;
+    // All degrees of the harmonics early, and the rate as soon as Gaussians neither come nor go.
+    config.model.sh_degree = 3;
+    config.train.sh_degree_interval = 10;
+    config.compression.rate.lambda = 0.03;
+    config.compression.rate.from = 10;
+    // Weights as float32, so that module and file can be compared to the last symbol.
+    config.compression.profile = FileProfile::Paper;
+    let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
 
-    // Trained, here on values that stand still: noise in place of rounding, and the bits are the loss.
-    let mut model = FromColorAndPlace::new(STEP, &device.clone().autodiff());
-    let values = Tensor::from_inner(scene.gaussians.sh_rest.val());
-    let ShKnown { sh_dc, positions, planes } = known(&scene);
-    let facts = ShKnown { sh_dc: Tensor::from_inner(sh_dc), positions: Tensor::from_inner(positions), planes };
-    let mut optimizer = AdamConfig::new().init();
-    let mut history = Vec::new();
-    for _ in 0..300 {
-        let bits = model.bits(model.add_noise(values.clone()), &facts).mean();
-        history.push(bits.clone().into_scalar::<f32>());
-        let gradients = GradientsParams::from_grads(bits.backward(), &model);
-        model = optimizer.step(1e-2, model, gradients);
-    }
-    let model = model.valid();
-    let (first, last) = first_and_last(&history);
-    println!("{first:.2} bits a value at first, {last:.2} in the end");
-    assert!(last < 0.8 * first);
-
-    // The file has as many bits as training expects, and fewer than with a table for each channel.
-    let arrays = scene.to_arrays(SceneMeta::default());
-    let coding = model.to_coding(&arrays.gaussians.sh_rest)?;
-    let bytes = |coding: &ShCoding| encode_sh(&arrays.gaussians, coding, &arrays.frame, &arrays.hexplane);
-    let quantized = model.quantize(scene.gaussians.sh_rest.val(), &known(&scene));
-    let bits = model.bits(quantized.clone(), &known(&scene)).sum().into_scalar::<f32>();
-    let layers = |prior: &ShPrior| prior.network.layers().map(|layer| layer.weight.len() + layer.bias.len()).sum();
-    let weights: usize = model.priors().iter().map(|prior| -> usize { layers(prior) }).sum();
-    let (expected, found) = (f64::from(bits) / 8.0, bytes(&coding)?.len() as f64 - 4.0 * weights as f64);
-    let tables = bytes(&counted_sh_coding(&arrays.gaussians.sh_rest, SH_CHANNELS, STEP)?)?.len();
-    println!("{found:.0} bytes for the values, {expected:.0} expected; {tables} with a table for each channel");
-    assert!((found / expected - 1.0).abs() < 0.05);
-    assert!(found < tables as f64);
-
-    // Coded and decoded: what comes out is what the Burn module says, but for values on the edge between two symbols.
-    let input = CompressionInput {
-        profile: Profile::Paper,
-        planes: None,
-        sh: coding,
-        attributes: AttributeSteps::default(),
-        weights: WeightPrecisions::default(),
+    // Trained: the model learns in the loop, from the rate in the loss.
+    let mut trainer = Trainer::builder(config, data).entropy_models(WithColorAndPlace).build()?;
+    let model = |trainer: &Trainer<HexPlaneField, WithColorAndPlace>| {
+        trainer.compression().and_then(|models| models.sh.clone()).expect("the rate is in the loss").valid()
     };
-    let decoded = decode(&encode_compressed(&arrays, &input)?.bytes)?.gaussians.sh_rest;
-    let ours: Vec<f32> = quantized.into_data().iter::<f32>().collect();
-    let close = ours.iter().zip(&decoded).filter(|(ours, exact)| (**ours - **exact).abs() < 1e-4).count();
-    println!("{close} of {} values are the same in Burn and in the codec", decoded.len());
-    assert!(close as f64 > 0.999 * decoded.len() as f64);
+    let before = model(&trainer).priors();
+    while trainer.step()?.is_some() {}
+    let model = model(&trainer);
+    assert_ne!(model.priors(), before, "the model learns nothing");
+
+    // Coded: the file has as many bits as training expects.
+    let coded = trainer.encode()?;
+    let (record, _) = coded.coding.expect("the profile is a coded one");
+    let [_, sh] = record.parts();
+    println!("spherical harmonics: {:.0} bits expected, {:.0} in the file", sh.expected, sh.coded);
+    assert!((sh.expected / sh.coded - 1.0).abs() < 0.02);
+
+    // Decoded: what comes out is what the Burn module says, but for values on the edge between two symbols. The
+    // module looks at what a decoder has.
+    let decoded = decode(&coded.bytes)?;
+    let scene = DynamicScene::<HexPlaneField>::from_arrays(&decoded, &Device::flex())?;
+    let again = model.quantize(scene.gaussians.sh_rest.val(), &known(&scene));
+    let ours: Vec<f32> = again.into_data().iter::<f32>().collect();
+    let exact = &decoded.gaussians.sh_rest;
+    let close = ours.iter().zip(exact).filter(|(ours, exact)| (**ours - **exact).abs() < 1e-3).count();
+    println!("{close} of {} values are the same in Burn and in the codec", exact.len());
+    assert!(close as f64 > 0.999 * exact.len() as f64);
+    // A model of the same kind reads it again to the same arrays.
+    assert_eq!(scene.to_arrays(decoded.meta.clone()).gaussians, decoded.gaussians);
     Ok(())
 }

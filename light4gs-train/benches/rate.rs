@@ -4,8 +4,8 @@
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use light4gs_model::{
-    ContextModelConfig, HexPlaneConfig, Latent, PlaneSteps, ShAutoregressiveConfig, ShBottleneckConfig, ShEntropy,
-    ShEntropyConfig, ShKnown, ShMixtureConfig,
+    ContextModelConfig, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps, ShAutoregressiveConfig, ShBottleneckConfig,
+    ShEntropy, ShEntropyConfig, ShKnown, ShMixtureConfig,
 };
 use light4gs_train::device::{built_in, device_by_name};
 

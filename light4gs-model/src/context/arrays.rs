@@ -23,19 +23,11 @@ impl PlaneSteps {
 }
 
 impl ContextModel {
-    /// What a decoder needs of the model. Call [`Self::update_quantiles`] first: the hyperprior's tables go as far as
-    /// its quantiles.
+    /// What a decoder needs of a composition of parts. Call [`Self::update_quantiles`] first: the hyperprior's tables go
+    /// as far as its quantiles.
     ///
     /// # Errors
     /// A density that gives no frequency table; the message names what is wrong with it.
-    pub fn to_arrays(&self) -> Result<ContextModelArrays, CodecError> {
-        self.to_arrays_with(&self.parts())
-    }
-
-    /// [`Self::to_arrays`] with other parts than the model's own.
-    ///
-    /// # Errors
-    /// As [`Self::to_arrays`].
     pub fn to_arrays_with(&self, parts: &[Box<dyn PriorPart + '_>]) -> Result<ContextModelArrays, CodecError> {
         let mut arrays = ContextModelArrays {
             channels: self.entropy_parameters.channels() as u32,

@@ -12,11 +12,13 @@
 //! Where a part is switched off, the next one that applies takes its place: inter-scale, inter-plane, hyperprior,
 //! then a constant. [`EntropyParameters`] turns what the parts know into the distribution.
 //!
-//! Which parts there are is said in this file and nowhere else. A new one is a file of its own with a [`PriorPart`], which
-//! computes its prior with Burn and describes the same network for the codec, and an entry in [`ContextModel::parts`].
+//! Which parts the paper's model has is said in this file and nowhere else. A new one is a file of its own with a
+//! [`PriorPart`], which computes its prior with Burn and describes the same network for the codec, and an entry in
+//! [`PlaneEntropy::parts`]: of [`ContextModel`] here, or of a composition of one's own.
 
 mod arrays;
 pub(crate) mod checkerboard;
+pub(crate) mod composition;
 pub(crate) mod entropy_parameters;
 pub(crate) mod hyperprior;
 pub(crate) mod inter_plane;
@@ -25,6 +27,7 @@ pub(crate) mod prior;
 mod rate;
 
 pub use checkerboard::{Checkerboard, CheckerboardConfig, anchor_mask};
+pub use composition::PlaneEntropy;
 pub use entropy_parameters::{EntropyParameters, EntropyParametersConfig, Start};
 pub use hyperprior::{Hyperprior, HyperpriorConfig};
 pub use inter_plane::{InterPlane, InterPlaneConfig};
@@ -160,7 +163,7 @@ impl ContextModelConfig {
 ///
 /// ```
 /// use burn::tensor::Device;
-/// use light4gs_model::{ContextModelConfig, HexPlaneConfig, Latent, PlaneSteps};
+/// use light4gs_model::{ContextModelConfig, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps};
 ///
 /// let device = Device::flex();
 /// let hexplane = HexPlaneConfig::new().with_channels(8).with_resolution([8, 8, 8, 4]).init(&device);
@@ -188,9 +191,16 @@ pub struct ContextModel {
     space_time_center: f64,
 }
 
-impl ContextModel {
-    /// The composition: for each plane the first part that applies gives its prior.
-    pub fn parts(&self) -> Vec<Box<dyn PriorPart + '_>> {
+impl PlaneEntropy for ContextModel {
+    fn base(&self) -> &ContextModel {
+        self
+    }
+
+    fn base_mut(&mut self) -> &mut ContextModel {
+        self
+    }
+
+    fn parts(&self) -> Vec<Box<dyn PriorPart + '_>> {
         let mut parts: Vec<Box<dyn PriorPart>> = Vec::new();
         match (&self.hyperprior, &self.inter_scale) {
             (Some(hyperprior), Some(inter_scale)) if self.high_scale_hyperprior => {

@@ -54,21 +54,7 @@ impl ContextModel {
         CenteredPlanes { planes, steps: steps.clone() }
     }
 
-    /// Bits of the selected planes. The values are taken as they are: noisy in training, quantized in an evaluation.
-    /// Differentiable in planes, steps and weights.
-    pub fn rate(
-        &self,
-        planes: &[Tensor<3>],
-        steps: &PlaneSteps,
-        selection: &[usize],
-        latent: Latent,
-    ) -> Vec<PlaneRate> {
-        let (planes, parts) = (self.centered(planes, steps), self.parts());
-        selection.iter().map(|plane| self.rate_with(&parts, &planes, *plane, latent)).collect()
-    }
-
-    /// [`Self::rate`] of one plane with other parts than the model's own: for a composition with a part that this
-    /// module does not know.
+    /// Bits of a plane under a composition of parts.
     pub fn rate_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
@@ -80,7 +66,8 @@ impl ContextModel {
         PlaneRate { plane, values_bits: value_bits(planes.in_steps(plane), gaussians).sum(), hyper_bits }
     }
 
-    /// [`Self::plane_parameters`] of one plane with other parts than the model's own, and its hyperprior's bits.
+    /// Means and scales of a plane's values under a composition of parts, in units of the plane's step and relative to its
+    /// center, and its hyperprior's bits.
     pub fn parameters_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
@@ -93,54 +80,36 @@ impl ContextModel {
         (self.gaussians(prior, &planes.planes[plane]), hyper_bits)
     }
 
-    /// `[H, W]` for each selected plane: the bits of its values, summed over channels.
-    pub fn bit_map(
+    /// `[H, W]`: the bits of a plane's values under a composition of parts, summed over channels.
+    pub fn bit_map_with(
         &self,
-        planes: &[Tensor<3>],
-        steps: &PlaneSteps,
-        selection: &[usize],
+        parts: &[Box<dyn PriorPart + '_>],
+        planes: &CenteredPlanes,
+        plane: usize,
         latent: Latent,
-    ) -> Vec<Tensor<2>> {
-        let centered = self.centered(planes, steps);
-        let gaussians = self.plane_parameters(planes, steps, selection, latent);
-        let maps = selection
-            .iter()
-            .zip(gaussians)
-            .map(|(plane, gaussians)| value_bits(centered.in_steps(*plane), gaussians).sum_dim(0).squeeze_dim(0));
-        maps.collect()
+    ) -> Tensor<2> {
+        let (gaussians, _) = self.parameters_with(parts, planes, plane, latent);
+        value_bits(planes.in_steps(plane), gaussians).sum_dim(0).squeeze_dim(0)
     }
 
-    /// Means and scales of the selected planes' values, in units of their steps, relative to the center.
-    pub fn plane_parameters(
+    /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one under a composition of parts.
+    pub fn latent_symbols_with(
         &self,
+        parts: &[Box<dyn PriorPart + '_>],
         planes: &[Tensor<3>],
         steps: &PlaneSteps,
-        selection: &[usize],
-        latent: Latent,
-    ) -> Vec<NormalParameters<3>> {
-        let (planes, parts) = (self.centered(planes, steps), self.parts());
-        selection.iter().map(|plane| self.parameters_with(&parts, &planes, *plane, latent).0).collect()
-    }
-
-    /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one. Call
-    /// [`update_quantiles`](crate::EntropyBottleneck::update_quantiles) first, since they count from the medians.
-    pub fn latent_symbols(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
-        let (planes, parts) = (self.centered(planes, steps), self.parts());
+    ) -> Vec<Option<Tensor<3>>> {
+        let planes = self.centered(planes, steps);
         let symbols = (0..planes.planes.len()).map(|plane| {
-            let has_latent = prior_of(&parts, &planes, plane, Latent::Rounded).hyper_bits.is_some();
+            let has_latent = prior_of(parts, &planes, plane, Latent::Rounded).hyper_bits.is_some();
             let hyperprior = self.hyperprior.as_ref().filter(|_| has_latent)?;
             Some(hyperprior.symbols(planes.in_steps(plane)))
         });
         symbols.collect()
     }
 
-    /// Quantizes all planes in coding order, each with the parameters that the decoder will have: what the codec does,
-    /// with a back end's floats in place of its exact executor. Without gradients.
-    pub fn quantize(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<QuantizedPlane> {
-        self.quantize_with(&self.parts(), planes, steps)
-    }
-
-    /// [`Self::quantize`] with other parts than the model's own.
+    /// Quantizes all planes in coding order under a composition of parts, each with the parameters that the decoder will
+    /// have. Without gradients.
     pub fn quantize_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],

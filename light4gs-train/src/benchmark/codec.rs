@@ -15,7 +15,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
-use crate::compression::{Compression, compression_input};
+use crate::compression::{Compression, ConfiguredModels, compression_input};
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::report::table::{Align, Table};
@@ -64,7 +64,7 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = crate::device::any()?;
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
-    let mut compression = Compression::new(&config, scene.planes(), &device)?;
+    let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device)?;
     compression.start_from(scene.planes());
     let data = scene.to_arrays(SceneMeta::default());
     let input: CompressionInput =

@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 
-use crate::compression::Compression;
+use crate::compression::{Compression, ConfiguredModels};
 use crate::config::{Config, DeviceName};
 use crate::device::adapter_name;
 use crate::error::TrainError;
@@ -334,7 +334,8 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     add("Adam step", adam_ms);
     add("training step", step_ms);
 
-    let compression = Compression::new(small, dynamic.planes(), autodiff).expect("the preset's models fit its planes");
+    let compression = Compression::new(&ConfiguredModels, small, dynamic.planes(), autodiff)
+        .expect("the preset's models fit its planes");
     let fraction = small.compression.rate.fraction;
     let lambda = 0.05;
     for (stage, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {

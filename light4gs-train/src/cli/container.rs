@@ -18,7 +18,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::FitBar;
 use super::output::{say, say_json};
 use super::train::{coding_table, sections_table};
-use crate::compression::{CodedScene, TrainedScene, code_scene};
+use crate::compression::{CodedScene, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
 use crate::device;
@@ -64,7 +64,8 @@ impl Encode {
             )));
         };
         let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
-        let checkpoint: Checkpoint = Checkpoint::load(&path, &config, &config.model.field(), &device)?;
+        let checkpoint: Checkpoint =
+            Checkpoint::load(&path, &config, &config.model.field(), &ConfiguredModels, &device)?;
         let data = match &record.scene {
             Some(dataset) => Scene::open(dataset, &load_options(&config))?,
             None => scene_around(&checkpoint.scene.gaussians.to_arrays(), folder.root(), config.data.background)?,
@@ -79,6 +80,7 @@ impl Encode {
         let trained = TrainedScene {
             scene: &checkpoint.scene,
             compression: checkpoint.compression.as_ref().filter(|_| same_models),
+            models: &ConfiguredModels,
             config: &changed,
             data: &data,
             images: record.scene.is_some().then_some(&images),
@@ -102,8 +104,8 @@ impl Encode {
 }
 
 /// Codes a scene, with a progress bar for what is fitted, writes the file, and prints what it holds.
-pub(super) fn code_to_file<F: DeformationField>(
-    trained: &TrainedScene<F>,
+pub(super) fn code_to_file<F: DeformationField, E: EntropyModels>(
+    trained: &TrainedScene<F, E>,
     out: &Path,
     json: bool,
 ) -> Result<CodedScene, TrainError> {

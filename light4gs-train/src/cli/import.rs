@@ -8,7 +8,7 @@ use light4gs_data::Scene;
 use super::check_output;
 use super::container::code_to_file;
 use super::output::say;
-use crate::compression::TrainedScene;
+use crate::compression::{ConfiguredModels, TrainedScene};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
 use crate::device;
@@ -110,6 +110,7 @@ impl Import {
         let trained = TrainedScene {
             scene: &scene,
             compression: None,
+            models: &ConfiguredModels,
             config: &config,
             data: &data,
             images: self.scene.is_some().then_some(&images),

@@ -3,6 +3,7 @@
 
 use std::time::Instant;
 
+use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{PlaneBytes, Profile, SceneData};
@@ -10,7 +11,10 @@ use light4gs_data::{Frame, Scene};
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::{BitEstimate, BitMap, Compression, EncodedScene, SearchImages, encode, fit, frozen_steps};
+use super::{
+    BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, SearchImages,
+    encode, fit, frozen_steps,
+};
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
 use crate::error::TrainError;
@@ -87,11 +91,13 @@ pub struct PlaneRecord {
 }
 
 /// A scene as trained, and where its images are.
-pub struct TrainedScene<'a, F: DeformationField = HexPlaneField> {
+pub struct TrainedScene<'a, F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
     /// The model.
     pub scene: &'a DynamicScene<F>,
     /// Its entropy models, if it was trained with them.
-    pub compression: Option<&'a Compression>,
+    pub compression: Option<&'a CompressionOf<E>>,
+    /// Makes them, if it was not.
+    pub models: &'a E,
     /// The run's.
     pub config: &'a Config,
     /// The dataset, or cameras around a scene that came without one.
@@ -116,8 +122,8 @@ pub struct CodedScene {
 ///
 /// # Errors
 /// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
-pub fn code_scene<F: DeformationField>(
-    trained: &TrainedScene<F>,
+pub fn code_scene<F: DeformationField, E: EntropyModels>(
+    trained: &TrainedScene<F, E>,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
 ) -> Result<CodedScene, TrainError> {
     let TrainedScene { scene, config, data, device, .. } = trained;
@@ -146,7 +152,7 @@ pub fn code_scene<F: DeformationField>(
                 frozen_steps::search(&scene.to_arrays(meta.clone()), &mut config.compression, images);
             }
             let begin = Instant::now();
-            let compression = fit(scene, &config, device, progress)?;
+            let compression = fit(trained.models, scene, &config, device, progress)?;
             (compression, Some(begin.elapsed().as_secs_f64()), config.compression)
         }
     };
@@ -173,7 +179,7 @@ fn searches(settings: &CompressionConfig, fits: bool) -> bool {
     settings.attributes.search_tolerance > 0.0 || (fits && fitted)
 }
 
-fn plane_records(encoded: &EncodedScene, compression: &Compression) -> Vec<PlaneRecord> {
+fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Compression<C, S>) -> Vec<PlaneRecord> {
     let Some(models) = &compression.planes else { return Vec::new() };
     let steps = models.quantization.steps_without_gradient().values();
     let record = |bytes: &PlaneBytes| PlaneRecord {

@@ -8,11 +8,11 @@ use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
 };
-use light4gs_model::{DeformationField, DynamicScene, HexPlane, Latent, ShEntropy, counted_sh_coding};
+use light4gs_model::{DeformationField, DynamicScene, HexPlane, Latent, PlaneEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
-use super::{Compression, step_search};
+use super::{Compression, ShModel, step_search};
 use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
@@ -84,9 +84,9 @@ pub struct SearchImages<'a> {
 
 /// Encodes a scene in a profile. Everything that is coded is decoded again and
 /// compared before this returns.
-pub fn encode<F: DeformationField>(
+pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
-    compression: &Compression,
+    compression: &Compression<C, S>,
     meta: SceneMeta,
     config: &CompressionConfig,
     profile: Profile,
@@ -127,9 +127,9 @@ const FREEZING_ROUNDS: usize = 8;
 ///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
-pub fn freeze_planes<F: DeformationField>(
+pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
-    compression: &Compression,
+    compression: &Compression<C, S>,
     config: &CompressionConfig,
     device: &Device,
 ) -> Result<Option<HexPlane>, TrainError> {
@@ -159,15 +159,15 @@ pub fn freeze_planes<F: DeformationField>(
 
 /// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
 /// arrays.
-pub fn compression_input<F: DeformationField>(
-    compression: &mut Compression,
+pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
+    compression: &mut Compression<C, S>,
     scene: &DynamicScene<F>,
     data: &SceneData,
     config: &CompressionConfig,
     profile: Profile,
 ) -> Result<CompressionInput, TrainError> {
     if let Some(models) = &mut compression.planes {
-        models.context.update_quantiles();
+        models.context.base_mut().update_quantiles();
     }
     Ok(CompressionInput {
         profile,
@@ -182,7 +182,7 @@ pub fn compression_input<F: DeformationField>(
     })
 }
 
-impl Compression {
+impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// What the codec needs to code the planes.
     fn plane_coding<F: DeformationField>(&self, scene: &DynamicScene<F>) -> Result<Option<PlaneCoding>, TrainError> {
         let (Some(models), Some(hexplane)) = (&self.planes, scene.planes()) else { return Ok(None) };

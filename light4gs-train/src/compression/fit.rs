@@ -3,7 +3,7 @@
 use burn::tensor::Device;
 use light4gs_model::{DeformationField, DynamicScene};
 
-use super::Compression;
+use super::{Compression, CompressionOf, EntropyModels};
 use crate::config::Config;
 use crate::divergence::Divergence;
 use crate::divergence::{not_finite_parameter, remedy};
@@ -20,14 +20,15 @@ use crate::stage::Stage;
 ///
 /// # Errors
 /// What `progress` returns; [`TrainError::Diverged`] if a model has numbers that are not finite.
-pub fn fit<F: DeformationField>(
+pub fn fit<F: DeformationField, E: EntropyModels>(
+    models: &E,
     scene: &DynamicScene<F>,
     config: &Config,
     device: &Device,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
-) -> Result<Compression, TrainError> {
+) -> Result<CompressionOf<E>, TrainError> {
     seed_device(device, config.seed, Stage::Fine, 0);
-    let mut compression = Compression::new(config, scene.planes(), device)?;
+    let mut compression = Compression::new(models, config, scene.planes(), device)?;
     let settings = &config.compression;
     let iterations = settings.context.fit_iterations;
     let decay = |first: f64, last: f64| ExponentialDecay::new(first, last, iterations);

@@ -2,11 +2,13 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
-use light4gs_model::{DeformationField, DynamicScene, HexPlane, HexPlaneField, Latent, PlaneSteps, ShEntropy, ShKnown};
+use light4gs_model::{
+    DeformationField, DynamicScene, HexPlane, HexPlaneField, Latent, PlaneEntropy, PlaneSteps, ShEntropy, ShKnown,
+};
 use rand::Rng;
 use rand::seq::index;
 
-use super::Compression;
+use super::{Compression, ShModel};
 
 /// A scene with the noise of quantization, which both the image and the rate see.
 #[derive(Clone, Debug)]
@@ -52,7 +54,7 @@ impl Rate {
     }
 }
 
-impl Compression {
+impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// The scene with uniform noise as wide as the steps. `learn_steps` asks for the steps' gradients; `with_sh` puts noise
     /// on the spherical harmonics too.
     pub fn noisy<F: DeformationField>(

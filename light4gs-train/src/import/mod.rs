@@ -14,14 +14,14 @@ mod views;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use light4gs_model::{DynamicScene, HexPlaneField};
+use light4gs_model::DynamicScene;
 
 pub use views::scene_around;
 
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::optimization::adam::Adam;
-use crate::run::{Checkpoint, RunFolder, SaveError};
+use crate::run::{Checkpoint, RunFolder, SaveError, checkpoint_name};
 use crate::stage::Stage;
 
 /// A scene with motion, as another program has trained it.
@@ -80,7 +80,7 @@ impl ImportedScene {
         let config = self.config(base)?;
         let folder = RunFolder::create(root, dataset, &config, overwrite)?;
         let iteration = config.train.fine_iterations;
-        let state = Checkpoint {
+        let state: Checkpoint = Checkpoint {
             scene: self.scene,
             compression: None,
             adam: Adam::default(),
@@ -89,7 +89,7 @@ impl ImportedScene {
             iteration,
             seconds: 0.0,
         };
-        let name = Checkpoint::<HexPlaneField>::file_name(Stage::Fine, iteration);
+        let name = checkpoint_name(Stage::Fine, iteration);
         let path = folder.checkpoints().join(name);
         state.save(&path).map_err(|error| match error {
             SaveError::Other(error) => error,

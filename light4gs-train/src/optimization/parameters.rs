@@ -124,7 +124,7 @@ mod tests {
     use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
     use super::*;
-    use crate::compression::Compression;
+    use crate::compression::{Compression, ConfiguredModels};
     use crate::config::Config;
 
     #[derive(Default)]
@@ -145,7 +145,7 @@ mod tests {
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let device = Device::flex();
         let scene = config.model.build().init(&cloud, &device);
-        let compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let (mut groups, mut models) = (Groups::default(), Groups::default());
         visit_parameters(&scene, &mut groups);
         visit_parameters(&compression, &mut models);

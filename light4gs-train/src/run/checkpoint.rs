@@ -15,7 +15,7 @@ use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_paramete
 use light4gs_model::{DeformationField, DynamicScene, HexPlaneField};
 
 use super::stored_tensors::{self, Entry, StoredTensors, floats, not_finite};
-use crate::compression::Compression;
+use crate::compression::{Compression, CompressionOf, ConfiguredModels, EntropyModels};
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::optimization::adam::{Adam, AdamState};
@@ -24,11 +24,11 @@ use crate::stage::Stage;
 
 /// A run's state after an iteration.
 #[derive(Debug)]
-pub struct Checkpoint<F: DeformationField = HexPlaneField> {
+pub struct Checkpoint<F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
     /// The model, on the run's device.
     pub scene: DynamicScene<F>,
     /// Entropy models and quantization steps, where the run trains them.
-    pub compression: Option<Compression>,
+    pub compression: Option<CompressionOf<E>>,
     /// Optimizer state.
     pub adam: Adam,
     /// What the density strategy keeps, by name: vectors off the tape.
@@ -86,12 +86,7 @@ fn parsed_mapping(text: &str) -> Option<CoordinateMapping> {
     finite.then_some(CoordinateMapping { contracts: contracts != 0.0, scale, offset, time_scale, time_offset })
 }
 
-impl<F: DeformationField> Checkpoint<F> {
-    /// File name of a checkpoint.
-    pub fn file_name(stage: Stage, iteration: usize) -> String {
-        format!("{}_{iteration:06}.safetensors", stage.name())
-    }
-
+impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
     /// Everything that is stored, by name.
     fn entries(&self) -> BTreeMap<String, Entry> {
         let mut entries = BTreeMap::new();
@@ -144,7 +139,8 @@ impl<F: DeformationField> Checkpoint<F> {
         Ok(write_atomically(path, |file| file.write_all(&bytes)).map_err(TrainError::from)?)
     }
 
-    /// Reads a checkpoint of a run with this configuration and this deformation field onto an autodiff device.
+    /// Reads a checkpoint of a run with this configuration, this deformation field and these entropy models onto an autodiff
+    /// device.
     ///
     /// Nothing in the file is believed: every tensor must be there, of the shape that the configuration and the number of
     /// Gaussians give it, with finite values that training can have led to, and no other; the place in the run must be on
@@ -152,7 +148,13 @@ impl<F: DeformationField> Checkpoint<F> {
     ///
     /// # Errors
     /// [`TrainError::Checkpoint`] naming the tensor or the entry, or the other kind of field.
-    pub fn load(path: &Path, config: &Config, field: &F::Config, device: &Device) -> Result<Self, TrainError> {
+    pub fn load(
+        path: &Path,
+        config: &Config,
+        field: &F::Config,
+        models: &E,
+        device: &Device,
+    ) -> Result<Self, TrainError> {
         let bytes = read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
         let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
         let mut file = StoredTensors::new(&bytes).map_err(failed)?;
@@ -173,7 +175,7 @@ impl<F: DeformationField> Checkpoint<F> {
             let wrong = || failed(format!("metadata `{MAPPING}` is `{text}`, expected nine numbers"));
             scene.coordinates = scene.coordinates.with_mapping(parsed_mapping(text).ok_or_else(wrong)?);
         }
-        let mut compression = Compression::of_run(config, scene.planes(), device)?;
+        let mut compression = Compression::of_run(models, config, scene.planes(), device)?;
         let count = gaussian_count(&file);
         if count == 0 {
             let means = GaussianAttribute::Means.path();
@@ -343,6 +345,11 @@ fn check_range(path: &str, values: &[f32]) -> Result<(), String> {
         ));
     }
     row.map_or(Ok(()), |row| Err(format!("has, in row {row}, something else than {expected}")))
+}
+
+/// File name of a checkpoint.
+pub fn checkpoint_name(stage: Stage, iteration: usize) -> String {
+    format!("{}_{iteration:06}.safetensors", stage.name())
 }
 
 /// Stage and iteration, as a checkpoint's name has them.

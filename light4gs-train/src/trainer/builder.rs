@@ -14,7 +14,7 @@ use super::Trainer;
 use super::profile::Profile;
 use super::sampling::FrameSampler;
 use super::views::ViewPools;
-use crate::compression::{Compression, compression_input};
+use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
 use crate::config::Config;
 use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{AdaptiveDensityControl, DensityStrategy, SignificanceScore, VolumeWeightedScore};
@@ -30,10 +30,11 @@ use crate::run::{Checkpoint, RunFolder};
 use crate::stage::Stage;
 
 /// The parts of a [`Trainer`]: those that are not given are the ones that the configuration describes.
-pub struct TrainerBuilder<F: DeformationField = HexPlaneField> {
+pub struct TrainerBuilder<F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
     config: Config,
     data: Scene,
     field: F::Config,
+    models: E,
     device: Option<Device>,
     images: Option<Box<dyn ImageSource>>,
     folder: Option<RunFolder>,
@@ -60,6 +61,43 @@ impl<F: DeformationField> TrainerBuilder<F> {
             config,
             data,
             field,
+            models: ConfiguredModels,
+        }
+    }
+}
+
+impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
+    /// Entropy models of one's own, instead of those that the configuration describes.
+    pub fn entropy_models<O: EntropyModels>(self, models: O) -> TrainerBuilder<F, O> {
+        let Self {
+            config,
+            data,
+            field,
+            models: _,
+            device,
+            images,
+            folder,
+            loss,
+            density,
+            significance,
+            observers,
+            accept_changed_dataset,
+            stop,
+        } = self;
+        TrainerBuilder {
+            config,
+            data,
+            field,
+            models,
+            device,
+            images,
+            folder,
+            loss,
+            density,
+            significance,
+            observers,
+            accept_changed_dataset,
+            stop,
         }
     }
 
@@ -124,7 +162,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
     /// # Errors
     /// A configuration out of range; a device that there is not; a dataset without frames; logs that cannot be opened; a
     /// folder that another process writes into.
-    pub fn build(mut self) -> Result<Trainer<F>, TrainError> {
+    pub fn build(mut self) -> Result<Trainer<F, E>, TrainError> {
         let device = self.open_device()?;
         self.begin(device)
     }
@@ -135,12 +173,12 @@ impl<F: DeformationField> TrainerBuilder<F> {
     /// # Errors
     /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration;
     /// [`TrainError::Input`] with what has changed if the dataset is not what it was when the run began.
-    pub fn resume(mut self) -> Result<Trainer<F>, TrainError> {
+    pub fn resume(mut self) -> Result<Trainer<F, E>, TrainError> {
         let device = self.open_device()?;
         match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
             None => self.begin(device),
             Some(path) => {
-                let state = Checkpoint::load(&path, &self.config, &self.field, &device)?;
+                let state = Checkpoint::load(&path, &self.config, &self.field, &self.models, &device)?;
                 self.assemble(device, state, Some(path))
             }
         }
@@ -180,17 +218,17 @@ impl<F: DeformationField> TrainerBuilder<F> {
         self.first_state(&device).map(|_| ())
     }
 
-    fn begin(self, device: Device) -> Result<Trainer<F>, TrainError> {
+    fn begin(self, device: Device) -> Result<Trainer<F, E>, TrainError> {
         let state = self.first_state(&device)?;
         self.assemble(device, state, None)
     }
 
     /// What training begins with.
-    fn first_state(&self, device: &Device) -> Result<Checkpoint<F>, TrainError> {
+    fn first_state(&self, device: &Device) -> Result<Checkpoint<F, E>, TrainError> {
         device.seed(self.config.seed);
         let scene = self.config.model.scene::<F>(self.field.clone()).init(&self.data.points, device);
         let state = Checkpoint {
-            compression: Compression::of_run(&self.config, scene.planes(), device)?,
+            compression: Compression::of_run(&self.models, &self.config, scene.planes(), device)?,
             scene,
             adam: Adam::default(),
             density: Default::default(),
@@ -203,7 +241,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
     }
 
     /// Refuses now what the encoder would refuse in the end: it is asked about the scene and the models to start from.
-    fn check_encodable(&self, state: &Checkpoint<F>) -> Result<(), TrainError> {
+    fn check_encodable(&self, state: &Checkpoint<F, E>) -> Result<(), TrainError> {
         let scene = state.scene.valid();
         let arrays = scene.to_arrays(scene_meta(&self.config, &self.data));
         let settings = &self.config.compression;
@@ -221,10 +259,10 @@ impl<F: DeformationField> TrainerBuilder<F> {
     fn assemble(
         self,
         device: Device,
-        mut state: Checkpoint<F>,
+        mut state: Checkpoint<F, E>,
         checkpoint: Option<PathBuf>,
-    ) -> Result<Trainer<F>, TrainError> {
-        let Self { config, data, images, folder, loss, mut density, significance, observers, stop, .. } = self;
+    ) -> Result<Trainer<F, E>, TrainError> {
+        let Self { config, data, models, images, folder, loss, mut density, significance, observers, stop, .. } = self;
         let count = state.scene.gaussians.len();
         match checkpoint {
             None => density.begin_stage(count, &device.clone().inner()),
@@ -258,6 +296,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             images,
             folder,
             state,
+            models,
             loss,
             density,
             significance,

@@ -31,7 +31,7 @@ use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneFi
 
 pub use builder::TrainerBuilder;
 
-use crate::compression::{CodedScene, Compression, TrainedScene, code_scene};
+use crate::compression::{CodedScene, CompressionOf, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
 use crate::config::Config;
 use crate::dataset::ImageSource;
 use crate::density::{DensityStrategy, SignificanceScore};
@@ -42,7 +42,7 @@ use crate::metrics::{image_tensor, psnr};
 use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
-use crate::run::{Checkpoint, RunFolder, SaveError, list_checkpoints};
+use crate::run::{Checkpoint, RunFolder, SaveError, checkpoint_name, list_checkpoints};
 use crate::stage::Stage;
 use profile::Profile;
 use sampling::FrameSampler;
@@ -97,13 +97,14 @@ use views::ViewPools;
 /// assert_eq!(losses.len(), 10);
 /// # Ok::<(), light4gs_train::error::TrainError>(())
 /// ```
-pub struct Trainer<F: DeformationField = HexPlaneField> {
+pub struct Trainer<F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
     config: Config,
     device: Device,
     data: Scene,
     images: Box<dyn ImageSource>,
     folder: Option<RunFolder>,
-    state: Checkpoint<F>,
+    state: Checkpoint<F, E>,
+    models: E,
     loss: Box<dyn Loss>,
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
@@ -139,7 +140,9 @@ impl<F: DeformationField> Trainer<F> {
     pub fn builder_with_field(config: Config, data: Scene, field: F::Config) -> TrainerBuilder<F> {
         TrainerBuilder::new(config, data, field)
     }
+}
 
+impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// From now on measures the parts of every iteration. The run gets slower, since each part is waited for.
     pub fn measure_stages(&mut self) {
         self.profile = Profile::on(&self.device);
@@ -168,7 +171,7 @@ impl<F: DeformationField> Trainer<F> {
     }
 
     /// Entropy models and quantization steps, where the run trains them.
-    pub fn compression(&self) -> Option<&Compression> {
+    pub fn compression(&self) -> Option<&CompressionOf<E>> {
         self.state.compression.as_ref()
     }
 
@@ -208,6 +211,7 @@ impl<F: DeformationField> Trainer<F> {
         let trained = TrainedScene {
             scene: &self.state.scene,
             compression: self.state.compression.as_ref(),
+            models: &self.models,
             config: &self.config,
             data: &self.data,
             images: Some(&*self.images),
@@ -284,8 +288,7 @@ impl<F: DeformationField> Trainer<F> {
     /// Makes sure that nothing is lost, and returns the error that says where training has stopped.
     fn stop(&mut self) -> Result<TrainError, TrainError> {
         let (stage, iteration) = self.position();
-        let saved =
-            |folder: &RunFolder| folder.checkpoints().join(Checkpoint::<F>::file_name(stage, iteration)).exists();
+        let saved = |folder: &RunFolder| folder.checkpoints().join(checkpoint_name(stage, iteration)).exists();
         // At the beginning of a stage there is nothing that the last checkpoint, or the dataset, does not have.
         if iteration > 0 && !self.folder.as_ref().is_some_and(saved) {
             self.save_checkpoint()?;
@@ -336,7 +339,7 @@ impl<F: DeformationField> Trainer<F> {
 
     fn save_checkpoint(&mut self) -> Result<(), TrainError> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let path = folder.checkpoints().join(Checkpoint::<F>::file_name(self.state.stage, self.state.iteration));
+        let path = folder.checkpoints().join(checkpoint_name(self.state.stage, self.state.iteration));
         self.state.density = self.density.state();
         self.state.save(&path).map_err(|error| match error {
             SaveError::NotFinite { tensor: name, index, value } => {

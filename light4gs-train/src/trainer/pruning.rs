@@ -8,11 +8,12 @@ use light4gs_model::{DeformationField, Significance, least_significant};
 use rand::Rng;
 
 use super::Trainer;
+use crate::compression::EntropyModels;
 use crate::density::{GaussianContributions, GaussianEditor};
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
 
-impl<F: DeformationField> Trainer<F> {
+impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// Drops the Gaussians that contribute least to the training views at their times.
     pub(super) fn prune_insignificant(&mut self, iteration: usize) {
         // Off the tape, which would hold on to every view's tensors until the next backward pass.

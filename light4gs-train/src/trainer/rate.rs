@@ -1,17 +1,18 @@
 //! Quantization noise and the rate in a training step (paper III-C to III-E, IV-B).
 
+use burn::module::Module;
 use burn::tensor::Tensor;
 use light4gs_model::{DeformationField, DynamicScene};
 
 use super::Trainer;
-use crate::compression::{Compression, NoisyScene, freeze_planes};
+use crate::compression::{Compression, EntropyModels, NoisyScene, freeze_planes};
 use crate::config::{Config, RateWeighting};
 use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
 use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
 
-impl<F: DeformationField> Trainer<F> {
+impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// The scene as it will roughly be decoded, once the rate has entered the training.
     pub(super) fn quantization_noise(
         &mut self,
@@ -96,10 +97,10 @@ impl<F: DeformationField> Trainer<F> {
 
 /// A term with the steps' whole gradient: what the rate says of them (`direct`, by plane), and what the noisy planes pass
 /// on, which is the noise, in steps, times the gradient of what carries it. None where no step is learned.
-fn steps_term<F: DeformationField>(
+fn steps_term<F: DeformationField, C: Module, S: Module>(
     noisy: &NoisyScene<F>,
     scene: &DynamicScene<F>,
-    compression: &Compression,
+    compression: &Compression<C, S>,
     direct: Vec<Option<Tensor<1>>>,
     gradients: &GradientSums,
 ) -> Option<Tensor<1>> {
@@ -127,6 +128,7 @@ mod tests {
     use light4gs_data::PointCloud;
 
     use super::*;
+    use crate::compression::ConfiguredModels;
     use crate::config::Config;
 
     /// Steps learn from planes on a tape of their own what they would learn on one and the same.
@@ -139,7 +141,7 @@ mod tests {
         config.compression.steps.per_scale = true;
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let scene = config.model.build().init(&cloud, &device);
-        let compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let noisy = compression.noisy(&scene, true, false);
         // Something that planes and steps both have a part in, another one in each plane.
         let loss = |planes: &[Tensor<3>], steps: &dyn Fn(usize) -> Tensor<1>| {

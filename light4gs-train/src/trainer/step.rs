@@ -6,6 +6,7 @@ use light4gs_model::{DeformationField, HexPlane};
 
 use super::Trainer;
 use super::views::ViewPass;
+use crate::compression::EntropyModels;
 use crate::density::{GaussianEditor, Moment, ViewStatistics};
 use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
@@ -18,7 +19,7 @@ use crate::stage::Stage;
 /// How many iterations ahead images are decoded.
 const PREFETCHED_ITERATIONS: usize = 8;
 
-impl<F: DeformationField> Trainer<F> {
+impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// Forward, backward, and one optimizer step.
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
         self.profile.begin_step();

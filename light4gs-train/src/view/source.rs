@@ -7,6 +7,7 @@ use burn::tensor::Device;
 use light4gs_codec::read_info;
 use light4gs_data::{DataError, Scene};
 
+use crate::compression::ConfiguredModels;
 use crate::config::{Config, DeviceName};
 use crate::dataset::{load_options, scene_meta};
 use crate::device;
@@ -143,7 +144,8 @@ impl Run {
 
     /// A checkpoint as a stream without loss, and where in the training it was written.
     fn encode(&self, path: &Path) -> Result<(Vec<u8>, String), TrainError> {
-        let checkpoint: Checkpoint = Checkpoint::load(path, &self.config, &self.config.model.field(), &self.device)?;
+        let checkpoint: Checkpoint =
+            Checkpoint::load(path, &self.config, &self.config.model.field(), &ConfiguredModels, &self.device)?;
         let data = checkpoint.scene.to_arrays(scene_meta(&self.config, &self.dataset));
         let status = format!("{} stage, iteration {}", checkpoint.stage.name(), checkpoint.iteration);
         Ok((light4gs_codec::encode(&data)?, status))

@@ -11,7 +11,8 @@ use light4gs_codec::{Network, PlaneSource};
 use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
     CenteredPlanes, ContextModel, ContextModelConfig, DescribedCondition, DescribedPrior, InterPlane, InterScale,
-    KernelShape, Latent, Passes, PlaneSteps, Prior, PriorPart, anchor_mask, checkerboard_kernel, upsample,
+    KernelShape, Latent, Passes, PlaneEntropy, PlaneSteps, Prior, PriorPart, anchor_mask, checkerboard_kernel,
+    upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::named::{compare_gradients, load};

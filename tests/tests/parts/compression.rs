@@ -5,10 +5,10 @@ use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::{PlaneCoding, Profile, SceneMeta, decode, plane_distributions};
 use light4gs_data::PointCloud;
 use light4gs_model::{
-    ContextModel, ContextModelConfig, ContextParts, DynamicScene, HexPlaneConfig, Latent, PlaneSteps,
+    ContextModel, ContextModelConfig, ContextParts, DynamicScene, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
-use light4gs_train::compression::{Compression, encode, freeze_planes};
+use light4gs_train::compression::{Compression, ConfiguredModels, encode, freeze_planes};
 use light4gs_train::config::Config;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -108,7 +108,7 @@ fn the_rate_on_a_part_is_unbiased() {
     let device = Device::flex().autodiff();
     let config = config(&[]);
     let scene = scene(&config, &device);
-    let compression = Compression::new(&config, scene.planes(), &device).unwrap();
+    let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
     let noisy = compression.noisy(&scene, false, true);
     // The hyperprior's own noise is drawn anew each time; seeding it makes all draws see the same.
     let estimate = |fraction: f64, seed: u64| {
@@ -154,7 +154,7 @@ fn every_configuration_makes_a_file_that_decodes() {
     ] {
         let config = config(overrides);
         let scene = scene(&config, &device);
-        let mut compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         compression.start_from(scene.planes());
         let encoded =
             encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
@@ -186,7 +186,7 @@ fn frozen_planes_are_those_of_the_file() {
             let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.05), &device);
             *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
         }
-        let mut compression = Compression::new(&config, scene.planes(), &device).unwrap();
+        let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let mut models = compression.planes.unwrap();
         models.context =
             shaken(models.context, &scene.field.hexplane.tensors(), &models.quantization.steps_without_gradient());
@@ -214,7 +214,7 @@ fn freezing_does_not_carry_planes_away() {
         let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.2), &device);
         *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
     }
-    let mut compression = Compression::new(&config, scene.planes(), &device).unwrap();
+    let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
     let mut models = compression.planes.unwrap();
     let steps = models.quantization.steps_without_gradient();
     models.context = shaken(models.context, &scene.field.hexplane.tensors(), &steps);
@@ -243,7 +243,7 @@ fn a_scene_without_gaussians_is_a_file_too() {
     let mut empty = full;
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
     let scene: DynamicScene = DynamicScene::from_arrays(&empty, &device).unwrap();
-    let compression = Compression::new(&config, scene.planes(), &device).unwrap();
+    let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
     let encoded =
         encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
             .unwrap();

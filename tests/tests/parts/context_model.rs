@@ -7,7 +7,8 @@ use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::plane_layout::coding_order;
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 use light4gs_model::{
-    AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlaneConfig, Latent, PlaneSteps,
+    AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlaneConfig, Latent, PlaneEntropy,
+    PlaneSteps,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 

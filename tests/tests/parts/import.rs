@@ -8,7 +8,7 @@ use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter, St
 use light4gs_tests::golden::{Golden, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::pytorch::{StateDict, save_state_dict};
 use light4gs_tests::random::Random;
-use light4gs_train::compression::{TrainedScene, code_scene};
+use light4gs_train::compression::{ConfiguredModels, TrainedScene, code_scene};
 use light4gs_train::config::Config;
 use light4gs_train::import::{reference, scene_around, still};
 use light4gs_train::run::{Checkpoint, RunFolder};
@@ -355,7 +355,8 @@ fn a_coded_checkpoint_costs_no_more_than_0_05_db() {
     assert_eq!(read, config);
     assert!(record.dataset().unwrap_err().to_string().contains("--scene"));
     let checkpoint = folder_of_run.last_checkpoint().unwrap();
-    let loaded: Checkpoint = Checkpoint::load(&checkpoint, &read, &read.model.field(), &device).unwrap();
+    let loaded: Checkpoint =
+        Checkpoint::load(&checkpoint, &read, &read.model.field(), &ConfiguredModels, &device).unwrap();
     let frames = other_views(&scene.gaussians.to_arrays(), folder.path());
     let before = |frame: &Frame| pixels(&scene, config.data.background, frame);
     for frame in &frames.test {
@@ -365,6 +366,7 @@ fn a_coded_checkpoint_costs_no_more_than_0_05_db() {
     let trained = TrainedScene {
         scene: &loaded.scene,
         compression: None,
+        models: &ConfiguredModels,
         config: &read,
         data: &data,
         images: None,
@@ -393,8 +395,15 @@ fn a_ply_becomes_a_file_that_renders_alike() {
     let scene = still::read(&path, &device).unwrap();
     let config = small_fit("imported");
     let data = scene_around(&scene.gaussians.to_arrays(), folder.path(), [0.0; 3]).unwrap();
-    let trained =
-        TrainedScene { scene: &scene, compression: None, config: &config, data: &data, images: None, device: &device };
+    let trained = TrainedScene {
+        scene: &scene,
+        compression: None,
+        models: &ConfiguredModels,
+        config: &config,
+        data: &data,
+        images: None,
+        device: &device,
+    };
     let coded = code_scene(&trained, &mut |_, _| Ok(())).unwrap();
     let decoded = light4gs_codec::decode(&coded.bytes).unwrap();
     assert!(decoded.motion.kind.is_empty() && decoded.hexplane.planes.is_empty());

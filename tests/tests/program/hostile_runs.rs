@@ -13,6 +13,7 @@ use light4gs_tests::hostile::configurations::{is_cheap, odd, tiny_with};
 use light4gs_tests::hostile::{assert_bearable, bytes, cases, generator, json, run_within, train, without_panic};
 use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 use light4gs_train::Stage;
+use light4gs_train::compression::ConfiguredModels;
 use light4gs_train::config::Config;
 use light4gs_train::dataset::load_options;
 use light4gs_train::density::{AdaptiveDensityControl, DensityStrategy};
@@ -44,7 +45,8 @@ fn checkpoint(folder: &Path) -> (Config, PathBuf) {
 
 /// As `resume` does: the density strategy takes its part.
 fn load(path: &Path, config: &Config) -> Result<Checkpoint, TrainError> {
-    let checkpoint: Checkpoint = Checkpoint::load(path, config, &config.model.field(), &Device::flex().autodiff())?;
+    let checkpoint: Checkpoint =
+        Checkpoint::load(path, config, &config.model.field(), &ConfiguredModels, &Device::flex().autodiff())?;
     let mut density = AdaptiveDensityControl::new(config.train.densify.clone());
     density
         .restore(checkpoint.density.clone(), checkpoint.scene.gaussians.len())
