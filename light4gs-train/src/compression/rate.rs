@@ -3,7 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::{
-    DeformationField, DynamicScene, HexPlane, HexPlaneField, Latent, PlaneEntropy, PlaneSteps, ShEntropy, ShKnown,
+    DeformationField, DynamicScene, HexPlane, HexPlaneField, Latent, PlaneEntropy, PlaneSteps, ShKnown,
 };
 use rand::Rng;
 use rand::seq::index;
