@@ -2,7 +2,7 @@
 
 use std::slice::from_ref;
 
-use crate::{CodecError, SceneData, bytes::Section};
+use crate::{CodecError, SceneData, bytes::Section, scene::SH_REST};
 
 /// One array of numbers of a scene.
 struct Field<'a> {
@@ -22,13 +22,10 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     add("meta", "background".into(), &meta.background);
     add("meta", "fov_x".into(), from_ref(&meta.fov_x));
 
-    let section = Section::Gaussians.name();
-    add(section, "means".into(), gaussians.means.as_flattened());
-    add(section, "log_scales".into(), gaussians.log_scales.as_flattened());
-    add(section, "quats".into(), gaussians.quats.as_flattened());
-    add(section, "opacity_logits".into(), &gaussians.opacity_logits);
-    add(section, "sh_dc".into(), gaussians.sh_dc.as_flattened());
-    add(Section::Sh.name(), "sh_rest".into(), &gaussians.sh_rest);
+    for attribute in gaussians.attributes() {
+        let section = if attribute.name == SH_REST { Section::Sh } else { Section::Gaussians };
+        add(section.name(), attribute.name.to_owned(), attribute.values);
+    }
 
     let section = Section::SceneFrame.name();
     add(section, "mean".into(), &frame.mean);

@@ -18,6 +18,7 @@
 //!         sh_dc: vec![[0.1; 3]],
 //!         sh_degree: 1,
 //!         sh_rest: vec![0.0; 9],
+//!         further: Vec::new(),
 //!     },
 //!     frame: SceneFrameArrays::default(), // no normalization
 //!     ..Default::default()                // no hexplane, no network: a scene that does not move
@@ -106,8 +107,9 @@ pub use planes::{
     Condition, ContextModelArrays, LatentArrays, PlaneCoding, PlanePrior, PlaneSource, section::PlaneBytes,
 };
 pub use scene::{
-    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource,
-    NamedTensor, Plane, SceneData, SceneFrameArrays, SceneMeta, sh_rest_coefficients,
+    AttributeValues, Coder, CoordinateMapping, FurtherAttribute, GaussianArrays, HexPlaneArrays,
+    LONGEST_ATTRIBUTE_NAME, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Plane, SceneData,
+    SceneFrameArrays, SceneMeta, legal_attribute_name, sh_rest_coefficients,
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use steps::PerGroup;

@@ -38,6 +38,10 @@ pub struct Limits {
     pub image_pixels: u64,
     /// Gaussians.
     pub gaussians: u32,
+    /// Attributes of a Gaussian.
+    pub attributes: u32,
+    /// Numbers that an attribute has for a Gaussian.
+    pub attribute_width: u32,
     /// Channels of a plane.
     pub channels: u32,
     /// Samples of a plane along one axis.
@@ -73,6 +77,8 @@ impl Default for Limits {
             image_side: 1 << 14,
             image_pixels: 1 << 25,
             gaussians: 1 << 26,
+            attributes: 64,
+            attribute_width: 1 << 8,
             channels: 1 << 12,
             resolution: 1 << 16,
             scales: 16,

@@ -47,13 +47,17 @@ pub fn sh_step(step: f32) -> Result<(), CodecError> {
     check_step(Section::Sh.name(), "step", step, LEAST_STEP)
 }
 
-/// Refuses a step of one of the [`AttributeSteps`](crate::attributes::AttributeSteps), by the name of its field.
+/// Refuses a step of one of the [`AttributeSteps`](crate::attributes::AttributeSteps), by the attribute's name.
 ///
 /// # Errors
-/// As [`plane_step`]; a position's step, which is relative, may be any normal number up to 1e30.
+/// As [`plane_step`]; the step of `means`, which is relative, may be any normal number up to 1e30.
 pub fn attribute_step(attribute: &str, step: f32) -> Result<(), CodecError> {
-    let least = if attribute == "position" { f32::MIN_POSITIVE } else { LEAST_STEP };
-    check_step(Section::Gaussians.name(), format!("step of {attribute}"), step, least)
+    check_step(Section::Gaussians.name(), format!("step of {attribute}"), step, least_step(attribute))
+}
+
+/// The smallest step that the encoder takes for an attribute. That of the positions is relative to the size of Gaussians.
+pub(crate) fn least_step(attribute: &str) -> f32 {
+    if attribute == "means" { f32::MIN_POSITIVE } else { LEAST_STEP }
 }
 
 /// Refuses a step outside of a range.

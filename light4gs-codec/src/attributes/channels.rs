@@ -11,6 +11,9 @@ const LAST_LEVEL: usize = 13;
 /// A residual counts for the context no more than this, so that one wild value does not spoil its neighbors'.
 const LARGEST_RESIDUAL: u32 = 1 << 16;
 
+/// From so many channels before it a channel is predicted at most, so that a wide attribute takes time in proportion.
+const MOST_BEFORE: usize = 7;
+
 /// Writes the channels of an attribute, each with a value for every Gaussian.
 pub(super) fn encode(channels: &[Vec<i32>], neighbors: &[[u32; NEIGHBORS]]) -> Vec<u8> {
     let mut encoder = BitEncoder::default();
@@ -41,11 +44,12 @@ fn code(
     for values in channels.iter_mut() {
         let mean = numbers.code(coder, 0, mean(values));
         let mut own = Channel::new(std::mem::take(values), mean);
-        let mut prediction = LinearPrediction::zero(before.len());
+        let last = &before[before.len().saturating_sub(MOST_BEFORE)..];
+        let mut prediction = LinearPrediction::zero(last.len());
         if encoding {
             let mut whole = own.clone();
             neighbors.iter().for_each(|near| whole.gather(near));
-            prediction = LinearPrediction::fit(&whole, &before, neighbors);
+            prediction = LinearPrediction::fit(&whole, last, neighbors);
         }
         prediction.code(coder, &mut numbers);
 
@@ -54,7 +58,7 @@ fn code(
         for (index, near) in neighbors.iter().enumerate() {
             coder.check()?;
             own.gather(near);
-            let predicted = prediction.predict(&own, &before, near, index);
+            let predicted = prediction.predict(&own, last, near, index);
             let level = expected_level(&missed, missed_before.get(index), near);
             let residual = residuals.code(coder, level, own.values[index].wrapping_sub(predicted));
             own.values[index] = predicted.wrapping_add(residual);

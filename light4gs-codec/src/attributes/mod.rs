@@ -1,60 +1,58 @@
-//! Compact coding of the Gaussians' attributes, but for the higher spherical harmonics (docs/design.md).
+//! What every Gaussian has, but for the higher spherical harmonics (docs/design.md).
 //!
-//! Positions go onto a grid and into Morton order, in which they are coded as a set (`positions.rs`). The other
-//! attributes follow in that order, uniformly quantized. Each channel is predicted linearly from the nearest Gaussians
-//! before and from the channels before, and what the prediction misses by is coded adaptively.
+//! A section is a list of named attributes, each with its width and its coder; `docs/format.md` has the bytes. Without
+//! loss all are float32. Compact, positions go onto a grid and into Morton order, in which they are coded as a set
+//! (`positions.rs`). The other attributes follow in that order, uniformly quantized: each channel is predicted linearly
+//! from the nearest Gaussians before and from the channels before, and what the prediction misses by is coded adaptively.
+//! A further attribute without a step stays float32.
 //!
 //! ```
-//! use light4gs_codec::{GaussianArrays, Limits, attributes::{self, AttributeSteps}};
+//! use light4gs_codec::{FurtherAttribute, GaussianArrays, Limits, attributes::{self, AttributeSteps}};
 //!
+//! let age = FurtherAttribute { name: "age".into(), width: 1, values: vec![7.0, 8.0], optional: true };
 //! let gaussians = GaussianArrays {
 //!     means: vec![[0.5, 0.0, 0.0], [0.0; 3]],
 //!     log_scales: vec![[-3.0; 3]; 2],
 //!     quats: vec![[1.0, 0.0, 0.0, 0.0]; 2],
 //!     opacity_logits: vec![2.0, -1.0],
 //!     sh_dc: vec![[0.1; 3]; 2],
+//!     further: vec![age],
 //!     ..Default::default()
 //! };
-//! let steps = AttributeSteps::default();
+//! let steps = AttributeSteps::default().with("age", 0.5);
 //! let encoded = attributes::encode(&gaussians, &steps)?;
 //! let decoded = attributes::decode(&encoded.bytes, &Limits::default())?;
 //! assert_eq!(decoded, attributes::quantized(&gaussians, &steps)?);
 //! // Other arrays must follow the Gaussians: the first of the new order was the second.
 //! assert_eq!(encoded.order, [1, 0]);
+//! assert_eq!(decoded.further[0].values, [8.0, 7.0]);
 //! # Ok::<(), light4gs_codec::CodecError>(())
 //! ```
-//!
-//! The bytes, all numbers little-endian:
-//!
-//! | type | field |
-//! |---|---|
-//! | `u32` | number of Gaussians `N` |
-//! | 3 × `f32`, `f32`, `u8` | grid: smallest corner, step, bits of a coordinate (at most 20) |
-//! | 4 × `f32` | steps of log scales, opacity logits, quaternions, spherical harmonics of degree 0 |
-//! | 5 × `u32` | lengths of the streams that follow |
-//! | bytes | range-coded streams: positions and the four attributes in the order of the steps |
-//! | zeros | as many as make `N / 8` bytes of all, so that a count can be trusted |
 
 mod channels;
-pub(crate) mod explicit;
 mod neighbors;
 mod position_grid;
 mod positions;
 mod prediction;
+mod quantized;
+mod section;
 mod steps;
 
 use neighbors::{NEIGHBORS, nearest_before};
 pub(crate) use position_grid::check_positions;
-use position_grid::{PositionGrid, morton_cell, morton_code};
+use position_grid::{PositionGrid, morton_cell};
+use quantized::{Quantized, join};
+pub use section::AttributeInfo;
+pub(crate) use section::{Head, check};
 pub use steps::AttributeSteps;
 use steps::check_step;
 
 use crate::{
-    CodecError, GaussianArrays, Limits,
-    adaptive::{BitDecoder, BitEncoder, LARGEST_INDEX, index, reconstruct},
+    AttributeValues, CodecError, Coder, FurtherAttribute, GaussianArrays, Limits,
+    adaptive::{BitDecoder, BitEncoder, LARGEST_INDEX},
     budget::Budget,
-    bytes::{Reader, Section, Writer},
-    limits::at_most,
+    bytes::{Reader, Section, Writer, sections::Encoding},
+    scene::{BUILT_IN, SH_REST},
 };
 
 const SECTION: &str = Section::Gaussians.name();
@@ -63,16 +61,14 @@ const GAUSSIANS_A_BYTE: usize = 8;
 
 /// Bytes that decoding takes for a Gaussian: 56 that stay, neighbors, and the integers of the largest attribute.
 const GAUSSIAN_BYTES: u64 = 136;
-/// Nanoseconds to find a Gaussian's neighbors and to read its attributes where they take next to no bits.
+/// Nanoseconds to find a Gaussian's neighbors and to read its built-in attributes where they take next to no bits.
 const GAUSSIAN_NANOSECONDS: u64 = 3000;
 /// Nanoseconds of a level of the tree of positions.
 const LEVEL_NANOSECONDS: u64 = 12;
-
-/// The order in which an attribute's channels are coded.
-const AXES: [usize; 3] = [0, 1, 2];
-const COMPONENTS: [usize; 4] = [0, 1, 2, 3];
-/// Green first: it says most about the other two.
-const COLORS: [usize; 3] = [1, 0, 2];
+/// Bytes that decoding takes for a quantized number of a further attribute: itself, its integer, what predicts it.
+const NUMBER_BYTES: u64 = 28;
+/// Nanoseconds to read such a number where it takes next to no bits.
+const NUMBER_NANOSECONDS: u64 = 300;
 
 /// Coded attributes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -87,105 +83,137 @@ pub struct EncodedAttributes {
 }
 
 /// Bytes of each part of [`EncodedAttributes::bytes`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AttributeSizes {
-    /// Counts, steps and lengths, and the zeros at the end where there are any.
+    /// The list of attributes, and the zeros at the end where there are any.
     pub overhead: usize,
-    /// Positions.
-    pub means: usize,
-    /// Logarithms of the scales.
-    pub log_scales: usize,
-    /// Opacities.
-    pub opacity_logits: usize,
-    /// Rotations.
-    pub quats: usize,
-    /// Spherical harmonics of degree 0.
-    pub sh_dc: usize,
+    /// Names and bytes, in the order of the stream.
+    pub attributes: Vec<(String, usize)>,
 }
 
-/// Codes `N` Gaussians. `sh_degree` and `sh_rest` are left out.
+/// Codes `N` Gaussians, quantized. `sh_degree` and `sh_rest` are left out.
 ///
 /// # Errors
-/// Arrays of different lengths, NaN and infinities, steps that are not positive, positions beyond ±1e30, and other
-/// numbers beyond 2^23 steps.
+/// Arrays of different lengths, NaN and infinities, names that no attribute can have, steps that are not positive, positions
+/// beyond ±1e30, and other numbers beyond 2^23 steps.
 pub fn encode(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<EncodedAttributes, CodecError> {
     let quantized = Quantized::of(gaussians, steps)?;
     let neighbors = quantized.neighbors();
-    let mut encoder = BitEncoder::default();
-    positions::code(&mut encoder, &mut quantized.codes.clone(), quantized.grid.code_bits())
-        .expect("an encoder is never damaged");
-    let means = encoder.finish();
-    let attributes = quantized.attributes.each_ref().map(|channels| channels::encode(channels, &neighbors));
+    let mut streams: Vec<Vec<u8>> = Vec::new();
+    let mut infos: Vec<AttributeInfo> = Vec::new();
+    for attribute in &quantized.attributes {
+        let mut writer = Writer::default();
+        attribute.write(&quantized, &neighbors, &mut writer);
+        infos.push(attribute.info(writer.bytes.len()));
+        streams.push(writer.bytes);
+    }
 
+    let sizes: Vec<_> = infos.iter().map(|info| (info.name.clone(), info.bytes as usize)).collect();
     let mut writer = Writer::default();
-    quantized.head().write(&mut writer);
-    writer.u32(means.len() as u32);
-    attributes.iter().for_each(|stream| writer.u32(stream.len() as u32));
-    writer.bytes.extend(&means);
-    attributes.iter().for_each(|stream| writer.bytes.extend(stream));
+    Head { count: gaussians.len() as u32, attributes: infos }.write(&mut writer);
+    streams.iter().for_each(|stream| writer.bytes.extend(stream));
     let least = gaussians.len().div_ceil(GAUSSIANS_A_BYTE);
     writer.bytes.resize(writer.bytes.len().max(least), 0);
-
-    let [log_scales, opacity_logits, quats, sh_dc] = attributes.map(|stream| stream.len());
-    let coded = means.len() + log_scales + opacity_logits + quats + sh_dc;
-    let overhead = writer.bytes.len() - coded;
-    let sizes = AttributeSizes { overhead, means: means.len(), log_scales, opacity_logits, quats, sh_dc };
+    let overhead = writer.bytes.len() - sizes.iter().map(|(_, bytes)| bytes).sum::<usize>();
+    let sizes = AttributeSizes { overhead, attributes: sizes };
     Ok(EncodedAttributes { bytes: writer.bytes, order: quantized.order, sizes })
 }
 
-/// Reads Gaussians, in Morton order; `sh_degree` is 0 and `sh_rest` empty.
+/// Writes Gaussians whose arrays belong together as float32, but for `sh_degree` and `sh_rest`.
+pub(crate) fn write_float32(gaussians: &GaussianArrays, writer: &mut Writer) {
+    let attributes = || gaussians.attributes().filter(|attribute| attribute.name != SH_REST);
+    let info = |attribute: AttributeValues<'_>| AttributeInfo {
+        name: attribute.name.to_owned(),
+        width: attribute.width as u32,
+        coder: Coder::Float32,
+        optional: attribute.optional,
+        bytes: 4 * attribute.values.len() as u64,
+    };
+    Head { count: gaussians.len() as u32, attributes: attributes().map(info).collect() }.write(writer);
+    attributes().for_each(|attribute| writer.f32s(attribute.values));
+}
+
+/// Reads what [`encode`] writes: Gaussians in Morton order; `sh_degree` is 0 and `sh_rest` empty. Attributes whose coder is
+/// not known and that may be left out are left out.
 ///
 /// # Errors
 /// Bytes that [`encode`] does not write, and more Gaussians than the limits allow. Memory is taken for at most eight
 /// Gaussians a byte.
 pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GaussianArrays, CodecError> {
-    decode_within(bytes, &Budget::new(limits))
+    decode_within(bytes, Encoding::Quantized, &Budget::new(limits))
 }
 
-/// As [`decode`], at the cost of a budget.
-pub(crate) fn decode_within(bytes: &[u8], budget: &Budget) -> Result<GaussianArrays, CodecError> {
+/// As [`decode`], for either encoding and at the cost of a budget.
+pub(crate) fn decode_within(bytes: &[u8], encoding: Encoding, budget: &Budget) -> Result<GaussianArrays, CodecError> {
     let mut reader = Reader::new(SECTION, bytes);
-    let head = Head::read(&mut reader)?;
-    at_most(SECTION, "count", head.count.into(), budget.limits.gaussians)?;
+    let head = Head::read(&mut reader, encoding, &budget.limits)?;
+    let gaussians = match encoding {
+        Encoding::Float32 => {
+            budget.things(SECTION, bytes.len() as u64, 1, 1)?;
+            let mut numbers = Numbers::default();
+            for attribute in &head.attributes {
+                numbers.add(attribute, read_float32(&mut reader, attribute)?);
+            }
+            numbers.into_gaussians()
+        }
+        Encoding::Quantized => read_quantized(&mut reader, &head, bytes.len(), budget)?,
+    };
+    let padded = encoding == Encoding::Quantized && bytes.len() == (head.count as usize).div_ceil(GAUSSIANS_A_BYTE);
+    finish(reader, padded)?;
+    Ok(gaussians)
+}
+
+/// Reads the numbers of a quantized section of `all` bytes.
+fn read_quantized(
+    reader: &mut Reader<'_>,
+    head: &Head,
+    all: usize,
+    budget: &Budget,
+) -> Result<GaussianArrays, CodecError> {
     let count = head.count as usize;
-    if bytes.len() < count.div_ceil(GAUSSIANS_A_BYTE) {
-        let expected = format!("at most {GAUSSIANS_A_BYTE} a byte, of which there are {}", bytes.len());
+    if all < count.div_ceil(GAUSSIANS_A_BYTE) {
+        let expected = format!("at most {GAUSSIANS_A_BYTE} a byte, of which there are {all}");
         return Err(CodecError::invalid(SECTION, "count", count, expected));
     }
-    let lengths: [u32; 5] = [
-        reader.u32("length of means")?,
-        reader.u32("length of log_scales")?,
-        reader.u32("length of opacity_logits")?,
-        reader.u32("length of quats")?,
-        reader.u32("length of sh_dc")?,
-    ];
-    let [means, log_scales, opacity_logits, quats, sh_dc] = lengths;
-    budget.stream(SECTION, bytes.len())?;
-    let nanoseconds = GAUSSIAN_NANOSECONDS + LEVEL_NANOSECONDS * u64::from(head.grid.code_bits());
+    budget.stream(SECTION, all)?;
+    let (positions, others) = head.attributes.split_first().expect("`Head::read` refuses a head without positions");
+    let mut stream = take_stream(reader, positions)?;
+    let grid = PositionGrid::read(&mut stream)?;
+    let nanoseconds = GAUSSIAN_NANOSECONDS + LEVEL_NANOSECONDS * u64::from(grid.code_bits());
     budget.things(SECTION, count as u64, GAUSSIAN_BYTES, nanoseconds)?;
+    for further in &others[BUILT_IN.len() - 1..] {
+        let (bytes, nanoseconds) = match further.coder {
+            Coder::Float32 => (4, 4),
+            Coder::Unknown(_) => (0, 0),
+            _ => (NUMBER_BYTES, NUMBER_NANOSECONDS),
+        };
+        budget.things(SECTION, (count as u64).saturating_mul(further.width.into()), bytes, nanoseconds)?;
+    }
 
     let mut codes = vec![0; count];
-    let stream = reader.take("means", means.into())?;
-    positions::code(&mut BitDecoder::new(stream), &mut codes, head.grid.code_bits()).map_err(|_| damaged("means"))?;
+    positions::code(&mut BitDecoder::new(stream.rest()), &mut codes, grid.code_bits())
+        .map_err(|_| damaged(&positions.name))?;
     let cells: Vec<_> = codes.iter().map(|&code| morton_cell(code)).collect();
     drop(codes);
-    let means = head.means(&cells);
+    let mut numbers = Numbers::default();
+    numbers.add(positions, cells.iter().flat_map(|&cell| grid.mean(cell)).collect());
     let neighbors = nearest_before(&cells);
     drop(cells);
 
-    let mut channels = |field, count, length: u32| read_channels(&mut reader, field, count, length, &neighbors);
-    let [log_scale, opacity_logit, quaternion, dc] = head.steps;
     // Each attribute's integers go before the next one's come.
-    let gaussians = GaussianArrays {
-        means,
-        log_scales: join(&channels("log_scales", 3, log_scales)?, log_scale, AXES),
-        opacity_logits: join(&channels("opacity_logits", 1, opacity_logits)?, opacity_logit, [0]).into_flattened(),
-        quats: join(&channels("quats", 4, quats)?, quaternion, COMPONENTS),
-        sh_dc: join(&channels("sh_dc", 3, sh_dc)?, dc, COLORS),
-        ..GaussianArrays::default()
-    };
-    check_padding(reader, bytes.len(), count)?;
-    Ok(gaussians)
+    for attribute in others {
+        match attribute.coder {
+            Coder::Float32 => numbers.add(attribute, read_float32(reader, attribute)?),
+            Coder::Unknown(_) => drop(take_stream(reader, attribute)?),
+            _ => {
+                let mut stream = take_stream(reader, attribute)?;
+                let step = stream.f32(&format!("step of {}", attribute.name))?;
+                check_step(&attribute.name, step)?;
+                numbers.add(attribute, join(&read_channels(stream, attribute, &neighbors)?, step, attribute.coder));
+            }
+        }
+    }
+    Ok(numbers.into_gaussians())
 }
 
 /// What [`decode`] gives for what [`encode`] writes: the quantized Gaussians in their new order.
@@ -193,187 +221,85 @@ pub(crate) fn decode_within(bytes: &[u8], budget: &Budget) -> Result<GaussianArr
 /// # Errors
 /// As [`encode`].
 pub fn quantized(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<GaussianArrays, CodecError> {
-    let quantized = Quantized::of(gaussians, steps)?;
-    Ok(reconstructed(&quantized.head(), &quantized.cells(), &quantized.attributes))
+    Ok(Quantized::of(gaussians, steps)?.reconstructed())
 }
 
-/// What stands before the streams.
-#[derive(Clone, Copy, Debug)]
-struct Head {
-    count: u32,
-    grid: PositionGrid,
-    /// Steps of log scales, opacity logits, quaternions, spherical harmonics of degree 0.
-    steps: [f32; 4],
+/// The bytes of an attribute.
+fn take_stream<'a>(reader: &mut Reader<'a>, attribute: &AttributeInfo) -> Result<Reader<'a>, CodecError> {
+    Ok(Reader::new(SECTION, reader.take(&attribute.name, attribute.bytes)?))
 }
 
-impl Head {
-    /// Centers of cells.
-    fn means(&self, cells: &[[i32; 3]]) -> Vec<[f32; 3]> {
-        cells.iter().map(|&cell| self.grid.mean(cell)).collect()
-    }
-
-    fn write(&self, writer: &mut Writer) {
-        writer.u32(self.count);
-        self.grid.write(writer);
-        writer.f32s(&self.steps);
-    }
-
-    fn read(reader: &mut Reader<'_>) -> Result<Self, CodecError> {
-        let count = reader.u32("count")?;
-        let grid = PositionGrid::read(reader)?;
-        let steps = reader.group("steps")?;
-        for (attribute, step) in ["log_scale", "opacity_logit", "quaternion", "sh_dc"].into_iter().zip(steps) {
-            check_step(attribute, step)?;
-        }
-        Ok(Self { count, grid, steps })
-    }
-}
-
-/// Gaussians as integers, in Morton order.
-struct Quantized {
-    grid: PositionGrid,
-    steps: [f32; 4],
-    order: Vec<u32>,
-    /// Morton codes of the cells, ascending.
-    codes: Vec<u64>,
-    /// Channels of log scales, opacity logits, quaternions, spherical harmonics of degree 0, as they are coded.
-    attributes: [Vec<Vec<i32>>; 4],
-}
-
-impl Quantized {
-    fn of(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<Self, CodecError> {
-        explicit::check(gaussians, &Limits { gaussians: u32::MAX, ..Limits::default() })?;
-        steps.check()?;
-        let GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, .. } = gaussians;
-        check_finite("means", means.as_flattened())?;
-        check_finite("log_scales", log_scales.as_flattened())?;
-        let grid = PositionGrid::new(means, steps.position * typical_size(log_scales))?;
-
-        let codes: Vec<u64> = means.iter().map(|&mean| morton_code(grid.cell(mean))).collect();
-        let mut order: Vec<u32> = (0..means.len() as u32).collect();
-        order.sort_by_key(|&index| codes[index as usize]);
-        let opacities = opacity_logits.as_chunks::<1>().0;
-        let attributes = [
-            split("log_scales", log_scales, steps.log_scale, AXES, &order)?,
-            split("opacity_logits", opacities, steps.opacity_logit, [0], &order)?,
-            split("quats", quats, steps.quaternion, COMPONENTS, &order)?,
-            split("sh_dc", sh_dc, steps.sh_dc, COLORS, &order)?,
-        ];
-        let codes = order.iter().map(|&index| codes[index as usize]).collect();
-        let steps = [steps.log_scale, steps.opacity_logit, steps.quaternion, steps.sh_dc];
-        Ok(Self { grid, steps, order, codes, attributes })
-    }
-
-    fn head(&self) -> Head {
-        Head { count: self.codes.len() as u32, grid: self.grid, steps: self.steps }
-    }
-
-    fn cells(&self) -> Vec<[i32; 3]> {
-        self.codes.iter().map(|&code| morton_cell(code)).collect()
-    }
-
-    fn neighbors(&self) -> Vec<[u32; NEIGHBORS]> {
-        nearest_before(&self.cells())
-    }
-}
-
-/// Integers to Gaussians.
-fn reconstructed(head: &Head, cells: &[[i32; 3]], attributes: &[Vec<Vec<i32>>; 4]) -> GaussianArrays {
-    let [log_scales, opacity_logits, quats, sh_dc] = attributes;
-    let [log_scale, opacity_logit, quaternion, dc] = head.steps;
-    GaussianArrays {
-        means: head.means(cells),
-        log_scales: join(log_scales, log_scale, AXES),
-        quats: join(quats, quaternion, COMPONENTS),
-        opacity_logits: join(opacity_logits, opacity_logit, [0]).into_flattened(),
-        sh_dc: join(sh_dc, dc, COLORS),
-        ..GaussianArrays::default()
-    }
-}
-
-/// Rows of numbers to channels of indices; `order` is that of the rows, `channels` that of the channels.
-fn split<const K: usize>(
-    field: &'static str,
-    rows: &[[f32; K]],
-    step: f32,
-    channels: [usize; K],
-    order: &[u32],
-) -> Result<Vec<Vec<i32>>, CodecError> {
-    check_finite(field, rows.as_flattened())?;
-    let quantize = |row: u32, channel: usize| {
-        let value = rows[row as usize][channel];
-        index(value, step, 0.0).ok_or_else(|| {
-            let found = format!("{value:e} in value {}", row as usize * K + channel);
-            CodecError::invalid(SECTION, field, found, format!("at most {LARGEST_INDEX} steps of {step} from 0"))
-        })
-    };
-    channels.into_iter().map(|channel| order.iter().map(|&row| quantize(row, channel)).collect()).collect()
-}
-
-/// The inverse of [`split`], in the order of the indices.
-fn join<const K: usize>(indices: &[Vec<i32>], step: f32, channels: [usize; K]) -> Vec<[f32; K]> {
-    let count = indices.first().map_or(0, Vec::len);
-    let mut rows = vec![[0.0; K]; count];
-    for (indices, channel) in indices.iter().zip(channels) {
-        for (row, &index) in rows.iter_mut().zip(indices) {
-            row[channel] = reconstruct(index, step, 0.0);
-        }
-    }
-    rows
+fn read_float32(reader: &mut Reader<'_>, attribute: &AttributeInfo) -> Result<Vec<f32>, CodecError> {
+    reader.f32s(&attribute.name, attribute.bytes / 4)
 }
 
 /// Reads an attribute, refusing what could not be reconstructed.
 fn read_channels(
-    reader: &mut Reader<'_>,
-    field: &'static str,
-    count: usize,
-    length: u32,
+    stream: Reader<'_>,
+    attribute: &AttributeInfo,
     neighbors: &[[u32; NEIGHBORS]],
 ) -> Result<Vec<Vec<i32>>, CodecError> {
-    let stream = reader.take(field, length.into())?;
-    let channels = channels::decode(stream, count, neighbors).map_err(|_| damaged(field))?;
+    let AttributeInfo { name, width, .. } = attribute;
+    let channels = channels::decode(stream.rest(), *width as usize, neighbors).map_err(|_| damaged(name))?;
     match channels.iter().flatten().find(|index| index.unsigned_abs() > LARGEST_INDEX.unsigned_abs()) {
         None => Ok(channels),
         Some(index) => {
             let expected = format!("at most {LARGEST_INDEX} steps from 0");
-            Err(CodecError::invalid(SECTION, field, format!("{index} steps"), expected))
+            Err(CodecError::invalid(SECTION, name, format!("{index} steps"), expected))
         }
     }
 }
 
-/// Refuses anything behind the streams but the zeros that `count` asks for.
-fn check_padding(reader: Reader<'_>, all: usize, count: usize) -> Result<(), CodecError> {
-    let mut reader = reader;
-    if all == count.div_ceil(GAUSSIANS_A_BYTE) {
-        while reader.demand("zeros", 1).is_ok() {
-            if reader.u8("zeros")? != 0 {
-                return Err(CodecError::invalid(SECTION, "zeros at the end", "something else", "zeros"));
-            }
+/// Refuses anything behind the attributes but zeros, where these fill up the section.
+fn finish(mut reader: Reader<'_>, padded: bool) -> Result<(), CodecError> {
+    while padded && reader.demand("zeros", 1).is_ok() {
+        if reader.u8("zeros")? != 0 {
+            return Err(CodecError::invalid(SECTION, "zeros at the end", "something else", "zeros"));
         }
     }
     reader.finish()
 }
 
-fn check_finite(field: &'static str, values: &[f32]) -> Result<(), CodecError> {
-    match values.iter().position(|value| !value.is_finite()) {
-        None => Ok(()),
-        Some(index) => {
-            Err(CodecError::NonFinite { section: SECTION, field: field.into(), index, value: values[index] })
-        }
-    }
-}
-
-fn damaged(field: &'static str) -> CodecError {
+fn damaged(field: &str) -> CodecError {
     CodecError::invalid(SECTION, field, "damaged or cut short", "a range-coded stream")
 }
 
-/// The median over the Gaussians of the geometric mean of the scales, in world units; 1 where there are none.
-fn typical_size(log_scales: &[[f32; 3]]) -> f32 {
-    let mut logarithms: Vec<f32> = log_scales.iter().map(|[x, y, z]| x / 3.0 + y / 3.0 + z / 3.0).collect();
-    if logarithms.is_empty() {
-        return 1.0;
+/// Attributes as they come out of a section.
+#[derive(Default)]
+struct Numbers {
+    /// Those of all scenes, in the order of [`BUILT_IN`].
+    built_in: Vec<Vec<f32>>,
+    further: Vec<FurtherAttribute>,
+}
+
+impl Numbers {
+    /// Adds the next one: the built-in ones come first.
+    fn add(&mut self, attribute: &AttributeInfo, values: Vec<f32>) {
+        if self.built_in.len() < BUILT_IN.len() {
+            self.built_in.push(values);
+            return;
+        }
+        let AttributeInfo { name, width, optional, .. } = attribute;
+        self.further.push(FurtherAttribute { name: name.clone(), width: *width, values, optional: *optional });
     }
-    let middle = logarithms.len() / 2;
-    let (_, median, _) = logarithms.select_nth_unstable_by(middle, f32::total_cmp);
-    median.exp()
+
+    fn into_gaussians(self) -> GaussianArrays {
+        fn rows<const K: usize>(values: Vec<f32>) -> Vec<[f32; K]> {
+            values.as_chunks().0.to_vec()
+        }
+        let Ok([means, log_scales, quats, opacity_logits, sh_dc]) =
+            <[Vec<f32>; BUILT_IN.len()]>::try_from(self.built_in)
+        else {
+            unreachable!("a head has all built-in attributes");
+        };
+        GaussianArrays {
+            means: rows(means),
+            log_scales: rows(log_scales),
+            quats: rows(quats),
+            opacity_logits,
+            sh_dc: rows(sh_dc),
+            further: self.further,
+            ..GaussianArrays::default()
+        }
+    }
 }

@@ -118,12 +118,6 @@ impl<'a> Reader<'a> {
         Ok(group(taken))
     }
 
-    /// `count` groups of `K` numbers.
-    pub(crate) fn groups<const K: usize>(&mut self, field: &str, count: u64) -> Result<Vec<[f32; K]>, CodecError> {
-        let taken = self.take(field, count.saturating_mul(4 * K as u64))?;
-        Ok(taken.chunks_exact(4 * K).map(group).collect())
-    }
-
     /// A string: its length in bytes as `u32`, then UTF-8.
     pub(crate) fn string(&mut self, field: &str, limit: u32) -> Result<String, CodecError> {
         let length = self.u32(field)?;

@@ -1,7 +1,13 @@
 //! What a file holds, as plain arrays.
 
+mod gaussians;
 mod motion;
 
+pub use gaussians::{
+    AttributeValues, Coder, FurtherAttribute, GaussianArrays, LONGEST_ATTRIBUTE_NAME, legal_attribute_name,
+    sh_rest_coefficients,
+};
+pub(crate) use gaussians::{BUILT_IN, SH_REST, is_built_in};
 pub use motion::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor};
 
 use std::collections::BTreeMap;
@@ -44,47 +50,6 @@ pub struct SceneMeta {
     pub fov_x: f32,
     /// Free notes, such as the program that wrote the file.
     pub extra: BTreeMap<String, String>,
-}
-
-/// `N` Gaussians. All arrays have `N` entries but `sh_rest`, which has `N` times [`sh_rest_coefficients`] times 3.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct GaussianArrays {
-    /// Centers, in world units.
-    pub means: Vec<[f32; 3]>,
-    /// Natural logarithms of the scales.
-    pub log_scales: Vec<[f32; 3]>,
-    /// Rotations `(w, x, y, z)`, not necessarily of unit length.
-    pub quats: Vec<[f32; 4]>,
-    /// Opacities before the sigmoid.
-    pub opacity_logits: Vec<f32>,
-    /// Spherical harmonics of degree 0, red, green, blue.
-    pub sh_dc: Vec<[f32; 3]>,
-    /// Degree of the spherical harmonics, 0 to 3.
-    pub sh_degree: u8,
-    /// The other coefficients, `[N, (degree + 1)^2 - 1, 3]` row-major.
-    pub sh_rest: Vec<f32>,
-}
-
-impl GaussianArrays {
-    /// Number of Gaussians.
-    pub fn len(&self) -> usize {
-        self.means.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.means.is_empty()
-    }
-}
-
-/// Number of spherical harmonics a channel beyond degree 0: `(degree + 1)^2 - 1`.
-///
-/// ```
-/// assert_eq!([0, 1, 2, 3].map(light4gs_codec::sh_rest_coefficients), [0, 3, 8, 15]);
-/// ```
-pub const fn sh_rest_coefficients(degree: u8) -> usize {
-    let side = degree as usize + 1;
-    side * side - 1
 }
 
 /// Mean, principal axes and per-axis standard deviation of the initial cloud.

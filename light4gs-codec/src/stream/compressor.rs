@@ -8,7 +8,7 @@ use super::{
 };
 use crate::{
     CodecError, Demand, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, SceneData, ShBytes,
-    attributes::{self, EncodedAttributes, explicit},
+    attributes::{self, EncodedAttributes},
     bytes::{
         Writer,
         sections::{Encoding, Kind},
@@ -132,7 +132,7 @@ fn write_gaussians(
         return Ok((attributes::quantized(gaussians, &input.attributes)?, order));
     }
     let mut writer = Writer::default();
-    explicit::write(gaussians, &mut writer);
+    attributes::write_float32(gaussians, &mut writer);
     push(sections, Kind::GaussiansExplicit, Encoding::Float32, writer);
     let order = (0..gaussians.len() as u32).collect();
     Ok((GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.clone() }, order))

@@ -3,7 +3,7 @@
 use super::{container::Container, input::Profile};
 use crate::{
     CodecError, ContextModelArrays, Limits, MotionArrays, PerGroup, PlaneBytes, SceneMeta,
-    attributes::explicit,
+    attributes::{self, AttributeInfo},
     bytes::{
         Reader, Section,
         sections::{Encoding, Kind},
@@ -31,6 +31,8 @@ pub struct StreamInfo {
     pub sections: Vec<SectionInfo>,
     /// Number of Gaussians.
     pub gaussian_count: u32,
+    /// What every Gaussian has, but for the harmonics beyond degree 0.
+    pub attributes: Vec<AttributeInfo>,
     /// Degree of the spherical harmonics.
     pub sh_degree: u8,
     /// Channels of the hexplane.
@@ -95,7 +97,7 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
         Ok::<_, CodecError>((kind, encoding, Reader::new(section.name(), payload)))
     };
     let (_, gaussian_encoding, mut reader) = open(Section::Gaussians)?;
-    let gaussian_count = explicit::Head::read(&mut reader, &limits)?.count;
+    let gaussians = attributes::Head::read(&mut reader, gaussian_encoding, &limits)?;
     let (sh_kind, _, mut reader) = open(Section::Sh)?;
     let sh = sh::section::Head::read(&mut reader, &limits)?;
     let motion = section::read_description(&mut open(Section::Motion)?.2, &limits)?;
@@ -133,7 +135,8 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
         header_bytes: container.prelude.file_bytes - sections.iter().map(|section| section.bytes).sum::<u64>(),
         meta: container.meta,
         sections,
-        gaussian_count,
+        gaussian_count: gaussians.count,
+        attributes: gaussians.attributes,
         sh_degree: sh.degree,
         hexplane_channels: hexplane.channels,
         hexplane_resolution: hexplane.resolution,

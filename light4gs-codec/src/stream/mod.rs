@@ -25,8 +25,7 @@ pub use parts::{encode_planes, encode_sh, plane_distributions, sh_distributions}
 use container::NewSection;
 
 use crate::{
-    CodecError, Limits, SceneData,
-    attributes::explicit,
+    CodecError, Limits, SceneData, attributes,
     bytes::{
         Writer,
         sections::{Encoding, Kind},
@@ -52,7 +51,7 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
     let mut motion_writer = Writer::default();
     motion::section::write(&scene.motion, None, &mut motion_writer)?;
     let sections = [
-        section(Kind::GaussiansExplicit, &|writer| explicit::write(&scene.gaussians, writer)),
+        section(Kind::GaussiansExplicit, &|writer| attributes::write_float32(&scene.gaussians, writer)),
         section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
         section(scene_frame::kind(&scene.frame), &|writer| scene_frame::write(&scene.frame, writer)),
         section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
@@ -84,7 +83,7 @@ pub fn decode_with_limits(bytes: &[u8], limits: &Limits) -> Result<SceneData, Co
 /// Refuses a scene that contradicts itself, for the encoder and the decoder alike.
 pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError> {
     meta::check(&scene.meta, limits)?;
-    explicit::check(&scene.gaussians, limits)?;
+    attributes::check(&scene.gaussians, limits)?;
     sh::section::check(&scene.gaussians)?;
     fields::check_finite(scene)?;
     scene.motion.check(limits)?;

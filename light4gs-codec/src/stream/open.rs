@@ -3,11 +3,11 @@
 use super::{check, container::Container, scene_frame};
 use crate::{
     CodecError, GaussianArrays, HexPlaneArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
-    attributes::{self, explicit},
+    attributes,
     budget::{Budget, Demand},
     bytes::{
         Section,
-        sections::{Encoding, Kind},
+        sections::Kind,
     },
     motion, parallel, planes,
     sh::{self, coding::Conditions},
@@ -67,10 +67,8 @@ impl<'a> OpenStream<'a> {
     }
 
     fn gaussians_within(&self, budget: &Budget) -> Result<GaussianArrays, CodecError> {
-        match self.container.section(Section::Gaussians)? {
-            (_, Encoding::Quantized, payload) => attributes::decode_within(payload, budget),
-            (_, Encoding::Float32, payload) => explicit::read(payload, budget),
-        }
+        let (_, encoding, payload) = self.container.section(Section::Gaussians)?;
+        attributes::decode_within(payload, encoding, budget)
     }
 
     /// The frame.

@@ -4,7 +4,7 @@
 
 use crate::{
     CodecError, Distributions, GaussianArrays, HexPlaneArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding,
-    attributes::explicit,
+    attributes,
     bytes::{Section, Writer},
     planes,
     sh::{self, coding::Conditions},
@@ -34,7 +34,7 @@ pub fn encode_sh(
     hexplane: &HexPlaneArrays,
 ) -> Result<Vec<u8>, CodecError> {
     let limits = Limits::large();
-    explicit::check(gaussians, &limits)?;
+    attributes::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(hexplane, &limits)?;
     let mut writer = Writer::default();
@@ -74,7 +74,7 @@ pub fn sh_distributions(
     hexplane: &HexPlaneArrays,
 ) -> Result<Distributions, CodecError> {
     let limits = Limits::large();
-    explicit::check(gaussians, &limits)?;
+    attributes::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(hexplane, &limits)?;
     sh::section::distributions(gaussians, coding, Conditions { gaussians, frame, hexplane }, &limits)

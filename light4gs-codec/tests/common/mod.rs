@@ -31,6 +31,7 @@ pub fn gaussians(count: usize, sh_degree: u8) -> GaussianArrays {
         sh_dc: groups(count),
         sh_degree,
         sh_rest: numbers(count * sh_rest_coefficients(sh_degree) * 3),
+        further: Vec::new(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Coded attributes: what comes back, what is refused, what damage does.
 
 use light4gs_codec::{
-    GaussianArrays, Limits,
+    FurtherAttribute, GaussianArrays, Limits,
     attributes::{self, AttributeSteps},
 };
 use proptest::prelude::*;
@@ -42,6 +42,17 @@ fn cloud(count: usize) -> GaussianArrays {
     from_rows(&rows)
 }
 
+/// A further attribute of numbers around 0.
+fn further(name: &str, width: u32, count: usize) -> FurtherAttribute {
+    let number = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
+    FurtherAttribute {
+        name: name.into(),
+        width,
+        values: (0..count * width as usize).map(number).collect(),
+        optional: false,
+    }
+}
+
 /// Encodes, decodes, compares, and gives the bytes.
 fn round_trip(given: &GaussianArrays, steps: &AttributeSteps) -> Vec<u8> {
     let encoded = attributes::encode(given, steps).unwrap();
@@ -55,13 +66,19 @@ fn round_trip(given: &GaussianArrays, steps: &AttributeSteps) -> Vec<u8> {
         |a: &[f32], b: &[f32], step: f32| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 0.5001 * step + 1e-5 * a.abs());
     for (new, &old) in encoded.order.iter().enumerate() {
         let old = old as usize;
-        assert!(within(&given.log_scales[old], &decoded.log_scales[new], steps.log_scale));
-        assert!(within(&given.quats[old], &decoded.quats[new], steps.quaternion));
-        assert!(within(&[given.opacity_logits[old]], &[decoded.opacity_logits[new]], steps.opacity_logit));
-        assert!(within(&given.sh_dc[old], &decoded.sh_dc[new], steps.sh_dc));
+        for (given, decoded) in given.attributes().zip(decoded.attributes()).skip(1) {
+            assert_eq!((given.name, given.width, given.optional), (decoded.name, decoded.width, decoded.optional));
+            let row = |values: &[f32], row: usize| values[row * given.width..][..given.width].to_vec();
+            let (given_row, decoded_row) = (row(given.values, old), row(decoded.values, new));
+            match steps.of(given.name) {
+                Some(step) => assert!(within(&given_row, &decoded_row, step), "{}", given.name),
+                None => assert_eq!(given_row, decoded_row, "{}", given.name),
+            }
+        }
     }
-    let attributes::AttributeSizes { overhead, means, log_scales, opacity_logits, quats, sh_dc } = encoded.sizes;
-    assert_eq!(overhead + means + log_scales + opacity_logits + quats + sh_dc, encoded.bytes.len());
+    let sizes = encoded.sizes;
+    let coded: usize = sizes.attributes.iter().map(|(_, bytes)| bytes).sum();
+    assert_eq!(sizes.overhead + coded, encoded.bytes.len());
     encoded.bytes
 }
 
@@ -76,7 +93,9 @@ proptest! {
         given in gaussians(0..20, 3.0),
         position in 1e-12_f32..1e12, log_scale in 1e-5_f32..1e9, quaternion in 1e-5_f32..1e9, sh_dc in 1e-5_f32..1e9)
     {
-        round_trip(&given, &AttributeSteps { position, log_scale, quaternion, opacity_logit: 1e30, sh_dc });
+        let steps = AttributeSteps::default().with("means", position).with("log_scales", log_scale);
+        let steps = steps.with("quats", quaternion).with("opacity_logits", 1e30).with("sh_dc", sh_dc);
+        round_trip(&given, &steps);
     }
 
     #[test]
@@ -117,6 +136,111 @@ fn small_sets() {
 }
 
 #[test]
+fn further_attributes_follow_their_gaussians() {
+    for count in [0, 1, 7, 300] {
+        let mut given = cloud(count);
+        given.further = vec![further("lifetime", 2, count), further("a", 1, count), further("features", 20, count)];
+        given.further[1].optional = true;
+        // Those without a step are float32.
+        for steps in [AttributeSteps::default(), AttributeSteps::default().with("lifetime", 0.01).with("features", 0.1)]
+        {
+            round_trip(&given, &steps);
+        }
+    }
+}
+
+/// The bytes of a further attribute are its own: those of the others stay the same.
+#[test]
+fn a_further_attribute_changes_no_other_stream() {
+    let steps = AttributeSteps::default().with("lifetime", 0.01);
+    let without = attributes::encode(&cloud(300), &steps).unwrap();
+    let mut given = cloud(300);
+    given.further = vec![further("lifetime", 2, 300)];
+    let with = attributes::encode(&given, &steps).unwrap();
+    assert_eq!(with.sizes.attributes[..5], without.sizes.attributes);
+    let (begin, length) = (without.sizes.overhead, without.bytes.len() - without.sizes.overhead);
+    assert_eq!(with.bytes[with.sizes.overhead..][..length], without.bytes[begin..]);
+}
+
+/// A row of the list in a section: name, width, coder with the mark of what may be left out, bytes of the stream.
+fn row(name: &[u8], width: &[u8], coder: u8, bytes: &[u8]) -> Vec<u8> {
+    [&[name.len() as u8], name, width, &[coder], bytes].concat()
+}
+
+/// Ten Gaussians with these rows in place of the further attributes', and these bytes behind all others.
+fn forged(rows: &[Vec<u8>], behind: &[u8]) -> Result<GaussianArrays, String> {
+    let encoded = attributes::encode(&cloud(10), &AttributeSteps::default()).unwrap();
+    let (head, streams) = encoded.bytes.split_at(encoded.sizes.overhead);
+    assert_eq!(head[4], 5);
+    let bytes = [&head[..4], &[5 + rows.len() as u8], &head[5..], &rows.concat(), streams, behind].concat();
+    attributes::decode(&bytes, &Limits::default()).map_err(|error| error.to_string())
+}
+
+#[test]
+fn what_a_stream_says_of_further_attributes_is_checked() {
+    let numbers = [0; 40];
+    let plain = |name: &[u8]| row(name, &[1], 0, &[]);
+    let decoded = forged(&[plain(b"age")], &numbers).unwrap();
+    assert_eq!((&decoded.further[0].name[..], decoded.further[0].values.len()), ("age", 10));
+
+    let refused = |rows: &[Vec<u8>], text: &str| {
+        let error = forged(rows, &numbers).expect_err(text);
+        assert!(error.starts_with("gaussians: ") && error.contains(text), "{error}");
+    };
+    for name in [&b""[..], b"Age", b"a.b", b"\xff\xfe", b"\x1b[31m"] {
+        refused(&[plain(name)], "name of an attribute is");
+    }
+    refused(&[plain(b"age"), plain(b"age")], "\"age\" twice");
+    refused(&[plain(b"quats")], "\"quats\" twice");
+    refused(&[plain(b"sh_rest")], "\"sh_rest\" twice");
+    refused(&[plain(&[b'a'; 65])], "length of an attribute's name is 65, at most 64");
+    refused(&[row(b"age", &[0], 0, &[])], "width of age is 0");
+    refused(&[row(b"age", &[0x81, 2], 0, &[])], "width of age is 257, at most 256");
+    refused(&[row(b"age", &[2], 0, &[])], "age needs 80 bytes, 40 are left");
+    refused(&[row(b"age", &[1], 1, &[40])], "coder of age is 1 (grid)");
+    refused(&[row(b"age", &[1], 3, &[40])], "coder of age is 3 (colors)");
+    refused(&[row(b"age", &[1], 2, &[39])], "step of age is 0");
+    refused(&[row(b"age", &[1], 2, &[41])], "age needs 41 bytes, 40 are left");
+    refused(&vec![plain(b"age"); 60], "number of attributes is 65, at most 64");
+
+    // A coder that nobody knows, and an attribute that may be left out.
+    refused(&[row(b"age", &[1], 9, &[40])], "coder of age is 9 (unknown), expected one that this program knows");
+    assert_eq!(forged(&[row(b"age", &[1], 0x80 | 9, &[40])], &numbers).unwrap().further, []);
+}
+
+#[test]
+fn the_built_in_attributes_are_all_there() {
+    let encoded = attributes::encode(&cloud(10), &AttributeSteps::default()).unwrap();
+    let change = |at: usize, new: u8| {
+        let mut bytes = encoded.bytes.clone();
+        bytes[at] = new;
+        attributes::decode(&bytes, &Limits::default()).unwrap_err().to_string()
+    };
+    // Number of attributes; then name, width and coder of the first.
+    assert_eq!(encoded.bytes[4..13], *b"\x05\x05means\x03\x01");
+    assert!(change(4, 4).contains("attribute sh_dc is missing"));
+    assert!(change(6, b'n').contains("attribute means is \"neans\""));
+    assert!(change(11, 4).contains("width of means is 4, expected 3"));
+    assert!(change(12, 0x81).contains("mark of means is may be left out"));
+    assert!(change(12, 2).contains("coder of means is 2 (channels)"));
+    assert!(change(12, 0).contains("coder of means is 0 (float32)"));
+}
+
+/// A wide attribute of next to no bytes must be paid for like anything else.
+#[test]
+fn width_is_within_the_budget() {
+    let count = 40_000;
+    let mut given = from_rows(&vec![[0.25; 14]; count]);
+    given.further =
+        vec![FurtherAttribute { name: "features".into(), width: 256, values: vec![0.0; 256 * count], optional: true }];
+    let bytes = attributes::encode(&given, &AttributeSteps::default().with("features", 0.1)).unwrap().bytes;
+    assert!(bytes.len() < 10_000, "{}", bytes.len());
+    let error = attributes::decode(&bytes, &Limits::default()).unwrap_err().to_string();
+    assert!(error.contains("decoding takes"), "{error}");
+    assert_eq!(attributes::decode(&bytes, &Limits::large()).unwrap().further[0].values.len(), 256 * count);
+}
+
+#[test]
 fn all_alike_take_one_bit_each() {
     let given = from_rows(&[[0.25; 14]; 10_000]);
     let bytes = round_trip(&given, &AttributeSteps::default());
@@ -148,7 +272,24 @@ fn what_cannot_be_coded_is_named() {
     assert!(message(&|g| g.opacity_logits[2] = 1e30).contains("opacity_logits is 1e30 in value 2"));
     assert!(message(&|g| g.log_scales[0][0] = -1e30).contains("log_scales is -1e30 in value 0"));
     assert!(message(&|g| g.sh_dc.truncate(2)).contains("sh_dc"));
-    let zero = AttributeSteps { sh_dc: 0.0, ..steps };
+    let added = |name: &str, width: u32, values: usize| {
+        let attribute = FurtherAttribute { name: name.into(), width, values: vec![0.0; values], optional: false };
+        message(&|g| g.further.push(attribute.clone()))
+    };
+    assert!(added("age", 1, 2).contains("length of age is 2, expected 3"));
+    assert!(added("age", 2, 7).contains("length of age is 7, expected 6"));
+    assert!(added("age", 0, 0).contains("width of age is 0"));
+    assert!(added("Age", 1, 3).contains("name of an attribute is \"Age\""));
+    assert!(added("means", 3, 9).contains("\"means\" twice"));
+    assert!(message(&|g| g.further = vec![further("age", 1, 3); 2]).contains("\"age\" twice"));
+    assert!(
+        message(&|g| {
+            g.further = vec![further("age", 1, 3)];
+            g.further[0].values[1] = f32::NAN;
+        })
+        .contains("value 1 of age is NaN")
+    );
+    let zero = AttributeSteps::default().with("sh_dc", 0.0);
     assert!(attributes::encode(&cloud(3), &zero).unwrap_err().to_string().contains("step of sh_dc is 0"));
 }
 
@@ -201,16 +342,12 @@ fn measured_on_trained_scenes() {
         let decode = fastest(&|| drop(attributes::decode(&bytes, &Limits::default()).unwrap()));
         let sizes = attributes::encode(&given, &steps).unwrap().sizes;
         let a_gaussian = |bytes: usize| bytes as f64 / given.len() as f64;
+        let parts = sizes.attributes.iter().map(|(name, bytes)| format!("{name} {:.2}", a_gaussian(*bytes)));
         println!(
-            "{path}: {} Gaussians, {:.2} bytes each: means {:.2}, log_scales {:.2}, opacity {:.2}, quats {:.2}, dc {:.2}, \
-             overhead {} bytes; encode {encode:.1?}, decode {decode:.1?}",
+            "{path}: {} Gaussians, {:.2} bytes each: {}; overhead {} bytes; encode {encode:.1?}, decode {decode:.1?}",
             given.len(),
             a_gaussian(bytes.len()),
-            a_gaussian(sizes.means),
-            a_gaussian(sizes.log_scales),
-            a_gaussian(sizes.opacity_logits),
-            a_gaussian(sizes.quats),
-            a_gaussian(sizes.sh_dc),
+            parts.collect::<Vec<_>>().join(", "),
             sizes.overhead,
         );
     }

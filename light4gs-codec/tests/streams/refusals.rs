@@ -106,8 +106,8 @@ fn what_is_refused_before_training() {
     for step in [1e-45, 0.0, -0.1, 0.99e-5, 2e30, f32::NAN, f32::INFINITY] {
         assert!(checks::plane_step(step).is_err(), "{step}");
         assert!(checks::sh_step(step).is_err(), "{step}");
-        let steps = AttributeSteps { quaternion: step, ..Default::default() };
-        assert!(steps.check().unwrap_err().to_string().starts_with("gaussians: step of quaternion is"), "{step}");
+        let steps = AttributeSteps::default().with("quats", step);
+        assert!(steps.check().unwrap_err().to_string().starts_with("gaussians: step of quats is"), "{step}");
         assert!(steps.clamped().check().is_ok(), "{step}");
         let steps = checks::nearest_plane_steps(PerGroup { space_only: step, space_time: 0.1 });
         assert!(checks::plane_step(steps.space_only).is_ok() && steps.space_time == 0.1, "{step}");

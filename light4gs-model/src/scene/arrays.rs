@@ -1,13 +1,17 @@
 //! Between Burn modules and the codec's plain arrays.
 
+use std::sync::Arc;
+
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS, position_of, scale_of};
-use light4gs_codec::{GaussianArrays, HexPlaneArrays, Plane, SceneData, SceneFrameArrays, SceneMeta};
+use light4gs_codec::{FurtherAttribute, GaussianArrays, HexPlaneArrays, Plane, SceneData, SceneFrameArrays, SceneMeta};
 
+use super::attributes::Attribute;
 use super::coordinates::{Pca, SceneCoordinates};
 use super::dynamic_scene::DynamicScene;
 use super::field::DeformationField;
+use super::further::FurtherTensor;
 use super::gaussians::{GaussianTensors, Gaussians};
 use super::hexplane::HexPlane;
 
@@ -54,6 +58,13 @@ impl Gaussians {
         let count = arrays.len();
         let rest = (usize::from(arrays.sh_degree) + 1).pow(2) - 1;
         let cube = |values: Vec<f32>, middle| Tensor::from_data(TensorData::new(values, [count, middle, 3]), device);
+        let further = |given: &FurtherAttribute| {
+            let FurtherAttribute { name, width, values, optional } = given;
+            let shape = [count, *width as usize];
+            let values = Tensor::from_data(TensorData::new(values.clone(), shape), device);
+            let attribute = Attribute { optional: *optional, ..Attribute::new(name, *width as usize) };
+            FurtherTensor { attribute: Arc::new(attribute), values }
+        };
         Self::from_tensors(GaussianTensors {
             means: matrix(&arrays.means, device),
             log_scales: matrix(&arrays.log_scales, device),
@@ -61,6 +72,7 @@ impl Gaussians {
             opacity_logits: Tensor::from_data(TensorData::new(arrays.opacity_logits.clone(), [count, 1]), device),
             sh_dc: cube(arrays.sh_dc.concat(), 1),
             sh_rest: cube(arrays.sh_rest.clone(), rest),
+            further: arrays.further.iter().map(further).collect(),
         })
     }
 }
@@ -68,6 +80,12 @@ impl Gaussians {
 impl GaussianTensors {
     /// Copies to plain arrays.
     pub fn to_arrays(&self) -> GaussianArrays {
+        let further = |FurtherTensor { attribute, values: tensor }: &FurtherTensor| FurtherAttribute {
+            name: attribute.name.to_string(),
+            width: tensor.dims()[1] as u32,
+            values: values(tensor.clone()),
+            optional: attribute.optional,
+        };
         GaussianArrays {
             means: rows(self.means.clone()),
             log_scales: rows(self.log_scales.clone()),
@@ -76,6 +94,7 @@ impl GaussianTensors {
             sh_dc: values(self.sh_dc.clone()).as_chunks().0.to_vec(),
             sh_degree: ((self.sh_rest.dims()[1] + 1).isqrt() - 1) as u8,
             sh_rest: values(self.sh_rest.clone()),
+            further: self.further.iter().map(further).collect(),
         }
     }
 }

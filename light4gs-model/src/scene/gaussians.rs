@@ -1,46 +1,84 @@
 //! The static set of Gaussians.
 
-use burn::config::Config;
-use burn::module::{Module, Param};
-use burn::tensor::activation::sigmoid;
+use std::sync::Arc;
+
+use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::rendering::MAX_LOG_SCALE;
 use light4gs_data::PointCloud;
 
+use super::attributes::{Attribute, BUILT_IN, LOG_SCALES, OPACITY_LOGITS};
+use super::further::{FurtherParameters, FurtherTensor};
+use crate::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
+
 /// Configuration of [`Gaussians`].
-#[derive(Config, Debug)]
+#[derive(Clone, Debug)]
 pub struct GaussiansConfig {
     /// Degree of the spherical harmonics, 0 to 3.
-    #[config(default = 3)]
     pub sh_degree: usize,
     /// Opacity at the start, in (0, 1).
-    #[config(default = 0.1)]
     pub opacity: f32,
+    /// What the Gaussians have besides [`BUILT_IN`]; each name once, and none of theirs.
+    pub further: Vec<Attribute>,
 }
 
-impl GaussiansConfig {
-    /// One Gaussian a point: isotropic, as large as the root of the mean squared distance to the three nearest
-    /// neighbors, unrotated, in the point's color.
-    pub fn init(&self, cloud: &PointCloud, device: &Device) -> Gaussians {
-        let count = cloud.positions.len();
-        let log_scales: Vec<f32> = cloud.mean_squared_distances().iter().flat_map(|d2| [0.5 * d2.ln(); 3]).collect();
-        let dc = cloud.sh_dc().concat();
-        let logit = (self.opacity / (1.0 - self.opacity)).ln();
-        let rest = (self.sh_degree + 1).pow(2) - 1;
-        let quats = [1.0, 0.0, 0.0, 0.0].repeat(count);
-        Gaussians::from_tensors(GaussianTensors {
-            means: matrix(cloud.positions.concat(), 3, device),
-            log_scales: matrix(log_scales, 3, device),
-            quats: matrix(quats, 4, device),
-            opacity_logits: Tensor::full([count, 1], logit, device),
-            sh_dc: Tensor::from_data(TensorData::new(dc, [count, 1, 3]), device),
-            sh_rest: Tensor::zeros([count, rest, 3], device),
-        })
+impl Default for GaussiansConfig {
+    fn default() -> Self {
+        Self::new()
     }
 }
 
-fn matrix(values: Vec<f32>, columns: usize, device: &Device) -> Tensor<2> {
-    Tensor::from_data(TensorData::new(values.clone(), [values.len() / columns, columns]), device)
+impl GaussiansConfig {
+    /// Harmonics of degree 3, opacity 0.1, no further attributes.
+    pub fn new() -> Self {
+        Self { sh_degree: 3, opacity: 0.1, further: Vec::new() }
+    }
+
+    /// With harmonics up to a degree, 0 to 3.
+    pub fn with_sh_degree(self, sh_degree: usize) -> Self {
+        Self { sh_degree, ..self }
+    }
+
+    /// With an opacity at the start, in (0, 1).
+    pub fn with_opacity(self, opacity: f32) -> Self {
+        Self { opacity, ..self }
+    }
+
+    /// With one more attribute.
+    pub fn with_attribute(mut self, attribute: Attribute) -> Self {
+        self.further.push(attribute);
+        self
+    }
+
+    /// One Gaussian a point: isotropic, as large as the root of the mean squared distance to the three nearest
+    /// neighbors, unrotated, in the point's color.
+    ///
+    /// # Panics
+    /// If the start of a further attribute has another length than its width asks for.
+    pub fn init(&self, cloud: &PointCloud, device: &Device) -> Gaussians {
+        let count = cloud.positions.len();
+        let matrix = |attribute: &Attribute| {
+            let shape = [count, attribute.width.of(self.sh_degree)];
+            Tensor::<2>::from_data(TensorData::new(attribute.start(cloud, self), shape), device)
+        };
+        let cube = |attribute: &Attribute| {
+            let shape = [count, attribute.width.of(self.sh_degree) / 3, 3];
+            Tensor::<3>::from_data(TensorData::new(attribute.start(cloud, self), shape), device)
+        };
+        let [means, log_scales, quats, opacity_logits, sh_dc, sh_rest] = BUILT_IN.each_ref();
+        let further = self.further.iter();
+        Gaussians::from_tensors(GaussianTensors {
+            means: matrix(means),
+            log_scales: matrix(log_scales),
+            quats: matrix(quats),
+            opacity_logits: matrix(opacity_logits),
+            sh_dc: cube(sh_dc),
+            sh_rest: cube(sh_rest),
+            further: further
+                .map(|attribute| FurtherTensor { values: matrix(attribute), attribute: Arc::new(attribute.clone()) })
+                .collect(),
+        })
+    }
 }
 
 /// Raw attributes of N Gaussians as tensors: at rest or at a time.
@@ -58,22 +96,52 @@ pub struct GaussianTensors {
     pub sh_dc: Tensor<3>,
     /// `[N, (degree + 1)^2 - 1, 3]`.
     pub sh_rest: Tensor<3>,
+    /// What else they have, `[N, width]` each.
+    pub further: Vec<FurtherTensor>,
+}
+
+/// Something that makes of every attribute another one, whatever its rank: a closure could not be generic.
+pub trait AttributeMapper {
+    /// Called once an attribute; what it returns takes the place of `values`.
+    fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D>;
 }
 
 impl GaussianTensors {
+    /// Every attribute replaced by what the mapper makes of it, in the order of the fields.
+    pub fn map(self, mapper: &mut impl AttributeMapper) -> Self {
+        let [means, log_scales, quats, opacity_logits, sh_dc, sh_rest] = BUILT_IN.each_ref();
+        Self {
+            means: mapper.map(means, self.means),
+            log_scales: mapper.map(log_scales, self.log_scales),
+            quats: mapper.map(quats, self.quats),
+            opacity_logits: mapper.map(opacity_logits, self.opacity_logits),
+            sh_dc: mapper.map(sh_dc, self.sh_dc),
+            sh_rest: mapper.map(sh_rest, self.sh_rest),
+            further: self
+                .further
+                .into_iter()
+                .map(|FurtherTensor { attribute, values }| {
+                    let values = mapper.map(&attribute, values);
+                    FurtherTensor { attribute, values }
+                })
+                .collect(),
+        }
+    }
+
+    /// A further attribute by name, `[N, width]`.
+    pub fn further(&self, name: &str) -> Option<&Tensor<2>> {
+        self.further.iter().find(|tensor| tensor.attribute.name == name).map(|tensor| &tensor.values)
+    }
+
     /// The same values off the tape; tensors that were never on one stay as they are.
     pub fn inner(self) -> Self {
-        fn inner<const D: usize>(tensor: Tensor<D>) -> Tensor<D> {
-            if tensor.device().is_autodiff() { tensor.inner() } else { tensor }
+        struct Inner;
+        impl AttributeMapper for Inner {
+            fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
+                if values.device().is_autodiff() { values.inner() } else { values }
+            }
         }
-        Self {
-            means: inner(self.means),
-            log_scales: inner(self.log_scales),
-            quats: inner(self.quats),
-            opacity_logits: inner(self.opacity_logits),
-            sh_dc: inner(self.sh_dc),
-            sh_rest: inner(self.sh_rest),
-        }
+        self.map(&mut Inner)
     }
 }
 
@@ -95,13 +163,13 @@ pub struct ActivatedGaussians {
 }
 
 impl GaussianTensors {
-    /// The exponential of the logarithms, the sigmoid of the logits.
+    /// The exponential of the logarithms, the sigmoid of the logits. Further attributes are not drawn.
     pub fn activated(self) -> ActivatedGaussians {
         ActivatedGaussians {
             means: self.means,
             quats: self.quats,
-            scales: self.log_scales.clamp_max(MAX_LOG_SCALE).exp(),
-            opacities: sigmoid(self.opacity_logits),
+            scales: LOG_SCALES.activation.apply(self.log_scales),
+            opacities: OPACITY_LOGITS.activation.apply(self.opacity_logits),
             sh_dc: self.sh_dc,
             sh_rest: self.sh_rest,
         }
@@ -134,6 +202,8 @@ pub struct Gaussians {
     pub sh_dc: Param<Tensor<3>>,
     /// `[N, (degree + 1)^2 - 1, 3]`.
     pub sh_rest: Param<Tensor<3>>,
+    /// What else they have, `[N, width]` each.
+    pub further: FurtherParameters,
 }
 
 impl Gaussians {
@@ -146,6 +216,7 @@ impl Gaussians {
             opacity_logits: Param::from_tensor(tensors.opacity_logits),
             sh_dc: Param::from_tensor(tensors.sh_dc),
             sh_rest: Param::from_tensor(tensors.sh_rest),
+            further: FurtherParameters::from_tensors(tensors.further),
         }
     }
 
@@ -158,7 +229,34 @@ impl Gaussians {
             opacity_logits: self.opacity_logits.val(),
             sh_dc: self.sh_dc.val(),
             sh_rest: self.sh_rest.val(),
+            further: self.further.tensors(),
         }
+    }
+
+    /// Gives the parameters other values, which may have another number of rows; an optimizer knows them as the same.
+    pub fn set_tensors(&mut self, tensors: GaussianTensors) {
+        #[derive(Default)]
+        struct Identities(Vec<ParamId>);
+        impl ParameterVisitor for Identities {
+            fn visit<const D: usize>(&mut self, _: &str, parameter: &Param<Tensor<D>>) {
+                self.0.push(parameter.id);
+            }
+        }
+        struct Identify(std::vec::IntoIter<ParamId>);
+        impl ParameterMapper for Identify {
+            fn map<const D: usize>(&mut self, _: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+                let id = self.0.next().unwrap_or(parameter.id);
+                Param::initialized(id, parameter.into_value())
+            }
+        }
+        let mut identities = Identities::default();
+        visit_parameters(self, &mut identities);
+        *self = map_parameters(Self::from_tensors(tensors), &mut Identify(identities.0.into_iter()));
+    }
+
+    /// What every Gaussian has: [`BUILT_IN`], then the further attributes.
+    pub fn attributes(&self) -> impl Iterator<Item = &Attribute> {
+        BUILT_IN.iter().chain(self.further.attributes())
     }
 
     /// Number of Gaussians.

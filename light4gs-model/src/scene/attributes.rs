@@ -1,0 +1,281 @@
+//! What a Gaussian has: one table, from which everything else follows.
+//!
+//! [`BUILT_IN`] are the attributes of every scene, which the splatter needs. A scene may have further ones: give
+//! [`GaussiansConfig`] an [`Attribute`], and it is trained at its rate, copied where a Gaussian is cloned or split, kept in
+//! checkpoints, and coded with its step. What it does to the image is the affair of a
+//! [`DeformationField`](crate::DeformationField), which gets everything that a Gaussian has.
+//!
+//! ```
+//! use burn::tensor::Device;
+//! use light4gs_data::PointCloud;
+//! use light4gs_model::{Attribute, GaussiansConfig};
+//!
+//! let lifetime = Attribute::new("lifetime", 2).with_start(vec![0.5, 0.0]).with_learning_rate(1e-2).with_step(0.01);
+//! let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0]], colors: vec![[0.5; 3]; 2] };
+//! let gaussians = GaussiansConfig::new().with_attribute(lifetime).init(&cloud, &Device::flex());
+//! assert_eq!(gaussians.tensors().further("lifetime").unwrap().dims(), [2, 2]);
+//! ```
+
+use std::borrow::Cow;
+
+use burn::tensor::Tensor;
+use burn::tensor::activation::sigmoid;
+use light4gs_data::PointCloud;
+
+use super::gaussians::GaussiansConfig;
+
+/// One attribute of every Gaussian.
+#[derive(Clone, Debug)]
+pub struct Attribute {
+    /// The name of its field in [`Gaussians`](crate::Gaussians), or that of a further attribute; it stands in checkpoints and
+    /// files.
+    pub name: Cow<'static, str>,
+    /// Numbers a Gaussian.
+    pub width: Width,
+    /// Values at the beginning of a training.
+    pub start: Start,
+    /// What makes of the trained numbers those that are used.
+    pub activation: Activation,
+    /// Its learning rate. A key is one below `train.learning_rate`.
+    pub learning_rate: Setting,
+    /// How a file stores it.
+    pub coding: Coding,
+    /// Whether it stays what it is at rest: [`DynamicScene::at`](crate::DynamicScene::at) then takes no other values from a field.
+    pub constant: bool,
+    /// Whether the scene looks right without it, so that a program that does not know it may show the scene.
+    pub optional: bool,
+}
+
+/// How many numbers a Gaussian has of an attribute.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Width {
+    /// So many.
+    Fixed(usize),
+    /// As many as the scene's degree asks for: three for each spherical harmonic beyond degree 0.
+    HigherHarmonics,
+}
+
+/// Where an attribute begins.
+#[derive(Clone, Debug)]
+pub enum Start {
+    /// At these numbers for every Gaussian.
+    Row(Cow<'static, [f32]>),
+    /// At zeros.
+    Zeros,
+    /// At numbers `[N, width]`, row-major, that follow from the initial cloud of N points.
+    Cloud(fn(&PointCloud, &GaussiansConfig) -> Vec<f32>),
+}
+
+/// What makes of trained numbers those that are used.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Activation {
+    /// Nothing.
+    Identity,
+    /// The exponential, for what is positive.
+    Exponential,
+    /// The sigmoid, for what lies in [0, 1].
+    Sigmoid,
+}
+
+/// A number of an attribute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setting {
+    /// It stands in the configuration of the training, under this key of the table in question.
+    Key(&'static str),
+    /// This one.
+    Number(f64),
+}
+
+/// How a file stores an attribute.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Coding {
+    /// In multiples of a step, where the file is quantized. A key is one below `compression.attributes`.
+    Quantized(Setting),
+    /// As float32, whatever else is quantized.
+    Float32,
+    /// In a section of its own, under an entropy model of its own: the spherical harmonics beyond degree 0.
+    Harmonics,
+}
+
+/// Logarithms are cut here before the exponential: far beyond any scene, and the exponential stays finite, so that the
+/// backward pass has no 0 · infinity.
+const MAX_LOGARITHM: f32 = 40.0;
+
+impl Activation {
+    /// Applies it.
+    pub fn apply<const D: usize>(self, values: Tensor<D>) -> Tensor<D> {
+        match self {
+            Self::Identity => values,
+            Self::Exponential => values.clamp_max(MAX_LOGARITHM).exp(),
+            Self::Sigmoid => sigmoid(values),
+        }
+    }
+}
+
+impl Width {
+    /// The number, for harmonics up to a degree.
+    pub fn of(self, sh_degree: usize) -> usize {
+        match self {
+            Self::Fixed(width) => width,
+            Self::HigherHarmonics => 3 * ((sh_degree + 1).pow(2) - 1),
+        }
+    }
+}
+
+/// Positions, world units.
+pub static MEANS: &Attribute = &BUILT_IN[0];
+/// Natural logarithms of standard deviations, world units.
+pub static LOG_SCALES: &Attribute = &BUILT_IN[1];
+/// Rotations (w, x, y, z).
+pub static QUATS: &Attribute = &BUILT_IN[2];
+/// Opacities before the sigmoid.
+pub static OPACITY_LOGITS: &Attribute = &BUILT_IN[3];
+
+/// What every Gaussian of every scene has, in the order of [`Gaussians`](crate::Gaussians).
+pub static BUILT_IN: [Attribute; 6] = [
+    built_in(
+        ("means", Width::Fixed(3)),
+        Start::Cloud(|cloud, _| cloud.positions.concat()),
+        Activation::Identity,
+        "means",
+        Coding::Quantized(Setting::Key("means")),
+    ),
+    built_in(
+        ("log_scales", Width::Fixed(3)),
+        // As large as the root of the mean squared distance to the three nearest neighbors.
+        Start::Cloud(|cloud, _| {
+            cloud.mean_squared_distances().iter().flat_map(|squared| [0.5 * squared.ln(); 3]).collect()
+        }),
+        Activation::Exponential,
+        "scale",
+        Coding::Quantized(Setting::Key("log_scales")),
+    ),
+    built_in(
+        ("quats", Width::Fixed(4)),
+        Start::Row(Cow::Borrowed(&[1.0, 0.0, 0.0, 0.0])),
+        Activation::Identity,
+        "rotation",
+        Coding::Quantized(Setting::Key("quats")),
+    ),
+    built_in(
+        ("opacity_logits", Width::Fixed(1)),
+        Start::Cloud(|cloud, config| {
+            let logit = (config.opacity / (1.0 - config.opacity)).ln();
+            vec![logit; cloud.positions.len()]
+        }),
+        Activation::Sigmoid,
+        "opacity",
+        Coding::Quantized(Setting::Key("opacity_logits")),
+    ),
+    built_in(
+        ("sh_dc", Width::Fixed(3)),
+        Start::Cloud(|cloud, _| cloud.sh_dc().concat()),
+        Activation::Identity,
+        "sh_dc",
+        Coding::Quantized(Setting::Key("sh_dc")),
+    ),
+    built_in(("sh_rest", Width::HigherHarmonics), Start::Zeros, Activation::Identity, "sh_rest", Coding::Harmonics),
+];
+
+/// A row of the table.
+const fn built_in(
+    (name, width): (&'static str, Width),
+    start: Start,
+    activation: Activation,
+    learning_rate: &'static str,
+    coding: Coding,
+) -> Attribute {
+    let (name, learning_rate) = (Cow::Borrowed(name), Setting::Key(learning_rate));
+    Attribute { name, width, start, activation, learning_rate, coding, constant: false, optional: false }
+}
+
+/// Learning rate of a further attribute that has none of its own: that of colors.
+const DEFAULT_LEARNING_RATE: f64 = 2.5e-3;
+
+impl Attribute {
+    /// A further attribute of so many numbers a Gaussian. It begins at zeros, is stored as float32, and a program that does not
+    /// know it refuses to show the scene.
+    pub fn new(name: impl Into<String>, width: usize) -> Self {
+        Self {
+            name: Cow::Owned(name.into()),
+            width: Width::Fixed(width),
+            start: Start::Zeros,
+            activation: Activation::Identity,
+            learning_rate: Setting::Number(DEFAULT_LEARNING_RATE),
+            coding: Coding::Float32,
+            constant: false,
+            optional: false,
+        }
+    }
+
+    /// With these numbers for every Gaussian at the beginning.
+    pub fn with_start(self, row: Vec<f32>) -> Self {
+        Self { start: Start::Row(Cow::Owned(row)), ..self }
+    }
+
+    /// With numbers that follow from the initial cloud at the beginning: `[N, width]`, row-major.
+    pub fn with_start_of_cloud(self, start: fn(&PointCloud, &GaussiansConfig) -> Vec<f32>) -> Self {
+        Self { start: Start::Cloud(start), ..self }
+    }
+
+    /// Learning at this rate. It decays like those of colors, opacities, scales and rotations.
+    pub fn with_learning_rate(self, rate: f64) -> Self {
+        Self { learning_rate: Setting::Number(rate), ..self }
+    }
+
+    /// Stored in multiples of a step where the file is quantized.
+    pub fn with_step(self, step: f64) -> Self {
+        Self { coding: Coding::Quantized(Setting::Number(step)), ..self }
+    }
+
+    /// With an activation, which [`GaussianTensors::activated`](crate::GaussianTensors::activated) applies.
+    pub fn with_activation(self, activation: Activation) -> Self {
+        Self { activation, ..self }
+    }
+
+    /// Staying what it is at rest at all times.
+    pub fn constant(self) -> Self {
+        Self { constant: true, ..self }
+    }
+
+    /// Not needed for the scene to look right.
+    pub fn optional(self) -> Self {
+        Self { optional: true, ..self }
+    }
+
+    /// Values of N Gaussians at the beginning, `[N, width]` row-major.
+    ///
+    /// # Panics
+    /// If the attribute's own start has another length.
+    pub(super) fn start(&self, cloud: &PointCloud, config: &GaussiansConfig) -> Vec<f32> {
+        let (count, width) = (cloud.positions.len(), self.width.of(config.sh_degree));
+        let values = match &self.start {
+            Start::Row(row) => row.repeat(count),
+            Start::Zeros => vec![0.0; count * width],
+            Start::Cloud(start) => start(cloud, config),
+        };
+        assert_eq!(values.len(), count * width, "the start of `{}` must be {width} numbers a Gaussian", self.name);
+        values
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use light4gs_codec::attributes::AttributeSteps;
+
+    use super::*;
+
+    /// The codec has a small form of the table, since it knows nothing of this crate: the two agree.
+    #[test]
+    fn the_codec_has_the_same_table() {
+        let steps = AttributeSteps::default();
+        for attribute in &BUILT_IN {
+            let quantized = matches!(attribute.coding, Coding::Quantized(Setting::Key(key)) if key == attribute.name);
+            assert_eq!(steps.of(&attribute.name).is_some(), quantized, "{}", attribute.name);
+        }
+        assert_eq!(steps.iter().count(), BUILT_IN.len() - 1);
+        let arrays = light4gs_codec::GaussianArrays { sh_degree: 2, ..Default::default() };
+        let table: Vec<_> = BUILT_IN.iter().map(|row| (&*row.name, row.width.of(2))).collect();
+        assert_eq!(arrays.attributes().map(|row| (row.name, row.width)).collect::<Vec<_>>(), table);
+    }
+}
