@@ -66,6 +66,7 @@ mod tests {
             sh_dc: vec![[0.0; 3]],
             sh_degree: 0,
             sh_rest: Vec::new(),
+            further: Vec::new(),
         };
         let mut packed = vec![-1.0; FLOATS];
         pack(&gaussians, 0..1, &mut packed);

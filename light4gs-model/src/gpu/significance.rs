@@ -86,6 +86,7 @@ mod tests {
             opacity_logits: Tensor::full([count, 1], -5.2, device),
             sh_dc: Tensor::zeros([count, 1, 3], device),
             sh_rest: Tensor::zeros([count, 15, 3], device),
+            further: Vec::new(),
         };
         (gaussians, camera)
     }

@@ -189,6 +189,16 @@ const fn built_in(
     Attribute { name, width, start, activation, learning_rate, coding, constant: false, optional: false }
 }
 
+/// In front of the paths of attributes in a scene, and behind that of the further ones.
+const GAUSSIANS: &str = "gaussians.";
+const FURTHER: &str = "further.";
+
+/// The name of the attribute whose parameter has a path in a scene: the inverse of [`Attribute::path`].
+pub fn attribute_of_path(path: &str) -> Option<&str> {
+    let name = path.strip_prefix(GAUSSIANS)?;
+    Some(name.strip_prefix(FURTHER).unwrap_or(name))
+}
+
 /// Learning rate of a further attribute that has none of its own: that of colors.
 const DEFAULT_LEARNING_RATE: f64 = 2.5e-3;
 
@@ -241,6 +251,12 @@ impl Attribute {
     /// Not needed for the scene to look right.
     pub fn optional(self) -> Self {
         Self { optional: true, ..self }
+    }
+
+    /// The path of its parameter in a scene, as in `gaussians.means` or `gaussians.further.lifetime`.
+    pub fn path(&self) -> String {
+        let further = if BUILT_IN.iter().any(|row| row.name == self.name) { "" } else { FURTHER };
+        format!("{GAUSSIANS}{further}{}", self.name)
     }
 
     /// Values of N Gaussians at the beginning, `[N, width]` row-major.

@@ -89,6 +89,7 @@ impl GaussianTensors {
             opacity_logits: add(self.opacity_logits, offsets.opacity),
             sh_dc: add(self.sh_dc, dc),
             sh_rest: add(self.sh_rest, rest),
+            further: self.further,
         }
     }
 }

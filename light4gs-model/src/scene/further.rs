@@ -78,7 +78,7 @@ impl Module for FurtherParameters {
     fn visit<V: ModuleVisitor>(&self, visitor: &mut V) {
         for (attribute, values) in &self.list {
             visitor.enter_module(&attribute.name, CONTAINER);
-            values.visit(visitor);
+            Module::visit(values, visitor);
             visitor.exit_module(&attribute.name, CONTAINER);
         }
     }
@@ -86,7 +86,7 @@ impl Module for FurtherParameters {
     fn map<M: ModuleMapper>(self, mapper: &mut M) -> Self {
         let map = |(attribute, values): (Arc<Attribute>, Param<Tensor<2>>)| {
             mapper.enter_module(&attribute.name, CONTAINER);
-            let values = values.map(mapper);
+            let values = Module::map(values, mapper);
             mapper.exit_module(&attribute.name, CONTAINER);
             (attribute, values)
         };

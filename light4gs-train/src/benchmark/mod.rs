@@ -159,6 +159,7 @@ impl BenchScene {
             opacity_logits: matrix(&self.opacity_logits, 1),
             sh_dc: sh(0..3),
             sh_rest: sh(3..48),
+            further: Vec::new(),
         })
     }
 

@@ -5,10 +5,8 @@
 //! same share of it. One rendering an attribute tells how sensitive the images are to it; the steps follow from that.
 
 use light4gs_codec::attributes::{AttributeSteps, quantized};
-use light4gs_codec::{CodecError, SceneData};
+use light4gs_codec::{AttributeValues, CodecError, SceneData};
 
-/// Numbers a Gaussian: position, scales, quaternion, opacity, color.
-const NUMBERS: [f64; 5] = [3.0, 3.0, 4.0, 1.0, 3.0];
 /// Other attributes are left almost exact, at this share of their given step, while one is looked at.
 const ALMOST_EXACT: f32 = 1.0 / 64.0;
 /// A step grows by this factor at most: the squared-error model holds for small errors.
@@ -17,16 +15,6 @@ const LARGEST_GROWTH: f64 = 4.0;
 const LARGEST_SHRINKAGE: f64 = 1.0 / 64.0;
 /// Corrections of all steps together, after a look at what they really do.
 const CORRECTIONS: usize = 3;
-
-fn to_array(steps: &AttributeSteps) -> [f32; 5] {
-    let AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc } = *steps;
-    [position, log_scale, quaternion, opacity_logit, sh_dc]
-}
-
-fn from_array([position, log_scale, quaternion, opacity_logit, sh_dc]: [f32; 5]) -> AttributeSteps {
-    // What the search tries must be something that the encoder takes.
-    AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }.clamped()
-}
 
 /// Steps that cost at most about `tolerance` dB on the images that `render` makes, starting from `given`.
 ///
@@ -50,29 +38,38 @@ pub(super) fn search(
         Ok(sum / exact.len().max(1) as f64)
     };
     let budget = error * (10f64.powf(tolerance / 10.0) - 1.0);
-    let start = to_array(given);
-    let mut steps = start;
-    for attribute in 0..start.len() {
-        let mut alone = start.map(|step| step * ALMOST_EXACT);
-        alone[attribute] = start[attribute];
-        let share = budget * NUMBERS[attribute] / NUMBERS.iter().sum::<f64>();
-        let factor = (share / distortion(&from_array(alone))?.max(f64::MIN_POSITIVE)).sqrt();
-        steps[attribute] = start[attribute] * factor.clamp(LARGEST_SHRINKAGE, LARGEST_GROWTH) as f32;
+    // Images do not tell how exact those must be that do not show.
+    let searched = |attribute: &AttributeValues<'_>| !attribute.optional && given.of(attribute.name).is_some();
+    let searched: Vec<AttributeValues<'_>> = scene.gaussians.attributes().filter(searched).collect();
+    // What the search tries must be something that the encoder takes.
+    let steps_of = |steps: &[f32]| -> AttributeSteps {
+        let pairs = searched.iter().zip(steps);
+        pairs.fold(given.clone(), |all, (attribute, step)| all.with(attribute.name, *step)).clamped()
+    };
+    let start: Vec<f32> = searched.iter().filter_map(|attribute| given.of(attribute.name)).collect();
+    let numbers: f64 = searched.iter().map(|attribute| attribute.width as f64).sum();
+    let mut steps = start.clone();
+    for (place, attribute) in searched.iter().enumerate() {
+        let mut alone: Vec<f32> = start.iter().map(|step| step * ALMOST_EXACT).collect();
+        alone[place] = start[place];
+        let share = budget * attribute.width as f64 / numbers;
+        let factor = (share / distortion(&steps_of(&alone))?.max(f64::MIN_POSITIVE)).sqrt();
+        steps[place] = start[place] * factor.clamp(LARGEST_SHRINKAGE, LARGEST_GROWTH) as f32;
     }
     for _ in 0..CORRECTIONS {
-        let found = distortion(&from_array(steps))?;
+        let found = distortion(&steps_of(&steps))?;
         if found <= budget {
             break;
         }
         let factor = (budget / found).sqrt().max(0.5) as f32;
-        steps = steps.map(|step| step * factor);
+        steps.iter_mut().for_each(|step| *step *= factor);
     }
-    Ok(from_array(steps))
+    Ok(steps_of(&steps))
 }
 
 #[cfg(test)]
 mod tests {
-    use light4gs_codec::GaussianArrays;
+    use light4gs_codec::{FurtherAttribute, GaussianArrays};
 
     use super::*;
 
@@ -91,6 +88,28 @@ mod tests {
         SceneData { gaussians, ..SceneData::default() }
     }
 
+    fn given() -> AttributeSteps {
+        AttributeSteps::default().with("means", 1e-4).with("opacity_logits", 0.02).with("sh_dc", 0.02)
+    }
+
+    /// Attributes that the images do not show keep their steps; those that they do not need look like that too.
+    #[test]
+    fn further_attributes_are_searched_unless_they_are_optional() {
+        let further = |name: &str, optional| FurtherAttribute {
+            name: name.into(),
+            width: 1,
+            values: (0..500).map(|i| (i as f32 * 0.37).sin()).collect(),
+            optional,
+        };
+        let mut scene = scene();
+        scene.gaussians.further = vec![further("seen", false), further("unseen", true), further("exact", false)];
+        let given = given().with("seen", 0.02).with("unseen", 0.02);
+        let images = |scene: &SceneData| scene.gaussians.further[0].values.iter().map(|value| 10.0 * value).collect();
+        let steps = search(&scene, &given, 0.1, 1e-3, &images).unwrap();
+        assert!(steps.of("seen").unwrap() < 0.02, "{steps:?}");
+        assert_eq!((steps.of("unseen"), steps.of("exact")), (Some(0.02), None));
+    }
+
     /// "Images" that are ten times as sensitive to opacities as to colors, and to nothing else.
     fn images(scene: &SceneData) -> Vec<f32> {
         let GaussianArrays { sh_dc, opacity_logits, .. } = &scene.gaussians;
@@ -100,18 +119,19 @@ mod tests {
 
     #[test]
     fn sensitive_attributes_get_finer_steps() {
-        let given = AttributeSteps { position: 1e-4, opacity_logit: 0.02, sh_dc: 0.02, ..AttributeSteps::default() };
+        let given = given();
         let steps = search(&scene(), &given, 0.1, 1e-3, &images).unwrap();
-        assert!(steps.opacity_logit < 0.5 * steps.sh_dc, "{steps:?}");
+        assert!(steps.of("opacity_logits") < steps.of("sh_dc").map(|step| 0.5 * step), "{steps:?}");
         // The images do not see scales and rotations at all.
-        assert_eq!(steps.log_scale, given.log_scale * LARGEST_GROWTH as f32);
-        assert_eq!(steps.quaternion, given.quaternion * LARGEST_GROWTH as f32);
+        let grown = |name| given.of(name).map(|step| step * LARGEST_GROWTH as f32);
+        assert_eq!(steps.of("log_scales"), grown("log_scales"));
+        assert_eq!(steps.of("quats"), grown("quats"));
     }
 
     #[test]
     fn a_smaller_tolerance_gives_finer_steps() {
-        let given = AttributeSteps { position: 1e-4, opacity_logit: 0.02, sh_dc: 0.02, ..AttributeSteps::default() };
+        let given = given();
         let at = |tolerance| search(&scene(), &given, tolerance, 1e-3, &images).unwrap();
-        assert!(at(0.02).opacity_logit < at(0.2).opacity_logit);
+        assert!(at(0.02).of("opacity_logits") < at(0.2).of("opacity_logits"));
     }
 }

@@ -213,7 +213,8 @@ impl AttributesConfig {
     /// The steps, as the codec has them.
     pub fn steps(&self) -> AttributeSteps {
         let Self { position, log_scale, quaternion, opacity_logit, sh_dc, search_tolerance: _ } = *self;
-        AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc }
+        let steps = AttributeSteps::default().with("means", position).with("log_scales", log_scale);
+        steps.with("quats", quaternion).with("opacity_logits", opacity_logit).with("sh_dc", sh_dc)
     }
 }
 
@@ -307,8 +308,16 @@ impl Default for ShConfig {
 
 impl Default for AttributesConfig {
     fn default() -> Self {
-        let AttributeSteps { position, log_scale, quaternion, opacity_logit, sh_dc } = AttributeSteps::default();
-        Self { position, log_scale, quaternion, opacity_logit, sh_dc, search_tolerance: 0.05 }
+        let steps = AttributeSteps::default();
+        let step = |name| steps.of(name).unwrap_or(1.0);
+        Self {
+            position: step("means"),
+            log_scale: step("log_scales"),
+            quaternion: step("quats"),
+            opacity_logit: step("opacity_logits"),
+            sh_dc: step("sh_dc"),
+            search_tolerance: 0.05,
+        }
     }
 }
 

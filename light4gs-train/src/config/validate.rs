@@ -100,7 +100,7 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
     check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
     check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));
-    for (name, step) in attributes.steps().named() {
+    for (name, step) in attributes.steps().iter() {
         check.encodable(&format!("compression.attributes.{name}"), checks::attribute_step(name, step));
     }
 }

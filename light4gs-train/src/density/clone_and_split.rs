@@ -3,10 +3,10 @@
 
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Tensor, TensorData, s};
+use light4gs_model::attributes::OPACITY_LOGITS;
 use light4gs_model::{GaussianTensors, Gaussians};
 
 use super::GaussianEditor;
-use crate::optimization::parameters::GaussianAttribute;
 
 /// Scales of a split Gaussian's two halves are the old ones over this.
 const SPLIT_SHRINK: f32 = 1.6;
@@ -46,7 +46,7 @@ pub fn largest_scales(gaussians: &Gaussians) -> Vec<f32> {
     values(gaussians.log_scales.val().inner().max_dim(1).exp())
 }
 
-/// Clones and splits. The result is: the originals that were not split, the clones, the first halves, the second
+/// Clones and splits. What is new is a copy of its source in everything but position and scale. The result is: the originals that were not split, the clones, the first halves, the second
 /// halves. Returns the source of each new row. Moments follow their rows; new rows start with none.
 ///
 /// `normals` are standard normal numbers, `[2 · splits, 3]` row-major: the first halves' offsets in units of the
@@ -135,7 +135,7 @@ pub fn reset_opacity(gaussians: &mut GaussianEditor) {
         let opacity_logits = tensors.opacity_logits.clamp_max(highest);
         GaussianTensors { opacity_logits, ..tensors }
     });
-    gaussians.reset_moments(GaussianAttribute::OpacityLogits);
+    gaussians.reset_moments(OPACITY_LOGITS);
 }
 
 fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {

@@ -1,11 +1,9 @@
 //! Changes to the set of Gaussians, with the optimizer's moments in step.
 
-use burn::module::Param;
 use burn::tensor::{Int, Tensor, TensorData};
-use light4gs_model::{GaussianTensors, Gaussians};
+use light4gs_model::{Attribute, AttributeMapper, GaussianTensors, Gaussians};
 
 use crate::optimization::adam::Adam;
-use crate::optimization::parameters::GaussianAttribute;
 
 /// The Gaussians of a run while their number changes: every edit moves the optimizer's rows along.
 #[derive(Debug)]
@@ -48,17 +46,10 @@ impl<'a> GaussianEditor<'a> {
         let rows = Tensor::<1, Int>::from_data(TensorData::new(indices, [rows.len()]), &device);
         let fresh: Vec<f32> = (0..rows.dims()[0]).map(|k| if k < first_new { 0.0 } else { 1.0 }).collect();
         let fresh = Tensor::<1>::from_data(TensorData::new(fresh, rows.dims()), &device);
-        for attribute in GaussianAttribute::ALL {
-            self.adam.select_rows(attribute.path(), &rows, &fresh, count);
+        for attribute in self.gaussians.attributes() {
+            self.adam.select_rows(&attribute.path(), &rows, &fresh, count);
         }
-        self.replace(|tensors| GaussianTensors {
-            means: tensors.means.select(0, rows.clone()),
-            log_scales: tensors.log_scales.select(0, rows.clone()),
-            quats: tensors.quats.select(0, rows.clone()),
-            opacity_logits: tensors.opacity_logits.select(0, rows.clone()),
-            sh_dc: tensors.sh_dc.select(0, rows.clone()),
-            sh_rest: tensors.sh_rest.select(0, rows),
-        });
+        self.replace(|tensors| tensors.map(&mut SelectRows(rows)));
     }
 
     /// Keeps the Gaussians where `keep` is set. `[N]`
@@ -78,23 +69,30 @@ impl<'a> GaussianEditor<'a> {
     }
 
     /// Zeroes the moments of one attribute for all Gaussians.
-    pub fn reset_moments(&mut self, attribute: GaussianAttribute) {
-        self.adam.reset_moments(attribute.path());
+    pub fn reset_moments(&mut self, attribute: &Attribute) {
+        self.adam.reset_moments(&attribute.path());
     }
 
     fn replace(&mut self, change: impl FnOnce(GaussianTensors) -> GaussianTensors) {
-        let GaussianTensors { means, log_scales, quats, opacity_logits, sh_dc, sh_rest } =
-            change(self.gaussians.tensors().inner());
-        set(&mut self.gaussians.means, means);
-        set(&mut self.gaussians.log_scales, log_scales);
-        set(&mut self.gaussians.quats, quats);
-        set(&mut self.gaussians.opacity_logits, opacity_logits);
-        set(&mut self.gaussians.sh_dc, sh_dc);
-        set(&mut self.gaussians.sh_rest, sh_rest);
+        let tensors = change(self.gaussians.tensors().inner());
+        self.gaussians.set_tensors(tensors.map(&mut Trained));
     }
 }
 
-/// Gives a parameter a value that is trained further.
-fn set<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
-    *parameter = Param::initialized(parameter.id, Tensor::from_inner(value).require_grad());
+/// The rows of a list, of every attribute.
+struct SelectRows(Tensor<1, Int>);
+
+impl AttributeMapper for SelectRows {
+    fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
+        values.select(0, self.0.clone())
+    }
+}
+
+/// Values that are trained further.
+struct Trained;
+
+impl AttributeMapper for Trained {
+    fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
+        Tensor::from_inner(values).require_grad()
+    }
 }

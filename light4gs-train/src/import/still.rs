@@ -36,7 +36,8 @@ pub(super) fn read_gaussians(path: &Path) -> Result<GaussianArrays, DataError> {
         return Err(DataError::ply(path, "it holds no Gaussians", "export the scene again"));
     }
     let sh_rest = sh_rest.into_iter().flatten().flatten().collect();
-    Ok(GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, sh_degree: FULL_DEGREE, sh_rest })
+    let further = Vec::new();
+    Ok(GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, sh_degree: FULL_DEGREE, sh_rest, further })
 }
 
 /// Leaves out the degrees in which every coefficient of every Gaussian is 0.

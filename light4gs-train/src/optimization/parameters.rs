@@ -76,51 +76,12 @@ impl ParameterGroup {
     }
 }
 
-/// What every Gaussian has: the parameters with a row for each.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum GaussianAttribute {
-    /// Positions.
-    Means,
-    /// Logarithms of standard deviations.
-    LogScales,
-    /// Quaternions.
-    Quats,
-    /// Opacities before the sigmoid.
-    OpacityLogits,
-    /// Degree-0 spherical harmonics.
-    ShDc,
-    /// Higher spherical harmonics.
-    ShRest,
-}
-
-impl GaussianAttribute {
-    /// All of them.
-    pub const ALL: [Self; 6] =
-        [Self::Means, Self::LogScales, Self::Quats, Self::OpacityLogits, Self::ShDc, Self::ShRest];
-
-    /// The parameter's path in the scene.
-    pub fn path(self) -> &'static str {
-        match self {
-            Self::Means => "gaussians.means",
-            Self::LogScales => "gaussians.log_scales",
-            Self::Quats => "gaussians.quats",
-            Self::OpacityLogits => "gaussians.opacity_logits",
-            Self::ShDc => "gaussians.sh_dc",
-            Self::ShRest => "gaussians.sh_rest",
-        }
-    }
-
-    /// Whether a path is that of one of them.
-    pub fn has_path(path: &str) -> bool {
-        Self::ALL.iter().any(|attribute| attribute.path() == path)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use burn::module::Param;
     use burn::tensor::{Device, Tensor};
     use light4gs_data::PointCloud;
+    use light4gs_model::attributes::attribute_of_path;
     use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
     use super::*;
@@ -152,10 +113,10 @@ mod tests {
         for (path, group) in &groups.0 {
             assert_eq!(group.is_none(), path.starts_with("coordinates."), "{path}");
             let part = path.split('.').next().unwrap();
-            assert_eq!(part == "gaussians", GaussianAttribute::has_path(path), "{path}");
+            assert_eq!(part == "gaussians", attribute_of_path(path).is_some(), "{path}");
         }
-        for attribute in GaussianAttribute::ALL {
-            assert!(groups.0.iter().any(|(path, _)| path == attribute.path()), "{attribute:?}");
+        for attribute in scene.gaussians.attributes() {
+            assert!(groups.0.iter().any(|(path, _)| *path == attribute.path()), "{attribute:?}");
         }
         let grid = groups.0.iter().filter(|(_, group)| *group == Some(ParameterGroup::Grid)).count();
         assert_eq!(grid, 12);

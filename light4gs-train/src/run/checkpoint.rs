@@ -11,15 +11,16 @@ use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::CoordinateMapping;
 use light4gs_data::{DataError, PointCloud, read_regular_file, write_atomically};
+use light4gs_model::attributes::{MEANS, attribute_of_path};
 use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
-use light4gs_model::{DeformationField, DynamicScene, HexPlaneField};
+use light4gs_model::{Attribute, DeformationField, DynamicScene, Gaussians, HexPlaneField};
 
 use super::stored_tensors::{self, Entry, StoredTensors, floats, not_finite};
 use crate::compression::{Compression, CompressionOf, ConfiguredModels, EntropyModels};
 use crate::config::Config;
 use crate::error::TrainError;
 use crate::optimization::adam::{Adam, AdamState};
-use crate::optimization::parameters::{COMPRESSION, GaussianAttribute, ParameterGroup};
+use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
 use crate::stage::Stage;
 
 /// A run's state after an iteration.
@@ -176,9 +177,9 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             scene.coordinates = scene.coordinates.with_mapping(parsed_mapping(text).ok_or_else(wrong)?);
         }
         let mut compression = Compression::of_run(models, config, scene.planes(), device)?;
-        let count = gaussian_count(&file);
+        let count = gaussian_count(&file, &scene.gaussians);
         if count == 0 {
-            let means = GaussianAttribute::Means.path();
+            let means = MEANS.path();
             return Err(failed(format!("tensor `{SCENE}.{means}` has no rows, expected at least one Gaussian")));
         }
         let mut load = Load { prefix: SCENE, count, file: &mut file, device, sizes: BTreeMap::new(), problem: None };
@@ -226,10 +227,11 @@ fn vector(values: Vec<f32>, device: &Device) -> Tensor<1> {
 }
 
 /// The number of rows that most attributes of the Gaussians have, so that the error names the one that differs.
-fn gaussian_count(file: &StoredTensors) -> usize {
-    let rows = GaussianAttribute::ALL.map(|attribute| file.rows(&format!("{SCENE}.{}", attribute.path())).unwrap_or(0));
+fn gaussian_count(file: &StoredTensors, gaussians: &Gaussians) -> usize {
+    let rows = |attribute: &Attribute| file.rows(&format!("{SCENE}.{}", attribute.path())).unwrap_or(0);
+    let rows: Vec<usize> = gaussians.attributes().map(rows).collect();
     let having = |count: usize| rows.iter().filter(|rows| **rows == count).count();
-    rows.into_iter().max_by_key(|count| having(*count)).unwrap_or(0)
+    rows.iter().copied().max_by_key(|count| having(*count)).unwrap_or(0)
 }
 
 /// Where in its run a checkpoint is: on the schedule, and what the file's name says.
@@ -302,7 +304,7 @@ impl ParameterMapper for Load<'_, '_> {
         }
         // The shape is what the configuration says, but for the number of Gaussians.
         let mut shape = parameter.dims();
-        if GaussianAttribute::has_path(path) {
+        if attribute_of_path(path).is_some() {
             shape[0] = self.count;
         }
         let key = format!("{}.{path}", self.prefix);

@@ -233,6 +233,7 @@ fn deformed_gaussians() {
             opacity_logits: golden.tensor("full.in.opacity", &device),
             sh_dc: shs.clone().slice(s![.., 0..1, ..]),
             sh_rest: shs.slice(s![.., 1..coefficients, ..]),
+            further: Vec::new(),
         });
         let identity = Pca { mean: [0.0; 3], axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], std: [1.0; 3] };
         let GoldenNetwork { network, layers } = network_of(&golden, "depth1", &device);

@@ -225,5 +225,6 @@ fn raw_gaussians(golden: &Golden, device: &Device) -> GaussianTensors {
         opacity_logits: (opacities.clone() / (opacities.neg() + 1.0)).log(),
         sh_dc: sh.clone().slice(s![.., 0..1, ..]),
         sh_rest: sh.slice(s![.., 1..coefficients, ..]),
+        further: Vec::new(),
     }
 }

@@ -269,6 +269,7 @@ fn adam_after_an_opacity_reset() {
             opacity_logits: Tensor::from_data(opacity.parameter.val().into_data(), &device),
             sh_dc: zeros(3).reshape([count, 1, 3]),
             sh_rest: zeros(45).reshape([count, 15, 3]),
+            further: Vec::new(),
         });
         let steps_before = adam.states[opacity.name].time;
         reset_opacity(&mut GaussianEditor::new(&mut gaussians, &mut adam));
@@ -322,6 +323,7 @@ fn gaussians_of(golden: &Golden, prefix: &str, device: &Device) -> Gaussians {
         opacity_logits: tensor("opacity_logit"),
         sh_dc: golden.tensor(&format!("{prefix}.f_dc"), device),
         sh_rest: golden.tensor(&format!("{prefix}.f_rest"), device),
+        further: Vec::new(),
     })
 }
 
@@ -374,7 +376,7 @@ fn densification() {
             let key = format!("after_densify.{key}");
             assert_close(&format!("{name} {key}"), &found, &golden.values(&key), 1e-5);
         };
-        let GaussianTensors { means, log_scales, quats, opacity_logits, sh_dc, sh_rest } = gaussians.tensors();
+        let GaussianTensors { means, log_scales, quats, opacity_logits, sh_dc, sh_rest, .. } = gaussians.tensors();
         assert!(means.is_require_grad(), "the result is trained further");
         check("xyz", values_of(&means));
         check("scaling_log", values_of(&log_scales));

@@ -353,6 +353,7 @@ fn raw_failures() -> RawFailures {
                     opacity_logits,
                     sh_dc: sh_dc.reshape([2, 1, 3]),
                     sh_rest: sh_rest.reshape([2, 15, 3]),
+                    further: Vec::new(),
                 };
                 let rendering = Splatter::new(BACKGROUND, 3).render(gaussians, &camera, None);
                 let what = format!("{name}: {value} in {attribute}");
