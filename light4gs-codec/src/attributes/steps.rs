@@ -3,12 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::SECTION;
-use crate::{
-    CodecError,
-    adaptive::LARGEST_STEP,
-    scene::BUILT_IN,
-    steps,
-};
+use crate::{CodecError, adaptive::LARGEST_STEP, scene::BUILT_IN, steps};
 
 /// How finely each attribute of a Gaussian is quantized: steps by the attributes' names.
 ///

@@ -5,10 +5,7 @@ use crate::{
     CodecError, GaussianArrays, HexPlaneArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
     attributes,
     budget::{Budget, Demand},
-    bytes::{
-        Section,
-        sections::Kind,
-    },
+    bytes::{Section, sections::Kind},
     motion, parallel, planes,
     sh::{self, coding::Conditions},
 };
