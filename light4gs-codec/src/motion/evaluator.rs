@@ -5,7 +5,7 @@ use crate::{
     CodecError, CoordinateMapping, GaussianArrays, Limits, MotionNetwork, MotionOutput, MotionSource, Plane, SceneData,
     network::{
         Program,
-        kernels::{LANES, Lanes},
+        kernels::{LANES, Lanes, kept},
     },
     plane_layout::{PLANE_AXES, PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES},
     planes, sh_rest_coefficients,
@@ -14,7 +14,7 @@ use crate::{
 /// A scene's motion, ready to be run at one time after the other.
 ///
 /// What does not depend on the time is computed once: the product of the space-only samples of each Gaussian, which takes
-/// `4 · features` bytes a Gaussian. It runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to
+/// `4 · features` bytes a Gaussian. What depends on the time alone is computed once for each time. It runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to
 /// float tolerance, takes about a microsecond a Gaussian, and uses one thread.
 ///
 /// ```
@@ -66,11 +66,12 @@ impl MotionEvaluator {
         let limits = Limits::large();
         scene.motion.check(&limits)?;
         planes::head::check(&scene.hexplane, &limits)?;
-        scene.motion.check_features(scene.hexplane.features())?;
+        scene.motion.check_sources(scene.hexplane.features(), &scene.gaussians)?;
         let channels = scene.hexplane.channels as usize;
         let features = scene.hexplane.features() as usize;
+        let uniform: Vec<bool> = sources.iter().map(|source| *source == MotionSource::Time).collect();
         let mut motion = Motion {
-            program: Program::pointwise(network, &vec![true; sources.len()]),
+            program: Program::pointwise_with_uniform(network, &uniform),
             sources: sources.clone(),
             outputs: outputs.clone(),
             mapping: scene.frame.mapping,
@@ -104,7 +105,8 @@ impl MotionEvaluator {
 
     /// Whether the spherical harmonics change with time.
     pub fn changes_harmonics(&self) -> bool {
-        self.motion.as_ref().is_some_and(|motion| motion.outputs.contains(&MotionOutput::Sh))
+        let of_harmonics = |output: &MotionOutput| output.added() == MotionOutput::Sh;
+        self.motion.as_ref().is_some_and(|motion| motion.outputs.iter().any(of_harmonics))
     }
 
     /// Writes the Gaussians of a `range` at a `time` in [0, 1] into `moved`: attributes before their activations. Both
@@ -135,6 +137,12 @@ impl MotionEvaluator {
         let lines = motion.lines_at(time);
         let mut workspace = motion.program.workspace();
         let mut product = vec![0.0; motion.features];
+        for (input, source) in motion.sources.iter().enumerate() {
+            if *source == MotionSource::Time {
+                motion.program.input_lanes(&mut workspace, input)[0] = [kept(time); LANES];
+            }
+        }
+        motion.program.run_uniform(&mut workspace);
         for block in range.start / LANES..range.end.div_ceil(LANES) {
             for (input, source) in motion.sources.iter().enumerate() {
                 let inputs = motion.program.input_lanes(&mut workspace, input);
@@ -142,14 +150,20 @@ impl MotionEvaluator {
                     MotionSource::Features if motion.features == 0 => {}
                     MotionSource::Features => motion.set_features(block, &lines, &mut product, inputs),
                     MotionSource::Point => inputs.copy_from_slice(&motion.points[block]),
-                    MotionSource::Time => inputs[0] = [time; LANES],
+                    MotionSource::Time => {}
+                    MotionSource::Attribute(name) => set_attribute(canonical, name, block, inputs),
                 }
             }
             motion.program.run(&mut workspace);
             let lanes = range.start.max(block * LANES)..range.end.min((block + 1) * LANES);
             for (index, output) in motion.outputs.iter().enumerate() {
-                let offsets = motion.program.output_lanes(&workspace, index);
-                lanes.clone().for_each(|gaussian| add(*output, offsets, gaussian, moved));
+                let values = motion.program.output_lanes(&workspace, index);
+                match output.replaces() {
+                    true => lanes.clone().for_each(|gaussian| change(*output, values, gaussian, moved, |_, new| new)),
+                    false => {
+                        lanes.clone().for_each(|gaussian| change(*output, values, gaussian, moved, |old, by| old + by));
+                    }
+                }
             }
         }
     }
@@ -216,21 +230,38 @@ impl Motion {
     }
 }
 
-/// Adds what a network says of a Gaussian.
-fn add(output: MotionOutput, offsets: &[Lanes], gaussian: usize, moved: &mut GaussianArrays) {
+/// An attribute of eight Gaussians, `[width]`; zeros beyond the last one.
+fn set_attribute(canonical: &GaussianArrays, name: &str, block: usize, inputs: &mut [Lanes]) {
+    let attribute = canonical.attribute(name).expect("a source is checked when an evaluator is made");
+    let (width, values) = (attribute.width, attribute.values);
+    inputs.fill([0.0; LANES]);
+    let rows = values[(block * LANES * width).min(values.len())..].chunks_exact(width).take(LANES);
+    for (lane, row) in rows.enumerate() {
+        inputs.iter_mut().zip(row).for_each(|(lanes, &value)| lanes[lane] = kept(value));
+    }
+}
+
+/// Changes a Gaussian as a network says of it: the new value follows from the old one and the network's.
+fn change(
+    output: MotionOutput,
+    values: &[Lanes],
+    gaussian: usize,
+    moved: &mut GaussianArrays,
+    operation: impl Fn(f32, f32) -> f32,
+) {
     let lane = gaussian % LANES;
-    let add_to = |values: &mut [f32], offsets: &[Lanes]| {
-        values.iter_mut().zip(offsets).for_each(|(value, offset)| *value += offset[lane]);
+    let apply = |attribute: &mut [f32], values: &[Lanes]| {
+        attribute.iter_mut().zip(values).for_each(|(old, lanes)| *old = operation(*old, lanes[lane]));
     };
-    match output {
-        MotionOutput::Position => add_to(&mut moved.means[gaussian], offsets),
-        MotionOutput::LogScale => add_to(&mut moved.log_scales[gaussian], offsets),
-        MotionOutput::Quaternion => add_to(&mut moved.quats[gaussian], offsets),
-        MotionOutput::OpacityLogit => moved.opacity_logits[gaussian] += offsets[0][lane],
-        MotionOutput::Sh => {
-            add_to(&mut moved.sh_dc[gaussian], offsets);
+    match output.added() {
+        MotionOutput::Position => apply(&mut moved.means[gaussian], values),
+        MotionOutput::LogScale => apply(&mut moved.log_scales[gaussian], values),
+        MotionOutput::Quaternion => apply(&mut moved.quats[gaussian], values),
+        MotionOutput::OpacityLogit => apply(&mut moved.opacity_logits[gaussian..=gaussian], values),
+        _ => {
+            apply(&mut moved.sh_dc[gaussian], values);
             let rest = 3 * sh_rest_coefficients(moved.sh_degree);
-            add_to(&mut moved.sh_rest[gaussian * rest..][..rest], &offsets[3..]);
+            apply(&mut moved.sh_rest[gaussian * rest..][..rest], &values[3..]);
         }
     }
 }
@@ -246,7 +277,8 @@ impl SceneData {
     /// A network that contradicts itself or the hexplane.
     pub fn positions_at(&self, time: f32) -> Result<Vec<[f32; 3]>, CodecError> {
         let motion = self.motion.network.as_ref();
-        if !motion.is_some_and(|motion| motion.outputs.contains(&MotionOutput::Position)) {
+        let moves = |output: &MotionOutput| output.added() == MotionOutput::Position;
+        if !motion.is_some_and(|motion| motion.outputs.iter().any(moves)) {
             return Ok(self.gaussians.means.clone());
         }
         let mut moved = self.gaussians.clone();

@@ -11,6 +11,11 @@ use crate::{
 };
 
 const SECTION: &str = Section::Motion.name();
+/// Numbers of the sources of a network; a name follows the last one.
+const FEATURES: u8 = 0;
+const POINT: u8 = 1;
+const TIME: u8 = 2;
+const ATTRIBUTE: u8 = 3;
 
 /// Writes arrays that are sound, as float32 where there is no precision; returns them as a decoder gets them.
 pub(crate) fn write(
@@ -23,8 +28,18 @@ pub(crate) fn write(
     let mut tensors = Vec::new();
     if let Some(MotionNetwork { network, sources, outputs }) = &motion.network {
         network.write(writer);
-        sources.iter().for_each(|source| writer.u8(place(&MotionSource::ALL, source)));
-        outputs.iter().for_each(|output| writer.u8(place(&MotionOutput::ALL, output)));
+        for source in sources {
+            match source {
+                MotionSource::Features => writer.u8(FEATURES),
+                MotionSource::Point => writer.u8(POINT),
+                MotionSource::Time => writer.u8(TIME),
+                MotionSource::Attribute(name) => {
+                    writer.u8(ATTRIBUTE);
+                    writer.block(name.as_bytes());
+                }
+            }
+        }
+        outputs.iter().for_each(|&output| writer.u8(output as u8));
         tensors = network.stored_tensors();
     }
     writer.varint(motion.tensors.len() as u64);
@@ -37,10 +52,6 @@ pub(crate) fn write(
     let mut decoded = motion.clone();
     set_tensors(&mut decoded, write_tensors(SECTION, &tensors, precision, writer)?);
     Ok(decoded)
-}
-
-fn place<T: PartialEq>(all: &[T], one: &T) -> u8 {
-    all.iter().position(|other| other == one).unwrap_or(0) as u8
 }
 
 fn set_tensors(motion: &mut MotionArrays, tensors: Vec<Vec<f32>>) {
@@ -58,11 +69,25 @@ fn read_text(reader: &mut Reader<'_>, field: &str, limits: &Limits) -> Result<St
     Ok(text.to_owned())
 }
 
-fn read_one<T: Copy>(reader: &mut Reader<'_>, field: &str, all: &[T]) -> Result<T, CodecError> {
-    let number = reader.u8(field)?;
-    all.get(usize::from(number)).copied().ok_or_else(|| {
-        CodecError::invalid(SECTION, field, number, format!("less than {}; use a newer program", all.len()))
+fn unknown(field: &str, number: u8, known: usize) -> CodecError {
+    CodecError::invalid(SECTION, field, number, format!("less than {known}; use a newer program"))
+}
+
+fn read_source(reader: &mut Reader<'_>, limits: &Limits) -> Result<MotionSource, CodecError> {
+    let field = "a source of the network";
+    Ok(match reader.u8(field)? {
+        FEATURES => MotionSource::Features,
+        POINT => MotionSource::Point,
+        TIME => MotionSource::Time,
+        ATTRIBUTE => MotionSource::Attribute(read_text(reader, "name of an attribute", limits)?),
+        other => return Err(unknown(field, other, usize::from(ATTRIBUTE) + 1)),
     })
+}
+
+fn read_output(reader: &mut Reader<'_>) -> Result<MotionOutput, CodecError> {
+    let (field, all) = ("an output of the network", MotionOutput::ALL);
+    let number = reader.u8(field)?;
+    all.get(usize::from(number)).copied().ok_or_else(|| unknown(field, number, all.len()))
 }
 
 /// Reads the arrays without their numbers.
@@ -72,10 +97,8 @@ pub(crate) fn read_description(reader: &mut Reader<'_>, limits: &Limits) -> Resu
         0 => None,
         1 => {
             let network = Network::read(reader, SECTION, "the network", limits)?;
-            let source = |_: &u32| read_one(reader, "a source of the network", &MotionSource::ALL);
-            let sources = network.inputs.iter().map(source).collect::<Result<_, _>>()?;
-            let output = |_| read_one(reader, "an output of the network", &MotionOutput::ALL);
-            let outputs = (0..network.outputs.len()).map(output).collect::<Result<_, _>>()?;
+            let sources = network.inputs.iter().map(|_| read_source(reader, limits)).collect::<Result<_, _>>()?;
+            let outputs = network.outputs.iter().map(|_| read_output(reader)).collect::<Result<_, _>>()?;
             Some(MotionNetwork { network, sources, outputs })
         }
         other => return Err(CodecError::invalid(SECTION, "presence of a network", other, "0 or 1")),

@@ -22,7 +22,61 @@ impl Operation {
             Self::Spread => "spread",
             Self::Concatenate => "concatenate",
             Self::Add => "add",
+            Self::Subtract => "subtract",
             Self::Multiply => "multiply",
+            Self::Divide => "divide",
+            Self::Exponential => "exponential",
+            Self::Logarithm => "logarithm",
+            Self::SquareRoot => "square root",
+            Self::Affine { .. } => "affine",
+            Self::Clamp { .. } => "clamp",
+            Self::GroupSum(_) => "group sum",
+            Self::GroupMaximum(_) => "group maximum",
+            Self::Select(_) => "select",
+        }
+    }
+
+    /// Whether it takes two values, element by element.
+    pub(super) fn is_binary(&self) -> bool {
+        matches!(self, Self::Add | Self::Subtract | Self::Multiply | Self::Divide)
+    }
+
+    /// Channels of its value, from those of its inputs.
+    pub(super) fn channels(&self, inputs: impl IntoIterator<Item = u64>) -> u64 {
+        let mut inputs = inputs.into_iter();
+        match self {
+            Self::Layer(layer) => layer.outputs.into(),
+            Self::Concatenate => inputs.fold(0, u64::saturating_add),
+            Self::GroupSum(group) | Self::GroupMaximum(group) => inputs.next().unwrap_or(0) / u64::from(*group).max(1),
+            Self::Select(channels) => channels.len() as u64,
+            _ => inputs.next().unwrap_or(0),
+        }
+    }
+
+    /// Refuses numbers of its own that it cannot have. `first` are the channels of its first input.
+    fn check_numbers(&self, first: u64, section: &'static str, name: &str) -> Result<(), CodecError> {
+        let refuse = |field: &str, found: String, expected: &str| {
+            Err(CodecError::invalid(section, format!("{field} of {name}"), found, expected))
+        };
+        match self {
+            Self::LeakyRelu(slope) if !slope.is_finite() => refuse("slope", slope.to_string(), "a finite number"),
+            Self::Affine { scale, offset } if !(scale.is_finite() && offset.is_finite()) => {
+                refuse("scale and offset", format!("{scale} and {offset}"), "finite numbers")
+            }
+            Self::Clamp { least, most } if !(least.is_finite() && most.is_finite() && least <= most) => {
+                refuse("range", format!("{least} to {most}"), "finite numbers, the lower one first")
+            }
+            Self::GroupSum(group) | Self::GroupMaximum(group)
+                if *group == 0 || !first.is_multiple_of(u64::from(*group)) =>
+            {
+                refuse("channels of a group", group.to_string(), &format!("a divisor of {first}"))
+            }
+            Self::Select(channels) if channels.is_empty() => refuse("selected channels", "none".into(), "1 or more"),
+            Self::Select(channels) => match channels.iter().find(|&&channel| u64::from(channel) >= first) {
+                Some(beyond) => refuse("a selected channel", beyond.to_string(), &format!("less than {first}")),
+                None => Ok(()),
+            },
+            _ => Ok(()),
         }
     }
 
@@ -67,12 +121,8 @@ impl Network {
     pub(crate) fn channels(&self) -> Vec<u64> {
         let mut channels: Vec<u64> = self.inputs.iter().map(|&channels| channels.into()).collect();
         for node in &self.nodes {
-            let of = |value: &Value| channels[value.0 as usize];
-            channels.push(match &node.operation {
-                Operation::Layer(layer) => layer.outputs.into(),
-                Operation::Concatenate => node.inputs.iter().map(of).sum(),
-                _ => of(&node.inputs[0]),
-            });
+            let own = node.operation.channels(node.inputs.iter().map(|value| channels[value.0 as usize]));
+            channels.push(own);
         }
         channels
     }
@@ -116,7 +166,7 @@ impl Network {
             let (field, operation) = (format!("node {index}"), node.operation.name());
             let arity = match node.operation {
                 Operation::Concatenate => node.inputs.len().max(2),
-                Operation::Add | Operation::Multiply => 2,
+                _ if node.operation.is_binary() => 2,
                 _ => 1,
             };
             if node.inputs.len() != arity || arity > limits.nodes as usize {
@@ -134,11 +184,6 @@ impl Network {
             if let Operation::Layer(layer) = &node.operation {
                 check_layer(layer, section, &format!("{name}, {field}"), limits)?;
             }
-            if let Operation::LeakyRelu(slope) = node.operation
-                && !slope.is_finite()
-            {
-                return refuse(format!("slope of {field}"), slope.to_string(), "a finite number");
-            }
         }
         let all = self.inputs.len() + self.nodes.len();
         if let Some(missing) = self.outputs.iter().find(|value| value.0 as usize >= all) {
@@ -150,20 +195,18 @@ impl Network {
         for (index, node) in self.nodes.iter().enumerate() {
             let of = |value: &Value| channels[value.0 as usize];
             let first = of(&node.inputs[0]);
-            let own = match &node.operation {
-                Operation::Layer(layer) => {
-                    if first != u64::from(layer.inputs) {
-                        return refuse(format!("inputs of node {index}"), layer.inputs.to_string(), &first.to_string());
-                    }
-                    layer.outputs.into()
+            match &node.operation {
+                Operation::Layer(layer) if first != u64::from(layer.inputs) => {
+                    return refuse(format!("inputs of node {index}"), layer.inputs.to_string(), &first.to_string());
                 }
-                Operation::Concatenate => node.inputs.iter().fold(0, |sum: u64, value| sum.saturating_add(of(value))),
-                Operation::Add | Operation::Multiply if of(&node.inputs[1]) != first => {
+                operation if operation.is_binary() && !first.is_multiple_of(of(&node.inputs[1])) => {
                     let found = of(&node.inputs[1]).to_string();
-                    return refuse(format!("channels of the second input of node {index}"), found, &first.to_string());
+                    let expected = format!("{first}, or a divisor of it");
+                    return refuse(format!("channels of the second input of node {index}"), found, &expected);
                 }
-                _ => first,
-            };
+                operation => operation.check_numbers(first, section, &format!("{name}, node {index}"))?,
+            }
+            let own = node.operation.channels(node.inputs.iter().map(of));
             channels.push(own);
             total = total.saturating_add(own);
             at_most(section, format!("{name}, channels of all values"), total, limits.layer_width)?;

@@ -4,6 +4,7 @@ use super::{Layer, LayerKind, Network, Node, Operation, Value, kernels::masked_t
 use crate::{
     CodecError, Limits,
     bytes::{Reader, Writer},
+    limits::at_most,
     network::weights::TensorLength,
 };
 
@@ -23,6 +24,16 @@ const SPREAD: u8 = 12;
 const CONCATENATE: u8 = 13;
 const ADD: u8 = 14;
 const MULTIPLY: u8 = 15;
+const SUBTRACT: u8 = 16;
+const DIVIDE: u8 = 17;
+const EXPONENTIAL: u8 = 18;
+const LOGARITHM: u8 = 19;
+const SQUARE_ROOT: u8 = 20;
+const AFFINE: u8 = 21;
+const CLAMP: u8 = 22;
+const GROUP_SUM: u8 = 23;
+const GROUP_MAXIMUM: u8 = 24;
+const SELECT: u8 = 25;
 /// Set in a code where the first input is the value before.
 const READS_LAST: u8 = 0x80;
 /// The slope that [`LEAKY_RELU`] stands for.
@@ -49,6 +60,16 @@ impl Operation {
             Self::Concatenate => CONCATENATE,
             Self::Add => ADD,
             Self::Multiply => MULTIPLY,
+            Self::Subtract => SUBTRACT,
+            Self::Divide => DIVIDE,
+            Self::Exponential => EXPONENTIAL,
+            Self::Logarithm => LOGARITHM,
+            Self::SquareRoot => SQUARE_ROOT,
+            Self::Affine { .. } => AFFINE,
+            Self::Clamp { .. } => CLAMP,
+            Self::GroupSum(_) => GROUP_SUM,
+            Self::GroupMaximum(_) => GROUP_MAXIMUM,
+            Self::Select(_) => SELECT,
         }
     }
 }
@@ -77,6 +98,12 @@ impl Network {
                     }
                 }
                 Operation::LeakyRelu(slope) if code == LEAKY_RELU_OF_SLOPE => writer.f32(*slope),
+                Operation::Affine { scale: one, offset: other } | Operation::Clamp { least: one, most: other } => {
+                    writer.f32(*one);
+                    writer.f32(*other);
+                }
+                Operation::GroupSum(group) | Operation::GroupMaximum(group) => writer.varint((*group).into()),
+                Operation::Select(channels) => write_selection(channels, writer),
                 _ => {}
             }
         }
@@ -96,17 +123,19 @@ impl Network {
             .map(|_| reader.varint_at_most("channels of an input", limits.layer_width))
             .collect::<Result<Vec<_>, _>>()?;
         let mut channels: Vec<u64> = inputs.iter().map(|&channels| channels.into()).collect();
+        // A selection is longer than its bytes, so what all of them may take is bounded on the way.
+        let mut selected = 0;
         let count = reader.varint_at_most("number of a network's nodes", limits.nodes)?;
         let mut nodes = Vec::new();
         for index in 0..count as usize {
             let node = read_node(reader, section, &format!("{name}, node {index}"), &channels, limits)?;
+            if let Operation::Select(channels) = &node.operation {
+                selected += channels.len() as u64;
+                at_most(section, format!("{name}, selected channels"), selected, limits.layer_width)?;
+            }
             // The check below says it properly, if it is too many.
-            let of = |value: &Value| channels[value.0 as usize];
-            channels.push(match &node.operation {
-                Operation::Layer(layer) => layer.outputs.into(),
-                Operation::Concatenate => node.inputs.iter().fold(0u64, |sum, value| sum.saturating_add(of(value))),
-                _ => of(&node.inputs[0]),
-            });
+            let own = node.operation.channels(node.inputs.iter().map(|value| channels[value.0 as usize]));
+            channels.push(own);
             nodes.push(node);
         }
         let count = reader.varint_at_most("number of a network's outputs", limits.nodes)?;
@@ -154,9 +183,9 @@ fn read_node(
     let (code, reads_last) = (byte & !READS_LAST, byte & READS_LAST != 0);
     let count = match code {
         CONCATENATE => reader.varint_at_most("inputs of a concatenation", limits.nodes)?,
-        ADD | MULTIPLY => 2,
-        LINEAR..=SPREAD => 1,
-        _ => return Err(CodecError::invalid(section, format!("operation of {name}"), code, "0 to 15")),
+        ADD | MULTIPLY | SUBTRACT | DIVIDE => 2,
+        LINEAR..=SPREAD | EXPONENTIAL..=SELECT => 1,
+        _ => return Err(CodecError::invalid(section, format!("operation of {name}"), code, "0 to 25")),
     };
     let mut inputs = Vec::new();
     for index in 0..count {
@@ -199,9 +228,46 @@ fn read_node(
         SPREAD => Operation::Spread,
         CONCATENATE => Operation::Concatenate,
         ADD => Operation::Add,
-        _ => Operation::Multiply,
+        MULTIPLY => Operation::Multiply,
+        SUBTRACT => Operation::Subtract,
+        DIVIDE => Operation::Divide,
+        EXPONENTIAL => Operation::Exponential,
+        LOGARITHM => Operation::Logarithm,
+        SQUARE_ROOT => Operation::SquareRoot,
+        AFFINE => {
+            let scale = reader.finite("scale of an affine operation")?;
+            Operation::Affine { scale, offset: reader.finite("offset of an affine operation")? }
+        }
+        CLAMP => {
+            let least = reader.finite("lower end of a clamp")?;
+            Operation::Clamp { least, most: reader.finite("upper end of a clamp")? }
+        }
+        GROUP_SUM => Operation::GroupSum(reader.varint_at_most("channels of a group", limits.layer_width)?),
+        GROUP_MAXIMUM => Operation::GroupMaximum(reader.varint_at_most("channels of a group", limits.layer_width)?),
+        _ => Operation::Select(read_selection(reader, limits)?),
     };
     Ok(Node { operation, inputs })
+}
+
+/// Channels as runs of neighbors: where each begins, and its length.
+fn write_selection(channels: &[u32], writer: &mut Writer) {
+    let runs: Vec<&[u32]> = channels.chunk_by(|a, b| a.checked_add(1) == Some(*b)).collect();
+    writer.varint(runs.len() as u64);
+    for run in runs {
+        writer.varint(run[0].into());
+        writer.varint(run.len() as u64);
+    }
+}
+
+fn read_selection(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<u32>, CodecError> {
+    let mut channels = Vec::new();
+    for _ in 0..reader.varint_at_most("runs of selected channels", limits.layer_width)? {
+        let first = reader.varint_at_most("a selected channel", limits.layer_width)?;
+        let room = limits.layer_width - channels.len() as u32;
+        let length = reader.varint_at_most("length of a run of selected channels", room)?;
+        channels.extend(first..first.saturating_add(length));
+    }
+    Ok(channels)
 }
 
 /// A weight without what a mask hides.

@@ -21,8 +21,9 @@
 //!
 //! An encoder and a decoder that disagree about one bit of a parameter read two different streams, so nothing is left to
 //! a library: every output of a layer is its bias, plus the products of weight and input in a fixed order, each product
-//! and each sum rounded to float32. There are no fused multiply-adds (Rust does not contract) and no functions but
-//! comparison, division and square root, which IEEE 754 defines to the bit.
+//! and each sum rounded to float32. There are no fused multiply-adds (Rust does not contract) and no functions of the
+//! platform but comparison, division and square root, which IEEE 754 defines to the bit; exponential and logarithm are made of
+//! these.
 //!
 //! | file | what |
 //! |---|---|
@@ -88,10 +89,41 @@ pub enum Operation {
     Spread,
     /// The channels of two or more inputs of the same size behind each other.
     Concatenate,
-    /// The sum of two inputs of the same shape.
+    /// The sum of two inputs, element by element. As in [`Operation::Subtract`], [`Operation::Multiply`] and
+    /// [`Operation::Divide`], the second one may have fewer channels, a divisor of the first's; they are repeated then.
     Add,
-    /// The product of two inputs of the same shape, element by element.
+    /// The first input less the second one.
+    Subtract,
+    /// The product of two inputs.
     Multiply,
+    /// The first input divided by the second one.
+    Divide,
+    /// `exp(x)`.
+    Exponential,
+    /// The natural logarithm.
+    Logarithm,
+    /// The square root.
+    SquareRoot,
+    /// `x · scale + offset`.
+    Affine {
+        /// Finite.
+        scale: f32,
+        /// Finite.
+        offset: f32,
+    },
+    /// `x`, or the end of the range that it is beyond.
+    Clamp {
+        /// Finite.
+        least: f32,
+        /// Finite, not below the other end.
+        most: f32,
+    },
+    /// The sum of each group of so many neighboring channels.
+    GroupSum(u32),
+    /// The largest of each group of so many neighboring channels.
+    GroupMaximum(u32),
+    /// The channels of these numbers, in this order.
+    Select(Vec<u32>),
 }
 
 /// How a layer moves over a map.
@@ -178,6 +210,11 @@ impl Network {
     /// Appends a [`Operation::LeakyRelu`].
     pub fn leaky_relu(&mut self, input: Value, slope: f32) -> Value {
         self.node(Operation::LeakyRelu(slope), &[input])
+    }
+
+    /// Appends numbers that are the same everywhere: a layer that reads any value with weights of 0.
+    pub fn constant(&mut self, any: Value, channels: u32, numbers: Vec<f32>) -> Value {
+        self.layer(any, Layer::linear(vec![0.0; channels as usize * numbers.len()], numbers))
     }
 
     /// Declares an output.

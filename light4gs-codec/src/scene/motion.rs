@@ -1,5 +1,6 @@
 //! How the Gaussians move, as data.
 
+use super::GaussianArrays;
 use crate::{
     CodecError, Limits, Network,
     bytes::{Section, names::check_name},
@@ -25,19 +26,19 @@ pub struct MotionArrays {
     pub tensors: Vec<NamedTensor>,
 }
 
-/// A network that gives offsets of the attributes of one Gaussian at a time.
+/// A network that gives the attributes of one Gaussian at a time, or offsets of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionNetwork {
     /// It looks at one Gaussian at a time.
     pub network: Network,
     /// What its inputs are.
     pub sources: Vec<MotionSource>,
-    /// What its outputs are; each at most once.
+    /// What its outputs are; each attribute at most once.
     pub outputs: Vec<MotionOutput>,
 }
 
 /// What a [`MotionNetwork`] may read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MotionSource {
     /// For each scale and channel of the hexplane the product of the six samples at the Gaussian's canonical center and
     /// the time.
@@ -46,9 +47,14 @@ pub enum MotionSource {
     Point,
     /// The time in [0, 1].
     Time,
+    /// An attribute of the canonical Gaussian by its name in [`crate::GaussianArrays::attributes`], as it is stored there:
+    /// `means` (3, in world units), `log_scales` (3), `quats` (4), `opacity_logits` (1), `sh_dc` (3), `sh_rest`, and what the
+    /// Gaussians of the scene have besides.
+    Attribute(String),
 }
 
-/// What an output of a [`MotionNetwork`] is added to. Canonical attributes are those of [`crate::GaussianArrays`].
+/// What an output of a [`MotionNetwork`] is added to, or what it takes the place of. Canonical attributes are those of
+/// [`crate::GaussianArrays`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotionOutput {
     /// The center, 3 channels.
@@ -62,6 +68,16 @@ pub enum MotionOutput {
     /// Spherical harmonics: for each coefficient, degree 0 included, red, green, blue. Those that a scene does not have
     /// are left out.
     Sh,
+    /// As [`MotionOutput::Position`], in place of the canonical center.
+    NewPosition,
+    /// As [`MotionOutput::LogScale`], in place of the canonical ones.
+    NewLogScale,
+    /// As [`MotionOutput::Quaternion`], in place of the canonical one.
+    NewQuaternion,
+    /// As [`MotionOutput::OpacityLogit`], in place of the canonical one.
+    NewOpacityLogit,
+    /// As [`MotionOutput::Sh`], in place of the canonical ones.
+    NewSh,
 }
 
 /// Numbers with a name.
@@ -83,26 +99,48 @@ impl NamedTensor {
 }
 
 impl MotionSource {
-    pub(crate) const ALL: [Self; 3] = [Self::Features, Self::Point, Self::Time];
-
-    fn channels(self, features: u64) -> u64 {
+    /// Its channels, for planes with so many features and these Gaussians; none if they have no such attribute.
+    fn channels(&self, features: u64, gaussians: &GaussianArrays) -> Option<u64> {
         match self {
-            Self::Features => features,
-            Self::Point => 3,
-            Self::Time => 1,
+            Self::Features => Some(features),
+            Self::Point => Some(3),
+            Self::Time => Some(1),
+            Self::Attribute(name) => gaussians.attribute(name).map(|attribute| attribute.width as u64),
         }
     }
 }
 
 impl MotionOutput {
-    pub(crate) const ALL: [Self; 5] = [Self::Position, Self::LogScale, Self::Quaternion, Self::OpacityLogit, Self::Sh];
+    /// All, in the order of their numbers in a stream: first those that are added, then those that take the place.
+    pub(crate) const ALL: [Self; 10] = [
+        Self::Position,
+        Self::LogScale,
+        Self::Quaternion,
+        Self::OpacityLogit,
+        Self::Sh,
+        Self::NewPosition,
+        Self::NewLogScale,
+        Self::NewQuaternion,
+        Self::NewOpacityLogit,
+        Self::NewSh,
+    ];
+
+    /// What is added to the attribute that this one changes.
+    pub(crate) fn added(self) -> Self {
+        Self::ALL[self as usize % (Self::ALL.len() / 2)]
+    }
+
+    /// Whether it takes the place of the attribute.
+    pub(crate) fn replaces(self) -> bool {
+        self as usize >= Self::ALL.len() / 2
+    }
 
     fn has_channels(self, channels: u64) -> bool {
-        match self {
+        match self.added() {
             Self::Position | Self::LogScale => channels == 3,
             Self::Quaternion => channels == 4,
             Self::OpacityLogit => channels == 1,
-            Self::Sh => [1, 4, 9, 16].contains(&(channels / 3)) && channels.is_multiple_of(3),
+            _ => [1, 4, 9, 16].contains(&(channels / 3)) && channels.is_multiple_of(3),
         }
     }
 }
@@ -148,11 +186,14 @@ impl MotionArrays {
         at_most(SECTION, "number of weights", total, limits.layer_weights)
     }
 
-    /// Refuses a network that reads other features than a hexplane has.
-    pub(crate) fn check_features(&self, features: u64) -> Result<(), CodecError> {
+    /// Refuses a network that reads other features than a hexplane has, or attributes that these Gaussians do not have.
+    pub(crate) fn check_sources(&self, features: u64, gaussians: &GaussianArrays) -> Result<(), CodecError> {
         let Some(MotionNetwork { network, sources, .. }) = &self.network else { return Ok(()) };
         for (source, &found) in sources.iter().zip(&network.inputs) {
-            let expected = source.channels(features);
+            let Some(expected) = source.channels(features, gaussians) else {
+                let expected = "an attribute that the Gaussians have";
+                return Err(CodecError::invalid(SECTION, "a source of the network", format!("{source:?}"), expected));
+            };
             if u64::from(found) != expected {
                 let field = format!("channels of the input that is {source:?}");
                 return Err(CodecError::invalid(SECTION, field, found, expected.to_string()));
@@ -175,11 +216,17 @@ impl MotionNetwork {
                 return Err(CodecError::invalid(SECTION, what, found, format!("{expected}, as the network has")));
             }
         }
+        for source in sources {
+            if let MotionSource::Attribute(name) = source {
+                check_name(SECTION, "an attribute's name", name, limits)?;
+            }
+        }
         let channels = network.channels();
         for (index, (output, value)) in outputs.iter().zip(&network.outputs).enumerate() {
             let found = channels[value.0 as usize];
-            if !output.has_channels(found) || outputs[..index].contains(output) {
-                let expected = "what it is added to, once";
+            let again = outputs[..index].iter().any(|other| other.added() == output.added());
+            if !output.has_channels(found) || again {
+                let expected = "those of what it changes, once";
                 return Err(CodecError::invalid(
                     SECTION,
                     format!("output {output:?}"),

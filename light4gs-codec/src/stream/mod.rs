@@ -88,5 +88,5 @@ pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError
     fields::check_finite(scene)?;
     scene.motion.check(limits)?;
     planes::head::check(&scene.hexplane, limits)?;
-    scene.motion.check_features(scene.hexplane.features())
+    scene.motion.check_sources(scene.hexplane.features(), &scene.gaussians)
 }

@@ -10,6 +10,7 @@ mod files;
 mod golden;
 mod motion;
 mod network_weights;
+mod operations;
 mod paper_size;
 mod random_networks;
 mod refusals;

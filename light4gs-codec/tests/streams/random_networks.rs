@@ -41,11 +41,23 @@ fn node(choice: u8, picks: [u8; 3], channels: &[u32], random: &mut Random) -> No
         17..=19 => Operation::Spread,
         20..=22 => Operation::Concatenate,
         23 => Operation::Add,
-        _ => Operation::Multiply,
+        24 => Operation::Multiply,
+        25 => Operation::Subtract,
+        26 => Operation::Divide,
+        27 => Operation::Exponential,
+        28 => Operation::Logarithm,
+        29 => Operation::SquareRoot,
+        30 => Operation::Affine { scale: -1.5, offset: 0.25 },
+        31 => Operation::Clamp { least: -0.5, most: 2.0 },
+        32 => Operation::GroupSum(2),
+        33 => Operation::GroupMaximum(if inputs.is_multiple_of(3) { 3 } else { inputs }),
+        _ => Operation::Select(picks.iter().map(|&pick| u32::from(pick) % inputs).collect()),
     };
     let inputs = match operation {
         Operation::Concatenate => picks.iter().map(|&pick| value(pick)).collect(),
-        Operation::Add | Operation::Multiply => vec![first, value(picks[1])],
+        Operation::Add | Operation::Multiply | Operation::Subtract | Operation::Divide => {
+            vec![first, value(picks[1])]
+        }
         _ => vec![first],
     };
     Node { operation, inputs }
@@ -60,6 +72,10 @@ fn graph(inputs: &[u32], choices: &[(u8, [u8; 3])], random: &mut Random) -> Netw
         channels.push(match &node.operation {
             Operation::Layer(layer) => layer.outputs,
             Operation::Concatenate => node.inputs.iter().map(|value| channels[value.0 as usize]).sum(),
+            Operation::GroupSum(group) | Operation::GroupMaximum(group) => {
+                (channels[node.inputs[0].0 as usize] / group).max(1)
+            }
+            Operation::Select(selected) => selected.len() as u32,
             _ => channels[node.inputs[0].0 as usize],
         });
         network.nodes.push(node);
@@ -94,7 +110,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
     #[test]
     fn any_graph_decodes_or_is_refused(
-        choices in prop::collection::vec((0u8..25, any::<[u8; 3]>()), 0..10),
+        choices in prop::collection::vec((0u8..37, any::<[u8; 3]>()), 0..10),
         seed in any::<u64>(),
     ) {
         let mut random = Random::new(seed);

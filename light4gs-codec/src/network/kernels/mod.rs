@@ -8,8 +8,10 @@
 //! | `padded_map.rs` | channels of a map with a border of zeros, and windows of it |
 //! | `convolution.rs`, `transposed.rs`, `masked.rs` | the kinds of convolution |
 //! | `upsampling.rs`, `reductions.rs` | to another size, means, transposition |
+//! | `elementary.rs` | exponential and logarithm |
 
 mod convolution;
+mod elementary;
 mod lanes;
 mod masked;
 mod padded_map;
@@ -18,6 +20,7 @@ mod transposed;
 mod upsampling;
 
 pub(crate) use convolution::Convolution;
+pub(crate) use elementary::{exponential, logarithm};
 pub(crate) use lanes::{LANES, Lanes, kept};
 pub(crate) use masked::{AnchorMap, MaskedConvolution, first_anchor, masked_taps};
 pub(crate) use padded_map::{Columns, PaddedMap};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::{Action, Activation, InputKind, MapPlan, Program, Step, StepKind, ValuePlan};
 use crate::network::{
     Layer, LayerKind, Network, Operation,
-    kernels::{Convolution, MaskedConvolution, TransposedConvolution},
+    kernels::{Convolution, MaskedConvolution, TransposedConvolution, kept},
 };
 
 impl Program {
@@ -13,22 +13,36 @@ impl Program {
     pub(crate) fn over_maps(network: &Network) -> Self {
         let kind = |anchors: bool| if anchors { InputKind::Anchors } else { InputKind::Map };
         let inputs = network.anchor_inputs().into_iter().map(kind).collect();
-        Self::new(network, inputs, &vec![true; network.inputs.len()], None)
+        Self::new(network, inputs, &vec![true; network.inputs.len()], &[], None)
     }
 
     /// A program over numbers at single places, of a network that [`Network::check_pointwise`] has passed. Inputs that
     /// are not `present` are zeros; those that are at the end of what a layer reads take no part in its sums.
     pub(crate) fn pointwise(network: &Network, present: &[bool]) -> Self {
-        Self::new(network, vec![InputKind::Lanes; network.inputs.len()], present, None)
+        Self::new(network, vec![InputKind::Lanes; network.inputs.len()], present, &[], None)
+    }
+
+    /// A pointwise program some of whose inputs are the same at all places: what follows from these alone is computed by
+    /// [`Program::run_uniform`], once for all of them.
+    pub(crate) fn pointwise_with_uniform(network: &Network, uniform: &[bool]) -> Self {
+        let inputs = vec![InputKind::Lanes; network.inputs.len()];
+        Self::new(network, inputs, &vec![true; network.inputs.len()], uniform, None)
     }
 
     /// This pointwise program of a network, with other inputs present.
     pub(crate) fn with_present(&self, network: &Network, present: &[bool]) -> Self {
-        Self::new(network, self.inputs.clone(), present, Some(self))
+        Self::new(network, self.inputs.clone(), present, &[], Some(self))
     }
 
-    /// `shared` is another program of the same network, whose weights are used.
-    fn new(network: &Network, inputs: Vec<InputKind>, present: &[bool], shared: Option<&Self>) -> Self {
+    /// `uniform` inputs are the same at all places; those that it does not mention are not. `shared` is another program of
+    /// the same network, whose weights are used.
+    fn new(
+        network: &Network,
+        inputs: Vec<InputKind>,
+        present: &[bool],
+        uniform: &[bool],
+        shared: Option<&Self>,
+    ) -> Self {
         let channels: Vec<usize> = network.channels().into_iter().map(|channels| channels as usize).collect();
         let mut values: Vec<ValuePlan> = Vec::with_capacity(channels.len());
         for &channels in &channels {
@@ -79,9 +93,19 @@ impl Program {
                     }
                     known
                 }
-                Operation::Add | Operation::Multiply => known(0).max(known(1)),
-                Operation::Layer(_) => values[own].channels,
-                _ => known(0),
+                Operation::Add | Operation::Multiply
+                    if values[operands[0]].channels == values[operands[1]].channels =>
+                {
+                    known(0).max(known(1))
+                }
+                Operation::Relu
+                | Operation::LeakyRelu(_)
+                | Operation::Resize
+                | Operation::MeanOverHeight
+                | Operation::MeanOverWidth
+                | Operation::Transpose
+                | Operation::Spread => known(0),
+                _ => values[own].channels,
             };
             let kind = match shared {
                 Some(program) => Arc::clone(&program.steps[index].kind),
@@ -96,9 +120,28 @@ impl Program {
         }
         let outputs = network.outputs.iter().map(|value| stands[value.0 as usize]).collect();
         let slots = values.last().map_or(0, |last| last.slot + last.channels);
-        let mut program = Self { inputs, values, steps, outputs, schedule: Vec::new(), maps: Vec::new(), slots };
+        let (schedule, maps) = (Vec::new(), Vec::new());
+        let mut program = Self { inputs, values, steps, outputs, uniform: Vec::new(), schedule, maps, slots };
         program.plan();
+        program.split_schedule(uniform);
         program
+    }
+
+    /// Takes out of the schedule what follows from uniform inputs alone.
+    fn split_schedule(&mut self, uniform: &[bool]) {
+        if !uniform.contains(&true) {
+            return;
+        }
+        let mut is_uniform = uniform.to_vec();
+        is_uniform.resize(self.inputs.len(), false);
+        for step in &self.steps {
+            // What is merged into the step before has no value of its own, and nobody reads it.
+            let from_uniform = !step.inputs.is_empty() && step.inputs.iter().all(|&input| is_uniform[input]);
+            is_uniform.push(from_uniform);
+        }
+        let schedule = std::mem::take(&mut self.schedule);
+        let once = |action: &Action| matches!(*action, Action::Run(value) if is_uniform[value]);
+        (self.uniform, self.schedule) = schedule.into_iter().partition(once);
     }
 
     /// Finds what makes each map and the outputs, and when a map is done with.
@@ -192,7 +235,17 @@ impl StepKind {
             Operation::Spread => Self::Spread,
             Operation::Concatenate => Self::Concatenate,
             Operation::Add => Self::Add,
+            Operation::Subtract => Self::Subtract,
             Operation::Multiply => Self::Multiply,
+            Operation::Divide => Self::Divide,
+            Operation::Exponential => Self::Exponential,
+            Operation::Logarithm => Self::Logarithm,
+            Operation::SquareRoot => Self::SquareRoot,
+            &Operation::Affine { scale, offset } => Self::Affine { scale: kept(scale), offset: kept(offset) },
+            &Operation::Clamp { least, most } => Self::Clamp { least: kept(least), most: kept(most) },
+            Operation::GroupSum(group) => Self::GroupSum(*group as usize),
+            Operation::GroupMaximum(group) => Self::GroupMaximum(*group as usize),
+            Operation::Select(channels) => Self::Select(channels.clone()),
         }
     }
 

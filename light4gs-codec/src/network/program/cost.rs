@@ -6,7 +6,7 @@
 
 use super::{Action, Program, StepKind, ValuePlan};
 use crate::network::{
-    LayerKind, Network,
+    LayerKind, Network, Operation,
     kernels::{Convolution, LANES, PaddedMap, TransposedConvolution},
 };
 
@@ -25,6 +25,9 @@ const ACTION: u64 = 16;
 const ELEMENT: u64 = 6;
 const LOAD: u64 = 12;
 const STORE: u64 = 20;
+/// The same for divisions and square roots, for exponentials and logarithms.
+const DIVISION: u64 = 16;
+const ELEMENTARY: u64 = 80;
 /// The same for whole maps: interpolation, sums over rows and columns, exchange of rows and columns.
 const RESIZE: u64 = 80;
 const MEAN: u64 = 20;
@@ -110,6 +113,11 @@ impl Program {
             StepKind::MeanOverHeight | StepKind::MeanOverWidth => MEAN * channels,
             StepKind::Transpose => TRANSPOSE * channels,
             StepKind::Spread => LOAD * channels,
+            StepKind::Divide | StepKind::SquareRoot => DIVISION * channels,
+            StepKind::Exponential | StepKind::Logarithm => ELEMENTARY * channels,
+            StepKind::GroupSum(group) | StepKind::GroupMaximum(group) => {
+                ELEMENT * (channels * *group as u64 + channels)
+            }
             _ => ELEMENT * channels,
         };
         let activation = if step.activation.is_some() { ELEMENT * channels } else { 0 };
@@ -132,7 +140,11 @@ impl Network {
     /// Bytes of a [`Program`] without its weights: each value has a plan, a step and a part in the schedule of each map.
     pub(crate) fn plan_bytes(&self) -> u64 {
         let values = (self.inputs.len() + self.nodes.len()) as u64;
-        values * (400 + 8 * values)
+        let selected = self.nodes.iter().map(|node| match &node.operation {
+            Operation::Select(channels) => 4 * channels.len() as u64,
+            _ => 0,
+        });
+        values * (400 + 8 * values) + selected.sum::<u64>()
     }
 }
 

@@ -37,7 +37,9 @@ pub(crate) struct Program {
     values: Vec<ValuePlan>,
     steps: Vec<Step>,
     outputs: Vec<usize>,
-    /// What makes the outputs at a place.
+    /// What makes values that are the same everywhere, and the outputs need.
+    uniform: Vec<Action>,
+    /// What makes the outputs at a place, after that.
     schedule: Vec<Action>,
     /// Values that are made as whole maps, in order, with what makes each.
     maps: Vec<MapPlan>,
@@ -84,7 +86,23 @@ enum StepKind {
     Spread,
     Concatenate,
     Add,
+    Subtract,
     Multiply,
+    Divide,
+    Exponential,
+    Logarithm,
+    SquareRoot,
+    Affine {
+        scale: f32,
+        offset: f32,
+    },
+    Clamp {
+        least: f32,
+        most: f32,
+    },
+    GroupSum(usize),
+    GroupMaximum(usize),
+    Select(Vec<u32>),
     /// It has become a part of the step before, whose value is its own.
     Merged,
 }

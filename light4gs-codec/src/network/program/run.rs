@@ -2,7 +2,8 @@
 
 use super::{Action, Activation, MapPlan, Maps, Program, StepKind, ValuePlan, Workspace};
 use crate::network::kernels::{
-    AnchorMap, Columns, LANES, Lanes, PaddedMap, kept, mean_over_height, mean_over_width, resized, transposed,
+    AnchorMap, Columns, LANES, Lanes, PaddedMap, exponential, kept, logarithm, mean_over_height, mean_over_width,
+    resized, transposed,
 };
 
 impl Program {
@@ -17,6 +18,11 @@ impl Program {
             plan.done.iter().for_each(|&value| maps[value] = None);
         }
         Maps { program: self, maps }
+    }
+
+    /// Computes what is the same at all places, before [`Program::run`] is called for them with this workspace.
+    pub(crate) fn run_uniform(&self, workspace: &mut Workspace) {
+        self.perform(&self.uniform, &[], None, 0, Columns { first: 0, step: 1 }, workspace);
     }
 
     /// Computes the outputs of a pointwise program.
@@ -80,7 +86,22 @@ impl Program {
                     }
                 }
                 StepKind::Add => combine(own, operand(0).0, operand(1).0, |a, b| a + b),
+                StepKind::Subtract => combine(own, operand(0).0, operand(1).0, |a, b| a - b),
                 StepKind::Multiply => combine(own, operand(0).0, operand(1).0, |a, b| a * b),
+                StepKind::Divide => combine(own, operand(0).0, operand(1).0, |a, b| a / b),
+                StepKind::Exponential => change(own, operand(0).0, exponential),
+                StepKind::Logarithm => change(own, operand(0).0, logarithm),
+                StepKind::SquareRoot => change(own, operand(0).0, f32::sqrt),
+                &StepKind::Affine { scale, offset } => change(own, operand(0).0, |x| x * scale + offset),
+                &StepKind::Clamp { least, most } => change(own, operand(0).0, |x| clamped(x, least, most)),
+                StepKind::GroupSum(group) => reduce(own, operand(0).0, *group, |sum, x| sum + x),
+                StepKind::GroupMaximum(group) => {
+                    reduce(own, operand(0).0, *group, |largest, x| if x > largest { x } else { largest });
+                }
+                StepKind::Select(channels) => {
+                    let from = operand(0).0;
+                    own.iter_mut().zip(channels).for_each(|(own, &channel)| *own = from[channel as usize]);
+                }
                 StepKind::Doubling(_)
                 | StepKind::Resize
                 | StepKind::MeanOverHeight
@@ -194,7 +215,38 @@ fn spread(map: &PaddedMap, y: usize, columns: Columns, outputs: &mut [Lanes]) {
     }
 }
 
+/// Element by element; `b` may have fewer channels, which are repeated.
 fn combine(own: &mut [Lanes], a: &[Lanes], b: &[Lanes], operation: impl Fn(f32, f32) -> f32) {
-    let pairs = a.as_flattened().iter().zip(b.as_flattened());
-    own.as_flattened_mut().iter_mut().zip(pairs).for_each(|(own, (&a, &b))| *own = kept(operation(a, b)));
+    for (own, a) in own.chunks_exact_mut(b.len()).zip(a.chunks_exact(b.len())) {
+        let pairs = a.as_flattened().iter().zip(b.as_flattened());
+        own.as_flattened_mut().iter_mut().zip(pairs).for_each(|(own, (&a, &b))| *own = kept(operation(a, b)));
+    }
+}
+
+/// Number by number.
+fn change(own: &mut [Lanes], from: &[Lanes], operation: impl Fn(f32) -> f32) {
+    let numbers = own.as_flattened_mut().iter_mut().zip(from.as_flattened());
+    numbers.for_each(|(own, &x)| *own = kept(operation(x)));
+}
+
+/// Each group of neighboring channels into one, from the first to the last.
+fn reduce(own: &mut [Lanes], from: &[Lanes], group: usize, operation: impl Fn(f32, f32) -> f32) {
+    for (own, group) in own.iter_mut().zip(from.chunks_exact(group)) {
+        *own = group[0];
+        for lanes in &group[1..] {
+            own.iter_mut().zip(lanes).for_each(|(own, &x)| *own = operation(*own, x));
+        }
+        *own = own.map(kept);
+    }
+}
+
+/// No number stays none.
+fn clamped(x: f32, least: f32, most: f32) -> f32 {
+    if x < least {
+        least
+    } else if x > most {
+        most
+    } else {
+        x
+    }
 }
