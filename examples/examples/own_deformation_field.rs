@@ -13,7 +13,7 @@ use light4gs_codec::network::{Layer, Operation};
 use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, decode};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{DeformationField, DynamicScene, HexPlane, HexPlaneField, ModelError, Offsets};
+use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlane, HexPlaneField, ModelError};
 use light4gs_train::dataset::load_options;
 use light4gs_train::trainer::Trainer;
 
@@ -54,7 +54,7 @@ impl DeformationField for SharedTrajectories {
     type Config = SharedTrajectoriesConfig;
 
     /// The stream's name of it. A program that reads a file of another kind says so by this name.
-    const KIND: &'static str = "shared-trajectories";
+    const KINDS: &'static [&'static str] = &["shared-trajectories"];
 
     fn init(config: &SharedTrajectoriesConfig, device: &Device) -> Self {
         let linear = |inputs, outputs| LinearConfig::new(inputs, outputs).init(device);
@@ -66,17 +66,17 @@ impl DeformationField for SharedTrajectories {
         }
     }
 
-    fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
+    fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
         let branch =
             |[first, second]: &[Linear; 2], input| second.forward(leaky_relu(first.forward(input), SLOPE.into()));
         let [count, _] = points.dims();
         let time = Tensor::full([count, 1], time, &points.device());
         let along = branch(&self.place, points) * branch(&self.pace, time);
-        Offsets { position: Some(self.directions.forward(along)), ..Offsets::default() }
+        GaussianTensors { means: rest.means.clone() + self.directions.forward(along), ..rest }
     }
 
-    fn to_arrays(&self) -> MotionArrays {
-        // The same as `offsets`, as data. `Point` and `Time` are what the codec calls these inputs.
+    fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
+        // The same as `deform`, as data. `Point` and `Time` are what the codec calls these inputs.
         let (mut network, [point, time]) = Network::new([3, 1]);
         let branch = |network: &mut Network, [first, second]: &[Linear; 2], input| {
             let hidden = network.layer(input, to_layer(first));
@@ -90,7 +90,7 @@ impl DeformationField for SharedTrajectories {
         network.output(offset);
         let sources = vec![MotionSource::Point, MotionSource::Time];
         let network = MotionNetwork { network, sources, outputs: vec![MotionOutput::Position] };
-        MotionArrays { kind: Self::KIND.to_owned(), network: Some(network), tensors: Vec::new() }
+        Ok(MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() })
     }
 
     fn from_arrays(arrays: &MotionArrays, _planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
@@ -102,7 +102,7 @@ impl DeformationField for SharedTrajectories {
         // compared node by node before its numbers are taken over.
         let (width, trajectories) = (place.outputs as usize, directions.inputs as usize);
         let mut field = Self::init(&SharedTrajectoriesConfig { width, trajectories }, device);
-        let ours = field.to_arrays().network.expect("this kind has a network");
+        let ours = field.to_arrays()?.network.expect("this kind has a network");
         if !ours.network.has_structure_of(&motion.network) || ours.sources != motion.sources {
             return Err(wrong("other nodes"));
         }
@@ -155,7 +155,7 @@ fn main() -> Outcome {
     assert_eq!(arrays.motion.kind, "shared-trajectories");
     let device = Device::flex();
     let decoded = DynamicScene::<SharedTrajectories>::from_arrays(&arrays, &device)?;
-    assert_eq!(decoded.field.to_arrays(), arrays.motion);
+    assert_eq!(decoded.field.to_arrays()?, arrays.motion);
 
     // The codec runs the network too, without Burn and exactly: the two agree to float tolerance.
     let ours: Vec<f32> = decoded.at(0.3).means.into_data().iter::<f32>().collect();

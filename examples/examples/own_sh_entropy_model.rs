@@ -128,6 +128,6 @@ fn main() -> Outcome {
     println!("{close} of {} values are the same in Burn and in the codec", exact.len());
     assert!(close as f64 > 0.999 * exact.len() as f64);
     // A model of the same kind reads it again to the same arrays.
-    assert_eq!(scene.to_arrays(decoded.meta.clone()).gaussians, decoded.gaussians);
+    assert_eq!(scene.to_arrays(decoded.meta.clone())?.gaussians, decoded.gaussians);
     Ok(())
 }

@@ -19,13 +19,17 @@ pub(crate) enum Purpose {
     PruningViews,
     /// Quantization noise and the choice of planes and Gaussians for the rate.
     Rate,
+    /// What a deformation field draws.
+    Motion,
 }
 
 /// A generator for one purpose at one position, an iteration or a pass over the data.
 pub(crate) fn generator(seed: u64, purpose: Purpose, stage: Stage, position: usize) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     let stage = if stage == Stage::Coarse { 0 } else { 1 };
-    generator.set_stream((purpose as u64) << 62 | stage << 61 | position as u64);
+    // Two bits for the first four purposes, and a third one for the others.
+    let (purpose, other) = (purpose as u64 % 4, purpose as u64 / 4);
+    generator.set_stream(purpose << 62 | stage << 61 | other << 60 | position as u64);
     generator
 }
 

@@ -5,7 +5,9 @@ use std::sync::Arc;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS, position_of, scale_of};
-use light4gs_codec::{FurtherAttribute, GaussianArrays, HexPlaneArrays, Plane, SceneData, SceneFrameArrays, SceneMeta};
+use light4gs_codec::{
+    FurtherAttribute, GaussianArrays, HexPlaneArrays, MotionArrays, Plane, SceneData, SceneFrameArrays, SceneMeta,
+};
 
 use super::attributes::Attribute;
 use super::coordinates::{Pca, SceneCoordinates};
@@ -24,7 +26,19 @@ pub enum ModelError {
         /// As the file says.
         found: String,
         /// As the model says.
-        expected: &'static str,
+        expected: String,
+    },
+    /// A field whose author has not said how it is coded.
+    #[error(
+        "motion: a field of the kind `{kind}` cannot be {action} a file yet: implement `DeformationField::{method}` for it"
+    )]
+    NoStreamForm {
+        /// Of the field.
+        kind: &'static str,
+        /// "written to" or "read from".
+        action: &'static str,
+        /// What must be implemented.
+        method: &'static str,
     },
     /// What moves the Gaussians is not what its kind consists of.
     #[error("motion: {0}")]
@@ -154,13 +168,21 @@ impl HexPlane {
 
 impl<F: DeformationField> DynamicScene<F> {
     /// Copies the model to what a `.l4gs` file holds.
-    pub fn to_arrays(&self, meta: SceneMeta) -> SceneData {
+    ///
+    /// # Errors
+    /// A field that has no form in a stream.
+    pub fn to_arrays(&self, meta: SceneMeta) -> Result<SceneData, ModelError> {
+        Ok(SceneData { motion: self.field.to_arrays()?, ..self.to_arrays_at_rest(meta) })
+    }
+
+    /// [`DynamicScene::to_arrays`] without the motion: planes, but nothing that reads them.
+    pub fn to_arrays_at_rest(&self, meta: SceneMeta) -> SceneData {
         SceneData {
             meta,
             gaussians: self.gaussians.to_arrays(),
             frame: self.coordinates.to_arrays(),
             hexplane: self.planes().map(HexPlane::to_arrays).unwrap_or_default(),
-            motion: self.field.to_arrays(),
+            motion: MotionArrays::default(),
         }
     }
 
@@ -169,8 +191,9 @@ impl<F: DeformationField> DynamicScene<F> {
     /// # Errors
     /// Planes or layers that do not belong together, or are not what this kind of field needs.
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
-        if data.motion.kind != F::KIND {
-            return Err(ModelError::MotionKind { found: data.motion.kind.clone(), expected: F::KIND });
+        if !F::KINDS.contains(&data.motion.kind.as_str()) {
+            let expected = F::KINDS.join("` or `");
+            return Err(ModelError::MotionKind { found: data.motion.kind.clone(), expected });
         }
         let planes = match data.hexplane.planes.is_empty() {
             true => None,

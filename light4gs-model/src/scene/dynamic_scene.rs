@@ -88,8 +88,7 @@ impl<F: DeformationField> DynamicScene<F> {
         }
         let means = rest.means.clone();
         let means = if self.differentiate_points { means } else { means.detach() };
-        let offsets = self.field.offsets(self.coordinates.normalize(means), self.coordinates.field_time(time));
-        rest.offset_by(offsets)
+        self.field.deform(rest, self.coordinates.normalize(means), self.coordinates.field_time(time))
     }
 
     /// The field's planes, if it has some.

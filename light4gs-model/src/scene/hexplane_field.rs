@@ -8,6 +8,7 @@ use light4gs_codec::MotionArrays;
 use super::arrays::ModelError;
 use super::deformation::{Deformation, DeformationConfig};
 use super::field::{DeformationField, Offsets};
+use super::gaussians::GaussianTensors;
 use super::hexplane::{HexPlane, HexPlaneConfig};
 
 /// Configuration of a [`HexPlaneField`].
@@ -47,12 +48,17 @@ impl HexPlaneField {
         let time = Tensor::full([count, 1], 2.0 * time - 1.0, &points.device());
         Tensor::cat(vec![points, time], 1)
     }
+
+    /// Changes of Gaussians at `points [N, 3]`, N > 0, in the scene's coordinates, at a time in [0, 1].
+    pub fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
+        self.deformation.forward(self.hexplane.query(Self::query_points(points, time)))
+    }
 }
 
 impl DeformationField for HexPlaneField {
     type Config = HexPlaneFieldConfig;
 
-    const KIND: &'static str = "hexplane";
+    const KINDS: &'static [&'static str] = &["hexplane"];
 
     fn init(config: &HexPlaneFieldConfig, device: &Device) -> Self {
         let hexplane = config.hexplane.init(device);
@@ -60,8 +66,8 @@ impl DeformationField for HexPlaneField {
         Self { hexplane, deformation: deformation.init(device) }
     }
 
-    fn offsets(&self, points: Tensor<2>, time: f32) -> Offsets {
-        self.deformation.forward(self.hexplane.query(Self::query_points(points, time)))
+    fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+        rest.offset_by(self.offsets(points, time))
     }
 
     fn planes(&self) -> Option<&HexPlane> {
@@ -72,8 +78,9 @@ impl DeformationField for HexPlaneField {
         Some(&mut self.hexplane)
     }
 
-    fn to_arrays(&self) -> MotionArrays {
-        MotionArrays { kind: Self::KIND.to_owned(), network: Some(self.deformation.to_motion()), tensors: Vec::new() }
+    fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
+        let network = Some(self.deformation.to_motion());
+        Ok(MotionArrays { kind: self.kind().to_owned(), network, tensors: Vec::new() })
     }
 
     fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {

@@ -24,7 +24,7 @@ pub use contraction::contract;
 pub use coordinates::{CoordinatesConfig, Pca, SceneCoordinates};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
-pub use field::{DeformationField, Offsets};
+pub use field::{DeformationField, FinePosition, LearningRate, Offsets, SceneAtRest};
 pub use further::{FurtherParameters, FurtherTensor};
 pub use gaussians::{ActivatedGaussians, AttributeMapper, GaussianTensors, Gaussians, GaussiansConfig};
 pub use hexplane::{HexPlane, HexPlaneConfig, query_planes};

@@ -5,18 +5,20 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
 
 use super::arrays::ModelError;
-use super::field::{DeformationField, Offsets};
+use super::field::DeformationField;
+use super::gaussians::GaussianTensors;
 use super::hexplane::HexPlane;
 
 /// A field that moves nothing.
 ///
 /// ```
-/// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::{DeformationField, StillField};
+/// use burn::tensor::Device;
+/// use light4gs_data::PointCloud;
+/// use light4gs_model::{DynamicSceneConfig, GaussiansConfig, StillField};
 ///
-/// let device = Device::flex();
-/// let offsets = StillField::init(&(), &device).offsets(Tensor::zeros([5, 3], &device), 0.25);
-/// assert!(offsets.position.is_none());
+/// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0]], colors: vec![[0.5; 3]; 2] };
+/// let scene = DynamicSceneConfig::<StillField>::new(GaussiansConfig::new(), ()).init(&cloud, &Device::flex());
+/// assert_eq!(scene.at(0.25).means.into_data(), scene.gaussians.means.val().into_data());
 /// ```
 #[derive(Module, Debug)]
 pub struct StillField;
@@ -25,18 +27,18 @@ impl DeformationField for StillField {
     type Config = ();
 
     /// A stream in which nothing moves has no name for it.
-    const KIND: &'static str = "";
+    const KINDS: &'static [&'static str] = &[""];
 
     fn init((): &(), _: &Device) -> Self {
         Self
     }
 
-    fn offsets(&self, _: Tensor<2>, _: f32) -> Offsets {
-        Offsets::default()
+    fn deform(&self, rest: GaussianTensors, _: Tensor<2>, _: f32) -> GaussianTensors {
+        rest
     }
 
-    fn to_arrays(&self) -> MotionArrays {
-        MotionArrays::default()
+    fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
+        Ok(MotionArrays::default())
     }
 
     fn from_arrays(_: &MotionArrays, _: Option<HexPlane>, _: &Device) -> Result<Self, ModelError> {

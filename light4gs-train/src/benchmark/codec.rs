@@ -66,7 +66,7 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device)?;
     compression.start_from(scene.planes());
-    let data = scene.to_arrays(SceneMeta::default());
+    let data = scene.to_arrays(SceneMeta::default())?;
     let input: CompressionInput =
         compression_input(&mut compression, &scene, &data, &config.compression, Profile::Compact)?;
     let planes = input.planes.as_ref().expect("the compact profile codes planes");

@@ -311,7 +311,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     let mut adam = Adam::default();
     // Rates so small that the scene stays what it is while it is timed.
     let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
-        adam.step_module("", dynamic, &mut gradients, |_| Some(1e-12));
+        adam.step_module("", dynamic, &mut gradients, |_, _| Some(1e-12));
     };
     let mut times = [Vec::new(), Vec::new()];
     for repetition in 0..WARM_UP + repeats {

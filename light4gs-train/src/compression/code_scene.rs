@@ -126,20 +126,23 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     trained: &TrainedScene<F, E>,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
 ) -> Result<CodedScene, TrainError> {
-    let TrainedScene { scene, config, data, device, .. } = trained;
-    let meta = scene_meta(config, data);
+    let TrainedScene { scene, config, data: dataset, device, .. } = trained;
+    let meta = scene_meta(config, dataset);
     let settings = &config.compression;
+    let data = scene.to_arrays(meta.clone())?;
     let Some(profile) = settings.profile.coded() else {
-        return Ok(CodedScene { bytes: light4gs_codec::encode(&scene.to_arrays(meta))?, coding: None });
+        return Ok(CodedScene { bytes: light4gs_codec::encode(&data)?, coding: None });
     };
-    let views = search_views(data);
+    let views = search_views(dataset);
     let inner = (*device).clone().inner();
+    // Everything that is written is read again: a field that cannot be says so before anything is fitted.
+    DynamicScene::<F>::from_arrays(&data, &inner)?;
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
     let images =
         match (searches(settings, trained.compression.is_none()) && profile == Profile::Compact, trained.images) {
             (false, _) => None,
             (true, Some(images)) => {
-                let error = mean_squared_error(&render(&scene.to_arrays(meta.clone())), &views, images)?;
+                let error = mean_squared_error(&render(&data), &views, images)?;
                 Some(SearchImages { render: &render, error })
             }
             (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0) }),
@@ -149,7 +152,7 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
         (None, images) => {
             let mut config = (*config).clone();
             if let Some(images) = images {
-                frozen_steps::search(&scene.to_arrays(meta.clone()), &mut config.compression, images);
+                frozen_steps::search(&data, &mut config.compression, images);
             }
             let begin = Instant::now();
             let compression = fit(trained.models, scene, &config, device, progress)?;

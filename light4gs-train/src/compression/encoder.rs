@@ -95,7 +95,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 ) -> Result<EncodedScene, TrainError> {
     let (scene, device) = (&scene.valid(), &device.clone().inner());
     let compression = &mut compression.valid();
-    let data = scene.to_arrays(meta);
+    let data = scene.to_arrays(meta)?;
     let mut input = compression_input(compression, scene, &data, config, profile)?;
     if let (Some(images), Profile::Compact) = (images, input.profile)
         && config.attributes.search_tolerance > 0.0
@@ -123,7 +123,7 @@ const FREEZING_ROUNDS: usize = 8;
 ///
 /// None if there are no planes or no models of them. `device`, with autodiff, is where the result lives.
 ///
-/// Planes do not depend on Gaussians, so the scene that is coded here for their sake has none.
+/// Planes depend neither on Gaussians nor on what moves them, so the scene that is coded here for their sake has none of both.
 ///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
@@ -138,7 +138,7 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     if scene.planes().is_none() || compression.planes.is_none() {
         return Ok(None);
     }
-    let mut data = scene.to_arrays(SceneMeta::default());
+    let mut data = scene.to_arrays_at_rest(SceneMeta::default());
     data.gaussians = GaussianArrays { sh_degree: data.gaussians.sh_degree, ..GaussianArrays::default() };
     let mut first = None;
     for _ in 0..FREEZING_ROUNDS {

@@ -48,7 +48,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
         let mut gradients = GradientSums::default();
         gradients.add_module(&compression, &mut rate.megabytes().backward());
         // The steps stay what they are: there is no distortion here to weigh them against.
-        adam.step_module(COMPRESSION, &mut compression, &mut gradients, |group| match group {
+        adam.step_module(COMPRESSION, &mut compression, &mut gradients, |group, _| match group {
             ParameterGroup::Context => Some(context.at(iteration as f64)),
             ParameterGroup::ShModel => Some(sh.at(iteration as f64)),
             _ => None,

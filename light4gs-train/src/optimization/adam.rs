@@ -29,14 +29,14 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Steps every parameter of a module that has a gradient and a learning rate. `prefix` stands in front of the
-    /// module's paths, empty for none.
+    /// Steps every parameter of a module that has a gradient and a learning rate, which is asked for by group and path.
+    /// `prefix` stands in front of the module's paths, empty for none.
     pub fn step_module<M: Module>(
         &mut self,
         prefix: &str,
         module: &mut M,
         gradients: &mut GradientSums,
-        rate: impl Fn(ParameterGroup) -> Option<f64>,
+        rate: impl Fn(ParameterGroup, &str) -> Option<f64>,
     ) {
         update_parameters(module, &mut Step { adam: self, prefix, gradients, rate });
     }
@@ -96,10 +96,10 @@ struct Step<'a, R> {
     rate: R,
 }
 
-impl<R: Fn(ParameterGroup) -> Option<f64>> ParameterMapper for Step<'_, R> {
+impl<R: Fn(ParameterGroup, &str) -> Option<f64>> ParameterMapper for Step<'_, R> {
     fn map<const D: usize>(&mut self, path: &str, mut parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
         let joined = if self.prefix.is_empty() { path.to_owned() } else { format!("{}.{path}", self.prefix) };
-        if let Some(rate) = ParameterGroup::of(&joined).and_then(&self.rate)
+        if let Some(rate) = ParameterGroup::of(&joined).and_then(|group| (self.rate)(group, &joined))
             && let Some(gradient) = self.gradients.remove(parameter.id)
             // Spherical harmonics of degree 0 have no others: nothing to step, and no kernel takes nothing.
             && parameter.shape().num_elements() > 0

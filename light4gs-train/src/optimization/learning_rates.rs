@@ -1,5 +1,7 @@
 //! The learning rate of every parameter group at an iteration.
 
+use light4gs_model::LearningRate;
+
 use crate::config::Config;
 use crate::optimization::parameters::ParameterGroup;
 use crate::optimization::schedule::ExponentialDecay;
@@ -10,7 +12,7 @@ use crate::stage::Stage;
 pub struct GroupRates {
     means: f64,
     grid: f64,
-    deformation: f64,
+    deformation: LearningRate,
     sh_dc: f64,
     sh_rest: f64,
     opacity: f64,
@@ -19,6 +21,9 @@ pub struct GroupRates {
     context: f64,
     sh_model: f64,
     steps: f64,
+    /// Iterations over which rates decay.
+    steps_of_schedule: usize,
+    iteration: usize,
 }
 
 impl GroupRates {
@@ -37,7 +42,12 @@ impl GroupRates {
         Self {
             means: decay(rates.means_init, rates.means_final),
             grid: decay(rates.grid_init, rates.grid_final),
-            deformation: decay(rates.deformation_init, rates.deformation_final),
+            deformation: LearningRate {
+                initial: rates.deformation_init * scale,
+                last: rates.deformation_final * scale,
+            },
+            steps_of_schedule: steps,
+            iteration,
             sh_dc: attribute(rates.sh_dc),
             sh_rest: attribute(rates.sh_dc / rates.sh_rest_divisor),
             opacity: attribute(rates.opacity),
@@ -47,6 +57,19 @@ impl GroupRates {
             sh_model: model(compression.sh.learning_rate_init, compression.sh.learning_rate_final),
             steps: compression.steps.learning_rate,
         }
+    }
+
+    /// From beginning to end of the stage: what a deformation field is trained with unless it says otherwise.
+    pub fn deformation(&self) -> LearningRate {
+        self.deformation
+    }
+
+    /// Another rate at this iteration.
+    pub fn at(&self, LearningRate { initial, last }: LearningRate) -> f64 {
+        if initial == 0.0 || last == 0.0 {
+            return 0.0;
+        }
+        ExponentialDecay::new(initial, last, self.steps_of_schedule).at(self.iteration as f64)
     }
 
     /// The rate of a group.
@@ -59,7 +82,7 @@ impl GroupRates {
             ParameterGroup::ShDc => self.sh_dc,
             ParameterGroup::ShRest => self.sh_rest,
             ParameterGroup::Grid => self.grid,
-            ParameterGroup::Deformation => self.deformation,
+            ParameterGroup::Deformation => self.at(self.deformation),
             ParameterGroup::Context => self.context,
             ParameterGroup::ShModel => self.sh_model,
             ParameterGroup::Steps => self.steps,

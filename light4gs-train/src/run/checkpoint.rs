@@ -123,7 +123,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             }
         }
         let mut metadata = HashMap::from([
-            ("field".to_owned(), F::KIND.to_owned()),
+            ("field".to_owned(), self.scene.field.kind().to_owned()),
             ("stage".to_owned(), self.stage.name().to_owned()),
             ("iteration".to_owned(), self.iteration.to_string()),
             ("seconds".to_owned(), self.seconds.to_string()),
@@ -159,10 +159,6 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         let bytes = read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
         let failed = |problem: String| TrainError::Checkpoint { path: path.to_owned(), problem };
         let mut file = StoredTensors::new(&bytes).map_err(failed)?;
-        let kind = file.text("field").map_err(failed)?;
-        if kind != F::KIND {
-            return Err(failed(format!("it has a deformation field of the kind `{kind}`, not `{}`", F::KIND)));
-        }
         let (stage, iteration) = place(&file, path, config).map_err(failed)?;
         let seconds = file.number::<f64>("seconds").map_err(failed)?;
         if !(seconds.is_finite() && seconds >= 0.0) {
@@ -172,6 +168,15 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         // A model of the right structure, whose tensors are then replaced.
         let cloud = PointCloud { positions: vec![[0.0; 3]], colors: vec![[0.5; 3]] };
         let mut scene = config.model.scene::<F>(field.clone()).init(&cloud, device);
+        let (kind, expected) = (file.text("field").map_err(failed)?, scene.field.kind());
+        if kind != expected {
+            return Err(failed(format!("it has a deformation field of the kind `{kind}`, not `{expected}`")));
+        }
+        if stage == Stage::Fine {
+            // Motion has begun, which may have changed the field's shapes.
+            let shapes = file.shapes_after(&format!("{SCENE}.field."));
+            scene.field.resize(&shapes).map_err(|error| failed(error.to_string()))?;
+        }
         if let Ok(text) = file.text(MAPPING) {
             let wrong = || failed(format!("metadata `{MAPPING}` is `{text}`, expected nine numbers"));
             scene.coordinates = scene.coordinates.with_mapping(parsed_mapping(text).ok_or_else(wrong)?);

@@ -102,6 +102,15 @@ impl<'a> StoredTensors<'a> {
         self.tensors.get(name)?.shape().first().copied()
     }
 
+    /// Shapes of the tensors whose names begin with `prefix`, by what follows it: those that [`Self::take`] may give, each of
+    /// as many numbers as it says, and at least one.
+    pub(super) fn shapes_after(&self, prefix: &str) -> BTreeMap<String, Vec<usize>> {
+        let numbers = self.tensors.iter().filter(|(_, view)| view.dtype() == Dtype::F32 && !view.shape().contains(&0));
+        let shape =
+            |(name, view): (&String, &TensorView)| Some((name.strip_prefix(prefix)?.to_owned(), view.shape().to_vec()));
+        numbers.filter_map(shape).collect()
+    }
+
     /// The values of a tensor of this shape.
     ///
     /// # Errors

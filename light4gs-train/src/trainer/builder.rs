@@ -8,7 +8,7 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_codec::checks;
 use light4gs_data::Scene;
-use light4gs_model::{DeformationField, HexPlaneField};
+use light4gs_model::{DeformationField, HexPlaneField, ModelError};
 
 use super::Trainer;
 use super::profile::Profile;
@@ -243,7 +243,12 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
     /// Refuses now what the encoder would refuse in the end: it is asked about the scene and the models to start from.
     fn check_encodable(&self, state: &Checkpoint<F, E>) -> Result<(), TrainError> {
         let scene = state.scene.valid();
-        let arrays = scene.to_arrays(scene_meta(&self.config, &self.data));
+        let meta = scene_meta(&self.config, &self.data);
+        // A field whose author has not said how it is coded trains all the same.
+        let arrays = match scene.to_arrays(meta.clone()) {
+            Err(ModelError::NoStreamForm { .. }) => scene.to_arrays_at_rest(meta),
+            arrays => arrays?,
+        };
         let settings = &self.config.compression;
         match (&state.compression, settings.profile.coded()) {
             (Some(compression), Some(profile)) => {

@@ -4,6 +4,7 @@
 //! - `builder`: what a trainer is made of
 //! - `sampling`: the frames of an iteration
 //! - `step`: one iteration
+//! - `motion`: what the deformation field is asked besides moving the Gaussians
 //! - `views`: the views of an iteration, each with a tape of its own
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `pruning`: pruning by significance
@@ -13,6 +14,7 @@
 //! [`Observer`] and [`ImageSource`].
 
 mod builder;
+mod motion;
 pub mod profile;
 mod pruning;
 mod rate;
@@ -301,6 +303,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.state.stage = Stage::Fine;
         self.state.iteration = 0;
         self.state.adam = Adam::default();
+        self.begin_motion();
         self.empty_images.reset();
         self.density.begin_stage(self.state.scene.gaussians.len(), &self.device.clone().inner());
     }

@@ -23,6 +23,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// Forward, backward, and one optimizer step.
     pub(super) fn optimize(&mut self, stage: Stage, iteration: usize) -> Result<StepReport, TrainError> {
         self.profile.begin_step();
+        if stage == Stage::Fine {
+            self.begin_motion_step(iteration);
+        }
         let batch = self.config.train.batch_size.max(1);
         let indices = self.sampler.batch(self.config.seed, stage, iteration);
         self.prefetch(stage, iteration);
@@ -45,8 +48,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             gradients.add(std::mem::take(&mut view.gradients));
         }
         let rate = noisy.as_ref().and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
-        let regularizers = self.add_regularizers(stage, iteration, &mut gradients);
-        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
+        let regularizer = self.add_plane_regularizer(stage, iteration, &mut gradients);
+        let own = self.add_field_regularizer(stage, iteration, &mut gradients);
+        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizer).chain(own);
         let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
         // What an iteration reads back from the device: this number.
         let loss: f32 = loss.into_scalar();
@@ -62,7 +66,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.density.after_backward(&statistics, &self.moment(stage, iteration));
         self.profile.lap("density statistics");
         let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
-        let rate = |group| Some(rates.of(group));
+        let field_rates = self.field_rates(&rates);
+        let rate = |group, path: &str| Some(field_rates.get(path).copied().unwrap_or_else(|| rates.of(group)));
         self.state.adam.step_module("", &mut self.state.scene, &mut gradients, rate);
         if let Some(compression) = &mut self.state.compression {
             self.state.adam.step_module(COMPRESSION, compression, &mut gradients, rate);
@@ -84,8 +89,13 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.images.prefetch(&frames);
     }
 
-    /// Adds the gradients of the regularizers, and returns their value, `[1]`.
-    fn add_regularizers(&mut self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Option<Tensor<1>> {
+    /// Adds the gradients of what keeps the planes smooth, and returns its value, `[1]`.
+    fn add_plane_regularizer(
+        &mut self,
+        stage: Stage,
+        iteration: usize,
+        gradients: &mut GradientSums,
+    ) -> Option<Tensor<1>> {
         if stage == Stage::Coarse || self.planes_are_frozen(stage, iteration) {
             return None;
         }

@@ -146,7 +146,7 @@ impl Run {
     fn encode(&self, path: &Path) -> Result<(Vec<u8>, String), TrainError> {
         let checkpoint: Checkpoint =
             Checkpoint::load(path, &self.config, &self.config.model.field(), &ConfiguredModels, &self.device)?;
-        let data = checkpoint.scene.to_arrays(scene_meta(&self.config, &self.dataset));
+        let data = checkpoint.scene.to_arrays(scene_meta(&self.config, &self.dataset))?;
         let status = format!("{} stage, iteration {}", checkpoint.stage.name(), checkpoint.iteration);
         Ok((light4gs_codec::encode(&data)?, status))
     }

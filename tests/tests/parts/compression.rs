@@ -239,7 +239,7 @@ fn freezing_does_not_carry_planes_away() {
 fn a_scene_without_gaussians_is_a_file_too() {
     let device = Device::flex().autodiff();
     let config = config(&[]);
-    let full = scene(&config, &device).to_arrays(SceneMeta::default());
+    let full = scene(&config, &device).to_arrays(SceneMeta::default()).unwrap();
     let mut empty = full;
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
     let scene: DynamicScene = DynamicScene::from_arrays(&empty, &device).unwrap();

@@ -42,7 +42,7 @@ fn positions_are_those_of_the_model() {
     for (name, device) in devices() {
         for depth in [1, 3] {
             let scene = scene(depth, &device);
-            let data = decode(&encode(&scene.to_arrays(SceneMeta::default())).unwrap()).unwrap();
+            let data = decode(&encode(&scene.to_arrays(SceneMeta::default()).unwrap()).unwrap()).unwrap();
             for time in [0.0, 0.3, 1.0] {
                 let exact = data.positions_at(time).unwrap();
                 let moved = exact.iter().zip(&data.gaussians.means).any(|(a, b)| a != b);
@@ -50,7 +50,7 @@ fn positions_are_those_of_the_model() {
                 assert_close(name, exact.as_flattened(), &values_of(&scene.at(time).means), 2e-5);
             }
             let again: DynamicScene = DynamicScene::from_arrays(&data, &device).unwrap();
-            assert_eq!(again.to_arrays(SceneMeta::default()), data, "{name}");
+            assert_eq!(again.to_arrays(SceneMeta::default()).unwrap(), data, "{name}");
         }
     }
 }
@@ -66,7 +66,7 @@ fn spherical_harmonics_cost_what_the_model_says() {
             positions: scene.coordinates.normalize(scene.gaussians.means.val()),
             planes: planes.clone(),
         };
-        let data = scene.to_arrays(SceneMeta::default());
+        let data = scene.to_arrays(SceneMeta::default()).unwrap();
         let configs = [
             ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new()),
             ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(8)),

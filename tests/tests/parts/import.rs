@@ -377,7 +377,7 @@ fn a_coded_checkpoint_costs_no_more_than_0_05_db() {
     let again = DynamicScene::<HexPlaneField>::from_arrays(&decoded, &device.clone().inner()).unwrap();
     assert_eq!(again.coordinates.mapping(), scene.coordinates.mapping());
     let cost = cost_in_db(&before, &|frame| pixels(&again, config.data.background, frame), &frames);
-    let plain = light4gs_codec::encode(&scene.to_arrays(light4gs_codec::SceneMeta::default())).unwrap().len();
+    let plain = light4gs_codec::encode(&scene.to_arrays(light4gs_codec::SceneMeta::default()).unwrap()).unwrap().len();
     println!("{cost:.4} dB, {} bytes in place of {plain}", coded.bytes.len());
     assert!(cost < 0.05, "{cost} dB");
     assert!(coded.bytes.len() * 2 < plain, "{} bytes in place of {plain}", coded.bytes.len());

@@ -117,7 +117,7 @@ fn a_run_with_the_rate_in_its_loss_on_wgpu() {
     let decoded = light4gs_codec::decode(&fs::read(w.path("run/scene.l4gs")).unwrap()).unwrap();
     for (name, device) in devices() {
         let scene: DynamicScene = DynamicScene::from_arrays(&decoded, &device).unwrap();
-        assert_eq!(scene.to_arrays(decoded.meta.clone()), decoded, "{name}");
+        assert_eq!(scene.to_arrays(decoded.meta.clone()).unwrap(), decoded, "{name}");
     }
     assert_success(&w.run(["eval", "run/scene.l4gs", "--scene", "scene", "--device", "flex"]));
     // The checkpoint is no GPU's either.
