@@ -7,12 +7,15 @@ use std::path::PathBuf;
 
 const TOLERANCE: f32 = 1e-5;
 
-/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter.
+/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter; in the set's folder or in
+/// `datasets` there.
 fn golden(prefix: &str) -> PathBuf {
     let folder = std::env::var_os("LIGHT4GS_GOLDEN")
         .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden")), PathBuf::from);
     let entries = std::fs::read_dir(&folder).unwrap_or_else(|e| panic!("{}: {e}", folder.display()));
+    let inner = std::fs::read_dir(folder.join("datasets")).into_iter().flatten();
     let mut found: Vec<PathBuf> = entries
+        .chain(inner)
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.file_name().unwrap().to_string_lossy().starts_with(prefix))
         .collect();

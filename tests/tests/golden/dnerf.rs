@@ -9,11 +9,13 @@ use std::path::PathBuf;
 
 const TOLERANCE: f32 = 1e-5;
 
-/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter.
+/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter; in the set's folder or in
+/// `datasets` there.
 fn golden(prefix: &str) -> PathBuf {
     let folder = light4gs_tests::golden::directory();
     let mut found: Vec<PathBuf> = std::fs::read_dir(&folder)
         .unwrap_or_else(|e| panic!("{}: {e}", folder.display()))
+        .chain(std::fs::read_dir(folder.join("datasets")).into_iter().flatten())
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.file_name().unwrap().to_string_lossy().starts_with(prefix))
         .collect();
