@@ -1,7 +1,7 @@
 //! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with what it includes.
 //!
-//! `README.md` says what each stage does. The host's side, which puts a kernel together as constants (those of
-//! rendering from `light4gs_codec::rendering`), then includes, then the stage, is `light4gs_model::gpu`.
+//! `README.md` says what each kernel does. The host's side, which puts a kernel together as constants (those of
+//! rendering from `light4gs_codec::rendering`), then includes, then the kernel itself, is `light4gs_model::gpu`.
 
 #![no_std]
 
@@ -12,7 +12,7 @@ use include::{
 
 /// One kernel: a file of a folder here, with what it includes.
 #[derive(Clone, Copy, Debug)]
-pub struct Stage {
+pub struct Shader {
     /// The file's name without its ending.
     pub name: &'static str,
     /// What comes before it, in this order.
@@ -21,9 +21,9 @@ pub struct Stage {
     pub source: &'static str,
 }
 
-macro_rules! stages {
+macro_rules! shaders {
     ($($(#[$doc:meta])* $constant:ident = $folder:literal / $name:literal [$($include:ident),*];)*) => {
-        $($(#[$doc])* pub const $constant: Stage = Stage {
+        $($(#[$doc])* pub const $constant: Shader = Shader {
             name: $name,
             includes: &[DISPATCH, $($include),*],
             source: include_str!(concat!($folder, "/", $name, ".wgsl")),
@@ -31,7 +31,7 @@ macro_rules! stages {
     };
 }
 
-stages! {
+shaders! {
     /// One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
     ADAM = "elementwise" / "adam" [];
     /// Puts the Gaussians' numbers of cells into the order of depths.
@@ -83,7 +83,7 @@ stages! {
     SUBGROUPS = "elementwise" / "subgroups" [];
 }
 
-/// What several stages share.
+/// What several kernels share.
 pub mod include {
     macro_rules! wgsl {
         ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
@@ -123,7 +123,7 @@ pub mod include {
         TEAM_SUM_OF_MANY = "include/team_sum_of_many";
         /// A team is a workgroup of TEAM invocations that blends one cell.
         TEAM_WORKGROUP = "include/team_workgroup";
-        /// What is drawn, from where: one uniform for all stages of an image.
+        /// What is drawn, from where: one uniform for all kernels of an image.
         VIEW = "include/view";
     }
 }

@@ -14,7 +14,7 @@ use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
 use light4gs_train::Stage;
 use light4gs_train::dataset::load_options;
-use light4gs_train::density::{DensityStrategy, GaussianEditor, Moment, ViewStatistics};
+use light4gs_train::density::{DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
 use light4gs_train::trainer::Trainer;
 use rand::Rng;
 
@@ -34,10 +34,10 @@ impl DensityStrategy for Relocation {
     fn begin_stage(&mut self, _count: usize, _device: &Device) {}
 
     // Opacities say enough; a strategy that needs gradients of screen positions gathers them here.
-    fn after_backward(&mut self, _views: &[ViewStatistics], _moment: &Moment) {}
+    fn after_backward(&mut self, _views: &[ViewStatistics], _position: &TrainingPosition) {}
 
-    fn after_step(&mut self, gaussians: &mut GaussianEditor, moment: &Moment) {
-        if !moment.iteration.is_multiple_of(INTERVAL) || self.is_over(moment.stage, moment.iteration) {
+    fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition) {
+        if !position.iteration.is_multiple_of(INTERVAL) || self.is_over(position.stage, position.iteration) {
             return;
         }
         let logits = gaussians.gaussians().opacity_logits.val().inner();
@@ -46,9 +46,9 @@ impl DensityStrategy for Relocation {
         if opaque.is_empty() || faint.is_empty() {
             return;
         }
-        // Each faint one becomes a copy of an opaque one, drawn at random. The generator of the moment makes a resumed run
+        // Each faint one becomes a copy of an opaque one, drawn at random. The generator of the position makes a resumed run
         // draw the same.
-        let mut generator = moment.generator();
+        let mut generator = position.generator();
         let copies = faint.iter().map(|_| opaque[generator.random_range(0..opaque.len())]);
         let rows: Vec<usize> = opaque.iter().copied().chain(copies).collect();
         // The first rows keep their moments, the copies begin without.

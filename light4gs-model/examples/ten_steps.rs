@@ -19,7 +19,7 @@ use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::parameters::{ParameterMapper, map_parameters, update_parameters};
 use light4gs_model::{
     DeformationConfig, DynamicScene, DynamicSceneConfig, GaussiansConfig, HexPlaneConfig, HexPlaneFieldConfig,
-    Significance, SignificanceScore, Splatter,
+    PixelContribution, Significance, Splatter,
 };
 
 const STEPS: u32 = 10;
@@ -90,7 +90,7 @@ fn train(device: &Device) -> [f32; 3] {
     }
     let mut significance = Significance::new(scene.gaussians.len());
     significance.add(&splatter, scene.at(0.0), &cameras[0]);
-    let weights: f64 = significance.scores(SignificanceScore::BlendingWeight).iter().sum();
+    let weights: f64 = significance.sums(PixelContribution::BlendingWeight).iter().sum();
     [first, loss(&scene).into_scalar(), weights as f32]
 }
 

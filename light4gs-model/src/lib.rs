@@ -44,5 +44,5 @@ pub use entropy::*;
 pub use gpu_error::GpuError;
 pub use scene::*;
 pub use sh::*;
-pub use significance::{Significance, SignificanceScore, VolumeWeight, least_significant};
+pub use significance::{PixelContribution, Significance, VolumeWeight, least_significant};
 pub use splatter::{Rendering, Splatter};

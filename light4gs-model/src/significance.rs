@@ -12,7 +12,7 @@ const VOLUME_QUANTILE: f64 = 0.9;
 
 /// What is summed over the pixels that blend a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SignificanceScore {
+pub enum PixelContribution {
     /// Transmittance before the Gaussian times its opacity: the paper's.
     TransmittanceOpacity,
     /// The blending weight, transmittance times alpha.
@@ -68,7 +68,7 @@ impl VolumeWeight {
 /// ```
 /// use burn::tensor::Device;
 /// use light4gs_data::{Camera, PointCloud};
-/// use light4gs_model::{GaussiansConfig, Significance, SignificanceScore, Splatter};
+/// use light4gs_model::{GaussiansConfig, PixelContribution, Significance, Splatter};
 ///
 /// let positions = vec![[0.0; 3], [0.0, 9.0, 0.0]]; // the second is behind the first
 /// let cloud = PointCloud { positions, colors: vec![[0.5; 3]; 2] };
@@ -76,7 +76,7 @@ impl VolumeWeight {
 /// let camera = Camera::look_at([0.0, -4.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 40, 30);
 /// let mut significance = Significance::new(2);
 /// significance.add(&Splatter::new([1.0; 3], 0), gaussians.tensors(), &camera);
-/// let scores = significance.scores(SignificanceScore::BlendingWeight);
+/// let sums = significance.sums(PixelContribution::BlendingWeight);
 /// assert!(scores[0] > scores[1]);
 /// ```
 #[derive(Clone, Debug)]
@@ -110,12 +110,12 @@ impl Significance {
     }
 
     /// `[N]`: the score over all images so far.
-    pub fn scores(&self, score: SignificanceScore) -> Vec<f64> {
-        let column = match score {
-            SignificanceScore::PixelCount => 0,
-            SignificanceScore::BlendingWeight => 1,
-            SignificanceScore::TransmittanceOpacity => 2,
-            SignificanceScore::Opacity => 3,
+    pub fn sums(&self, contribution: PixelContribution) -> Vec<f64> {
+        let column = match contribution {
+            PixelContribution::PixelCount => 0,
+            PixelContribution::BlendingWeight => 1,
+            PixelContribution::TransmittanceOpacity => 2,
+            PixelContribution::Opacity => 3,
         };
         self.sums.iter().map(|sums| sums[column]).collect()
     }

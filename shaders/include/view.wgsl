@@ -1,4 +1,4 @@
-// What is drawn, from where: one uniform for all stages of an image. A stage declares it as `view`.
+// What is drawn, from where: one uniform for all kernels of an image. A kernel declares it as `view`.
 
 struct View {
     // Columns of the rotation from world to camera. In w: focal lengths x and y, principal point x, all in pixels.

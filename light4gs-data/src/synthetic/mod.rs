@@ -106,10 +106,10 @@ pub fn write_synthetic(root: &Path, options: &SyntheticOptions) -> Result<(), Da
 
 /// The procedural scene, for tests that photograph it with cameras of their own.
 #[cfg(test)]
-pub(crate) struct Stage(World);
+pub(crate) struct Studio(World);
 
 #[cfg(test)]
-impl Stage {
+impl Studio {
     pub(crate) fn new(seed: u64) -> Self {
         Self(World::new(seed))
     }

@@ -1,24 +1,24 @@
-//! Stages that make one value of one: the distribution function and the bound of the entropy models.
+//! Kernels that make one value of one: the distribution function and the bound of the entropy models.
 
 use burn::backend::TensorMetadata;
 use burn_wgpu::CubeTensor;
-use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Stage};
+use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Shader};
 
 use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Launch;
 use crate::gpu_error::GpuError;
 
-/// Launches a stage that reads tensors of one shape and writes another one. Its uniform is their size, then `numbers`.
-fn launch<const K: usize>(stage: Stage, inputs: [CubeTensor; K], numbers: &[f32]) -> Result<CubeTensor, GpuError> {
+/// Launches a kernel that reads tensors of one shape and writes another one. Its uniform is their size, then `numbers`.
+fn launch<const K: usize>(shader: Shader, inputs: [CubeTensor; K], numbers: &[f32]) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs[0])?;
     let shape = inputs[0].shape();
-    debug_assert!(inputs.iter().all(|input| input.shape() == shape), "{}: different shapes", stage.name);
+    debug_assert!(inputs.iter().all(|input| input.shape() == shape), "{}: different shapes", shader.name);
     let count = shape.num_elements();
-    let output = gpu.allocate(stage.name, count)?;
+    let output = gpu.allocate(shader.name, count)?;
     let uniform: Vec<u32> =
         std::iter::once(count as u32).chain(numbers.iter().map(|number| number.to_bits())).collect();
     let inputs = inputs.map(buffer_of);
-    let launch = inputs.iter().fold(Launch::new(&gpu.client, stage), Launch::reads);
+    let launch = inputs.iter().fold(Launch::new(&gpu.client, shader), Launch::reads);
     launch.writes(&output).uniform(&uniform).invocations(count)?;
     Ok(gpu.tensor(first_words(&output, count), shape))
 }

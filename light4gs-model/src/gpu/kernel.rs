@@ -10,7 +10,7 @@ use cubecl::ir::attributes::BufferIOAttr;
 use cubecl::prelude::{CubeCount, CubeDim, ExecutionMode, KernelId};
 use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, TILE};
-use light4gs_shaders::Stage;
+use light4gs_shaders::Shader;
 
 use crate::cpu::project::INVALID_RADIUS;
 use crate::gpu_error::GpuError;
@@ -19,15 +19,15 @@ use crate::gpu_error::GpuError;
 pub(super) const WORKGROUP: u32 = 64;
 /// Workgroups along one dimension of a dispatch: below WebGPU's limit of 65535.
 const MAX_GROUPS: u32 = 32768;
-/// Storage buffers that WebGPU promises to a stage.
+/// Storage buffers that WebGPU promises to a kernel.
 const MAX_BUFFERS: usize = 8;
 
 type Constants = Vec<(&'static str, u32)>;
 
-/// A stage with the values of its constants.
+/// A shader with the values of its constants.
 #[derive(Clone, Debug)]
 struct Kernel {
-    stage: Stage,
+    shader: Shader,
     team: &'static [&'static str],
     workgroup: u32,
     constants: Constants,
@@ -49,15 +49,15 @@ fn rendering_constants() -> String {
 impl KernelSource for Kernel {
     fn source(&self) -> SourceTemplate {
         let own = self.constants.iter().map(|(name, value)| format!("const {name}: u32 = {value}u;\n"));
-        let includes = self.stage.includes.iter().chain(self.team).copied();
+        let includes = self.shader.includes.iter().chain(self.team).copied();
         SourceTemplate::new(
-            rendering_constants() + &own.collect::<String>() + &includes.collect::<String>() + self.stage.source,
+            rendering_constants() + &own.collect::<String>() + &includes.collect::<String>() + self.shader.source,
         )
     }
 
     fn id(&self) -> KernelId {
         KernelId::new::<Self>()
-            .info((self.stage.name, self.team, self.constants.clone()))
+            .info((self.shader.name, self.team, self.constants.clone()))
             .cube_dim(*CubeDim::new_1d(self.workgroup))
             .mode(ExecutionMode::Unchecked)
     }
@@ -82,8 +82,8 @@ type Launched = (DeviceId, &'static str, Constants);
 static LAUNCHED: LazyLock<Mutex<HashSet<Launched>>> = LazyLock::new(Mutex::default);
 
 impl<'a> Launch<'a> {
-    pub(super) fn new(client: &'a Client, stage: Stage) -> Self {
-        let kernel = Kernel { stage, team: &[], workgroup: WORKGROUP, constants: vec![("WORKGROUP", WORKGROUP)] };
+    pub(super) fn new(client: &'a Client, shader: Shader) -> Self {
+        let kernel = Kernel { shader, team: &[], workgroup: WORKGROUP, constants: vec![("WORKGROUP", WORKGROUP)] };
         Self { client, kernel, arguments: KernelArguments::new(), written: Vec::new() }
     }
 
@@ -148,7 +148,7 @@ impl<'a> Launch<'a> {
     ///
     /// The first launch of a kernel on a device waits until it is compiled, and says if that failed.
     pub(super) fn groups(self, groups: usize) -> Result<(), GpuError> {
-        debug_assert!(self.arguments.resources.len() <= MAX_BUFFERS, "{}: too many buffers", self.kernel.stage.name);
+        debug_assert!(self.arguments.resources.len() <= MAX_BUFFERS, "{}: too many buffers", self.kernel.shader.name);
         if groups == 0 {
             return Ok(());
         }
@@ -158,7 +158,7 @@ impl<'a> Launch<'a> {
         } else {
             CubeCount::Static(MAX_GROUPS, groups.div_ceil(MAX_GROUPS), 1)
         };
-        let name = self.kernel.stage.name;
+        let name = self.kernel.shader.name;
         let key = (self.client.service_id().device, name, self.kernel.constants.clone());
         let cube_dim = CubeDim::new_1d(self.kernel.workgroup);
         self.client.launch(Box::new(SourceKernel::new(self.kernel, cube_dim)), count, self.arguments);
@@ -187,7 +187,7 @@ mod tests {
     use super::super::context::tests::gpu;
     use super::*;
 
-    const BROKEN: Stage = Stage {
+    const BROKEN: Shader = Shader {
         name: "broken",
         includes: &[],
         source: "@group(0) @binding(0) var<storage, read_write> out: array<f32>;\n\
@@ -209,7 +209,7 @@ mod tests {
 
     #[test]
     fn a_kernel_that_asks_too_much_is_an_error() {
-        const GREEDY: Stage = Stage {
+        const GREEDY: Shader = Shader {
             name: "greedy",
             includes: &[],
             source: "@group(0) @binding(0) var<storage, read_write> out: array<f32>;\n\

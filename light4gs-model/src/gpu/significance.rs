@@ -1,4 +1,4 @@
-//! The sums behind significance pruning on a GPU: the stages of splatting without color.
+//! The sums behind significance pruning on a GPU: the kernels of splatting without color.
 
 use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
@@ -60,7 +60,7 @@ mod tests {
     use light4gs_data::Camera;
 
     use crate::scene::gaussians::GaussianTensors;
-    use crate::significance::{Significance, SignificanceScore};
+    use crate::significance::{PixelContribution, Significance};
     use crate::splatter::Splatter;
 
     const SIDE: u32 = 8;
@@ -102,14 +102,14 @@ mod tests {
                 significance
             };
             let (found, expected) = (run(Device::wgpu(Default::default())), run(Device::flex()));
-            assert_eq!(found.scores(SignificanceScore::PixelCount), vec![1.0; count]);
+            assert_eq!(found.sums(PixelContribution::PixelCount), vec![1.0; count]);
             for score in [
-                SignificanceScore::PixelCount,
-                SignificanceScore::Opacity,
-                SignificanceScore::BlendingWeight,
-                SignificanceScore::TransmittanceOpacity,
+                PixelContribution::PixelCount,
+                PixelContribution::Opacity,
+                PixelContribution::BlendingWeight,
+                PixelContribution::TransmittanceOpacity,
             ] {
-                for (i, (found, expected)) in found.scores(score).iter().zip(expected.scores(score)).enumerate() {
+                for (i, (found, expected)) in found.sums(score).iter().zip(expected.sums(score)).enumerate() {
                     assert!(
                         (found - expected).abs() <= 1e-4 * expected,
                         "{score:?} of {i} in {count}: {found} against {expected}"

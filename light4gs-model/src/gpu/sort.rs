@@ -60,8 +60,8 @@ pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<
         .collect::<Result<Vec<_>, GpuError>>()?;
     for pass in 0..passes {
         let parameters = [count as u32, pass as u32 * RADIX_BITS, blocks as u32];
-        let launch = |stage| {
-            Launch::new(&gpu.client, stage)
+        let launch = |shader| {
+            Launch::new(&gpu.client, shader)
                 .workgroup(SORT_GROUP)
                 .constant("BLOCK", SORT_BLOCK as u32)
                 .constant("RADIX_BITS", RADIX_BITS)

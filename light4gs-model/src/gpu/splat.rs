@@ -1,4 +1,4 @@
-//! Splatting on a GPU: the stages of `shaders/` in their order.
+//! Splatting on a GPU: the kernels of `shaders/` in their order.
 
 use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
@@ -19,7 +19,7 @@ use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView, 
 /// Values of an intersection's sums.
 const SUMS: usize = 10;
 
-/// What the stages of one image have in common.
+/// What the kernels of one image have in common.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     view: View,

@@ -5,7 +5,7 @@ use std::sync::{LazyLock, Mutex};
 
 use cubecl::device::DeviceId;
 use light4gs_shaders::include::{TEAM_SUBGROUP, TEAM_SUM_OF_FEW, TEAM_SUM_OF_MANY, TEAM_WORKGROUP};
-use light4gs_shaders::{SUBGROUPS, Stage};
+use light4gs_shaders::{SUBGROUPS, Shader};
 
 use super::context::Gpu;
 use super::kernel::Launch;
@@ -52,9 +52,9 @@ impl Team {
         Ok(team)
     }
 
-    /// Begins the launch of a stage that blends.
-    pub(super) fn launch<'a>(&self, gpu: &'a Gpu, stage: Stage) -> Launch<'a> {
-        Launch::new(&gpu.client, stage)
+    /// Begins the launch of a kernel that blends.
+    pub(super) fn launch<'a>(&self, gpu: &'a Gpu, shader: Shader) -> Launch<'a> {
+        Launch::new(&gpu.client, shader)
             .team(self.members, self.includes)
             .constant("CELL", self.cell)
             .constant("CHUNK", CHUNK as u32)

@@ -1,4 +1,4 @@
-//! Timing of every stage of a training step, on scenes that anybody can make again.
+//! Timing of every part of a training step, on scenes that anybody can make again.
 
 pub mod codec;
 
@@ -179,22 +179,22 @@ impl BenchScene {
     }
 }
 
-/// Median milliseconds of one stage.
+/// Median milliseconds of one part.
 #[derive(Clone, Debug, Serialize)]
-pub struct StageTime {
+pub struct Timing {
     /// What was timed.
-    pub stage: &'static str,
+    pub name: &'static str,
     /// Median over the repetitions.
     pub milliseconds: f64,
 }
 
-/// All stages on one scene.
+/// All parts on one scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneTimes {
     /// Name of the scene.
     pub scene: String,
     /// In the order of a training step.
-    pub stages: Vec<StageTime>,
+    pub timings: Vec<Timing>,
 }
 
 /// All scenes on one device.
@@ -229,7 +229,7 @@ fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T,
     times[times.len() / 2]
 }
 
-/// Times every stage on every scene.
+/// Times every part on every scene.
 pub fn benchmark(
     name: DeviceName,
     device: &Device,
@@ -245,15 +245,15 @@ pub fn benchmark(
         .iter()
         .map(|scene| SceneTimes {
             scene: scene.name.clone(),
-            stages: stages(scene, device, &autodiff, &small, repeats),
+            timings: timings(scene, device, &autodiff, &small, repeats),
         })
         .collect();
     Ok(DeviceTimes { device: name.to_string(), adapter: adapter_name(name, device), calibration_ms, scenes })
 }
 
-fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config, repeats: usize) -> Vec<StageTime> {
+fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config, repeats: usize) -> Vec<Timing> {
     let mut out = Vec::new();
-    let mut add = |stage: &'static str, milliseconds: f64| out.push(StageTime { stage, milliseconds });
+    let mut add = |name: &'static str, milliseconds: f64| out.push(Timing { name, milliseconds });
     let splatter = Splatter::new(scene.background, 3);
     let [height, width] = [scene.camera.height as usize, scene.camera.width as usize];
 
@@ -339,7 +339,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
         .expect("the preset's models fit its planes");
     let fraction = small.compression.rate.fraction;
     let lambda = 0.05;
-    for (stage, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {
+    for (name, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {
         let mut random = ChaCha8Rng::seed_from_u64(1);
         let step = median(
             autodiff,
@@ -357,7 +357,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
                 update(&mut dynamic, sums);
             },
         );
-        add(stage, step);
+        add(name, step);
     }
 
     let decoded = scene.dynamic(&config, device);
@@ -377,7 +377,7 @@ fn stages(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config
     out
 }
 
-/// One table: a row a stage, a column a device and scene.
+/// One table: a row a part, a column a device and scene.
 pub fn table(results: &[DeviceTimes]) -> String {
     let mut columns = vec![("ms (median)".to_owned(), Align::Left)];
     for device in results {
@@ -391,16 +391,16 @@ pub fn table(results: &[DeviceTimes]) -> String {
             .chain(times.map(|(device, scene)| format!("{:.2}", value(device, scene))))
             .collect::<Vec<_>>()
     };
-    for (i, stage) in first.stages.iter().enumerate() {
-        table.row(cells(stage.stage, &|_, scene| scene.stages[i].milliseconds));
+    for (i, timing) in first.timings.iter().enumerate() {
+        table.row(cells(timing.name, &|_, scene| scene.timings[i].milliseconds));
     }
-    let stage_of = |name: &'static str| {
+    let timing_of = |name: &'static str| {
         move |_: &DeviceTimes, scene: &SceneTimes| {
-            1e3 / scene.stages.iter().find(|s| s.stage == name).map_or(f64::NAN, |s| s.milliseconds)
+            1e3 / scene.timings.iter().find(|timing| timing.name == name).map_or(f64::NAN, |timing| timing.milliseconds)
         }
     };
-    table.row(cells("training it/s", &stage_of("training step")));
-    table.row(cells("render FPS", &stage_of("render")));
+    table.row(cells("training it/s", &timing_of("training step")));
+    table.row(cells("render FPS", &timing_of("render")));
     table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
     let adapters = results.iter().filter_map(|device| Some((&device.device, device.adapter.as_ref()?)));
     adapters.fold(table.to_string(), |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))

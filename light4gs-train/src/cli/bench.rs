@@ -25,7 +25,7 @@ pub(super) struct Bench {
     /// Widths and heights of the generated scenes' images.
     #[arg(long, value_delimiter = ',', default_value = "400,800", allow_negative_numbers = true)]
     size: Vec<u32>,
-    /// Timed repetitions of each stage, after two untimed ones.
+    /// Timed repetitions of each part, after two untimed ones.
     #[arg(long, default_value_t = 11, value_parser = clap::value_parser!(u32).range(1..=10_000), allow_negative_numbers = true)]
     repeats: u32,
     /// Time the entropy coders instead, on a scene of the paper's size.

@@ -19,7 +19,7 @@ use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
 use crate::evaluation::{DecodedScene, Evaluation, is_still};
 use crate::metrics::lpips::Lpips;
-use crate::metrics::measure::Scores;
+use crate::metrics::scores::Scores;
 use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
 use crate::trainer::{Trainer, TrainerBuilder};

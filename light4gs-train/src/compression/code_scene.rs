@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, SearchImages,
-    encode, fit, frozen_steps,
+    encode, fit, plane_and_sh_step_search,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
@@ -152,7 +152,7 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
         (None, images) => {
             let mut config = (*config).clone();
             if let Some(images) = images {
-                frozen_steps::search(&data, &mut config.compression, images);
+                plane_and_sh_step_search::search(&data, &mut config.compression, images);
             }
             let begin = Instant::now();
             let compression = fit(trained.models, scene, &config, device, progress)?;

@@ -12,7 +12,7 @@ use light4gs_model::{DeformationField, DynamicScene, HexPlane, Latent, PlaneEntr
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
-use super::{Compression, ShModel, step_search};
+use super::{Compression, ShModel, attribute_step_search};
 use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
@@ -103,7 +103,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         let tolerance = config.attributes.search_tolerance;
         // The search tries steps much finer than those given. Values too far out for them, as a training that has gone
         // wrong leaves them, may still fit the given ones.
-        let found = step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
+        let found = attribute_step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
         input.attributes = found.unwrap_or(input.attributes);
     }
     let encoded = encode_compressed(&data, &input)?;

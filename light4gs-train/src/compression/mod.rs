@@ -6,16 +6,16 @@
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: a scene and its models into the bytes of a file
 //! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
-//! - `step_search`: how coarsely the other attributes may be quantized
-//! - `frozen_steps`: how coarsely planes and harmonics may be that never saw noise in training
+//! - `attribute_step_search`: how coarsely the other attributes may be quantized
+//! - `plane_and_sh_step_search`: how coarsely planes and harmonics may be that never saw noise in training
 
+mod attribute_step_search;
 mod code_scene;
 mod encoder;
 mod fit;
-mod frozen_steps;
 mod models;
+mod plane_and_sh_step_search;
 mod rate;
-mod step_search;
 
 pub use code_scene::{ASSUMED_PSNR, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
 pub use encoder::{

@@ -143,9 +143,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
 }
 
 impl<F: DeformationField> NoisyScene<F> {
-    /// The same scene for a rate that does not reach its planes, or its spherical harmonics: their models learn what they
-    /// cost, and they do not.
-    pub fn out_of_reach(&self, planes: bool, sh: bool) -> Self {
+    /// The same scene with its planes, or its spherical harmonics, detached: the rate trains their entropy models and not
+    /// them.
+    pub fn with_detached(&self, planes: bool, sh: bool) -> Self {
         let mut apart = self.clone();
         if planes {
             for plane in apart.scene.planes_mut().into_iter().flat_map(|hexplane| &mut hexplane.planes) {

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Tensor};
 
 use super::clone_and_split::{DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors};
-use super::{DensityStatistics, DensityStrategy, GaussianEditor, Moment, ViewStatistics};
+use super::{DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::config::DensifyConfig;
 use crate::randomness::standard_normal;
 use crate::stage::Stage;
@@ -32,11 +32,11 @@ impl AdaptiveDensityControl {
     }
 
     /// The smallest gradient that densifies, and the smallest opacity that survives.
-    fn thresholds(&self, moment: &Moment) -> (f32, f32) {
+    fn thresholds(&self, position: &TrainingPosition) -> (f32, f32) {
         let config = &self.config;
-        let progress = moment.iteration as f32 / config.until.max(1) as f32;
+        let progress = position.iteration as f32 / config.until.max(1) as f32;
         let between = |from: f32, to: f32| from + (to - from) * progress;
-        match moment.stage {
+        match position.stage {
             Stage::Coarse => (config.grad_threshold_coarse, config.opacity_threshold),
             Stage::Fine => (
                 between(config.grad_threshold_fine_init, config.grad_threshold_fine_final),
@@ -45,11 +45,11 @@ impl AdaptiveDensityControl {
         }
     }
 
-    fn prune(&mut self, gaussians: &mut GaussianEditor, min_opacity: f32, moment: &Moment) {
+    fn prune(&mut self, gaussians: &mut GaussianEditor, min_opacity: f32, position: &TrainingPosition) {
         let Some(statistics) = &self.statistics else { return };
         let interval = self.config.opacity_reset_interval;
-        let size_limit = (interval > 0 && moment.iteration > interval)
-            .then_some(SizeLimit { max_radius: MAX_SCREEN_RADIUS, max_scale: MAX_EXTENT_SHARE * moment.extent });
+        let size_limit = (interval > 0 && position.iteration > interval)
+            .then_some(SizeLimit { max_radius: MAX_SCREEN_RADIUS, max_scale: MAX_EXTENT_SHARE * position.extent });
         let keep = survivors(gaussians.gaussians(), min_opacity, size_limit, &statistics.largest_radius);
         // Never everything: an empty scene has no gradient to come back from.
         if keep.contains(&true) && keep.contains(&false) {
@@ -58,15 +58,15 @@ impl AdaptiveDensityControl {
         }
     }
 
-    fn clone_and_split(&mut self, gaussians: &mut GaussianEditor, threshold: f32, moment: &Moment) {
+    fn clone_and_split(&mut self, gaussians: &mut GaussianEditor, threshold: f32, position: &TrainingPosition) {
         let Some(statistics) = &self.statistics else { return };
         let masks = DensifyMasks::new(
             &statistics.mean_gradients(),
             &largest_scales(gaussians.gaussians()),
             threshold,
-            self.config.percent_dense * moment.extent,
+            self.config.percent_dense * position.extent,
         );
-        let mut generator = moment.generator();
+        let mut generator = position.generator();
         let normals: Vec<f32> = (0..masks.normals_needed()).map(|_| standard_normal(&mut generator)).collect();
         densify(gaussians, &masks, &normals);
         let device = gaussians.gaussians().means.device().inner();
@@ -79,8 +79,8 @@ impl DensityStrategy for AdaptiveDensityControl {
         self.statistics = Some(DensityStatistics::new(count, device));
     }
 
-    fn after_backward(&mut self, views: &[ViewStatistics], moment: &Moment) {
-        if self.is_over(moment.stage, moment.iteration.saturating_sub(1)) {
+    fn after_backward(&mut self, views: &[ViewStatistics], position: &TrainingPosition) {
+        if self.is_over(position.stage, position.iteration.saturating_sub(1)) {
             return;
         }
         let Some(statistics) = &mut self.statistics else { return };
@@ -91,19 +91,19 @@ impl DensityStrategy for AdaptiveDensityControl {
         }
     }
 
-    fn after_step(&mut self, gaussians: &mut GaussianEditor, moment: &Moment) {
+    fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition) {
         let DensifyConfig { from, until, interval, prune_from, prune_interval, .. } = self.config;
-        let iteration = moment.iteration;
+        let iteration = position.iteration;
         if iteration > until {
             return;
         }
-        let (threshold, min_opacity) = self.thresholds(moment);
+        let (threshold, min_opacity) = self.thresholds(position);
         let due = |from: usize, interval: usize| interval > 0 && iteration > from && iteration.is_multiple_of(interval);
         if due(prune_from, prune_interval) && gaussians.len() > self.config.prune_above {
-            self.prune(gaussians, min_opacity, moment);
+            self.prune(gaussians, min_opacity, position);
         }
         if due(from, interval) && gaussians.len() < self.config.max_gaussians {
-            self.clone_and_split(gaussians, threshold, moment);
+            self.clone_and_split(gaussians, threshold, position);
         }
         if due(0, self.config.opacity_reset_interval) && iteration < until {
             reset_opacity(gaussians);

@@ -25,9 +25,9 @@ pub use statistics::DensityStatistics;
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
 
-/// Where a run stands when a strategy is asked.
+/// The position in the training at which a strategy is asked.
 #[derive(Clone, Copy, Debug)]
-pub struct Moment {
+pub struct TrainingPosition {
     /// The stage.
     pub stage: Stage,
     /// Iteration of the stage, from 1.
@@ -38,7 +38,7 @@ pub struct Moment {
     pub(crate) seed: u64,
 }
 
-impl Moment {
+impl TrainingPosition {
     /// A generator that depends on the run's seed, the stage and the iteration alone, so that a run that was resumed
     /// draws the same numbers.
     pub fn generator(&self) -> impl Rng + use<> {
@@ -67,10 +67,10 @@ pub trait DensityStrategy: Send {
     fn begin_stage(&mut self, count: usize, device: &Device);
 
     /// The views of an iteration have been differentiated: the place to gather statistics.
-    fn after_backward(&mut self, views: &[ViewStatistics], moment: &Moment);
+    fn after_backward(&mut self, views: &[ViewStatistics], position: &TrainingPosition);
 
     /// The optimizer has made its step: the place to clone, split, prune and reset.
-    fn after_step(&mut self, gaussians: &mut GaussianEditor, moment: &Moment);
+    fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition);
 
     /// Somebody else, such as pruning by significance, has kept the rows where `keep` is set. `[N]`
     fn rows_kept(&mut self, keep: &[bool]);

@@ -1,6 +1,6 @@
 //! Scores by which Gaussians are pruned (paper III-B).
 
-use light4gs_model::{Significance, SignificanceScore as Sum, VolumeWeight};
+use light4gs_model::{PixelContribution as Sum, Significance, VolumeWeight};
 
 use crate::config::{PruneConfig, PruneScore, PruneVolume};
 
@@ -20,21 +20,21 @@ pub struct GaussianContributions {
 }
 
 impl GaussianContributions {
-    /// From sums over views, and the Gaussians' volumes.
-    pub fn new(sums: &Significance, volumes: Vec<f64>) -> Self {
+    /// From the sums over views, and the Gaussians' volumes.
+    pub fn new(significance: &Significance, volumes: Vec<f64>) -> Self {
         Self {
-            pixels: sums.scores(Sum::PixelCount),
-            blending_weight: sums.scores(Sum::BlendingWeight),
-            transmittance_opacity: sums.scores(Sum::TransmittanceOpacity),
-            opacity: sums.scores(Sum::Opacity),
+            pixels: significance.sums(Sum::PixelCount),
+            blending_weight: significance.sums(Sum::BlendingWeight),
+            transmittance_opacity: significance.sums(Sum::TransmittanceOpacity),
+            opacity: significance.sums(Sum::Opacity),
             volumes,
         }
     }
 }
 
-/// Says how much each Gaussian matters.
+/// Says how much each Gaussian contributes to the training views; those with the smallest scores are pruned.
 pub trait SignificanceScore: Send {
-    /// `[N]`: the larger, the more it matters. Must be finite.
+    /// `[N]`: the larger, the more it contributes. Must be finite.
     fn scores(&self, contributions: &GaussianContributions) -> Vec<f64>;
 }
 
@@ -42,7 +42,7 @@ pub trait SignificanceScore: Send {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeWeightedScore {
     /// What is summed.
-    pub pixel: PruneScore,
+    pub contribution: PruneScore,
     /// The factor.
     pub volume: VolumeWeight,
 }
@@ -56,13 +56,13 @@ impl VolumeWeightedScore {
             PruneVolume::Clamped => VolumeWeight::Clamped { exponent },
             PruneVolume::Unclamped => VolumeWeight::Unclamped { exponent },
         };
-        Self { pixel: config.score, volume }
+        Self { contribution: config.score, volume }
     }
 }
 
 impl SignificanceScore for VolumeWeightedScore {
     fn scores(&self, contributions: &GaussianContributions) -> Vec<f64> {
-        let sums = match self.pixel {
+        let sums = match self.contribution {
             PruneScore::Transmittance => &contributions.transmittance_opacity,
             PruneScore::Weight => &contributions.blending_weight,
             PruneScore::Opacity => &contributions.opacity,

@@ -16,7 +16,7 @@ use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::metrics::lpips::Lpips;
-use crate::metrics::measure::Scores;
+use crate::metrics::scores::Scores;
 use crate::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 

@@ -1,13 +1,13 @@
-//! Measures of how alike two images are, all differentiable. Images are `[H, W, 3]` in [0, 1]; a mask is `[H, W]`, 1 where
+//! Metrics of how alike two images are, all differentiable. Images are `[H, W, 3]` in [0, 1]; a mask is `[H, W]`, 1 where
 //! pixels count and 0 where they do not.
 //!
 //! - here: L1, squared differences, PSNR
 //! - `ssim`: SSIM in the field's two conventions, MS-SSIM and the D-SSIM of the tables
 //! - [`lpips`]: the learned distance, with weights from a file
-//! - [`measure`]: what is measured of an image, by name, and the numbers that were found
+//! - [`scores`]: the metrics by name, and the scores of an image
 
 pub mod lpips;
-pub mod measure;
+pub mod scores;
 mod ssim;
 
 use burn::tensor::{Device, Tensor, TensorData};

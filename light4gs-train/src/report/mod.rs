@@ -23,7 +23,7 @@ use light4gs_data::{DataError, RgbImage8};
 use light4gs_web::page::{Content, PLAYER, Place, element};
 
 use crate::compression::{BitMap, CodingRecord};
-use crate::metrics::measure::Scores;
+use crate::metrics::scores::Scores;
 use crate::observers::metrics_log::MetricsRecord;
 #[cfg(feature = "cli")]
 pub(crate) use color_map::inferno;

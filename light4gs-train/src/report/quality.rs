@@ -6,7 +6,7 @@ use super::SplitQuality;
 use super::chart::{Chart, Mark, Series};
 use super::format::{count, fixed};
 use super::html::escape;
-use crate::metrics::measure::{Measure, Scores};
+use crate::metrics::scores::{Metric, Scores};
 
 pub(super) fn section(splits: &[SplitQuality]) -> String {
     if splits.is_empty() {
@@ -26,7 +26,7 @@ const LEGEND: &str = "<p class=\"legend\">SSIM has zeros around the image, as 3D
     TensorFlow and scikit-image with Gaussian weights. D-SSIM is (1 - MS-SSIM) / 2. LPIPS needs weights from a file: \
     <code>light4gs eval --lpips FILE</code>. Measures with an m count the pixels of the dataset's masks.</p>\n";
 
-fn heads(html: &mut String, names: &[&str], columns: &[Measure]) {
+fn heads(html: &mut String, names: &[&str], columns: &[Metric]) {
     html.push_str("<thead><tr>");
     for name in names {
         let _ = write!(html, "<th scope=\"col\">{name}</th>");
@@ -37,7 +37,7 @@ fn heads(html: &mut String, names: &[&str], columns: &[Measure]) {
     html.push_str("</tr></thead>\n<tbody>\n");
 }
 
-fn cells(html: &mut String, scores: &Scores, columns: &[Measure]) {
+fn cells(html: &mut String, scores: &Scores, columns: &[Metric]) {
     for column in columns {
         let _ = write!(html, "<td class=\"number\">{}</td>", column.format(scores.get(*column)));
     }

@@ -1,7 +1,7 @@
 use super::*;
 use crate::compression::{BitEstimate, PlaneRecord};
 use crate::metrics::lpips::LpipsNetwork;
-use crate::metrics::measure::Measure;
+use crate::metrics::scores::Metric;
 use crate::stage::Stage;
 
 fn image(width: u32, height: u32, shift: u8) -> RgbImage8 {
@@ -25,7 +25,7 @@ fn sample() -> Report {
         record.iterations_per_second = Some(20.0);
         metrics.push(record);
     }
-    let measured = [(Measure::Psnr, 31.0), (Measure::Ssim, 0.95), (Measure::Lpips(LpipsNetwork::Alex), 0.05)];
+    let measured = [(Metric::Psnr, 31.0), (Metric::Ssim, 0.95), (Metric::Lpips(LpipsNetwork::Alex), 0.05)];
     let scores = Scores::from_values(measured);
     let view = |name: &str| ViewQuality { name: name.into(), time: 0.5, scores: scores.clone() };
     Report {
@@ -134,8 +134,8 @@ fn odd_values_do_no_harm() {
     report.metrics.truncate(1);
     report.metrics[0].loss = Some(f64::NAN);
     report.metrics[0].psnr = Some(f64::INFINITY);
-    report.splits[0].scores = Scores::from_values([(Measure::Psnr, f64::NAN)]);
-    report.splits[0].views[0].scores = Scores::from_values([(Measure::Psnr, f64::INFINITY)]);
+    report.splits[0].scores = Scores::from_values([(Metric::Psnr, f64::NAN)]);
+    report.splits[0].views[0].scores = Scores::from_values([(Metric::Psnr, f64::INFINITY)]);
     report.sections.iter_mut().for_each(|section| section.bytes = 0);
     let html = page(Path::new("report.html"), &report).expect("a page");
     assert_balanced(&html);

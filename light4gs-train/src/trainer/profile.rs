@@ -10,7 +10,7 @@ use crate::report::table::{Align, Table};
 /// Steps that compile kernels and fill caches, and are not counted.
 const WARM_UP: usize = 3;
 
-/// A stopwatch with a total for every stage. Switched off, it costs nothing and never waits for the device.
+/// A stopwatch with a total for every part. Switched off, it costs nothing and never waits for the device.
 #[derive(Debug)]
 pub struct Profile {
     laps: Option<RefCell<Laps>>,
@@ -21,8 +21,8 @@ struct Laps {
     device: Device,
     last: Instant,
     steps: usize,
-    /// Seconds, in the order in which the stages came first.
-    stages: Vec<(&'static str, f64)>,
+    /// Seconds, in the order in which the parts came first.
+    parts: Vec<(&'static str, f64)>,
 }
 
 impl Profile {
@@ -31,9 +31,9 @@ impl Profile {
         Self { laps: None }
     }
 
-    /// One that waits for the device at the end of every stage, so that the stage's time is its own.
+    /// One that waits for the device at the end of every part, so that the part's time is its own.
     pub fn on(device: &Device) -> Self {
-        let laps = Laps { device: device.clone(), last: Instant::now(), steps: 0, stages: Vec::new() };
+        let laps = Laps { device: device.clone(), last: Instant::now(), steps: 0, parts: Vec::new() };
         Self { laps: Some(RefCell::new(laps)) }
     }
 
@@ -46,8 +46,8 @@ impl Profile {
         laps.last = Instant::now();
     }
 
-    /// A stage ends, and the next one begins.
-    pub fn lap(&self, stage: &'static str) {
+    /// A part ends, and the next one begins.
+    pub fn lap(&self, part: &'static str) {
         let Some(laps) = &self.laps else { return };
         let mut laps = laps.borrow_mut();
         laps.wait();
@@ -57,22 +57,22 @@ impl Profile {
         if laps.steps <= WARM_UP {
             return;
         }
-        match laps.stages.iter_mut().find(|(name, _)| *name == stage) {
+        match laps.parts.iter_mut().find(|(name, _)| *name == part) {
             Some((_, total)) => *total += seconds,
-            None => laps.stages.push((stage, seconds)),
+            None => laps.parts.push((part, seconds)),
         }
     }
 
-    /// Milliseconds a step by stage; nothing if switched off or too short.
+    /// Milliseconds a step by part; nothing if switched off or too short.
     pub fn table(&self) -> Option<String> {
         let laps = self.laps.as_ref()?.borrow();
         let steps = laps.steps.checked_sub(WARM_UP).filter(|steps| *steps > 0)?;
-        let total: f64 = laps.stages.iter().map(|(_, seconds)| seconds).sum();
-        let mut table = Table::new([("stage", Align::Left), ("ms a step", Align::Right), ("share", Align::Right)]);
+        let total: f64 = laps.parts.iter().map(|(_, seconds)| seconds).sum();
+        let mut table = Table::new([("part", Align::Left), ("ms a step", Align::Right), ("share", Align::Right)]);
         let row = |name: &str, seconds: f64| {
             [name.to_owned(), format!("{:.2}", 1e3 * seconds / steps as f64), format!("{:.1} %", 1e2 * seconds / total)]
         };
-        for (name, seconds) in &laps.stages {
+        for (name, seconds) in &laps.parts {
             table.row(row(name, *seconds));
         }
         table.rule().row(row("step", total));

@@ -24,7 +24,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if stage == Stage::Coarse || iteration < from {
             return Ok(None);
         }
-        let with_sh = self.sh_counts(iteration);
+        let with_sh = self.sh_rate_is_active(iteration);
         let frozen = self.planes_are_frozen(stage, iteration);
         let Some(compression) = self.state.compression.as_mut() else { return Ok(None) };
         let scene = &mut self.state.scene;
@@ -51,8 +51,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         stage == Stage::Fine && until > 0 && iteration > until && self.state.compression.is_some()
     }
 
-    /// Whether spherical harmonics have a part in the rate: once Gaussians neither come nor split any more.
-    fn sh_counts(&self, iteration: usize) -> bool {
+    /// Whether the rate includes the spherical harmonics: from the end of densification on.
+    fn sh_rate_is_active(&self, iteration: usize) -> bool {
         self.density.is_over(Stage::Fine, iteration.saturating_sub(1))
     }
 
@@ -65,16 +65,15 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         gradients: &mut GradientSums,
     ) -> Option<Tensor<1>> {
         let config = &self.config.compression.rate;
-        let with_sh = self.sh_counts(iteration);
+        let with_sh = self.sh_rate_is_active(iteration);
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
         let mut steps = vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())];
-        // Frozen planes, and a field without any, have nothing to weigh where the spherical harmonics do not count: a rate
-        // of constants has no gradient.
+        // With frozen planes, or none, and without the spherical harmonics there is no rate: one of constants has no gradient.
         let anything = noisy.steps.is_some() || (with_sh && compression.sh.is_some());
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
-            let apart = (!config.planes || !config.sh).then(|| noisy.out_of_reach(!config.planes, !config.sh));
+            let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
             let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_sh, &mut generator);
             let term = match config.weighting {
                 RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,

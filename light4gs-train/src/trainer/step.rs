@@ -7,7 +7,7 @@ use light4gs_model::{DeformationField, HexPlane};
 use super::Trainer;
 use super::views::ViewPass;
 use crate::compression::EntropyModels;
-use crate::density::{GaussianEditor, Moment, ViewStatistics};
+use crate::density::{GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
 use crate::observers::StepReport;
@@ -63,7 +63,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let frame = indices[batch - 1];
 
         let statistics: Vec<ViewStatistics> = views.into_iter().map(|view| view.statistics).collect();
-        self.density.after_backward(&statistics, &self.moment(stage, iteration));
+        self.density.after_backward(&statistics, &self.training_position(stage, iteration));
         self.profile.lap("density statistics");
         let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
         let field_rates = self.field_rates(&rates);
@@ -107,15 +107,15 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Some(value)
     }
 
-    fn moment(&self, stage: Stage, iteration: usize) -> Moment {
-        Moment { stage, iteration, extent: self.data.extent, seed: self.config.seed }
+    fn training_position(&self, stage: Stage, iteration: usize) -> TrainingPosition {
+        TrainingPosition { stage, iteration, extent: self.data.extent, seed: self.config.seed }
     }
 
     /// Cloning, splitting and pruning, where they are due.
     pub(super) fn control_density(&mut self, stage: Stage, iteration: usize) {
-        let moment = self.moment(stage, iteration);
+        let position = self.training_position(stage, iteration);
         let mut editor = GaussianEditor::new(&mut self.state.scene.gaussians, &mut self.state.adam);
-        self.density.after_step(&mut editor, &moment);
+        self.density.after_step(&mut editor, &position);
         if stage == Stage::Fine && self.config.train.prune.is_due(iteration) {
             self.prune_insignificant(iteration);
         }

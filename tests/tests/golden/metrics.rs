@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_tests::golden::{Golden, assert_close, cpu_devices, devices, values_of};
 use light4gs_train::metrics::lpips::{Lpips, LpipsNetwork};
-use light4gs_train::metrics::measure::{Measure, Scores};
+use light4gs_train::metrics::scores::{Metric, Scores};
 use light4gs_train::metrics::{MS_SSIM_LEAST_SIDE, d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid};
 
 /// An image of bytes as `[H, W, 3]` in [0, 1]; `channels_first` says how the file has it.
@@ -127,13 +127,13 @@ fn images_that_are_too_small_have_no_multiscale_similarity() {
             Scores::measure(&image, &truth, None, &[])
         };
         let least = MS_SSIM_LEAST_SIDE;
-        assert!(measure(least, least + 4).get(Measure::MsSsim).is_some(), "{name}");
+        assert!(measure(least, least + 4).get(Metric::MsSsim).is_some(), "{name}");
         let small = measure(least - 1, least + 4);
-        assert!(small.get(Measure::MsSsim).is_none() && small.get(Measure::SsimValid).is_some(), "{name}");
-        assert_eq!(Measure::DSsim.format(small.get(Measure::DSsim)), "image too small");
+        assert!(small.get(Metric::MsSsim).is_none() && small.get(Metric::SsimValid).is_some(), "{name}");
+        assert_eq!(Metric::DSsim.format(small.get(Metric::DSsim)), "image too small");
         let tiny = measure(10, 30);
-        assert!(tiny.get(Measure::SsimValid).is_none() && tiny.ssim().is_finite(), "{name}");
-        let alex = Measure::Lpips(LpipsNetwork::Alex);
+        assert!(tiny.get(Metric::SsimValid).is_none() && tiny.ssim().is_finite(), "{name}");
+        let alex = Metric::Lpips(LpipsNetwork::Alex);
         assert_eq!(alex.format(tiny.get(alex)), "no weights");
     }
 }
@@ -167,9 +167,9 @@ fn masks_choose_the_pixels_that_count() {
         assert!((left - 20.0).abs() < 1e-3, "{name}: {left}");
         assert!((psnr(image.clone(), truth.clone()) - 23.0103).abs() < 1e-3, "{name}");
         let scores = Scores::measure(&image, &truth, Some(&columns(0.0, 1.0)), &[]);
-        assert_eq!(scores.get(Measure::MaskedPsnr), Some(f64::INFINITY), "{name}");
-        assert!(scores.get(Measure::MaskedSsim).unwrap() > scores.ssim(), "{name}");
+        assert_eq!(scores.get(Metric::MaskedPsnr), Some(f64::INFINITY), "{name}");
+        assert!(scores.get(Metric::MaskedSsim).unwrap() > scores.ssim(), "{name}");
         let empty = Scores::measure(&image, &truth, Some(&columns(0.0, 0.0)), &[]);
-        assert_eq!(empty.get(Measure::MaskedPsnr), None, "{name}: an empty mask has no mean");
+        assert_eq!(empty.get(Metric::MaskedPsnr), None, "{name}: an empty mask has no mean");
     }
 }

@@ -3,7 +3,7 @@
 use burn::tensor::{Device, Tensor, s};
 use light4gs_data::Camera;
 use light4gs_model::spherical_harmonics::{basis, basis_gradient, coefficient_count};
-use light4gs_model::{GaussianTensors, Significance, SignificanceScore, Splatter, VolumeWeight, least_significant};
+use light4gs_model::{GaussianTensors, PixelContribution, Significance, Splatter, VolumeWeight, least_significant};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::raster::{Leaves, camera_of};
 
@@ -120,21 +120,21 @@ fn rasterizer_corner_cases() {
     check_camera(&golden, "cam0", "grad_autograd", false);
 }
 
-const SCORES: [(&str, SignificanceScore); 4] = [
-    ("count", SignificanceScore::PixelCount),
-    ("sum_T_alpha", SignificanceScore::BlendingWeight),
-    ("sum_T_opacity", SignificanceScore::TransmittanceOpacity),
-    ("sum_opacity", SignificanceScore::Opacity),
+const SCORES: [(&str, PixelContribution); 4] = [
+    ("count", PixelContribution::PixelCount),
+    ("sum_T_alpha", PixelContribution::BlendingWeight),
+    ("sum_T_opacity", PixelContribution::TransmittanceOpacity),
+    ("sum_opacity", PixelContribution::Opacity),
 ];
 
 /// Checks the scores under `prefix` and returns them in the order of [`SCORES`].
 fn check_scores(golden: &Golden, what: &str, prefix: &str, significance: &Significance) -> Vec<Vec<f64>> {
-    let check = |(name, score): (&str, SignificanceScore)| {
+    let check = |(name, score): (&str, PixelContribution)| {
         let key = format!("{prefix}.{name}");
-        let found = significance.scores(score);
+        let found = significance.sums(score);
         let as_f32: Vec<f32> = found.iter().map(|v| *v as f32).collect();
         match score {
-            SignificanceScore::PixelCount => assert_eq!(as_f32, golden.values(&key), "{what} {key}"),
+            PixelContribution::PixelCount => assert_eq!(as_f32, golden.values(&key), "{what} {key}"),
             _ => assert_close_relative(&format!("{what} {key}"), &as_f32, &golden.values(&key), 2e-5),
         }
         found

@@ -3,7 +3,7 @@
 use crate::camera::Camera;
 use crate::images::RgbImage8;
 use crate::lens::{Distortion, Lens};
-use crate::synthetic::Stage;
+use crate::synthetic::Studio;
 use glam::{DVec2, Vec3};
 
 /// Width and height of the images, pixels: not square, odd, and the principal point is not in the middle.
@@ -19,7 +19,7 @@ pub(super) struct Shot {
 
 /// What is photographed, and how.
 pub(super) struct Capture {
-    stage: Stage,
+    studio: Studio,
     pub(super) shots: Vec<Shot>,
 }
 
@@ -54,7 +54,7 @@ impl Capture {
                 Shot { name, pinhole, lens, time }
             })
             .collect();
-        Self { stage: Stage::new(3), shots }
+        Self { studio: Studio::new(3), shots }
     }
 
     /// A moving camera: `count` frames called `PREFIX0000`...
@@ -68,7 +68,7 @@ impl Capture {
         let shot = &self.shots[i];
         let camera = &shot.pinhole;
         let axes = camera.rotation.transpose();
-        self.stage.photograph(camera.center(), (camera.width, camera.height), shot.time, |u, v| {
+        self.studio.photograph(camera.center(), (camera.width, camera.height), shot.time, |u, v| {
             let seen = DVec2::new(f64::from((u - camera.cx) / camera.fx), f64::from((v - camera.cy) / camera.fy));
             let mut point = seen;
             if let Some(lens) = &shot.lens {
@@ -86,7 +86,7 @@ impl Capture {
         let shot = &self.shots[i];
         let camera = shot.pinhole.resized(size.0, size.1);
         let axes = camera.rotation.transpose();
-        self.stage.photograph(camera.center(), size, shot.time, |u, v| {
+        self.studio.photograph(camera.center(), size, shot.time, |u, v| {
             (axes * Vec3::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0)).normalize()
         })
     }

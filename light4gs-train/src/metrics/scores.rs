@@ -1,4 +1,4 @@
-//! What is measured of an image, by name, and the numbers that were found.
+//! The metrics by name, and the scores of an image.
 
 use burn::tensor::Tensor;
 use serde::ser::{Serialize, SerializeMap, Serializer};
@@ -6,9 +6,9 @@ use serde::ser::{Serialize, SerializeMap, Serializer};
 use super::lpips::{Lpips, LpipsNetwork};
 use super::{d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid};
 
-/// A measure of how alike two images are.
+/// A metric of how alike two images are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Measure {
+pub enum Metric {
     /// Peak signal-to-noise ratio over the whole image, dB.
     Psnr,
     /// SSIM with zeros around the image, as 3DGS.
@@ -21,15 +21,15 @@ pub enum Measure {
     DSsim,
     /// LPIPS.
     Lpips(LpipsNetwork),
-    /// [`Measure::Psnr`] over the pixels of the dataset's mask.
+    /// [`Metric::Psnr`] over the pixels of the dataset's mask.
     MaskedPsnr,
-    /// [`Measure::Ssim`] over the windows around those pixels.
+    /// [`Metric::Ssim`] over the windows around those pixels.
     MaskedSsim,
     /// LPIPS over those pixels.
     MaskedLpips(LpipsNetwork),
 }
 
-impl Measure {
+impl Metric {
     /// What every evaluation has, or says why it has not.
     pub const ALWAYS: [Self; 7] = [
         Self::Psnr,
@@ -106,7 +106,7 @@ impl Measure {
 
 /// What was measured of one view, or the mean over some.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Scores(Vec<(Measure, f64)>);
+pub struct Scores(Vec<(Metric, f64)>);
 
 impl Scores {
     /// Measures an image against the truth, both `[H, W, 3]` in [0, 1]; over the pixels of a mask `[H, W]` too, where there is
@@ -119,68 +119,68 @@ impl Scores {
             measure(image, truth).map(number)
         };
         let mut scores = Self::default();
-        scores.0.push((Measure::Psnr, psnr(image.clone(), truth.clone())));
-        scores.set(Measure::Ssim, call(|a, b| Some(ssim(a, b))));
-        scores.set(Measure::SsimValid, call(ssim_valid));
+        scores.0.push((Metric::Psnr, psnr(image.clone(), truth.clone())));
+        scores.set(Metric::Ssim, call(|a, b| Some(ssim(a, b))));
+        scores.set(Metric::SsimValid, call(ssim_valid));
         let multiscale = call(ms_ssim);
-        scores.set(Measure::MsSsim, multiscale);
-        scores.set(Measure::DSsim, multiscale.map(d_ssim));
+        scores.set(Metric::MsSsim, multiscale);
+        scores.set(Metric::DSsim, multiscale.map(d_ssim));
         for network in lpips {
             let (image, truth) = pair();
-            scores.set(Measure::Lpips(network.network()), network.distance(image, truth).map(number));
+            scores.set(Metric::Lpips(network.network()), network.distance(image, truth).map(number));
         }
         let Some(mask) = mask.filter(|mask| (*mask).clone().sum().into_scalar::<f64>() > 0.0) else { return scores };
         let mask = || mask.clone();
-        scores.set(Measure::MaskedPsnr, Some(masked_psnr(image.clone(), truth.clone(), mask())));
-        scores.set(Measure::MaskedSsim, Some(number(masked_ssim(image.clone(), truth.clone(), mask()))));
+        scores.set(Metric::MaskedPsnr, Some(masked_psnr(image.clone(), truth.clone(), mask())));
+        scores.set(Metric::MaskedSsim, Some(number(masked_ssim(image.clone(), truth.clone(), mask()))));
         for network in lpips {
             let (image, truth) = pair();
             let distance = network.masked_distance(image, truth, mask()).map(number);
-            scores.set(Measure::MaskedLpips(network.network()), distance);
+            scores.set(Metric::MaskedLpips(network.network()), distance);
         }
         scores
     }
 
-    fn set(&mut self, measure: Measure, value: Option<f64>) {
-        self.0.extend(value.map(|value| (measure, value)));
+    fn set(&mut self, metric: Metric, value: Option<f64>) {
+        self.0.extend(value.map(|value| (metric, value)));
     }
 
     /// From numbers that are known.
-    pub fn from_values(values: impl IntoIterator<Item = (Measure, f64)>) -> Self {
+    pub fn from_values(values: impl IntoIterator<Item = (Metric, f64)>) -> Self {
         Self(values.into_iter().collect())
     }
 
     /// A number, if it was measured.
-    pub fn get(&self, measure: Measure) -> Option<f64> {
-        self.0.iter().find(|(known, _)| *known == measure).map(|(_, value)| *value)
+    pub fn get(&self, metric: Metric) -> Option<f64> {
+        self.0.iter().find(|(known, _)| *known == metric).map(|(_, value)| *value)
     }
 
     /// PSNR in dB; NaN where nothing was measured.
     pub fn psnr(&self) -> f64 {
-        self.get(Measure::Psnr).unwrap_or(f64::NAN)
+        self.get(Metric::Psnr).unwrap_or(f64::NAN)
     }
 
     /// SSIM as 3DGS; NaN where nothing was measured.
     pub fn ssim(&self) -> f64 {
-        self.get(Measure::Ssim).unwrap_or(f64::NAN)
+        self.get(Metric::Ssim).unwrap_or(f64::NAN)
     }
 
     /// The mean of each measure over the views that have it.
     pub fn mean<'a>(views: impl Iterator<Item = &'a Self> + Clone) -> Self {
-        let mean = |measure: Measure| {
+        let mean = |metric: Metric| {
             let (mut sum, mut count) = (0.0, 0);
-            for value in views.clone().filter_map(|scores| scores.get(measure)) {
+            for value in views.clone().filter_map(|scores| scores.get(metric)) {
                 (sum, count) = (sum + value, count + 1);
             }
-            (count > 0).then(|| (measure, sum / f64::from(count)))
+            (count > 0).then(|| (metric, sum / f64::from(count)))
         };
-        Self(Measure::ALWAYS.into_iter().chain(Measure::MASKED).filter_map(mean).collect())
+        Self(Metric::ALWAYS.into_iter().chain(Metric::MASKED).filter_map(mean).collect())
     }
 
     /// The columns of a table of these scores: what is always measured, then what some of them have with masks.
-    pub fn columns<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Vec<Measure> {
-        let present = |measure: &Measure| all.clone().any(|scores| scores.get(*measure).is_some());
-        Measure::ALWAYS.into_iter().chain(Measure::MASKED.into_iter().filter(present)).collect()
+    pub fn columns<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Vec<Metric> {
+        let present = |metric: &Metric| all.clone().any(|scores| scores.get(*metric).is_some());
+        Metric::ALWAYS.into_iter().chain(Metric::MASKED.into_iter().filter(present)).collect()
     }
 }
 
@@ -188,8 +188,8 @@ impl Scores {
 impl Serialize for Scores {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;
-        for (measure, value) in &self.0 {
-            map.serialize_entry(measure.key(), value)?;
+        for (metric, value) in &self.0 {
+            map.serialize_entry(metric.key(), value)?;
         }
         map.end()
     }
