@@ -18,6 +18,6 @@ pub const MIN_ALPHA: f32 = 1.0 / 255.0;
 pub const MAX_ALPHA: f32 = 0.99;
 /// A pixel takes no Gaussian that would leave it with less transmittance.
 pub const MIN_TRANSMITTANCE: f32 = 1e-4;
-/// Logarithms of scales are clamped here before the exponential: far beyond any scene, and the exponential stays finite, so
+/// Logarithms (of scales, above all) are clamped here before the exponential: far beyond any scene, and the exponential stays finite, so
 /// that a backward pass has no 0 · infinity.
-pub const MAX_LOG_SCALE: f32 = 40.0;
+pub const MAX_LOGARITHM: f32 = 40.0;

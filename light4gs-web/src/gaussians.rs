@@ -1,7 +1,7 @@
 //! Activated Gaussians, and what the vertex shader takes of them.
 
 use light4gs_codec::GaussianArrays;
-use light4gs_codec::rendering::MAX_LOG_SCALE;
+use light4gs_codec::rendering::MAX_LOGARITHM;
 
 /// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz.
 pub(crate) const FLOATS: usize = 10;
@@ -11,7 +11,7 @@ const SHORTEST_QUATERNION: f32 = 1e-12;
 
 /// Standard deviations from their logarithms.
 pub(crate) fn scales(log_scales: [f32; 3]) -> [f32; 3] {
-    log_scales.map(|scale| scale.min(MAX_LOG_SCALE).exp())
+    log_scales.map(|scale| scale.min(MAX_LOGARITHM).exp())
 }
 
 /// Opacity in [0, 1] from its logit.

@@ -20,6 +20,7 @@ use std::borrow::Cow;
 
 use burn::tensor::Tensor;
 use burn::tensor::activation::sigmoid;
+use light4gs_codec::rendering::MAX_LOGARITHM;
 use light4gs_data::PointCloud;
 
 use super::gaussians::GaussiansConfig;
@@ -96,10 +97,6 @@ pub enum Coding {
     /// In a section of its own, under an entropy model of its own: the spherical harmonics beyond degree 0.
     Harmonics,
 }
-
-/// Logarithms are cut here before the exponential: far beyond any scene, and the exponential stays finite, so that the
-/// backward pass has no 0 · infinity.
-const MAX_LOGARITHM: f32 = 40.0;
 
 impl Activation {
     /// Applies it.

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_codec::rendering::MAX_LOG_SCALE;
 use light4gs_data::PointCloud;
 
 use super::attributes::{Attribute, BUILT_IN, LOG_SCALES, OPACITY_LOGITS};
