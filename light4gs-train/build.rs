@@ -1,5 +1,7 @@
-//! Tells the program which commit it is built from.
+//! Tells the program which commit it is built from, and embeds the presets of `configs/`.
 
+use std::collections::BTreeMap;
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -7,6 +9,7 @@ fn main() {
     // Where it runs, not where it was compiled: checkouts may share a target folder.
     let folder = &std::env::var_os("CARGO_MANIFEST_DIR").map(PathBuf::from).unwrap_or_default();
     println!("cargo::rustc-env=LIGHT4GS_COMMIT={}", commit(folder).unwrap_or_else(|| "unknown".to_owned()));
+    write_presets(folder);
     for name in ["src", "configs", "build.rs"] {
         println!("cargo::rerun-if-changed={name}");
     }
@@ -17,6 +20,31 @@ fn main() {
             println!("cargo::rerun-if-changed={}", log.display());
         }
     }
+}
+
+/// Writes the list of presets: every TOML file of `configs/` and of the folders in it, but for the studies, which are listed in
+/// their order (`src/study/catalog.rs`).
+fn write_presets(folder: &Path) {
+    fn collect(folder: &Path, into: &mut BTreeMap<String, PathBuf>) {
+        for entry in fs::read_dir(folder).expect("reading configs").map(|entry| entry.expect("an entry").path()) {
+            if entry.is_dir() && !entry.ends_with("studies") {
+                collect(&entry, into);
+            } else if let (Some(stem), Some("toml")) =
+                (entry.file_stem(), entry.extension().and_then(|end| end.to_str()))
+            {
+                let name = stem.to_str().expect("a preset's name is plain text").to_owned();
+                if let Some(other) = into.insert(name, entry.clone()) {
+                    panic!("two presets have one name: {} and {}", other.display(), entry.display());
+                }
+            }
+        }
+    }
+    let mut presets = BTreeMap::new();
+    collect(&folder.join("configs"), &mut presets);
+    let rows = presets.iter().map(|(name, path)| format!("    ({name:?}, include_str!({path:?})),\n"));
+    let text = format!("const PRESETS: &[(&str, &str)] = &[\n{}];\n", rows.collect::<String>());
+    let out = std::env::var_os("OUT_DIR").map(PathBuf::from).expect("cargo sets OUT_DIR");
+    fs::write(out.join("presets.rs"), text).expect("writing the list of presets");
 }
 
 /// The commit of our own repository: a copy of the crate may lie in another one.

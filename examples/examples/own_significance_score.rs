@@ -33,7 +33,10 @@ fn main() -> Outcome {
     let mut config = tiny_config()?;
     // Cloning ends at iteration 60; at 80 a pass of pruning drops 30 % of the Gaussians.
     config.train.prune.fraction = 0.3;
-    assert_eq!((config.train.densify.until, config.train.prune.iterations.as_slice()), (60, [80].as_slice()));
+    assert_eq!(
+        (config.train.densify.strategies.adaptive.until, config.train.prune.iterations.as_slice()),
+        (60, [80].as_slice())
+    );
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
 
     let score = MeanWeight::default();

@@ -36,10 +36,10 @@ pub fn tiny_config() -> Outcome<Config> {
     config.model.deformation.width = 16;
     config.train.coarse_iterations = 20;
     config.train.fine_iterations = 100;
-    config.train.l2_until = 0;
-    config.train.densify.from = 10;
-    config.train.densify.until = 60;
-    config.train.densify.interval = 20;
+    config.train.losses.photometric.l2_until = 0;
+    config.train.densify.strategies.adaptive.from = 10;
+    config.train.densify.strategies.adaptive.until = 60;
+    config.train.densify.strategies.adaptive.interval = 20;
     config.train.prune.fraction = 0.0;
     config.train.prune.iterations = vec![80];
     Ok(config)

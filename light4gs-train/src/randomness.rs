@@ -2,7 +2,6 @@
 //! the same and a checkpoint holds no generator.
 
 use burn::tensor::Device;
-use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
@@ -42,24 +41,4 @@ pub(crate) fn seed_device(device: &Device, seed: u64, stage: Stage, iteration: u
 pub(crate) fn standard_normal(generator: &mut impl Rng) -> f32 {
     let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
     ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32
-}
-
-/// Frames in an order that is shuffled anew each time all have been seen.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct FrameOrder {
-    pass: Option<(Stage, usize)>,
-    order: Vec<usize>,
-}
-
-impl FrameOrder {
-    /// The frame at a position of the sequence, of `count` frames.
-    pub(crate) fn at(&mut self, seed: u64, stage: Stage, position: usize, count: usize) -> usize {
-        let pass = (stage, position / count);
-        if self.pass != Some(pass) || self.order.len() != count {
-            self.order = (0..count).collect();
-            self.order.shuffle(&mut generator(seed, Purpose::FrameOrder, stage, pass.1));
-            self.pass = Some(pass);
-        }
-        self.order[position % count]
-    }
 }

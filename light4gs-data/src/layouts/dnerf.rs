@@ -36,6 +36,10 @@ impl DatasetLayout for DNerf {
         "transforms_train.json"
     }
 
+    fn preset(&self) -> Option<&'static str> {
+        Some("dnerf-small")
+    }
+
     fn detect(&self, root: &Path) -> bool {
         root.join(self.signature()).is_file()
     }

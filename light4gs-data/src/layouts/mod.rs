@@ -1,6 +1,7 @@
 //! Dataset layouts: [`DatasetLayout`] is the seam, [`Layouts`] the list of those that are known.
 //!
-//! To add one to this crate: its own file in this folder, its `mod` line and its place in [`Layouts::default`].
+//! To add one to this crate: its own file in this folder, its `mod` line and its place in [`Layouts::default`], and a preset in
+//! `light4gs-train/configs/`, which a test asks for.
 
 pub(crate) mod colmap;
 mod dnerf;

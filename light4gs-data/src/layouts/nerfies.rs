@@ -45,6 +45,10 @@ impl DatasetLayout for HyperNerf {
         "dataset.json and camera/"
     }
 
+    fn preset(&self) -> Option<&'static str> {
+        Some("hypernerf-small")
+    }
+
     fn detect(&self, root: &Path) -> bool {
         root.join("dataset.json").is_file() && root.join("camera").is_dir()
     }
@@ -61,6 +65,10 @@ impl DatasetLayout for NerfDs {
 
     fn signature(&self) -> &'static str {
         "dataset.json, camera/ID_left.json and mask/"
+    }
+
+    fn preset(&self) -> Option<&'static str> {
+        Some("nerfds-small")
     }
 
     fn detect(&self, root: &Path) -> bool {

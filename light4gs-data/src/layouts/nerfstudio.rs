@@ -41,6 +41,10 @@ impl DatasetLayout for Nerfstudio {
         "transforms.json"
     }
 
+    fn preset(&self) -> Option<&'static str> {
+        Some("nerfstudio-small")
+    }
+
     fn detect(&self, root: &Path) -> bool {
         root.join(self.signature()).is_file()
     }

@@ -42,7 +42,7 @@ pub(super) struct RunOutput {
 pub(super) struct Train {
     /// Folder of the dataset.
     scene: PathBuf,
-    /// A preset (see docs/configuration.md) or a TOML file. Without it: the small preset of the dataset's layout, such as
+    /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as
     /// dnerf-small.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
@@ -72,8 +72,8 @@ impl Train {
         overrides.extend(self.format.as_ref().map(|layout| format!("data.layout={layout}")));
         let preset = match (self.config, self.format) {
             (Some(config), _) => config,
-            (None, Some(layout)) => format!("{layout}-small"),
-            (None, None) => format!("{}-small", Layouts::default().detect(&self.scene)?.name()),
+            (None, Some(layout)) => Config::preset_of(Layouts::default().by_name(&layout)?)?.to_owned(),
+            (None, None) => Config::preset_of(Layouts::default().detect(&self.scene)?)?.to_owned(),
         };
         let config = Config::load(&preset, &overrides)?;
         train(config, &self.scene, &self.out, self.overwrite, &self.output)

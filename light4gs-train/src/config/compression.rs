@@ -10,26 +10,31 @@ use light4gs_model::AdaptiveQuantizationConfig;
 use light4gs_model::ShKind;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use super::choice::{UnknownChoice, choice};
+use crate::keys::Bounds::{self, Flag, Number, Whole, Word};
+use crate::keys::{ITERATION, RATE, STEP, TOLERANCE, UnknownChoice, WEIGHT, choice, keys};
 
-/// What the file looks like, and what is trained for its sake.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct CompressionConfig {
-    /// How the file is written.
-    pub profile: FileProfile,
-    /// The rate in the loss.
-    pub rate: RateConfig,
-    /// The context model of the hexplanes (MHCM).
-    pub context: ContextConfig,
-    /// Quantization steps of the hexplanes.
-    pub steps: StepsConfig,
-    /// The entropy model of the spherical harmonics.
-    pub sh: ShConfig,
-    /// Steps of the other attributes, in the `compact` profile.
-    pub attributes: AttributesConfig,
-    /// Precision of network weights, in the `compact` profile.
-    pub weights: WeightsConfig,
+keys! {
+    /// What the file looks like, and what is trained for its sake (paper III-C to III-E,
+    /// [design](design.md#compression)).
+    pub struct CompressionConfig {
+        /// `"compact"`: everything is quantized and entropy coded. `"paper"`: planes and spherical harmonics are
+        /// coded, all else is float32. `"float32"`: nothing is coded.
+        profile: FileProfile = FileProfile::Compact;
+            Word(FileProfile::NAMES),
+            "ours; paper", "or \"paper\" (other attributes and weights as float32), \"float32\"";
+        /// The rate in the loss.
+        rate: RateConfig;
+        /// The context model of the hexplanes (MHCM).
+        context: ContextConfig;
+        /// Quantization steps of the hexplanes.
+        steps: StepsConfig;
+        /// The entropy model of the spherical harmonics.
+        sh: ShConfig;
+        /// Steps of the other attributes, in the `compact` profile.
+        attributes: AttributesConfig;
+        /// Precision of network weights, in the `compact` profile.
+        weights: WeightsConfig;
+    }
 }
 
 choice! {
@@ -55,28 +60,35 @@ impl FileProfile {
     }
 }
 
-/// The rate term of the loss.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct RateConfig {
-    /// Weight of the rate; 0 = no rate in the loss.
-    pub lambda: f64,
-    /// What lambda weighs.
-    pub weighting: RateWeighting,
-    /// Whether the rate of the planes shapes the planes. Where it does not, their entropy model learns all the same.
-    pub planes: bool,
-    /// Whether the rate of the spherical harmonics shapes the Gaussians. Where it does not, its model learns all the same.
-    pub sh: bool,
-    /// The rate is taken in every so many iterations.
-    pub interval: usize,
-    /// Share of the planes, and of the Gaussians, on which it is estimated.
-    pub fraction: f64,
-    /// Iteration of the fine stage from which planes carry noise and the rate counts. Spherical harmonics join once
-    /// densification is over.
-    pub from: usize,
-    /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have, and
-    /// the rest of the scene goes on learning around them. 0 = never.
-    pub planes_until: usize,
+keys! {
+    /// The rate term of the loss.
+    pub struct RateConfig {
+        /// Weight of the rate in the loss. 0: the scene is trained without it, and the entropy models are fitted to
+        /// the finished scene.
+        lambda: f64 = 0.0;
+            WEIGHT, "ours; the reference's log of *bouncing balls* has 0.001 per symbol", "0 = no rate in the loss";
+        /// What lambda weighs: `"megabytes"` (10^6 bytes) of the file, so that one lambda trades bytes for
+        /// distortion, or `"per_symbol"`, bits per plane symbol plus bits per symbol of the spherical harmonics.
+        weighting: RateWeighting = RateWeighting::Megabytes;
+            Word(RateWeighting::NAMES), "ours; paper", "what lambda weighs; or \"per_symbol\", as the paper";
+        /// The rate of the planes shapes the planes. Off: their entropy model learns beside them, and they do not
+        /// hear of it.
+        planes: bool = true;
+            Flag, "ours, for the ablation", "false = the rate trains the planes' model only, not the planes";
+        /// The same for the spherical harmonics.
+        sh: bool = true; Flag, "ours, for the ablation", "the same for the spherical harmonics";
+        /// The rate is taken in every so many iterations.
+        interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
+        /// Share of the planes, and of the Gaussians, on which it is estimated; the estimate is unbiased.
+        fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours", "of the planes and the Gaussians";
+        /// Iteration of the fine stage from which planes carry the noise of quantization and the rate counts.
+        /// Spherical harmonics join once densification is over.
+        from: usize = 1000; ITERATION, "reference: 3; SH 2000";
+        /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will
+        /// have, and the rest of the scene goes on learning around them. 0: never.
+        planes_until: usize = 27_000;
+            ITERATION, "ours", "0 = the planes change to the last iteration, as the paper's";
+    }
 }
 
 choice! {
@@ -89,28 +101,30 @@ choice! {
     }
 }
 
-/// Parts and sizes of the context model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ContextConfig {
-    /// Sizes of its networks.
-    pub architecture: ContextArchitecture,
-    /// Whether the lowest scale's space-time planes send a hyperprior.
-    pub hyperprior: bool,
-    /// Whether the second half of the lowest scale's positions sees the first.
-    pub checkerboard: bool,
-    /// Whether space-only planes are predicted from space-time planes.
-    pub inter_plane: bool,
-    /// Whether higher scales are predicted from the one below.
-    pub inter_scale: bool,
-    /// Whether higher scales send a hyperprior as well, as the public code does.
-    pub high_scale_hyperprior: bool,
-    /// Learning rate at the first step.
-    pub learning_rate_init: f64,
-    /// Learning rate at the end of the fine stage.
-    pub learning_rate_final: f64,
-    /// Steps that fit the model to planes that were trained without it, when such a checkpoint is encoded.
-    pub fit_iterations: usize,
+keys! {
+    /// Parts and sizes of the context model.
+    pub struct ContextConfig {
+        /// Sizes of the context model's networks: about 6000 weights at 16 channels, or the public code's
+        /// (`"reference"`).
+        architecture: ContextArchitecture = ContextArchitecture::Compact;
+            Word(ContextArchitecture::NAMES), "ours; reference", "or \"reference\", the public code's sizes";
+        /// The lowest scale's space-time planes send a hyperprior.
+        hyperprior: bool = true; Flag, "paper";
+        /// Half of the lowest scale's positions are coded in sight of the other half.
+        checkerboard: bool = true; Flag, "paper";
+        /// Space-only planes are predicted from the space-time planes over their axes.
+        inter_plane: bool = true; Flag, "paper";
+        /// Higher scales are predicted from the scale below.
+        inter_scale: bool = true; Flag, "paper";
+        /// Higher scales send a hyperprior as well. Needs `hyperprior` and `inter_scale`.
+        high_scale_hyperprior: bool = false; Flag, "reference", "the public code's";
+        /// Learning rate of the context model at the first step.
+        learning_rate_init: f64 = 5e-3; RATE, "ours";
+        /// The same at the end of the fine stage.
+        learning_rate_final: f64 = 5e-4; RATE, "ours";
+        /// Steps that fit entropy models to a scene that was trained without them.
+        fit_iterations: usize = 1500; Whole { least: 1, most: 1_000_000 }, "ours";
+    }
 }
 
 choice! {
@@ -123,42 +137,48 @@ choice! {
     }
 }
 
-/// Quantization steps of the planes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct StepsConfig {
-    /// Step of the space-only planes, at the beginning.
-    pub space_only: f64,
-    /// Step of the space-time planes, at the beginning.
-    pub space_time: f64,
-    /// Whether the steps are learned.
-    pub adaptive: bool,
-    /// Iteration of the fine stage from which they are.
-    pub adaptive_from: usize,
-    /// Whether learned steps may become finer than they begin.
-    pub refine: bool,
-    /// Whether every scale has its own pair.
-    pub per_scale: bool,
-    /// Learning rate of the steps' logarithms.
-    pub learning_rate: f64,
-    /// Of a scene that was trained without a rate: how much PSNR the steps may cost, in dB; 0 takes the steps as they stand.
-    pub search_tolerance: f64,
+keys! {
+    /// Quantization steps of the planes.
+    pub struct StepsConfig {
+        /// Quantization step of the planes over space, at the beginning.
+        space_only: f64 = quantization().space_only; STEP, "ours; reference: 0.1, fixed";
+        /// The same for the planes over an axis and time.
+        space_time: f64 = quantization().space_time; STEP, "ours; reference: 0.1, fixed";
+        /// The steps are learned.
+        adaptive: bool = true; Flag, "paper; dropped by the reference";
+        /// Iteration of the fine stage from which they are.
+        adaptive_from: usize = 15_000; ITERATION, "paper";
+        /// Learned steps may become finer than they begin. That serves training frames and not others:
+        /// [results](results.md#learned-quantization-steps).
+        refine: bool = false; Flag, "ours; paper: yes", "finer steps help training frames only";
+        /// Every scale has a pair of steps of its own.
+        per_scale: bool = quantization().per_scale; Flag, "ours";
+        /// Learning rate of the steps' logarithms.
+        learning_rate: f64 = 2e-3; RATE, "ours";
+        /// Where a scene was trained without a rate, such as an imported one: the encoder looks for the coarsest
+        /// steps that cost this much PSNR, dB. 0: the steps as they stand.
+        search_tolerance: f64 = 0.0; TOLERANCE, "ours", "dB; 0 = these steps also where the training knew no rate";
+    }
 }
 
-/// The model of the spherical harmonics beyond degree 0.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ShConfig {
-    /// Which model.
-    pub model: ShModel,
-    /// Quantization step.
-    pub step: f64,
-    /// Learning rate of the model at the first step.
-    pub learning_rate_init: f64,
-    /// Learning rate of the model at the end of the fine stage.
-    pub learning_rate_final: f64,
-    /// Of a scene that was trained without a rate: how much PSNR the step may cost, in dB; 0 takes the step as it stands.
-    pub search_tolerance: f64,
+keys! {
+    /// The model of the spherical harmonics beyond degree 0.
+    pub struct ShConfig {
+        /// Entropy model of the spherical harmonics beyond degree 0: `"factorized"`, `"mixture_of_logistics"`,
+        /// `"channel_autoregressive"` or `"hexplane_coupled"`. Trained for degree 3; lower degrees are coded with the
+        /// frequencies of their symbols.
+        model: ShModel = ShModel(ShKind::Factorized);
+            Word(&ShKind::NAMES),
+            "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";
+        /// Their quantization step.
+        step: f64 = 0.02; STEP, "paper";
+        /// Learning rate of that model at the first step.
+        learning_rate_init: f64 = 5e-3; RATE, "ours";
+        /// The same at the end of the fine stage.
+        learning_rate_final: f64 = 5e-4; RATE, "ours";
+        /// As `compression.steps.search_tolerance`, for this step.
+        search_tolerance: f64 = 0.0; TOLERANCE, "ours";
+    }
 }
 
 /// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. Which there are is said in the model crate.
@@ -191,22 +211,24 @@ impl<'de> Deserialize<'de> for ShModel {
     }
 }
 
-/// Quantization of what every Gaussian has besides spherical harmonics.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct AttributesConfig {
-    /// Step of the positions, as a share of the size of the typical Gaussian.
-    pub position: f32,
-    /// Step of the logarithms of scales.
-    pub log_scale: f32,
-    /// Step of the quaternions' components.
-    pub quaternion: f32,
-    /// Step of the opacity logits.
-    pub opacity_logit: f32,
-    /// Step of the degree-0 spherical harmonics.
-    pub sh_dc: f32,
-    /// Loss of training PSNR in dB that the search for coarser steps may cost; 0 = the steps as they stand.
-    pub search_tolerance: f64,
+keys! {
+    /// Quantization of what every Gaussian has besides spherical harmonics.
+    pub struct AttributesConfig {
+        /// Step of the positions as a share of the typical Gaussian's size. This and the next four: `compact` profile
+        /// only, and where the search begins.
+        position: f32 = step("means"); STEP, "ours", "of the size of the typical Gaussian";
+        /// Step of the scales' logarithms.
+        log_scale: f32 = step("log_scales"); STEP, "ours";
+        /// Step of the quaternions' components.
+        quaternion: f32 = step("quats"); STEP, "ours";
+        /// Step of the opacity logits.
+        opacity_logit: f32 = step("opacity_logits"); STEP, "ours";
+        /// Step of the constant colors.
+        sh_dc: f32 = step("sh_dc"); STEP, "ours";
+        /// The encoder looks for the coarsest steps that cost this much PSNR on some training views, dB. 0: the steps
+        /// as they stand.
+        search_tolerance: f64 = 0.05; TOLERANCE, "ours", "dB of training PSNR";
+    }
 }
 
 impl AttributesConfig {
@@ -218,117 +240,35 @@ impl AttributesConfig {
     }
 }
 
-/// Bits a weight may have.
-pub(super) const LEAST_WEIGHT_BITS: u8 = 4;
-/// Bits a weight may have.
-pub(super) const MOST_WEIGHT_BITS: u8 = 16;
-
-/// Quantization of network weights.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct WeightsConfig {
-    /// Bits a weight of the deformation network.
-    pub deformation_bits: u8,
-    /// Bits a weight of the context model and of spherical-harmonics networks.
-    pub context_bits: u8,
+/// Where the steps' defaults come from.
+fn step(attribute: &str) -> f32 {
+    AttributeSteps::default().of(attribute).unwrap_or(1.0)
 }
 
-impl Default for CompressionConfig {
-    fn default() -> Self {
-        Self {
-            profile: FileProfile::Compact,
-            rate: RateConfig::default(),
-            context: ContextConfig::default(),
-            steps: StepsConfig::default(),
-            sh: ShConfig::default(),
-            attributes: AttributesConfig::default(),
-            weights: WeightsConfig::default(),
-        }
+/// The most bits that a weight may have.
+const MOST_WEIGHT_BITS: u8 = 16;
+const WEIGHT_BITS: Bounds = Whole { least: 4, most: MOST_WEIGHT_BITS as u64 };
+
+keys! {
+    /// Quantization of network weights.
+    pub struct WeightsConfig {
+        /// Bits a weight of the deformation network.
+        deformation_bits: u8 = bits(WeightPrecisions::default().motion); WEIGHT_BITS, "ours";
+        /// Bits a weight of the entropy models' networks.
+        context_bits: u8 = bits(WeightPrecisions::default().context_model); WEIGHT_BITS, "ours";
     }
 }
 
-impl Default for RateConfig {
-    fn default() -> Self {
-        Self {
-            lambda: 0.0,
-            weighting: RateWeighting::Megabytes,
-            planes: true,
-            sh: true,
-            interval: 3,
-            fraction: 0.125,
-            from: 1000,
-            planes_until: 27_000,
-        }
-    }
+/// Where the steps' defaults come from.
+fn quantization() -> AdaptiveQuantizationConfig {
+    AdaptiveQuantizationConfig::new(1)
 }
 
-impl Default for ContextConfig {
-    fn default() -> Self {
-        Self {
-            architecture: ContextArchitecture::Compact,
-            hyperprior: true,
-            checkerboard: true,
-            inter_plane: true,
-            inter_scale: true,
-            high_scale_hyperprior: false,
-            learning_rate_init: 5e-3,
-            learning_rate_final: 5e-4,
-            fit_iterations: 1500,
-        }
-    }
-}
-
-impl Default for StepsConfig {
-    fn default() -> Self {
-        let AdaptiveQuantizationConfig { space_only, space_time, per_scale, .. } = AdaptiveQuantizationConfig::new(1);
-        Self {
-            space_only,
-            space_time,
-            adaptive: true,
-            adaptive_from: 15_000,
-            refine: false,
-            per_scale,
-            learning_rate: 2e-3,
-            search_tolerance: 0.0,
-        }
-    }
-}
-
-impl Default for ShConfig {
-    fn default() -> Self {
-        Self {
-            model: ShModel(ShKind::Factorized),
-            step: 0.02,
-            learning_rate_init: 5e-3,
-            learning_rate_final: 5e-4,
-            search_tolerance: 0.0,
-        }
-    }
-}
-
-impl Default for AttributesConfig {
-    fn default() -> Self {
-        let steps = AttributeSteps::default();
-        let step = |name| steps.of(name).unwrap_or(1.0);
-        Self {
-            position: step("means"),
-            log_scale: step("log_scales"),
-            quaternion: step("quats"),
-            opacity_logit: step("opacity_logits"),
-            sh_dc: step("sh_dc"),
-            search_tolerance: 0.05,
-        }
-    }
-}
-
-impl Default for WeightsConfig {
-    fn default() -> Self {
-        let WeightPrecisions { motion, context_model, .. } = WeightPrecisions::default();
-        let bits = |precision| match precision {
-            WeightPrecision::Bits(bits) => bits,
-            // The configuration knows bits only; so many lose nothing that matters.
-            WeightPrecision::Step(_) => MOST_WEIGHT_BITS,
-        };
-        Self { deformation_bits: bits(motion), context_bits: bits(context_model) }
+/// The configuration knows bits only.
+fn bits(precision: WeightPrecision) -> u8 {
+    match precision {
+        WeightPrecision::Bits(bits) => bits,
+        // So many lose nothing that matters.
+        WeightPrecision::Step(_) => MOST_WEIGHT_BITS,
     }
 }

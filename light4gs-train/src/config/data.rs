@@ -1,42 +1,38 @@
 //! `[data]`: what is trained on.
 
-use serde::{Deserialize, Serialize};
+use light4gs_data::Layouts;
 
-use super::optional;
+use crate::keys::Bounds::{LayoutOrNone, List, Number, Whole, WholeOrNone};
+use crate::keys::{MOST_GAUSSIANS, SHARE, keys, optional};
 
-/// Images and the cloud that training starts from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct DataConfig {
-    /// The dataset's layout, such as `neu3d`; `None` (empty in TOML) finds it by content.
-    #[serde(with = "optional")]
-    pub layout: Option<String>,
-    /// Length of the sequence in frames: later ones are left out. `None` (0 in TOML) takes all.
-    #[serde(with = "optional")]
-    pub frames: Option<usize>,
-    /// Images are resized to this width; `None` (0 in TOML) leaves them as they are.
-    #[serde(with = "optional")]
-    pub resolution: Option<u32>,
-    /// Color behind transparent pixels, each channel in [0, 1].
-    pub background: [f32; 3],
-    /// Upper bound of the memory that decoded images may take, in MiB.
-    pub memory_limit_mib: u64,
-    /// Number of Gaussians to start from where the dataset brings no point cloud.
-    pub initial_points: usize,
-    /// Half the side of the cube in which those are scattered, in world units.
-    pub initial_box: f32,
-}
-
-impl Default for DataConfig {
-    fn default() -> Self {
-        Self {
-            layout: None,
-            frames: None,
-            resolution: None,
-            background: [1.0; 3],
-            memory_limit_mib: 2048,
-            initial_points: 2000,
-            initial_box: 1.3,
-        }
+keys! {
+    /// Images, and the cloud that training starts from.
+    pub struct DataConfig {
+        /// Layout of the dataset, such as `dnerf` ([data.md](data.md) has them all). Empty: found by content. `train
+        /// --format` sets it.
+        #[serde(with = "optional")]
+        layout: Option<String> = None;
+            LayoutOrNone { names: || Layouts::default().names() },
+            "ours", "or \"dnerf\", \"neu3d\", \"nerfds\", ...; empty = found by content";
+        /// Length of the sequence in frames: later ones are left out, and where the dataset counts frames (`neu3d`)
+        /// frame `i` has time `i` divided by this. 0: as many as there are.
+        #[serde(with = "optional")]
+        frames: Option<usize> = None;
+            WholeOrNone { least: 1, most: 1_000_000 },
+            "reference, Neu3D: 300", "length of the sequence; 0 = all there are";
+        /// Images are resized so that their longer side has this many pixels, keeping their shape. 0 leaves them as
+        /// they are.
+        #[serde(with = "optional")]
+        resolution: Option<u32> = None;
+            WholeOrNone { least: 8, most: 16_384 }, "ours", "pixels of the longer side; 0 = images as they are";
+        /// Color behind transparent pixels, each channel 0 to 1.
+        background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
+        /// Upper bound of the memory for decoded images. Above it they are decoded again, ahead of the iterations
+        /// that need them.
+        memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";
+        /// Gaussians to start from where the dataset brings no point cloud.
+        initial_points: usize = 2000; Whole { least: 4, most: MOST_GAUSSIANS }, "reference, D-NeRF";
+        /// They are scattered in a cube of ± this, in world units.
+        initial_box: f32 = 1.3; Number { least: 1e-6, most: 1e6 }, "reference, D-NeRF";
     }
 }

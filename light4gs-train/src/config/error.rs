@@ -27,7 +27,7 @@ impl fmt::Display for Origin {
 /// One value out of its range.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Problem {
-    /// Full path of the key, such as `train.densify.interval`.
+    /// Full path of the key, such as `train.prune.fraction`.
     pub key: String,
     /// What is wrong and what would be right.
     pub message: String,
@@ -97,6 +97,12 @@ pub enum ConfigError {
         by: Option<Origin>,
         /// The preset most like it.
         nearest: String,
+    },
+    /// A layout of a dataset for which no preset is made, where no configuration is named.
+    #[error("there is no preset for datasets of the layout `{layout}`: name one, or a file (presets: {})", super::preset_names().join(", "))]
+    NoPreset {
+        /// The layout's name.
+        layout: &'static str,
     },
     /// Files that extend each other in a circle.
     #[error("`extends` runs in a circle: {}", chain.iter().map(ToString::to_string).collect::<Vec<_>>().join(" -> "))]

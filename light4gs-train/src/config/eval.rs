@@ -3,28 +3,30 @@
 use std::path::PathBuf;
 
 use light4gs_data::Split;
-use serde::{Deserialize, Serialize};
 
-use super::choice::choice;
+use crate::keys::Bounds::{Flag, List, Text, Whole, Word};
+use crate::keys::{ITERATION, choice, keys};
 
-/// Views and repetitions of an evaluation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct EvalConfig {
-    /// Splits that are measured. One that the dataset lacks is passed over.
-    pub splits: Vec<EvalSplit>,
-    /// Whether every rendered view is saved as a PNG.
-    pub save_renders: bool,
-    /// Frames rendered before the clock starts.
-    pub fps_warmup: usize,
-    /// Frames over which the frame rate is measured.
-    pub fps_frames: usize,
-    /// While training, test PSNR is measured every so many iterations; 0 means never.
-    pub interval: usize,
-    /// The number of test views for that.
-    pub views: usize,
-    /// Files with the weights of LPIPS; without any, the column says that there are none.
-    pub lpips: Vec<PathBuf>,
+keys! {
+    /// What is measured, on the decoded file.
+    pub struct EvalConfig {
+        /// Splits to measure: `test`, `val`, `train`. One that the dataset lacks is passed over.
+        splits: Vec<EvalSplit> = vec![EvalSplit::Test, EvalSplit::Val];
+            List { element: &Word(EvalSplit::NAMES), length: None }, "ours";
+        /// Save every rendered view as a PNG in `renders/`.
+        save_renders: bool = true; Flag, "ours";
+        /// Frames rendered before the clock starts.
+        fps_warmup: usize = 5; Whole { least: 0, most: 1_000_000 }, "ours";
+        /// Frames over which the frame rate is measured.
+        fps_frames: usize = 50; Whole { least: 1, most: 1_000_000 }, "ours";
+        /// While training, test PSNR every so many iterations. 0 means never.
+        interval: usize = 1000; ITERATION, "ours";
+        /// Test views for that measurement.
+        views: usize = 4; ITERATION, "ours";
+        /// Files with the weights of LPIPS ([metrics.md](metrics.md)); without any, its columns say so.
+        lpips: Vec<PathBuf> = Vec::new();
+            List { element: &Text, length: None }, "ours", "files with weights, see docs/metrics.md";
+    }
 }
 
 choice! {
@@ -45,20 +47,6 @@ impl From<EvalSplit> for Split {
             EvalSplit::Test => Self::Test,
             EvalSplit::Val => Self::Val,
             EvalSplit::Train => Self::Train,
-        }
-    }
-}
-
-impl Default for EvalConfig {
-    fn default() -> Self {
-        Self {
-            splits: vec![EvalSplit::Test, EvalSplit::Val],
-            save_renders: true,
-            fps_warmup: 5,
-            fps_frames: 50,
-            interval: 1000,
-            views: 4,
-            lpips: Vec::new(),
         }
     }
 }

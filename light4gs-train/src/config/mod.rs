@@ -12,8 +12,6 @@
 //! fine_iterations = 2000
 //! ```
 
-mod bounds;
-mod choice;
 mod compression;
 mod data;
 mod device_name;
@@ -21,8 +19,6 @@ mod error;
 mod eval;
 mod layering;
 mod model;
-mod optional;
-mod prune;
 mod train;
 mod validate;
 
@@ -30,15 +26,16 @@ mod validate;
 mod tests;
 
 use std::path::Path;
+use std::sync::LazyLock;
 
-use serde::{Deserialize, Serialize};
+use light4gs_data::DatasetLayout;
 use sha2::{Digest, Sha256};
 
-pub(crate) use choice::choice;
+use crate::keys::Bounds::{Device, Whole};
+use crate::keys::{MOST_INTEGER, keys};
 use layering::layers;
 
-pub use bounds::{BOUNDS, Bounds};
-pub use choice::UnknownChoice;
+pub use crate::keys::{Bounds, Key, UnknownChoice};
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
     ShConfig, ShModel, StepsConfig, WeightsConfig,
@@ -49,30 +46,43 @@ pub use error::{ConfigError, Origin, Problem};
 pub use eval::{EvalConfig, EvalSplit};
 pub use layering::presets::preset_names;
 pub use model::{CoordinatesConfig, DeformationConfig, HexPlaneConfig, ModelConfig};
-pub use prune::{PruneConfig, PruneScore, PruneVolume};
-pub use train::{DensifyConfig, LearningRates, RegularizerConfig, Sampling, TrainConfig};
+pub use train::{LearningRates, RegularizerConfig, TrainConfig};
 
 /// Files of configurations are far shorter.
 pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;
 
-/// The complete configuration of a run.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct Config {
-    /// Seed of everything random in a run.
-    pub seed: u64,
-    /// Back end that computes, for `wgpu` with the adapter if wanted.
-    pub device: DeviceName,
-    /// What is trained on.
-    pub data: DataConfig,
-    /// What is trained.
-    pub model: ModelConfig,
-    /// How it is trained.
-    pub train: TrainConfig,
-    /// How small it becomes.
-    pub compression: CompressionConfig,
-    /// How it is measured.
-    pub eval: EvalConfig,
+keys! {
+    /// The complete configuration of a run.
+    pub struct Config {
+        /// Seed of everything random in a run: scattering, splitting, the order of frames.
+        seed: u64 = 0; Whole { least: 0, most: MOST_INTEGER }, "ours";
+        /// Back end that computes: `ndarray`, `flex`, or `wgpu`, the last with an adapter if wanted: `wgpu:0` (by
+        /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
+        device: DeviceName = DeviceName::NdArray; Device(DEVICES), "ours", "or \"flex\", \"wgpu\", \"wgpu:0\"";
+        /// What is trained on.
+        data: DataConfig;
+        /// What is trained.
+        model: ModelConfig;
+        /// How it is trained.
+        train: TrainConfig;
+        /// How small it becomes.
+        compression: CompressionConfig;
+        /// How it is measured.
+        eval: EvalConfig;
+    }
+}
+
+/// Every key, in the order of the configuration.
+pub static KEYS: LazyLock<Vec<Key>> = LazyLock::new(crate::keys::list::<Config>);
+
+/// Every key with its default, as the tables of `docs/configuration.md`.
+pub fn keys_as_markdown() -> String {
+    crate::keys::markdown::<Config>()
+}
+
+/// Every key with its default and a note, as a TOML file: the preset `base`.
+pub fn keys_as_toml() -> String {
+    crate::keys::toml_text::<Config>()
 }
 
 impl Config {
@@ -84,6 +94,14 @@ impl Config {
     /// The built-in preset called `name` (see [`preset_names`]), validated.
     pub fn from_preset(name: &str) -> Result<Self, ConfigError> {
         layers::resolve(&Origin::Preset(name.to_owned()), &[], &[])
+    }
+
+    /// The name of the preset that fits datasets of a layout.
+    ///
+    /// # Errors
+    /// [`ConfigError::NoPreset`] for a layout that has none.
+    pub fn preset_of(layout: &dyn DatasetLayout) -> Result<&'static str, ConfigError> {
+        layout.preset().ok_or_else(|| ConfigError::NoPreset { layout: layout.name() })
     }
 
     /// What a command line gives: a preset's name or a file's path, and overrides such as

@@ -1,107 +1,83 @@
 //! `[model]`: what is trained.
 
 use light4gs_model::{DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig};
-use serde::{Deserialize, Serialize};
 
-/// Sizes and switches of the model.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct ModelConfig {
-    /// Highest degree of the spherical harmonics, 0 to 3.
-    pub sh_degree: u8,
-    /// From world coordinates to those of the planes.
-    pub coordinates: CoordinatesConfig,
-    /// The feature planes.
-    pub hexplane: HexPlaneConfig,
-    /// The network that turns features into motion.
-    pub deformation: DeformationConfig,
-}
+use crate::keys::Bounds::{Flag, List, Whole};
+use crate::keys::keys;
 
-/// What the coordinates in which the planes lie are made of (paper III-A).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct CoordinatesConfig {
-    /// Whether they lie along the principal axes of the initial cloud; else along the world's.
-    pub pca: bool,
-    /// Whether what lies outside of one standard deviation of the cloud is contracted; else the whole cloud is scaled into
-    /// what is not.
-    pub contraction: bool,
-}
+/// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
+pub(super) const MOST_PLANE_RESOLUTION: u64 = 4096;
 
-impl Default for CoordinatesConfig {
-    fn default() -> Self {
-        let light4gs_model::CoordinatesConfig { pca, contraction } = light4gs_model::CoordinatesConfig::default();
-        Self { pca, contraction }
+keys! {
+    /// What is trained.
+    pub struct ModelConfig {
+        /// Highest degree of the spherical harmonics, 0 to 3.
+        sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";
+        /// From world coordinates to those of the planes.
+        coordinates: CoordinatesConfig;
+        /// The feature planes.
+        hexplane: HexPlaneConfig;
+        /// The network that turns features into motion.
+        deformation: DeformationConfig;
     }
 }
 
-/// Sizes of the multiscale hexplane.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct HexPlaneConfig {
-    /// Features a plane.
-    pub channels: usize,
-    /// Resolution along x, y, z, t at the lowest scale; every one a multiple of 4.
-    pub resolution: [usize; 4],
-    /// One scale for each: its spatial resolution is the base times this. Time keeps its resolution.
-    pub multipliers: Vec<usize>,
-}
-
-/// Sizes and heads of the deformation network.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
-pub struct DeformationConfig {
-    /// Width of the hidden layers.
-    pub width: usize,
-    /// Layers before the heads; 0 means the same as 1.
-    pub depth: usize,
-    /// Whether positions move.
-    pub position: bool,
-    /// Whether scales change.
-    pub scale: bool,
-    /// Whether rotations change.
-    pub rotation: bool,
-    /// Whether opacities change.
-    pub opacity: bool,
-    /// Whether spherical harmonics change.
-    pub sh: bool,
-    /// Whether positions get a gradient through the hexplane query as well.
-    pub differentiate_points: bool,
-}
-
-impl Default for ModelConfig {
-    fn default() -> Self {
-        Self {
-            sh_degree: 3,
-            coordinates: CoordinatesConfig::default(),
-            hexplane: HexPlaneConfig::default(),
-            deformation: DeformationConfig::default(),
-        }
+keys! {
+    /// From world coordinates to those of the planes (paper III-A).
+    pub struct CoordinatesConfig {
+        /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, with the
+        /// cloud's standard deviation along each.
+        pca: bool = light4gs_model::CoordinatesConfig::default().pca;
+            Flag, "paper", "along the principal axes of the initial cloud; false = along the world's";
+        /// What lies outside of one standard deviation of the cloud is contracted. Off: the whole cloud is scaled
+        /// into the ball that contraction leaves as it is, which is half as wide as the planes.
+        contraction: bool = light4gs_model::CoordinatesConfig::default().contraction;
+            Flag, "paper", "false = the whole cloud is scaled into what is not contracted";
     }
 }
 
-impl Default for HexPlaneConfig {
-    fn default() -> Self {
-        let light4gs_model::HexPlaneConfig { channels, resolution, multipliers } =
-            light4gs_model::HexPlaneConfig::new();
-        Self { channels, resolution, multipliers }
+keys! {
+    /// Sizes of the multiscale hexplane.
+    pub struct HexPlaneConfig {
+        /// Features a plane.
+        channels: usize = light4gs_model::HexPlaneConfig::new().channels;
+            Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
+        /// Resolution along x, y, z, t at the lowest scale. Multiples of 4.
+        resolution: [usize; 4] = light4gs_model::HexPlaneConfig::new().resolution;
+            List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION }, length: Some(4) },
+            "paper; its 25 time steps are no multiple of 4", "x, y, z, t; multiples of 4";
+        /// One scale each, ascending: spatial resolution is the base times this. Time keeps its resolution.
+        multipliers: Vec<usize> = light4gs_model::HexPlaneConfig::new().multipliers;
+            List { element: &Whole { least: 1, most: MOST_PLANE_RESOLUTION / 4 }, length: None },
+            "paper", "spatial axes only";
     }
 }
 
-impl Default for DeformationConfig {
-    fn default() -> Self {
-        let network = light4gs_model::DeformationConfig::new(0);
-        Self {
-            width: network.width,
-            depth: network.depth,
-            position: network.position,
-            scale: network.scale,
-            rotation: network.rotation,
-            opacity: network.opacity,
-            sh: network.sh,
-            differentiate_points: true,
-        }
+keys! {
+    /// Sizes and heads of the deformation network.
+    pub struct DeformationConfig {
+        /// Width of the deformation network.
+        width: usize = network().width; Whole { least: 1, most: 4096 }, "paper, D-NeRF";
+        /// Layers before the heads. 0 means the same as 1.
+        depth: usize = network().depth; Whole { least: 0, most: 64 }, "reference";
+        /// Positions move.
+        position: bool = network().position; Flag, "reference";
+        /// Scales change.
+        scale: bool = network().scale; Flag, "reference";
+        /// Rotations change.
+        rotation: bool = network().rotation; Flag, "reference";
+        /// Opacities change.
+        opacity: bool = network().opacity; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
+        /// Spherical harmonics change.
+        sh: bool = network().sh; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
+        /// Positions get a gradient through the hexplane query as well. Off is what the reference does.
+        differentiate_points: bool = true; Flag, "ours";
     }
+}
+
+/// Where the network's defaults come from.
+fn network() -> light4gs_model::DeformationConfig {
+    light4gs_model::DeformationConfig::new(0)
 }
 
 impl ModelConfig {

@@ -26,24 +26,50 @@ fn every_preset_loads_and_survives_a_round_trip() {
     }
 }
 
-#[test]
-fn every_file_of_configs_is_a_preset() {
-    fn below(folder: &Path) -> Vec<String> {
-        let paths = fs::read_dir(folder).expect("reading configs").map(|entry| entry.expect("an entry").path());
-        paths
-            .flat_map(|path| {
-                if path.is_dir() {
-                    // Studies have a list of their own.
-                    return if path.ends_with("studies") { Vec::new() } else { below(&path) };
-                }
-                let name = path.file_stem().and_then(|stem| stem.to_str()).expect("a name");
-                vec![name.to_owned()]
-            })
-            .collect()
+/// Set, the test of what follows from the declarations of keys writes it instead of comparing it.
+const WRITE: &str = "LIGHT4GS_WRITE_KEYS";
+
+/// Compares a part of a file of the repository with what follows from the declarations.
+fn follows(path: &str, begin: &str, end: &str, expected: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("..").join(path);
+    let text = fs::read_to_string(&path).expect("reading a file of the repository");
+    let (above, rest) = text.split_once(begin).unwrap_or_else(|| panic!("{} lacks: {begin}", path.display()));
+    let below = rest.find(end).map_or("", |place| &rest[place..]);
+    let whole = format!("{above}{begin}{expected}{below}");
+    if std::env::var_os(WRITE).is_some() {
+        fs::write(&path, whole).expect("writing a file of the repository");
+    } else {
+        let stale = text.lines().zip(whole.lines()).find(|(found, expected)| found != expected);
+        assert_eq!(
+            text,
+            whole,
+            "{} is not what the declarations of keys say, from {stale:?} on: run this test with {WRITE}=1, which writes it",
+            path.display()
+        );
     }
-    let mut names = below(Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/configs")));
-    names.sort();
-    assert_eq!(names, preset_names());
+}
+
+#[test]
+fn base_and_the_tables_of_keys_follow_from_the_declarations() {
+    let begin = "where it does not.\n\n";
+    follows("light4gs-train/configs/base.toml", begin, "\0", &keys_as_toml());
+    let (begin, end) = ("<!-- keys -->\n", "<!-- end of keys -->");
+    follows("docs/configuration.md", begin, end, &keys_as_markdown());
+}
+
+#[test]
+fn every_layout_has_a_preset() {
+    use light4gs_data::Layouts;
+    let layouts = Layouts::default();
+    for name in layouts.names() {
+        let layout = layouts.by_name(name).expect("a known layout");
+        let preset = Config::preset_of(layout).unwrap_or_else(|error| panic!("{error}"));
+        let config = Config::from_preset(preset).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert!(
+            config.data.layout.is_none_or(|layout| layout == name),
+            "the preset {preset} is for another layout than {name}"
+        );
+    }
 }
 
 #[test]
@@ -60,9 +86,23 @@ fn base_is_the_default_and_writes_every_key() {
             .collect()
     }
     assert_eq!(keys(&base, ""), keys(&schema::defaults(), ""));
-    let guide = include_str!("../../../docs/configuration.md");
-    for key in keys(&base, "") {
-        assert!(guide.contains(&format!("| `{key}` |")), "docs/configuration.md lacks {key}");
+    let mut declared: Vec<_> = KEYS.iter().map(|key| key.path.clone()).collect();
+    declared.sort();
+    let mut known = keys(&base, "");
+    known.sort();
+    assert_eq!(declared, known);
+}
+
+#[test]
+fn numbers_that_float32_cannot_hold_are_refused() {
+    for value in ["1e39", "3e38", "1e-45", "nan", "inf", "-1.0"] {
+        for Key { path, bounds, .. } in KEYS.iter() {
+            let zero = matches!(bounds, Bounds::Number { least: 0.0, .. });
+            if matches!(bounds, Bounds::Number { .. }) && !(value == "1e-45" && zero) {
+                let text = problem_text(Config::from_toml(&format!("{path} = {value}"), "text"));
+                assert!(text.contains(path), "{path} = {value}: {text}");
+            }
+        }
     }
 }
 
@@ -81,12 +121,12 @@ fn the_step_of_spherical_harmonics_is_that_of_the_models() {
 
 #[test]
 fn an_unknown_key_is_named_with_file_line_and_nearest_key() {
-    let folder = folder_with("mine.toml", "extends = \"dnerf\"\n\n[train.densify]\nintervall = 50\n");
+    let folder = folder_with("mine.toml", "extends = \"dnerf\"\n\n[train.densify.adaptive]\nintervall = 50\n");
     let path = folder.path().join("mine.toml");
     assert_eq!(
         problem_text(Config::from_file(&path)),
         format!(
-            "{}:4: unknown key `train.densify.intervall`; the nearest known key is `train.densify.interval`",
+            "{}:4: unknown key `train.densify.adaptive.intervall`; the nearest known key is `train.densify.adaptive.interval`",
             path.display()
         )
     );
@@ -177,6 +217,9 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
         ("compression.rate.weighting = 'megabyte'", "compression.rate.weighting", "megabytes"),
         ("compression.context.architecture = 'compcat'", "compression.context.architecture", "compact"),
         ("compression.sh.model = 'factorised'", "compression.sh.model", "factorized"),
+        ("train.loss = 'charboner'", "train.loss", "charbonnier"),
+        ("train.sampling = 'sametime'", "train.sampling", "same_time"),
+        ("train.densify.strategy = 'adaptiv'", "train.densify.strategy", "adaptive"),
         ("train.prune.score = 'wieght'", "train.prune.score", "weight"),
         ("train.prune.volume = 'unclampd'", "train.prune.volume", "unclamped"),
         ("eval.splits = ['tset']", "eval.splits", "test"),
@@ -185,6 +228,18 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
         let text = problem_text(Config::from_toml(bad, "text"));
         assert!(text.contains(&format!("`{key}`")) && text.contains(&format!("nearest is `{nearest}`")), "{text}");
     }
+    let text = problem_text(Config::from_toml("data.layout = 'dnref'", "text"));
+    assert!(text.contains("`data.layout` is `dnref`, and the nearest layout is `dnerf`"), "{text}");
+}
+
+#[test]
+fn density_strategies_are_checked_with_the_rest() {
+    // Where none is to come, pruning may begin at once; where some are, they come first.
+    let overrides = ["train.densify.strategy=none", "train.prune.fraction=0.1", "train.prune.iterations=[5]"];
+    let text = format!("extends = 'dnerf-small'\n{}", overrides.join("\n").replace("=none", "='none'"));
+    Config::from_toml(&text, "text").expect("a configuration");
+    let text = problem_text(Config::from_toml(&text.replace("'none'", "'adaptive'"), "text"));
+    assert!(text.contains("pruning follows densification, which ends at 3500"), "{text}");
 }
 
 #[test]
@@ -216,16 +271,16 @@ fn plane_sizes_must_be_multiples_of_four() {
 
 #[test]
 fn all_ranges_are_reported_at_once() {
-    let bad = "[train]\nbatch_size = 0\nlambda_dssim = 1.5\n[train.learning_rate]\nopacity = 0\n\
-               means_init = nan\n[train.densify]\nfrom = 9\nuntil = 8\n";
+    let bad = "[train]\nbatch_size = 0\n[train.photometric]\nlambda_dssim = 1.5\n[train.learning_rate]\nopacity = 0\n\
+               means_init = nan\n[train.densify.adaptive]\nfrom = 9\nuntil = 8\n";
     let Err(ConfigError::Invalid { problems }) = Config::from_toml(bad, "text") else { panic!("must be refused") };
     let keys: Vec<&str> = problems.iter().map(|problem| problem.key.as_str()).collect();
     let expected = [
         "train.batch_size",
-        "train.lambda_dssim",
+        "train.photometric.lambda_dssim",
         "train.learning_rate.means_init",
         "train.learning_rate.opacity",
-        "train.densify.from",
+        "train.densify.adaptive.from",
     ];
     assert_eq!(keys, expected);
 }

@@ -1,18 +1,17 @@
-//! What keys may not hold together. What each may hold by itself is said in `bounds.rs`.
+//! What keys may not hold together. What each may hold by itself is said where it is declared.
 
 use light4gs_codec::plane_layout::check_resolution;
 use light4gs_codec::{CodecError, checks};
-use light4gs_data::Layouts;
+use serde_json::Value;
 
-use super::bounds::{self, MOST_PLANE_RESOLUTION};
+use super::model::MOST_PLANE_RESOLUTION;
 use super::{
-    CompressionConfig, Config, ConfigError, DataConfig, DensifyConfig, EvalConfig, HexPlaneConfig, ModelConfig,
-    Problem, PruneConfig, TrainConfig,
+    CompressionConfig, Config, ConfigError, EvalConfig, HexPlaneConfig, KEYS, Key, ModelConfig, Problem, TrainConfig,
 };
+use crate::density::PruneConfig;
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
-    let mut check = Check { problems: bounds::problems(config) };
-    data(&mut check, &config.data);
+    let mut check = Check { problems: out_of_bounds(config) };
     hexplane(&mut check, &config.model.hexplane);
     deformation(&mut check, &config.model);
     train(&mut check, &config.train);
@@ -21,13 +20,15 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
 }
 
-fn data(check: &mut Check, data: &DataConfig) {
-    if let Some(name) = &data.layout {
-        let known = Layouts::default().names();
-        check.that("data.layout", known.contains(&name.as_str()), || {
-            format!("is `{name}`; it must be empty (found by content) or one of {}", known.join(", "))
-        });
-    }
+/// All values out of bounds, in the order of the keys.
+fn out_of_bounds(config: &Config) -> Vec<Problem> {
+    let table = serde_json::to_value(config).expect("a configuration is plain data");
+    let check = |key: &Key| {
+        let value = key.path.split('.').try_fold(&table, |table, name| table.get(name));
+        let message = key.bounds.problem(value.unwrap_or(&Value::Null))?;
+        Some(Problem { key: key.path.clone(), message })
+    };
+    KEYS.iter().filter_map(check).collect()
 }
 
 fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
@@ -64,24 +65,22 @@ fn train(check: &mut Check, train: &TrainConfig) {
     check.that("train.fine_iterations", train.coarse_iterations > 0 || train.fine_iterations > 0, || {
         "and `train.coarse_iterations` are both 0: nothing would be trained".to_owned()
     });
-    densify(check, &train.densify);
-    prune(check, &train.prune, train);
+    let density = train.densify.chosen();
+    if let Some((key, problem)) = density.problem() {
+        let key = format!("train.densify.{}.{key}", train.densify.strategy);
+        check.problems.push(Problem { key, message: problem });
+    }
+    prune(check, &train.prune, train, density.end());
 }
 
-fn densify(check: &mut Check, densify: &DensifyConfig) {
-    check.that("train.densify.from", densify.from <= densify.until, || {
-        format!("is {}, after `train.densify.until`, which is {}", densify.from, densify.until)
-    });
-}
-
-fn prune(check: &mut Check, prune: &PruneConfig, train: &TrainConfig) {
+fn prune(check: &mut Check, prune: &PruneConfig, train: &TrainConfig, densification_ends: usize) {
     if prune.fraction > 0.0 {
         for &iteration in &prune.iterations {
             check.that("train.prune.iterations", (1..=train.fine_iterations).contains(&iteration), || {
                 format!("has {iteration}, but the fine stage has iterations 1 to {}", train.fine_iterations)
             });
-            check.that("train.prune.iterations", iteration > train.densify.until, || {
-                format!("has {iteration}; pruning follows densification, which ends at {}", train.densify.until)
+            check.that("train.prune.iterations", iteration > densification_ends, || {
+                format!("has {iteration}; pruning follows densification, which ends at {densification_ends}")
             });
         }
     }

@@ -6,8 +6,9 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Tensor};
 
 use super::clone_and_split::{DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors};
-use super::{DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
-use crate::config::DensifyConfig;
+use super::{DensityConfig, DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
+use crate::keys::Bounds::{Number, Whole};
+use crate::keys::{INTERVAL, ITERATION, MOST_GAUSSIANS, SHARE, THRESHOLD, keys};
 use crate::randomness::standard_normal;
 use crate::stage::Stage;
 
@@ -16,18 +17,71 @@ const MAX_SCREEN_RADIUS: f32 = 20.0;
 /// Gaussians larger than this share of the scene's extent are dropped once opacities have been reset.
 const MAX_EXTENT_SHARE: f32 = 0.1;
 
+keys! {
+    /// Adaptive density control (3DGS). Iterations count from 1 in each stage.
+    pub struct AdaptiveDensityConfig {
+        /// Cloning and splitting start after this iteration.
+        from: usize = 500; ITERATION, "3DGS";
+        /// Cloning, splitting and opacity reset end before this iteration.
+        until: usize = 15_000; ITERATION, "reference; the paper says 14000";
+        /// Every so many iterations.
+        interval: usize = 100; INTERVAL, "reference";
+        /// Screen-space gradient (in half-image units) above which a Gaussian is cloned or split, coarse stage.
+        grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
+        /// The same at the start of the fine stage.
+        grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
+        /// The same at `until`; linear in between.
+        grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
+        /// Gaussians up to this share of the scene's extent are cloned, larger ones split in two.
+        percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
+        /// No cloning or splitting from this many on.
+        max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference";
+        /// Opacity below which a Gaussian is removed, coarse stage.
+        opacity_threshold: f32 = 0.005; SHARE, "3DGS";
+        /// The same at the start of the fine stage.
+        opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
+        /// The same at `until`; linear in between.
+        opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
+        /// Pruning starts after this iteration.
+        prune_from: usize = 500; ITERATION, "reference";
+        /// Every so many iterations.
+        prune_interval: usize = 100; INTERVAL, "reference";
+        /// Prune by opacity only above this many Gaussians. Below it fast objects survive the coarse stage, where
+        /// they are faint. 0 means always.
+        prune_above: usize = 200_000;
+            ITERATION, "reference: 200000", "Gaussians; below it nothing is pruned for its opacity";
+        /// Opacities are reset every so many iterations; 0 = never.
+        opacity_reset_interval: usize = 3000; ITERATION, "3DGS";
+    }
+}
+
+impl DensityConfig for AdaptiveDensityConfig {
+    fn strategy(&self) -> Box<dyn DensityStrategy> {
+        Box::new(AdaptiveDensityControl::new(self.clone()))
+    }
+
+    fn end(&self) -> usize {
+        self.until
+    }
+
+    fn problem(&self) -> Option<(&'static str, String)> {
+        let problem = || format!("is {}, after `train.densify.adaptive.until`, which is {}", self.from, self.until);
+        (self.from > self.until).then(|| ("from", problem()))
+    }
+}
+
 /// Clones small Gaussians and splits large ones where the screen-space gradient is large, prunes transparent and
 /// oversized ones, resets opacities. The default.
 #[derive(Debug)]
 pub struct AdaptiveDensityControl {
-    config: DensifyConfig,
+    config: AdaptiveDensityConfig,
     /// Empty before the first stage.
     statistics: Option<DensityStatistics>,
 }
 
 impl AdaptiveDensityControl {
     /// With the thresholds and intervals of a configuration.
-    pub fn new(config: DensifyConfig) -> Self {
+    pub fn new(config: AdaptiveDensityConfig) -> Self {
         Self { config, statistics: None }
     }
 
@@ -92,7 +146,7 @@ impl DensityStrategy for AdaptiveDensityControl {
     }
 
     fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition) {
-        let DensifyConfig { from, until, interval, prune_from, prune_interval, .. } = self.config;
+        let AdaptiveDensityConfig { from, until, interval, prune_from, prune_interval, .. } = self.config;
         let iteration = position.iteration;
         if iteration > until {
             return;

@@ -1,7 +1,8 @@
 //! How many Gaussians there are: when they are cloned, split and pruned.
 //!
-//! - here: [`DensityStrategy`], what the trainer asks of a strategy
+//! - here: [`DensityStrategy`], what the trainer asks of a strategy, and [`DensityKind`], the built-in ones by name
 //! - `adaptive`: the strategy of 3DGS, the default
+//! - `none`: the Gaussians of the cloud stay as many as they are
 //! - `clone_and_split`, `statistics`: its parts
 //! - `editor`: how a strategy changes the Gaussians, with the optimizer's moments in step
 //! - `significance`: scores by which Gaussians are pruned after densification (paper III-B)
@@ -9,6 +10,7 @@
 mod adaptive;
 pub mod clone_and_split;
 mod editor;
+mod none;
 pub mod significance;
 mod statistics;
 
@@ -17,13 +19,63 @@ use std::collections::BTreeMap;
 use burn::tensor::{Device, Int, Tensor};
 use rand::Rng;
 
-pub use adaptive::AdaptiveDensityControl;
+pub use adaptive::{AdaptiveDensityConfig, AdaptiveDensityControl};
 pub use editor::GaussianEditor;
-pub use significance::{GaussianContributions, SignificanceScore, VolumeWeightedScore};
+pub use none::NoDensityControl;
+pub use significance::{
+    GaussianContributions, PruneConfig, PruneScore, PruneVolume, SignificanceScore, VolumeWeightedScore,
+};
 pub use statistics::DensityStatistics;
 
+use crate::keys::Bounds::Kind;
+use crate::keys::{keys, kinds};
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
+
+kinds! {
+    /// The built-in density strategies, by the names that `train.densify.strategy` takes.
+    pub enum DensityKind: "strategy" {
+        Adaptive = adaptive: AdaptiveDensityConfig,
+        None = none: NoDensityControl,
+    }
+    /// The keys of the built-in density strategies.
+    pub struct DensityStrategies: dyn DensityConfig;
+}
+
+keys! {
+    /// How Gaussians come and go.
+    pub struct DensifyConfig {
+        /// The strategy: `"adaptive"` clones, splits and prunes, `"none"` keeps the Gaussians of the cloud. The keys of each
+        /// stand in a table of its name.
+        strategy: DensityKind = DensityKind::Adaptive;
+            Kind { names: DensityKind::NAMES, list: "light4gs-train/src/density/mod.rs" },
+            "3DGS", "or \"none\"";
+        /// The keys of the strategies.
+        #[serde(flatten)]
+        strategies: DensityStrategies;
+    }
+}
+
+impl DensifyConfig {
+    /// The strategy that is chosen, with its keys.
+    pub fn chosen(&self) -> Box<dyn DensityConfig> {
+        self.strategies.of(self.strategy)
+    }
+}
+
+/// The keys of a density strategy.
+pub trait DensityConfig {
+    /// The strategy that they describe.
+    fn strategy(&self) -> Box<dyn DensityStrategy>;
+
+    /// The last iteration of the fine stage after which Gaussians come; 0 if they never do.
+    fn end(&self) -> usize;
+
+    /// What is wrong with the keys together, if something is: one of them, and what about it.
+    fn problem(&self) -> Option<(&'static str, String)> {
+        None
+    }
+}
 
 /// The position in the training at which a strategy is asked.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,70 @@
 
 use light4gs_model::{PixelContribution as Sum, Significance, VolumeWeight};
 
-use crate::config::{PruneConfig, PruneScore, PruneVolume};
+use crate::keys::Bounds::{Flag, List, Number, Word};
+use crate::keys::{INTERVAL, choice, keys};
+
+keys! {
+    /// Significance pruning (STP, paper III-B): passes after densification, each dropping the Gaussians that
+    /// contribute least to the training views at their times.
+    pub struct PruneConfig {
+        /// Share of the Gaussians that each pass drops; 0 = never. Two passes of 0.1, 0.2, 0.3, 0.4 drop 19, 36, 51,
+        /// 64 %.
+        fraction: f64 = 0.0;
+            Number { least: 0.0, most: 0.999 },
+            "paper: 0.1 to 0.4", "of the Gaussians, each pass; 0 = never. The paper: 0.1, 0.2, 0.3, 0.4";
+        /// Iterations of the fine stage after which a pass takes place; all after the end of densification.
+        iterations: Vec<usize> = vec![15_001, 20_000];
+            List { element: &INTERVAL, length: None },
+            "paper: mid-way and near the end", "of the fine stage, after densification";
+        /// What a pixel adds to the score of a Gaussian that it blends: `"transmittance"` times opacity, the blending
+        /// `"weight"` (transmittance times alpha), its `"opacity"`, or one (`"count"`).
+        score: PruneScore = PruneScore::Transmittance;
+            Word(PruneScore::NAMES), "paper; the reference sums the opacity", "or \"weight\", \"opacity\", \"count\"";
+        /// Factor of the volume V: `"clamped"` is clamp(V / V_90, 0, 1)^exponent, `"unclamped"` (V / V_10)^exponent,
+        /// or `"none"`.
+        volume: PruneVolume = PruneVolume::Clamped;
+            Word(PruneVolume::NAMES),
+            "paper; the reference has the unclamped one, unused", "or \"none\", \"unclamped\" (as the public code)";
+        /// Exponent of that factor.
+        volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
+        /// Look through one random camera a time instead of every training view; for data with many cameras.
+        one_camera_per_time: bool = false; Flag, "paper, multi-view data";
+    }
+}
+
+choice! {
+    /// What a pixel adds to the significance of a Gaussian that it blends.
+    pub enum PruneScore: "score" {
+        /// Transmittance before the Gaussian times its opacity: the paper's.
+        Transmittance = "transmittance",
+        /// The blending weight, transmittance times alpha.
+        Weight = "weight",
+        /// The opacity alone, as the first public code of LightGaussian does.
+        Opacity = "opacity",
+        /// One a pixel.
+        Count = "count",
+    }
+}
+
+choice! {
+    /// The factor of a Gaussian's volume in its significance.
+    pub enum PruneVolume: "volume" {
+        /// None.
+        None = "none",
+        /// Relative to the volume that 90 % stay below, at most 1: the paper's.
+        Clamped = "clamped",
+        /// Relative to the volume that 10 % stay below, without a bound: the public code's.
+        Unclamped = "unclamped",
+    }
+}
+
+impl PruneConfig {
+    /// Whether a pass takes place after an iteration of the fine stage.
+    pub fn is_due(&self, iteration: usize) -> bool {
+        self.fraction > 0.0 && self.iterations.contains(&iteration)
+    }
+}
 
 /// What the training views say of each of `N` Gaussians, each at its time.
 #[derive(Clone, Debug, Default)]

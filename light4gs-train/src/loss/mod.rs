@@ -1,16 +1,29 @@
 //! Losses: what a rendered image should be like.
 //!
-//! - here: [`Loss`], what the trainer asks of a loss
-//! - `photometric`: L1 and D-SSIM, the default
+//! - here: [`Loss`], what the trainer asks of a loss, and [`LossKind`], the built-in ones by name
+//! - `photometric`, `charbonnier`: one file each
 
+mod charbonnier;
 mod photometric;
 
 use burn::tensor::Tensor;
 use light4gs_data::Frame;
 
+pub use charbonnier::CharbonnierLoss;
 pub use photometric::{PhotometricLoss, photometric};
 
+use crate::keys::kinds;
 use crate::stage::Stage;
+
+kinds! {
+    /// The built-in losses, by the names that `train.loss` takes.
+    pub enum LossKind: "loss" {
+        Photometric = photometric: PhotometricLoss,
+        Charbonnier = charbonnier: CharbonnierLoss,
+    }
+    /// The keys of the built-in losses.
+    pub struct Losses: dyn Loss;
+}
 
 /// A rendered view beside the truth, and where the run stands.
 #[derive(Clone, Debug)]

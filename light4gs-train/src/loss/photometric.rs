@@ -3,23 +3,18 @@
 use burn::tensor::Tensor;
 
 use super::{Loss, LossInput};
-use crate::config::TrainConfig;
+use crate::keys::{ITERATION, SHARE, keys};
 use crate::metrics::{l1, l2, ssim};
 use crate::stage::Stage;
 
-/// `(1 - lambda) · L1 + lambda · (1 - SSIM)`, or the squared difference in the first iterations. The default.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PhotometricLoss {
-    /// Weight of D-SSIM, 0 to 1; L1 has the rest.
-    pub lambda_dssim: f32,
-    /// The loss is the squared difference until this iteration of the fine stage, and in the coarse stage if it is not 0.
-    pub l2_until: usize,
-}
-
-impl PhotometricLoss {
-    /// As a configuration says.
-    pub fn new(config: &TrainConfig) -> Self {
-        Self { lambda_dssim: config.lambda_dssim, l2_until: config.l2_until }
+keys! {
+    /// `(1 - lambda) · L1 + lambda · (1 - SSIM)`, or the squared difference in the first iterations. The default.
+    pub struct PhotometricLoss {
+        /// Weight of D-SSIM in the loss, 0 to 1; L1 has the rest.
+        lambda_dssim: f32 = 0.0; SHARE, "reference";
+        /// The loss is the squared difference until this iteration of the fine stage (and in the coarse stage, if not
+        /// 0). L1 is content with the median, which for a fast object is the background behind it.
+        l2_until: usize = 0; ITERATION, "ours", "iteration; squared differences until then keep fast objects alive";
     }
 }
 

@@ -27,8 +27,9 @@ use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::measure::{Column, default_columns};
-use crate::config::{MAX_CONFIG_BYTES, UnknownChoice, choice};
+use crate::config::{MAX_CONFIG_BYTES, UnknownChoice};
 use crate::error::TrainError;
+use crate::keys::choice;
 
 /// More runs than this are a mistake.
 const MOST_VARIANTS: usize = 10_000;

@@ -4,7 +4,7 @@ use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::results::RunResult;
-use crate::config::choice;
+use crate::keys::choice;
 
 choice! {
     /// Something measured of a finished run.

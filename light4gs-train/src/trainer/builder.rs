@@ -12,21 +12,22 @@ use light4gs_model::{DeformationField, HexPlaneField, ModelError};
 
 use super::Trainer;
 use super::profile::Profile;
-use super::sampling::FrameSampler;
 use super::views::ViewPools;
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
 use crate::config::Config;
 use crate::dataset::{ImageSource, image_store, scene_meta};
-use crate::density::{AdaptiveDensityControl, DensityStrategy, SignificanceScore, VolumeWeightedScore};
+use crate::density::{DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
 use crate::divergence::EmptyImageWatch;
 use crate::error::TrainError;
-use crate::loss::{Loss, PhotometricLoss};
+use crate::loss::Loss;
 use crate::observers::Observer;
 use crate::observers::metrics_log::MetricsLog;
 use crate::observers::tensorboard::TensorBoardLog;
 use crate::optimization::adam::Adam;
+use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder};
+use crate::sampling::{FrameSampler, StageFrames};
 use crate::stage::Stage;
 
 /// The parts of a [`Trainer`]: those that are not given are the ones that the configuration describes.
@@ -39,6 +40,8 @@ pub struct TrainerBuilder<F: DeformationField = HexPlaneField, E: EntropyModels 
     images: Option<Box<dyn ImageSource>>,
     folder: Option<RunFolder>,
     loss: Box<dyn Loss>,
+    sampler: Box<dyn FrameSampler>,
+    regularizers: Vec<Box<dyn Regularizer<F>>>,
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
@@ -52,8 +55,10 @@ impl<F: DeformationField> TrainerBuilder<F> {
             device: None,
             images: None,
             folder: None,
-            loss: Box::new(PhotometricLoss::new(&config.train)),
-            density: Box::new(AdaptiveDensityControl::new(config.train.densify.clone())),
+            loss: config.train.losses.of(config.train.loss),
+            sampler: config.train.samplers.of(config.train.sampling),
+            regularizers: Vec::new(),
+            density: config.train.densify.chosen().strategy(),
             significance: Box::new(VolumeWeightedScore::new(&config.train.prune)),
             observers: Vec::new(),
             accept_changed_dataset: false,
@@ -78,6 +83,8 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             images,
             folder,
             loss,
+            sampler,
+            regularizers,
             density,
             significance,
             observers,
@@ -93,6 +100,8 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             images,
             folder,
             loss,
+            sampler,
+            regularizers,
             density,
             significance,
             observers,
@@ -119,13 +128,25 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self
     }
 
-    /// What the rendered views are compared by, instead of [`PhotometricLoss`].
+    /// What the rendered views are compared by, instead of the configured loss.
     pub fn loss(mut self, loss: impl Loss + 'static) -> Self {
         self.loss = Box::new(loss);
         self
     }
 
-    /// How Gaussians come and go, instead of [`AdaptiveDensityControl`].
+    /// Which frames an iteration looks at, instead of the configured sampler.
+    pub fn sampler(mut self, sampler: impl FrameSampler + 'static) -> Self {
+        self.sampler = Box::new(sampler);
+        self
+    }
+
+    /// One more term of the loss, over the scene instead of a view. The regularizers of the planes stay as they are.
+    pub fn regularizer(mut self, regularizer: impl Regularizer<F> + 'static) -> Self {
+        self.regularizers.push(Box::new(regularizer));
+        self
+    }
+
+    /// How Gaussians come and go, instead of the configured strategy.
     pub fn density(mut self, strategy: impl DensityStrategy + 'static) -> Self {
         self.density = Box::new(strategy);
         self
@@ -267,7 +288,8 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         mut state: Checkpoint<F, E>,
         checkpoint: Option<PathBuf>,
     ) -> Result<Trainer<F, E>, TrainError> {
-        let Self { config, data, models, images, folder, loss, mut density, significance, observers, stop, .. } = self;
+        let Self { config, data, models, images, folder, observers, stop, .. } = self;
+        let Self { loss, sampler, regularizers, mut density, significance, .. } = self;
         let count = state.scene.gaussians.len();
         match checkpoint {
             None => density.begin_stage(count, &device.clone().inner()),
@@ -293,7 +315,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             None => config.device.computes_on_processor(),
         };
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
-        let sampler = FrameSampler::new(&config.train, &data.train);
+        let stage_frames = StageFrames::new(config.train.coarse_times, &data.train);
         Ok(Trainer {
             config,
             device,
@@ -307,8 +329,9 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             significance,
             observers: all,
             stop,
-            sampler_ahead: sampler.clone(),
             sampler,
+            stage_frames,
+            regularizers,
             profile: Profile::off(),
             view_pools,
             lap: None,

@@ -2,23 +2,22 @@
 //!
 //! - here: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
 //! - `builder`: what a trainer is made of
-//! - `sampling`: the frames of an iteration
 //! - `step`: one iteration
 //! - `motion`: what the deformation field is asked besides moving the Gaussians
 //! - `views`: the views of an iteration, each with a tape of its own
+//! - `learning_rates`: what each parameter group learns with
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `pruning`: pruning by significance
 //!
-//! What a researcher may want to replace are traits: [`Loss`],
-//! [`DensityStrategy`], [`SignificanceScore`],
-//! [`Observer`] and [`ImageSource`].
+//! What a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`], [`DensityStrategy`],
+//! [`SignificanceScore`], [`Observer`] and [`ImageSource`].
 
 mod builder;
+mod learning_rates;
 mod motion;
 pub mod profile;
 mod pruning;
 mod rate;
-mod sampling;
 mod step;
 mod views;
 
@@ -44,10 +43,11 @@ use crate::metrics::{image_tensor, psnr};
 use crate::observers::metrics_log::MetricsRecord;
 use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
+use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder, SaveError, checkpoint_name, list_checkpoints};
+use crate::sampling::{FrameSampler, StageFrames};
 use crate::stage::Stage;
 use profile::Profile;
-use sampling::FrameSampler;
 use views::ViewPools;
 
 /// A run in progress.
@@ -112,9 +112,9 @@ pub struct Trainer<F: DeformationField = HexPlaneField, E: EntropyModels = Confi
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
     stop: Arc<AtomicBool>,
-    sampler: FrameSampler,
-    /// The same, asked for what comes later.
-    sampler_ahead: FrameSampler,
+    sampler: Box<dyn FrameSampler>,
+    stage_frames: StageFrames,
+    regularizers: Vec<Box<dyn Regularizer<F>>>,
     profile: Profile,
     view_pools: ViewPools,
     lap: Option<Lap>,

@@ -9,9 +9,9 @@ use light4gs_model::{DeformationField, DynamicScene, FinePosition, SceneAtRest};
 use rand::Rng;
 
 use super::Trainer;
+use super::learning_rates::GroupRates;
 use crate::compression::EntropyModels;
 use crate::optimization::gradients::GradientSums;
-use crate::optimization::learning_rates::GroupRates;
 use crate::optimization::parameters::ParameterGroup;
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;

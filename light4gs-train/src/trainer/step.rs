@@ -5,6 +5,7 @@ use light4gs_data::Frame;
 use light4gs_model::{DeformationField, HexPlane};
 
 use super::Trainer;
+use super::learning_rates::GroupRates;
 use super::views::ViewPass;
 use crate::compression::EntropyModels;
 use crate::density::{GaussianEditor, TrainingPosition, ViewStatistics};
@@ -12,8 +13,9 @@ use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
 use crate::observers::StepReport;
 use crate::optimization::gradients::GradientSums;
-use crate::optimization::learning_rates::GroupRates;
 use crate::optimization::parameters::COMPRESSION;
+use crate::regularizer::RegularizerInput;
+use crate::sampling::BatchRequest;
 use crate::stage::Stage;
 
 /// How many iterations ahead images are decoded.
@@ -26,9 +28,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if stage == Stage::Fine {
             self.begin_motion_step(iteration);
         }
-        let batch = self.config.train.batch_size.max(1);
-        let indices = self.sampler.batch(self.config.seed, stage, iteration);
-        self.prefetch(stage, iteration);
+        let indices = self.batch(stage, iteration)?;
+        let batch = indices.len();
+        self.prefetch(stage, iteration)?;
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
@@ -50,7 +52,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let rate = noisy.as_ref().and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
         let regularizer = self.add_plane_regularizer(stage, iteration, &mut gradients);
         let own = self.add_field_regularizer(stage, iteration, &mut gradients);
-        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizer).chain(own);
+        let others = self.add_regularizers(stage, iteration, &mut gradients);
+        let regularizers = regularizer.into_iter().chain(own).chain(others);
+        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
         let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
         // What an iteration reads back from the device: this number.
         let loss: f32 = loss.into_scalar();
@@ -82,11 +86,35 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// Has the images of the next iterations decoded in the background. An iteration asks for as many as it uses, so that
     /// those before it are there already.
-    fn prefetch(&mut self, stage: Stage, iteration: usize) {
-        // Another sampler: this one is asked for positions of the next pass while the first is still in the last.
-        let indices = self.sampler_ahead.batch(self.config.seed, stage, iteration + PREFETCHED_ITERATIONS);
+    fn prefetch(&mut self, stage: Stage, iteration: usize) -> Result<(), TrainError> {
+        let indices = self.batch(stage, iteration + PREFETCHED_ITERATIONS)?;
         let frames: Vec<Frame> = indices.into_iter().map(|frame| self.data.train[frame].clone()).collect();
         self.images.prefetch(&frames);
+        Ok(())
+    }
+
+    /// The frames of an iteration, by their places in the training split.
+    fn batch(&self, stage: Stage, iteration: usize) -> Result<Vec<usize>, TrainError> {
+        let train = &self.config.train;
+        let frames = &self.data.train;
+        let indices = self.sampler.batch(&BatchRequest {
+            frames,
+            candidates: self.stage_frames.of(stage),
+            batch_size: train.batch_size.max(1),
+            stage,
+            iteration,
+            iterations: train.iterations(stage),
+            seed: self.config.seed,
+        });
+        let problem = match indices.iter().find(|index| **index >= frames.len()) {
+            Some(index) => format!("frame {index} of {}", frames.len()),
+            None if indices.is_empty() => "no frame".to_owned(),
+            None => return Ok(indices),
+        };
+        let place = format!("iteration {iteration} of the {stage} stage");
+        Err(TrainError::Input(format!(
+            "the sampler gives {problem} for {place}; it must name at least one training frame"
+        )))
     }
 
     /// Adds the gradients of what keeps the planes smooth, and returns its value, `[1]`.
@@ -105,6 +133,20 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         gradients.add_module(scene, &mut term.backward());
         self.profile.lap("regularizers");
         Some(value)
+    }
+
+    /// Adds the gradients of the regularizers from outside, and returns the values of those that have one, `[1]` each.
+    fn add_regularizers(&self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Vec<Tensor<1>> {
+        let scene = &self.state.scene;
+        let input = RegularizerInput { scene, stage, iteration, iterations: self.config.train.iterations(stage) };
+        let terms = self.regularizers.iter().filter_map(|regularizer| regularizer.loss(input));
+        let add = |term: Tensor<1>| {
+            let value = term.clone().inner();
+            gradients.add_module(scene, &mut term.backward());
+            self.profile.lap("regularizers");
+            value
+        };
+        terms.map(add).collect()
     }
 
     fn training_position(&self, stage: Stage, iteration: usize) -> TrainingPosition {

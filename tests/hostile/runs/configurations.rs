@@ -1,6 +1,6 @@
 //! Odd configurations: values at and beyond the ends of ranges, of the wrong kind, several at once.
 
-use light4gs_train::config::{BOUNDS, Bounds, Config};
+use light4gs_train::config::{Bounds, Config, KEYS, Key};
 use rand::Rng;
 use rand::seq::IndexedRandom;
 
@@ -13,7 +13,7 @@ model.hexplane = { channels = 4, resolution = [8, 8, 8, 4] }
 model.deformation.width = 8
 train.coarse_iterations = 1
 train.fine_iterations = 3
-train.densify = { from = 0, until = 2, interval = 1, prune_from = 0, prune_interval = 1, prune_above = 0, max_gaussians = 500 }
+train.densify.adaptive = { from = 0, until = 2, interval = 1, prune_from = 0, prune_interval = 1, prune_above = 0, max_gaussians = 500 }
 train.prune.iterations = [3]
 train.prune.fraction = 0.1
 compression.rate = { lambda = 0.01, from = 1, planes_until = 2, interval = 1 }
@@ -48,8 +48,12 @@ pub fn ends(bounds: &Bounds) -> Vec<String> {
     match bounds {
         Bounds::Flag => ["true", "false"].map(str::to_owned).to_vec(),
         Bounds::Text => vec!["\"\"".to_owned()],
-        Bounds::Word(words) => words.iter().map(|word| format!("\"{word}\"")).collect(),
-        Bounds::Device => ["\"ndarray\"", "\"flex\""].map(str::to_owned).to_vec(),
+        // A named layout needs a dataset in it.
+        Bounds::LayoutOrNone { .. } => vec!["\"\"".to_owned()],
+        Bounds::Word(words) | Bounds::Kind { names: words, .. } => {
+            words.iter().map(|word| format!("\"{word}\"")).collect()
+        }
+        Bounds::Device(_) => ["\"ndarray\"", "\"flex\""].map(str::to_owned).to_vec(),
         Bounds::Whole { least, most } => vec![least.to_string(), most.to_string()],
         Bounds::WholeOrNone { least, most } => vec!["0".to_owned(), least.to_string(), most.to_string()],
         Bounds::Number { least, most } => [least, most].map(|value| format!("{value:e}")).to_vec(),
@@ -92,13 +96,13 @@ const ODD: [&str; 22] = [
 pub fn odd(random: &mut impl Rng) -> String {
     let mut pairs = Vec::new();
     for _ in 0..random.random_range(1..4) {
-        let (key, bounds) = BOUNDS.choose(random).expect("some");
+        let Key { path, bounds, .. } = KEYS.choose(random).expect("some");
         let value = if random.random() {
             ends(bounds).choose(random).expect("some").clone()
         } else {
             (*ODD.choose(random).expect("some")).to_owned()
         };
-        pairs.push((*key, value));
+        pairs.push((path.as_str(), value));
     }
     let pairs: Vec<(&str, &str)> = pairs.iter().map(|(key, value)| (*key, value.as_str())).collect();
     tiny_with(&pairs)

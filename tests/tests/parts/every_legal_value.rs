@@ -5,7 +5,7 @@ use std::path::Path;
 use light4gs_data::{SyntheticOptions, write_synthetic};
 use light4gs_tests::hostile::configurations::{ends, tiny_with};
 use light4gs_tests::hostile::{train, without_panic};
-use light4gs_train::config::{BOUNDS, Config};
+use light4gs_train::config::{Config, KEYS, Key};
 use light4gs_train::error::TrainError;
 
 /// Where an end of the range would ask for the machine: a large value that takes a moment.
@@ -28,10 +28,14 @@ type Overrides = &'static [(&'static str, &'static str)];
 const COMPANIONS: [(&str, &str, Overrides); 13] = [
     ("train.coarse_iterations", "0", &[("train.fine_iterations", "3")]),
     ("train.fine_iterations", "0", &[("train.prune.iterations", "[]"), ("train.coarse_iterations", "3")]),
-    ("train.densify.from", "", &[("train.densify.until", "9223372036854775807"), ("train.prune.fraction", "0.0")]),
-    ("train.densify.until", "", &[("train.prune.fraction", "0.0")]),
-    ("train.densify.until", "0", &[("train.densify.from", "0")]),
-    ("train.prune.iterations", "[1]", &[("train.densify.until", "0")]),
+    (
+        "train.densify.adaptive.from",
+        "",
+        &[("train.densify.adaptive.until", "9223372036854775807"), ("train.prune.fraction", "0.0")],
+    ),
+    ("train.densify.adaptive.until", "", &[("train.prune.fraction", "0.0")]),
+    ("train.densify.adaptive.until", "0", &[("train.densify.adaptive.from", "0")]),
+    ("train.prune.iterations", "[1]", &[("train.densify.adaptive.until", "0")]),
     ("train.prune.iterations", "[100000000]", &[("train.fine_iterations", "100000000")]),
     ("compression.rate.from", "", &[("compression.rate.planes_until", "0")]),
     ("compression.context.high_scale_hyperprior", "", &[("compression.context.inter_scale", "true")]),
@@ -53,13 +57,14 @@ fn every_legal_value_of_every_key_trains_and_is_encoded() {
     scene(&data);
     let mut failures = Vec::new();
     let mut count = 0;
-    for (key, bounds) in BOUNDS {
+    for Key { path: key, bounds, .. } in KEYS.iter() {
         let mut values = ends(bounds);
-        if let Some((_, cheaper)) = CHEAPER.iter().find(|(expensive, _)| expensive == key) {
+        if let Some((_, cheaper)) = CHEAPER.iter().find(|(expensive, _)| *expensive == key.as_str()) {
             *values.last_mut().unwrap() = (*cheaper).to_owned();
         }
         for value in values {
-            let companions = COMPANIONS.iter().filter(|(other, at, _)| other == key && (at.is_empty() || *at == value));
+            let companions =
+                COMPANIONS.iter().filter(|(other, at, _)| *other == key.as_str() && (at.is_empty() || *at == value));
             let mut pairs: Vec<(&str, &str)> = companions.flat_map(|(_, _, pairs)| *pairs).copied().collect();
             pairs.push((key, &value));
             let text = tiny_with(&pairs);

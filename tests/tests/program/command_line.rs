@@ -220,10 +220,13 @@ fn an_empty_split() {
 #[test]
 fn an_unknown_key() {
     let w = Workspace::new(PROGRAM);
-    fs::write(w.path("mine.toml"), "extends = \"dnerf-small\"\n[train.densify]\nintervall = 3\n").unwrap();
+    fs::write(w.path("mine.toml"), "extends = \"dnerf-small\"\n[train.densify.adaptive]\nintervall = 3\n").unwrap();
     let output = w.run(["train", "scene", "--config", "mine.toml", "--out", "run"]);
-    assert_refused(&output, &["mine.toml", "train.densify.intervall", "train.densify.interval"]);
-    assert_refused(&w.train("run", &["train.lamda_dssim=1"]).output().unwrap(), &["lamda_dssim", "lambda_dssim"]);
+    assert_refused(&output, &["mine.toml", "train.densify.adaptive.intervall", "train.densify.adaptive.interval"]);
+    assert_refused(
+        &w.train("run", &["train.photometric.lamda_dssim=1"]).output().unwrap(),
+        &["lamda_dssim", "lambda_dssim"],
+    );
     assert_refused(&w.train("run", &["device=cuda"]).output().unwrap(), &["device", "ndarray"]);
     assert!(!w.path("run").exists());
 }

@@ -47,7 +47,7 @@ fn checkpoint(folder: &Path) -> (Config, PathBuf) {
 fn load(path: &Path, config: &Config) -> Result<Checkpoint, TrainError> {
     let checkpoint: Checkpoint =
         Checkpoint::load(path, config, &config.model.field(), &ConfiguredModels, &Device::flex().autodiff())?;
-    let mut density = AdaptiveDensityControl::new(config.train.densify.clone());
+    let mut density = AdaptiveDensityControl::new(config.train.densify.strategies.adaptive.clone());
     density
         .restore(checkpoint.density.clone(), checkpoint.scene.gaussians.len())
         .map_err(|problem| TrainError::Checkpoint { path: path.to_owned(), problem })?;
@@ -410,7 +410,7 @@ fn a_dataset_that_cannot_be_coded_costs_no_run() {
 fn frozen_planes_alone_have_no_rate() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path());
-    for pairs in [("model.sh_degree", "0"), ("train.densify.until", "1000")] {
+    for pairs in [("model.sh_degree", "0"), ("train.densify.adaptive.until", "1000")] {
         let text = tiny_with(&[("train.prune.fraction", "0.0"), ("train.fine_iterations", "6"), pairs]);
         train(&Config::from_toml(&text, "frozen").unwrap(), &scene, 7).unwrap();
     }

@@ -140,7 +140,7 @@ fn seeds_give_a_spread_and_failures_do_not_stop_others() {
         "--set",
         "train.fine_iterations=20",
         "--set",
-        "train.densify.until=15",
+        "train.densify.adaptive.until=15",
         "--set",
         "compression.rate.planes_until=0",
     ];

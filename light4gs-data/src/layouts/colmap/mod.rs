@@ -40,6 +40,10 @@ impl DatasetLayout for Colmap {
         "sparse/0/cameras.bin and images.bin, or both as .txt"
     }
 
+    fn preset(&self) -> Option<&'static str> {
+        Some("colmap-small")
+    }
+
     fn detect(&self, root: &Path) -> bool {
         !model_folders(root).is_empty()
     }

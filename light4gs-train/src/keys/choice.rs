@@ -28,7 +28,7 @@ macro_rules! choice {
     (
         $(#[$attribute:meta])*
         pub enum $choice:ident: $what:literal {
-            $($(#[$variant_attribute:meta])* $variant:ident = $name:literal,)+
+            $($(#[$variant_attribute:meta])* $variant:ident = $name:expr,)+
         }
     ) => {
         $(#[$attribute])*
@@ -56,13 +56,13 @@ macro_rules! choice {
         }
 
         impl std::str::FromStr for $choice {
-            type Err = $crate::config::UnknownChoice;
+            type Err = $crate::keys::UnknownChoice;
 
             fn from_str(name: &str) -> Result<Self, Self::Err> {
-                match name {
-                    $($name => Ok(Self::$variant),)+
-                    _ => Err($crate::config::UnknownChoice::new($what, name, Self::NAMES)),
-                }
+                $(if name == $name {
+                    return Ok(Self::$variant);
+                })+
+                Err($crate::keys::UnknownChoice::new($what, name, Self::NAMES))
             }
         }
 

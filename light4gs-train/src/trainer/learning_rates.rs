@@ -9,7 +9,7 @@ use crate::stage::Stage;
 
 /// Learning rates of one iteration, by parameter group.
 #[derive(Clone, Copy, Debug)]
-pub struct GroupRates {
+pub(super) struct GroupRates {
     means: f64,
     grid: f64,
     deformation: LearningRate,
@@ -28,7 +28,7 @@ pub struct GroupRates {
 
 impl GroupRates {
     /// `iteration` counts from 1 in its stage; `extent` is the scene's, world units.
-    pub fn new(config: &Config, stage: Stage, iteration: usize, extent: f32) -> Self {
+    pub(super) fn new(config: &Config, stage: Stage, iteration: usize, extent: f32) -> Self {
         let Config { train, compression, .. } = config;
         let rates = &train.learning_rate;
         let steps = rates.schedule_steps.unwrap_or(train.iterations(stage));
@@ -60,12 +60,12 @@ impl GroupRates {
     }
 
     /// From beginning to end of the stage: what a deformation field is trained with unless it says otherwise.
-    pub fn deformation(&self) -> LearningRate {
+    pub(super) fn deformation(&self) -> LearningRate {
         self.deformation
     }
 
     /// Another rate at this iteration.
-    pub fn at(&self, LearningRate { initial, last }: LearningRate) -> f64 {
+    pub(super) fn at(&self, LearningRate { initial, last }: LearningRate) -> f64 {
         if initial == 0.0 || last == 0.0 {
             return 0.0;
         }
@@ -73,7 +73,7 @@ impl GroupRates {
     }
 
     /// The rate of a group.
-    pub fn of(&self, group: ParameterGroup) -> f64 {
+    pub(super) fn of(&self, group: ParameterGroup) -> f64 {
         match group {
             ParameterGroup::Means => self.means,
             ParameterGroup::LogScales => self.scale,

@@ -1,0 +1,30 @@
+//! Configuration keys, declared once: type, default, bounds, documentation and source.
+//!
+//! - `declaration`: the macro `keys!`, which makes a struct and its table of keys of one declaration
+//! - `bounds`: what a key may hold
+//! - `choice`: words, declared as enums
+//! - `kinds`: parts of the training that are chosen by name, each with its own keys
+//! - `optional`: values that may be absent, which TOML has no word for
+//! - `reference`: what follows from the declarations: the list of all keys, `configs/base.toml`, and the tables of
+//!   `docs/configuration.md`
+//!
+//! This room knows no key. The declarations stand near what they configure, and `config` puts them together.
+
+mod bounds;
+mod choice;
+mod declaration;
+mod kinds;
+pub(crate) mod optional;
+mod reference;
+
+pub use bounds::Bounds;
+pub(crate) use bounds::{
+    INTERVAL, ITERATION, ITERATIONS, MOST_GAUSSIANS, MOST_INTEGER, RATE, SHARE, STEP, THRESHOLD, TOLERANCE, WEIGHT,
+};
+pub use choice::UnknownChoice;
+pub(crate) use choice::choice;
+pub(crate) use declaration::has_no_keys;
+pub(crate) use declaration::{Entry, KeyTable, default_value, entry, keys};
+pub(crate) use kinds::kinds;
+pub use reference::Key;
+pub(crate) use reference::{list, markdown, toml_text};
