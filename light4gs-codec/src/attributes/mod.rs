@@ -204,7 +204,9 @@ fn read_quantized(
     for attribute in others {
         match attribute.coder {
             Coder::Float32 => numbers.add(attribute, read_float32(reader, attribute)?),
-            Coder::Unknown(_) => drop(take_stream(reader, attribute)?),
+            Coder::Unknown(_) => {
+                let _ = take_stream(reader, attribute)?;
+            }
             _ => {
                 let mut stream = take_stream(reader, attribute)?;
                 let step = stream.f32(&format!("step of {}", attribute.name))?;
