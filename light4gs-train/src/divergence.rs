@@ -6,9 +6,11 @@ use std::path::PathBuf;
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
+use light4gs_model::Attribute;
+use light4gs_model::attributes::{BUILT_IN, attribute_of_path};
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
-use crate::config::Config;
+use crate::config::{AttributeRate, Config};
 use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
 use crate::stage::Stage;
 
@@ -84,21 +86,32 @@ impl fmt::Display for Divergence {
     }
 }
 
-/// The learning rate of a group: its key and its value.
-fn learning_rate(group: ParameterGroup, config: &Config) -> (&'static str, f64) {
-    let (rates, compression) = (&config.train.learning_rate, &config.compression);
-    match group {
-        ParameterGroup::Means => ("train.learning_rate.means_init", rates.means_init),
-        ParameterGroup::LogScales => ("train.learning_rate.scale", rates.scale),
-        ParameterGroup::Quats => ("train.learning_rate.rotation", rates.rotation),
-        ParameterGroup::Opacity => ("train.learning_rate.opacity", rates.opacity),
-        ParameterGroup::ShDc | ParameterGroup::ShRest => ("train.learning_rate.sh_dc", rates.sh_dc),
-        ParameterGroup::Grid => ("train.learning_rate.grid_init", rates.grid_init),
-        ParameterGroup::Deformation => ("train.learning_rate.deformation_init", rates.deformation_init),
-        ParameterGroup::Context => ("compression.context.learning_rate_init", compression.context.learning_rate_init),
-        ParameterGroup::ShModel => ("compression.sh.learning_rate_init", compression.sh.learning_rate_init),
-        ParameterGroup::Steps => ("compression.steps.learning_rate", compression.steps.learning_rate),
+/// The learning rate of an attribute: its key and its value, where it has a key.
+fn attribute_rate(attribute: &Attribute, config: &Config) -> Option<(&'static str, f64)> {
+    AttributeRate::of(attribute, &config.train.learning_rate)?.key
+}
+
+/// The learning rate of a parameter: its key and its value. None for an attribute whose rate is no key.
+fn learning_rate(path: &str, config: &Config) -> Option<(&'static str, f64)> {
+    let group = ParameterGroup::of(path)?;
+    if group == ParameterGroup::Attribute {
+        let name = attribute_of_path(path)?;
+        return attribute_rate(BUILT_IN.iter().find(|attribute| attribute.name == name)?, config);
     }
+    group_rates(config).into_iter().find(|(other, ..)| *other == group).map(|(_, key, value)| (key, value))
+}
+
+/// The learning rates of all groups but the attributes: their keys and values.
+fn group_rates(config: &Config) -> [(ParameterGroup, &'static str, f64); 5] {
+    let (rates, compression) = (&config.train.learning_rate, &config.compression);
+    let (context, sh) = (&compression.context, &compression.sh);
+    [
+        (ParameterGroup::Grid, "train.learning_rate.grid_init", rates.grid_init),
+        (ParameterGroup::Deformation, "train.learning_rate.deformation_init", rates.deformation_init),
+        (ParameterGroup::Context, "compression.context.learning_rate_init", context.learning_rate_init),
+        (ParameterGroup::ShModel, "compression.sh.learning_rate_init", sh.learning_rate_init),
+        (ParameterGroup::Steps, "compression.steps.learning_rate", compression.steps.learning_rate),
+    ]
 }
 
 /// What else can drive a training apart: the rates at the end, and the weights of the loss besides the images'.
@@ -122,8 +135,9 @@ const SUSPICIOUS: f64 = 12.0;
 /// where all are about as usual.
 pub(super) fn unusual_key(config: &Config) -> Option<Remedy> {
     let keys = |config: &Config| -> Vec<(&'static str, f64)> {
-        let rates = ParameterGroup::ALL.into_iter().map(|group| learning_rate(group, config));
-        rates.chain(other_keys(config)).collect()
+        let attributes = BUILT_IN.iter().filter_map(|attribute| attribute_rate(attribute, config));
+        let groups = group_rates(config).map(|(_, key, value)| (key, value));
+        attributes.chain(groups).chain(other_keys(config)).collect()
     };
     // Where the default is 0, a small weight.
     let usual = keys(&Config::default()).into_iter().map(|(_, value)| if value > 0.0 { value } else { 0.1 });
@@ -137,18 +151,18 @@ pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
     if let Some(remedy) = unusual_key(config) {
         return remedy;
     }
-    let group = match found {
-        NotFinite::Parameter { name, .. } => group_of(name),
+    let rate = match found {
+        NotFinite::Parameter { name, .. } => learning_rate(path_of(name), config),
         NotFinite::Loss(_) => None,
     };
-    let (key, value) = learning_rate(group.unwrap_or(ParameterGroup::Means), config);
+    let rates = &config.train.learning_rate;
+    let (key, value) = rate.unwrap_or(("train.learning_rate.means_init", rates.means_init));
     Remedy { key, value: value / 10.0 }
 }
 
-/// The group of a tensor of a checkpoint: a parameter, or a moment of one.
-fn group_of(name: &str) -> Option<ParameterGroup> {
-    let path = ["scene.", "first.", "second."].iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name);
-    ParameterGroup::of(path)
+/// The path of the parameter that a tensor of a checkpoint is, or is a moment of.
+fn path_of(name: &str) -> &str {
+    ["scene.", "first.", "second."].iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name)
 }
 
 /// The first parameter of a module that has a number which is not finite. `prefix` stands in front of its name.

@@ -20,6 +20,7 @@ use std::borrow::Cow;
 
 use burn::tensor::Tensor;
 use burn::tensor::activation::sigmoid;
+use light4gs_codec::legal_attribute_name;
 use light4gs_codec::rendering::MAX_LOGARITHM;
 use light4gs_data::PointCloud;
 
@@ -99,7 +100,8 @@ pub enum Coding {
 }
 
 impl Activation {
-    /// Applies it.
+    /// Applies it. Logarithms are cut before the exponential, which then stays finite, so that the backward pass has no 0 ·
+    /// infinity.
     pub fn apply<const D: usize>(self, values: Tensor<D>) -> Tensor<D> {
         match self {
             Self::Identity => values,
@@ -184,6 +186,26 @@ const fn built_in(
 ) -> Attribute {
     let (name, learning_rate) = (Cow::Borrowed(name), Setting::Key(learning_rate));
     Attribute { name, width, start, activation, learning_rate, coding, constant: false, optional: false }
+}
+
+/// Refuses further attributes that no scene can have.
+///
+/// # Errors
+/// In words: a name that no file can hold, one that stands twice, a width of 0.
+pub fn check_further(attributes: &[Attribute]) -> Result<(), String> {
+    for (index, attribute) in attributes.iter().enumerate() {
+        let name = &attribute.name;
+        if !legal_attribute_name(name) {
+            return Err(format!("`{name}`: a name is 1 to 64 of a-z, 0-9, `-`, `_`, and none that every Gaussian has"));
+        }
+        if attributes[..index].iter().any(|other| other.name == *name) {
+            return Err(format!("`{name}` stands twice; each attribute has a name of its own"));
+        }
+        if attribute.width.of(0) == 0 {
+            return Err(format!("`{name}` has no numbers; its width must be 1 or more"));
+        }
+    }
+    Ok(())
 }
 
 /// In front of the paths of attributes in a scene, and behind that of the further ones.

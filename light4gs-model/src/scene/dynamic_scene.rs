@@ -24,8 +24,9 @@ pub struct DynamicSceneConfig<F: DeformationField = HexPlaneField> {
 }
 
 impl<F: DeformationField> DynamicSceneConfig<F> {
-    /// With gradients to the positions.
-    pub fn new(gaussians: GaussiansConfig, field: F::Config) -> Self {
+    /// With gradients to the positions, and with the attributes that the field asks for.
+    pub fn new(mut gaussians: GaussiansConfig, field: F::Config) -> Self {
+        gaussians.further.extend(F::attributes(&field));
         Self { gaussians, field, coordinates: CoordinatesConfig::default(), differentiate_points: true }
     }
 
@@ -88,7 +89,9 @@ impl<F: DeformationField> DynamicScene<F> {
         }
         let means = rest.means.clone();
         let means = if self.differentiate_points { means } else { means.detach() };
-        self.field.deform(rest, self.coordinates.normalize(means), self.coordinates.field_time(time))
+        let at_rest = rest.further.clone();
+        let (points, time) = (self.coordinates.normalize(means), self.coordinates.field_time(time));
+        self.field.deform(rest, points, time).with_constants_of(&at_rest)
     }
 
     /// The field's planes, if it has some.

@@ -8,6 +8,7 @@ use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::MotionArrays;
 
 use super::arrays::ModelError;
+use super::attributes::Attribute;
 use super::coordinates::SceneCoordinates;
 use super::gaussians::{GaussianTensors, Gaussians};
 use super::hexplane::HexPlane;
@@ -28,6 +29,13 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
 
     /// The names that it has in files and checkpoints: most fields have one. A file of another kind is refused by its name.
     const KINDS: &'static [&'static str];
+
+    /// What every Gaussian must have for this field, besides what all of them have: see
+    /// [`GaussianTensors::further`](crate::GaussianTensors::further). A field that needs something has it trained, coded and
+    /// given back by saying so here.
+    fn attributes(_config: &Self::Config) -> Vec<Attribute> {
+        Vec::new()
+    }
 
     /// The field at the beginning of a training: it should move nothing much.
     fn init(config: &Self::Config, device: &Device) -> Self;

@@ -132,6 +132,17 @@ impl GaussianTensors {
         self.further.iter().find(|tensor| tensor.attribute.name == name).map(|tensor| &tensor.values)
     }
 
+    /// Gives the attributes that are [constant](Attribute::constant) their values at rest back.
+    pub(super) fn with_constants_of(mut self, rest: &[FurtherTensor]) -> Self {
+        for constant in rest.iter().filter(|tensor| tensor.attribute.constant) {
+            let same = |tensor: &&mut FurtherTensor| tensor.attribute.name == constant.attribute.name;
+            if let Some(moved) = self.further.iter_mut().find(same) {
+                moved.values = constant.values.clone();
+            }
+        }
+        self
+    }
+
     /// The same values off the tape; tensors that were never on one stay as they are.
     pub fn inner(self) -> Self {
         struct Inner;

@@ -65,7 +65,7 @@ impl Encode {
         };
         let device = device::open(self.device.unwrap_or(config.device))?.autodiff();
         let checkpoint: Checkpoint =
-            Checkpoint::load(&path, &config, &config.model.field(), &ConfiguredModels, &device)?;
+            Checkpoint::load(&path, &config, &config.model.build(), &ConfiguredModels, &device)?;
         let data = match &record.scene {
             Some(dataset) => Scene::open(dataset, &load_options(&config))?,
             None => scene_around(&checkpoint.scene.gaussians.to_arrays(), folder.root(), config.data.background)?,

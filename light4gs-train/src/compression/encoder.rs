@@ -173,7 +173,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         profile,
         planes: compression.plane_coding(scene)?,
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
-        attributes: config.attributes.steps(),
+        attributes: config.attributes.steps_of(scene.gaussians.attributes()),
         weights: WeightPrecisions {
             motion: WeightPrecision::Bits(config.weights.deformation_bits),
             context_model: WeightPrecision::Bits(config.weights.context_bits),

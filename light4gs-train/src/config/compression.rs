@@ -216,13 +216,13 @@ keys! {
     pub struct AttributesConfig {
         /// Step of the positions as a share of the typical Gaussian's size. This and the next four: `compact` profile
         /// only, and where the search begins.
-        position: f32 = step("means"); STEP, "ours", "of the size of the typical Gaussian";
+        means: f32 = step("means"); STEP, "ours", "of the size of the typical Gaussian";
         /// Step of the scales' logarithms.
-        log_scale: f32 = step("log_scales"); STEP, "ours";
+        log_scales: f32 = step("log_scales"); STEP, "ours";
         /// Step of the quaternions' components.
-        quaternion: f32 = step("quats"); STEP, "ours";
+        quats: f32 = step("quats"); STEP, "ours";
         /// Step of the opacity logits.
-        opacity_logit: f32 = step("opacity_logits"); STEP, "ours";
+        opacity_logits: f32 = step("opacity_logits"); STEP, "ours";
         /// Step of the constant colors.
         sh_dc: f32 = step("sh_dc"); STEP, "ours";
         /// The encoder looks for the coarsest steps that cost this much PSNR on some training views, dB. 0: the steps
@@ -232,11 +232,11 @@ keys! {
 }
 
 impl AttributesConfig {
-    /// The steps, as the codec has them.
+    /// The steps, as the codec has them: by the names of the attributes, which are those of the keys.
     pub fn steps(&self) -> AttributeSteps {
-        let Self { position, log_scale, quaternion, opacity_logit, sh_dc, search_tolerance: _ } = *self;
-        let steps = AttributeSteps::default().with("means", position).with("log_scales", log_scale);
-        steps.with("quats", quaternion).with("opacity_logits", opacity_logit).with("sh_dc", sh_dc)
+        let Self { means, log_scales, quats, opacity_logits, sh_dc, search_tolerance: _ } = *self;
+        let steps = AttributeSteps::default().with("means", means).with("log_scales", log_scales);
+        steps.with("quats", quats).with("opacity_logits", opacity_logits).with("sh_dc", sh_dc)
     }
 }
 

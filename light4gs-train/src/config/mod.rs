@@ -12,6 +12,7 @@
 //! fine_iterations = 2000
 //! ```
 
+mod attributes;
 mod compression;
 mod data;
 mod device_name;
@@ -36,6 +37,7 @@ use crate::keys::{MOST_INTEGER, keys};
 use layering::layers;
 
 pub use crate::keys::{Bounds, Key, UnknownChoice};
+pub(crate) use attributes::AttributeRate;
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
     ShConfig, ShModel, StepsConfig, WeightsConfig,

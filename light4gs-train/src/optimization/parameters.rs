@@ -8,18 +8,8 @@ pub const COMPRESSION: &str = "compression";
 /// Parameters that share a learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterGroup {
-    /// Positions.
-    Means,
-    /// Logarithms of scales.
-    LogScales,
-    /// Quaternions.
-    Quats,
-    /// Opacity logits.
-    Opacity,
-    /// Degree-0 spherical harmonics.
-    ShDc,
-    /// Higher spherical harmonics.
-    ShRest,
+    /// What every Gaussian has; each attribute has a rate of its own.
+    Attribute,
     /// Feature planes of the deformation field.
     Grid,
     /// Everything else of the deformation field.
@@ -34,13 +24,8 @@ pub enum ParameterGroup {
 
 /// Beginning of a path, a name that must follow somewhere in it (or nothing), and the group. The first line that fits
 /// counts. What fits none, such as the scene's coordinates, is not trained.
-const GROUPS: [(&str, &str, ParameterGroup); 11] = [
-    ("gaussians.means", "", ParameterGroup::Means),
-    ("gaussians.log_scales", "", ParameterGroup::LogScales),
-    ("gaussians.quats", "", ParameterGroup::Quats),
-    ("gaussians.opacity_logits", "", ParameterGroup::Opacity),
-    ("gaussians.sh_dc", "", ParameterGroup::ShDc),
-    ("gaussians.sh_rest", "", ParameterGroup::ShRest),
+const GROUPS: [(&str, &str, ParameterGroup); 6] = [
+    ("gaussians", "", ParameterGroup::Attribute),
     // The planes of any field: `field.hexplane.planes.3` for the built-in one.
     ("field", "planes", ParameterGroup::Grid),
     ("field", "", ParameterGroup::Deformation),
@@ -50,21 +35,6 @@ const GROUPS: [(&str, &str, ParameterGroup); 11] = [
 ];
 
 impl ParameterGroup {
-    /// All of them.
-    pub const ALL: [Self; 11] = [
-        Self::Means,
-        Self::LogScales,
-        Self::Quats,
-        Self::Opacity,
-        Self::ShDc,
-        Self::ShRest,
-        Self::Grid,
-        Self::Deformation,
-        Self::Context,
-        Self::ShModel,
-        Self::Steps,
-    ];
-
     /// The group of a parameter. None for constants.
     pub fn of(path: &str) -> Option<Self> {
         let fits = |(beginning, name, _): &&(&str, &str, Self)| {

@@ -13,7 +13,7 @@ use light4gs_codec::CoordinateMapping;
 use light4gs_data::{DataError, PointCloud, read_regular_file, write_atomically};
 use light4gs_model::attributes::{MEANS, attribute_of_path};
 use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
-use light4gs_model::{Attribute, DeformationField, DynamicScene, Gaussians, HexPlaneField};
+use light4gs_model::{Attribute, DeformationField, DynamicScene, DynamicSceneConfig, Gaussians, HexPlaneField};
 
 use super::stored_tensors::{self, Entry, StoredTensors, floats, not_finite};
 use crate::compression::{Compression, CompressionOf, ConfiguredModels, EntropyModels};
@@ -140,8 +140,8 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         Ok(write_atomically(path, |file| file.write_all(&bytes)).map_err(TrainError::from)?)
     }
 
-    /// Reads a checkpoint of a run with this configuration, this deformation field and these entropy models onto an autodiff
-    /// device.
+    /// Reads a checkpoint of a run with this configuration, this scene and these entropy models onto an autodiff device. The
+    /// scene is the run's before it was trained: its deformation field, and what its Gaussians have.
     ///
     /// Nothing in the file is believed: every tensor must be there, of the shape that the configuration and the number of
     /// Gaussians give it, with finite values that training can have led to, and no other; the place in the run must be on
@@ -152,7 +152,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
     pub fn load(
         path: &Path,
         config: &Config,
-        field: &F::Config,
+        scene: &DynamicSceneConfig<F>,
         models: &E,
         device: &Device,
     ) -> Result<Self, TrainError> {
@@ -167,7 +167,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
 
         // A model of the right structure, whose tensors are then replaced.
         let cloud = PointCloud { positions: vec![[0.0; 3]], colors: vec![[0.5; 3]] };
-        let mut scene = config.model.scene::<F>(field.clone()).init(&cloud, device);
+        let mut scene = scene.init(&cloud, device);
         let (kind, expected) = (file.text("field").map_err(failed)?, scene.field.kind());
         if kind != expected {
             return Err(failed(format!("it has a deformation field of the kind `{kind}`, not `{expected}`")));

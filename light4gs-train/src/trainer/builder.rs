@@ -8,7 +8,8 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_codec::checks;
 use light4gs_data::Scene;
-use light4gs_model::{DeformationField, HexPlaneField, ModelError};
+use light4gs_model::attributes::check_further;
+use light4gs_model::{Attribute, DeformationField, DynamicSceneConfig, HexPlaneField, ModelError};
 
 use super::Trainer;
 use super::profile::Profile;
@@ -35,6 +36,7 @@ pub struct TrainerBuilder<F: DeformationField = HexPlaneField, E: EntropyModels 
     config: Config,
     data: Scene,
     field: F::Config,
+    attributes: Vec<Attribute>,
     models: E,
     device: Option<Device>,
     images: Option<Box<dyn ImageSource>>,
@@ -66,6 +68,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
             config,
             data,
             field,
+            attributes: Vec::new(),
             models: ConfiguredModels,
         }
     }
@@ -78,6 +81,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             config,
             data,
             field,
+            attributes,
             models: _,
             device,
             images,
@@ -95,6 +99,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             config,
             data,
             field,
+            attributes,
             models,
             device,
             images,
@@ -178,6 +183,13 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self
     }
 
+    /// One more attribute of every Gaussian, beyond those that the deformation field asks for: trained at its rate, copied
+    /// where Gaussians are cloned and split, kept in checkpoints, stored with its step.
+    pub fn attribute(mut self, attribute: Attribute) -> Self {
+        self.attributes.push(attribute);
+        self
+    }
+
     /// Begins a run.
     ///
     /// # Errors
@@ -199,7 +211,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
             None => self.begin(device),
             Some(path) => {
-                let state = Checkpoint::load(&path, &self.config, &self.field, &self.models, &device)?;
+                let state = Checkpoint::load(&path, &self.config, &self.scene(), &self.models, &device)?;
                 self.assemble(device, state, Some(path))
             }
         }
@@ -216,6 +228,18 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         }
         if self.data.train.is_empty() {
             return Err(TrainError::Input(format!("the dataset `{}` has no training frames", self.data.name)));
+        }
+        let scene = self.scene();
+        check_further(&scene.gaussians.further)
+            .map_err(|problem| TrainError::Input(format!("attribute of the Gaussians: {problem}")))?;
+        for attribute in &scene.gaussians.further {
+            if AttributeRate::of(attribute, &self.config.train.learning_rate).is_none() {
+                let (name, rate) = (&attribute.name, attribute.learning_rate);
+                return Err(TrainError::Input(format!(
+                    "attribute of the Gaussians: `{name}` has the learning rate {rate:?}, which is no key of \
+                     train.learning_rate; give it a number"
+                )));
+            }
         }
         // What the encoder would refuse in the end is refused now.
         light4gs_codec::checks::positions(&self.data.points.positions).map_err(|error| {
@@ -244,10 +268,17 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self.assemble(device, state, None)
     }
 
+    /// What the scene is made from.
+    fn scene(&self) -> DynamicSceneConfig<F> {
+        let mut scene = self.config.model.scene::<F>(self.field.clone());
+        scene.gaussians.further.extend(self.attributes.iter().cloned());
+        scene
+    }
+
     /// What training begins with.
     fn first_state(&self, device: &Device) -> Result<Checkpoint<F, E>, TrainError> {
         device.seed(self.config.seed);
-        let scene = self.config.model.scene::<F>(self.field.clone()).init(&self.data.points, device);
+        let scene = self.scene().init(&self.data.points, device);
         let state = Checkpoint {
             compression: Compression::of_run(&self.models, &self.config, scene.planes(), device)?,
             scene,

@@ -1,23 +1,21 @@
 //! The learning rate of every parameter group at an iteration.
 
-use light4gs_model::LearningRate;
+use std::collections::BTreeMap;
 
-use crate::config::Config;
+use light4gs_model::{Attribute, LearningRate};
+
+use crate::config::{AttributeRate, Config};
 use crate::optimization::parameters::ParameterGroup;
 use crate::optimization::schedule::ExponentialDecay;
 use crate::stage::Stage;
 
 /// Learning rates of one iteration, by parameter group.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct GroupRates {
-    means: f64,
+    /// By the path of their parameters.
+    attributes: BTreeMap<String, f64>,
     grid: f64,
     deformation: LearningRate,
-    sh_dc: f64,
-    sh_rest: f64,
-    opacity: f64,
-    scale: f64,
-    rotation: f64,
     context: f64,
     sh_model: f64,
     steps: f64,
@@ -27,20 +25,32 @@ pub(super) struct GroupRates {
 }
 
 impl GroupRates {
-    /// `iteration` counts from 1 in its stage; `extent` is the scene's, world units.
-    pub(super) fn new(config: &Config, stage: Stage, iteration: usize, extent: f32) -> Self {
+    /// Of Gaussians that have these attributes. `iteration` counts from 1 in its stage; `extent` is the scene's, world units.
+    pub(super) fn new<'a>(
+        config: &Config,
+        attributes: impl Iterator<Item = &'a Attribute>,
+        stage: Stage,
+        iteration: usize,
+        extent: f32,
+    ) -> Self {
         let Config { train, compression, .. } = config;
         let rates = &train.learning_rate;
         let steps = rates.schedule_steps.unwrap_or(train.iterations(stage));
         let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
-        let attribute =
-            |rate: f64| ExponentialDecay::new(rate, rate * rates.attributes_final_share, steps).at(iteration as f64);
+        let attribute = |attribute: &Attribute| {
+            let AttributeRate { first, last, by_extent, .. } = AttributeRate::of(attribute, rates)?;
+            let rate = match by_extent {
+                true => decay(first, last),
+                false => ExponentialDecay::new(first, last, steps).at(iteration as f64),
+            };
+            Some((attribute.path(), rate))
+        };
         let model =
             |first: f64, last: f64| ExponentialDecay::new(first, last, train.fine_iterations).at(iteration as f64);
         Self {
-            means: decay(rates.means_init, rates.means_final),
+            attributes: attributes.filter_map(attribute).collect(),
             grid: decay(rates.grid_init, rates.grid_final),
             deformation: LearningRate {
                 initial: rates.deformation_init * scale,
@@ -48,11 +58,6 @@ impl GroupRates {
             },
             steps_of_schedule: steps,
             iteration,
-            sh_dc: attribute(rates.sh_dc),
-            sh_rest: attribute(rates.sh_dc / rates.sh_rest_divisor),
-            opacity: attribute(rates.opacity),
-            scale: attribute(rates.scale),
-            rotation: attribute(rates.rotation),
             context: model(compression.context.learning_rate_init, compression.context.learning_rate_final),
             sh_model: model(compression.sh.learning_rate_init, compression.sh.learning_rate_final),
             steps: compression.steps.learning_rate,
@@ -72,20 +77,15 @@ impl GroupRates {
         ExponentialDecay::new(initial, last, self.steps_of_schedule).at(self.iteration as f64)
     }
 
-    /// The rate of a group.
-    pub(super) fn of(&self, group: ParameterGroup) -> f64 {
+    /// The rate of a parameter of a group; none for an attribute whose rate nobody knows.
+    pub(super) fn of(&self, group: ParameterGroup, path: &str) -> Option<f64> {
         match group {
-            ParameterGroup::Means => self.means,
-            ParameterGroup::LogScales => self.scale,
-            ParameterGroup::Quats => self.rotation,
-            ParameterGroup::Opacity => self.opacity,
-            ParameterGroup::ShDc => self.sh_dc,
-            ParameterGroup::ShRest => self.sh_rest,
-            ParameterGroup::Grid => self.grid,
-            ParameterGroup::Deformation => self.at(self.deformation),
-            ParameterGroup::Context => self.context,
-            ParameterGroup::ShModel => self.sh_model,
-            ParameterGroup::Steps => self.steps,
+            ParameterGroup::Attribute => self.attributes.get(path).copied(),
+            ParameterGroup::Grid => Some(self.grid),
+            ParameterGroup::Deformation => Some(self.at(self.deformation)),
+            ParameterGroup::Context => Some(self.context),
+            ParameterGroup::ShModel => Some(self.sh_model),
+            ParameterGroup::Steps => Some(self.steps),
         }
     }
 }

@@ -69,9 +69,10 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let statistics: Vec<ViewStatistics> = views.into_iter().map(|view| view.statistics).collect();
         self.density.after_backward(&statistics, &self.training_position(stage, iteration));
         self.profile.lap("density statistics");
-        let rates = GroupRates::new(&self.config, stage, iteration, self.data.extent);
+        let attributes = self.state.scene.gaussians.attributes();
+        let rates = GroupRates::new(&self.config, attributes, stage, iteration, self.data.extent);
         let field_rates = self.field_rates(&rates);
-        let rate = |group, path: &str| Some(field_rates.get(path).copied().unwrap_or_else(|| rates.of(group)));
+        let rate = |group, path: &str| field_rates.get(path).copied().or_else(|| rates.of(group, path));
         self.state.adam.step_module("", &mut self.state.scene, &mut gradients, rate);
         if let Some(compression) = &mut self.state.compression {
             self.state.adam.step_module(COMPRESSION, compression, &mut gradients, rate);

@@ -145,7 +145,7 @@ impl Run {
     /// A checkpoint as a stream without loss, and where in the training it was written.
     fn encode(&self, path: &Path) -> Result<(Vec<u8>, String), TrainError> {
         let checkpoint: Checkpoint =
-            Checkpoint::load(path, &self.config, &self.config.model.field(), &ConfiguredModels, &self.device)?;
+            Checkpoint::load(path, &self.config, &self.config.model.build(), &ConfiguredModels, &self.device)?;
         let data = checkpoint.scene.to_arrays(scene_meta(&self.config, &self.dataset))?;
         let status = format!("{} stage, iteration {}", checkpoint.stage.name(), checkpoint.iteration);
         Ok((light4gs_codec::encode(&data)?, status))

@@ -356,7 +356,7 @@ fn a_coded_checkpoint_costs_no_more_than_0_05_db() {
     assert!(record.dataset().unwrap_err().to_string().contains("--scene"));
     let checkpoint = folder_of_run.last_checkpoint().unwrap();
     let loaded: Checkpoint =
-        Checkpoint::load(&checkpoint, &read, &read.model.field(), &ConfiguredModels, &device).unwrap();
+        Checkpoint::load(&checkpoint, &read, &read.model.build(), &ConfiguredModels, &device).unwrap();
     let frames = other_views(&scene.gaussians.to_arrays(), folder.path());
     let before = |frame: &Frame| pixels(&scene, config.data.background, frame);
     for frame in &frames.test {

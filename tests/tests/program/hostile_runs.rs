@@ -46,7 +46,7 @@ fn checkpoint(folder: &Path) -> (Config, PathBuf) {
 /// As `resume` does: the density strategy takes its part.
 fn load(path: &Path, config: &Config) -> Result<Checkpoint, TrainError> {
     let checkpoint: Checkpoint =
-        Checkpoint::load(path, config, &config.model.field(), &ConfiguredModels, &Device::flex().autodiff())?;
+        Checkpoint::load(path, config, &config.model.build(), &ConfiguredModels, &Device::flex().autodiff())?;
     let mut density = AdaptiveDensityControl::new(config.train.densify.strategies.adaptive.clone());
     density
         .restore(checkpoint.density.clone(), checkpoint.scene.gaussians.len())
@@ -332,7 +332,7 @@ fn found_before() {
     // Configurations that the encoder would refuse after the last iteration.
     for (key_value, key) in [
         ("model.hexplane.multipliers=[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17]", "model.hexplane.multipliers"),
-        ("compression.attributes.opacity_logit=1e-45", "compression.attributes.opacity_logit"),
+        ("compression.attributes.opacity_logits=1e-45", "compression.attributes.opacity_logits"),
         ("compression.steps.space_time=1e-45", "compression.steps.space_time"),
         ("compression.sh.step=1e300", "compression.sh.step"),
         ("data.initial_box=3e38", "data.initial_box"),
