@@ -84,6 +84,15 @@ pub enum CodecError {
         /// The number that is not known.
         encoding: u8,
     },
+    /// Gaussians have an attribute that the scene does not look right without, and nobody knows what it does.
+    #[error(
+        "gaussians: the attribute `{name}` has a part in what is seen, and neither this program nor the scene itself says which; \
+         use the program that wrote the file, or a newer one"
+    )]
+    UnknownAttribute {
+        /// Its name.
+        name: String,
+    },
     /// A section stands twice in the table.
     #[error("{section}: the section stands twice in the table, expected once; write the stream again")]
     DuplicateSection {

@@ -58,8 +58,10 @@ impl MotionEvaluator {
     /// Prepares the motion of a scene.
     ///
     /// # Errors
-    /// A network that contradicts itself or the hexplane.
+    /// A network that contradicts itself or the hexplane; an attribute without which the scene would look wrong, and that
+    /// nobody knows ([`SceneData::check_attributes_are_known`]).
     pub fn new(scene: &SceneData) -> Result<Self, CodecError> {
+        scene.check_attributes_are_known()?;
         let Some(MotionNetwork { network, sources, outputs }) = &scene.motion.network else {
             return Ok(Self { motion: None });
         };

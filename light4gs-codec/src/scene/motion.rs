@@ -1,6 +1,6 @@
 //! How the Gaussians move, as data.
 
-use super::GaussianArrays;
+use super::{FurtherAttribute, GaussianArrays, SceneData};
 use crate::{
     CodecError, Limits, Network,
     bytes::{Section, names::check_name},
@@ -146,6 +146,16 @@ impl MotionOutput {
 }
 
 impl MotionArrays {
+    /// Whether what an attribute does is known from here: the network reads it, or there is no network and the kind, which
+    /// only a program that knows it can use, is all there is.
+    fn knows(&self, attribute: &str) -> bool {
+        let is_read = |source: &MotionSource| matches!(source, MotionSource::Attribute(name) if name == attribute);
+        match &self.network {
+            Some(motion) => motion.sources.iter().any(is_read),
+            None => !self.kind.is_empty(),
+        }
+    }
+
     /// Refuses arrays that contradict themselves.
     pub(crate) fn check(&self, limits: &Limits) -> Result<(), CodecError> {
         self.check_structure(limits)?;
@@ -200,6 +210,21 @@ impl MotionArrays {
             }
         }
         Ok(())
+    }
+}
+
+impl SceneData {
+    /// Refuses to show a scene that would look wrong: one whose Gaussians have a further attribute that is not
+    /// [optional](crate::FurtherAttribute::optional), and that the motion does not read. Decoding such a scene is no error.
+    ///
+    /// # Errors
+    /// [`CodecError::UnknownAttribute`] with the first such name.
+    pub fn check_attributes_are_known(&self) -> Result<(), CodecError> {
+        let unknown = |attribute: &&FurtherAttribute| !attribute.optional && !self.motion.knows(&attribute.name);
+        match self.gaussians.further.iter().find(unknown) {
+            None => Ok(()),
+            Some(attribute) => Err(CodecError::UnknownAttribute { name: attribute.name.clone() }),
+        }
     }
 }
 

@@ -43,6 +43,9 @@ pub enum ModelError {
     /// What moves the Gaussians is not what its kind consists of.
     #[error("motion: {0}")]
     Motion(String),
+    /// The Gaussians have an attribute that the scene does not look right without, and nobody knows what it does.
+    #[error("{0}")]
+    UnknownAttribute(String),
     /// The planes are not six a scale in the shapes that the resolution gives.
     #[error("hexplanes: {0}")]
     Planes(String),
@@ -189,8 +192,10 @@ impl<F: DeformationField> DynamicScene<F> {
     /// The model of a decoded file, on any device.
     ///
     /// # Errors
-    /// Planes or layers that do not belong together, or are not what this kind of field needs.
+    /// Planes or layers that do not belong together, or are not what this kind of field needs; an attribute without which the
+    /// scene would look wrong, and that nobody knows.
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
+        data.check_attributes_are_known().map_err(|error| ModelError::UnknownAttribute(error.to_string()))?;
         if !F::KINDS.contains(&data.motion.kind.as_str()) {
             let expected = F::KINDS.join("` or `");
             return Err(ModelError::MotionKind { found: data.motion.kind.clone(), expected });

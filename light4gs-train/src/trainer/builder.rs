@@ -299,7 +299,14 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         // A field whose author has not said how it is coded trains all the same.
         let arrays = match scene.to_arrays(meta.clone()) {
             Err(ModelError::NoStreamForm { .. }) => scene.to_arrays_at_rest(meta),
-            arrays => arrays?,
+            arrays => {
+                let arrays = arrays?;
+                arrays.check_attributes_are_known().map_err(|error| {
+                    let remedy = "let the deformation field's network read it, or mark it with `Attribute::optional`";
+                    TrainError::Input(format!("{error}. As its author: {remedy}"))
+                })?;
+                arrays
+            }
         };
         let settings = &self.config.compression;
         match (&state.compression, settings.profile.coded()) {
