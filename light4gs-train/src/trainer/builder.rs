@@ -15,7 +15,7 @@ use super::Trainer;
 use super::profile::Profile;
 use super::views::ViewPools;
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
-use crate::config::Config;
+use crate::config::{AttributeRate, Config};
 use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
