@@ -175,3 +175,18 @@ fn a_four_dgs_file_reads_back_at_every_time() {
     assert!(error.contains("a.4dgs") && error.contains("t0"), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), bytes);
 }
+
+#[cfg(target_os = "linux")]
+#[test]
+fn readers_refuse_a_pipe() {
+    let folder = tempfile::tempdir().unwrap();
+    let pipe = folder.path().join("pipe.ply");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    let errors = [
+        light4gs_data::read_pytorch(&pipe).unwrap_err().to_string(),
+        light4gs_data::GaussianPly::read(&pipe).unwrap_err().to_string(),
+    ];
+    for text in errors {
+        assert!(text.contains("pipe.ply") && text.contains("expected a regular file"), "{text}");
+    }
+}

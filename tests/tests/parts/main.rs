@@ -7,6 +7,7 @@ mod context_model;
 mod every_legal_value;
 mod exact_networks;
 mod finite_differences;
+mod gpu_kernels;
 mod import;
 mod plane_convolutions;
 mod poisoned_scenes;

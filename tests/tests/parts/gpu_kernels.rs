@@ -1,0 +1,99 @@
+//! Kernels of the wgpu back end where the other tests of back ends do not look: functions far into their tails, and lists that
+//! are longer than one launch takes.
+
+use burn::tensor::{Device, Tensor, TensorData};
+use glam::Vec3;
+use light4gs_data::Camera;
+use light4gs_model::ops::lower_bound::lower_bound;
+use light4gs_model::ops::normal_cdf::normal_cdf;
+use light4gs_model::{GaussianTensors, PixelContribution, Significance, Splatter};
+
+/// Values and gradient of a function, at places far into the tails and on both sides of the bound.
+fn run(function: fn(Tensor<1>) -> Tensor<1>, device: Device, count: usize) -> [Vec<f32>; 2] {
+    let device = device.autodiff();
+    let places: Vec<f32> = (0..count).map(|i| i as f32 * 0.01 - 13.0).collect();
+    let leaf = Tensor::<1>::from_floats(places.as_slice(), &device).require_grad();
+    let values = function(leaf.clone());
+    // Upstream gradients of both signs.
+    let signs: Vec<f32> = (0..count).map(|i| [1.0, -0.5, 0.0][i % 3]).collect();
+    let signs = Tensor::from_floats(signs.as_slice(), &device);
+    let gradients = (values.clone() * signs).sum().backward();
+    let gradient = leaf.grad(&gradients).expect("the leaf has a gradient");
+    [values.into_data(), gradient.into_data()].map(|data| data.iter::<f32>().collect())
+}
+
+#[test]
+fn values_and_gradients_are_those_of_the_cpu() {
+    for (what, function) in
+        [("normal cdf", normal_cdf as fn(Tensor<1>) -> Tensor<1>), ("lower bound", |x| lower_bound(x, 0.11))]
+    {
+        for count in [0, 1, 2600] {
+            let expected = run(function, Device::flex(), count);
+            let found = run(function, Device::wgpu(Default::default()), count);
+            for (found, expected) in found.iter().zip(&expected) {
+                assert_eq!(found.len(), count);
+                for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
+                    // At -13 a rounding of the exponent, which is -84, is 4e-6 of the value.
+                    let allowed = 1e-5 * expected.abs();
+                    assert!((found - expected).abs() <= allowed, "{what} {i}: {found} against {expected}");
+                }
+            }
+        }
+    }
+}
+
+const SIDE: u32 = 8;
+
+/// Faint dots, each in the middle of one pixel of an image that is one cell, no two at one depth: nothing hangs on
+/// the last bit.
+fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
+    let camera = Camera::look_at(Vec3::new(0.3, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIDE, SIDE);
+    let place = |i: usize| {
+        let pixel = i as u32 % (SIDE * SIDE);
+        let across = ((pixel % SIDE) as f32 + 0.5 - camera.cx) / camera.fx;
+        let down = ((pixel / SIDE) as f32 + 0.5 - camera.cy) / camera.fy;
+        let depth = 2.0 + 1e-4 * i as f32;
+        (camera.rotation.transpose() * (Vec3::new(across, down, 1.0) * depth - camera.translation)).to_array()
+    };
+    let means: Vec<f32> = (0..count).flat_map(place).collect();
+    let quats = [1.0, 0.0, 0.0, 0.0].repeat(count);
+    let gaussians = GaussianTensors {
+        means: Tensor::from_data(TensorData::new(means, [count, 3]), device),
+        quats: Tensor::from_data(TensorData::new(quats, [count, 4]), device),
+        log_scales: Tensor::full([count, 3], -7.0, device),
+        // An alpha of 0.0055: above 1/255 in its pixel, below it in the next.
+        opacity_logits: Tensor::full([count, 1], -5.2, device),
+        sh_dc: Tensor::zeros([count, 1, 3], device),
+        sh_rest: Tensor::zeros([count, 15, 3], device),
+        further: Vec::new(),
+    };
+    (gaussians, camera)
+}
+
+/// No Gaussian, one, and more in one cell than one launch takes.
+#[test]
+fn scores_are_those_of_the_cpu() {
+    for count in [0, 1, 40_000] {
+        let run = |device: Device| {
+            let (gaussians, camera) = dots(count, &device);
+            let mut significance = Significance::new(count);
+            significance.add(&Splatter::new([0.0; 3], 0), gaussians, &camera);
+            significance
+        };
+        let (found, expected) = (run(Device::wgpu(Default::default())), run(Device::flex()));
+        assert_eq!(found.sums(PixelContribution::PixelCount), vec![1.0; count]);
+        for score in [
+            PixelContribution::PixelCount,
+            PixelContribution::Opacity,
+            PixelContribution::BlendingWeight,
+            PixelContribution::TransmittanceOpacity,
+        ] {
+            for (i, (found, expected)) in found.sums(score).iter().zip(expected.sums(score)).enumerate() {
+                assert!(
+                    (found - expected).abs() <= 1e-4 * expected,
+                    "{score:?} of {i} in {count}: {found} against {expected}"
+                );
+            }
+        }
+    }
+}
