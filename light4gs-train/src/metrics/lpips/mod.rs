@@ -14,11 +14,11 @@ use burn::tensor::activation::relu;
 use burn::tensor::module::{interpolate, max_pool2d};
 use burn::tensor::ops::{InterpolateMode, InterpolateOptions, MaxPoolOptions};
 use burn::tensor::{Device, Tensor};
+use light4gs_data::DataError;
 
 pub use network::LpipsNetwork;
 
 use super::masked_mean;
-use crate::error::TrainError;
 
 /// What the images are shifted and scaled by, after they are mapped to [-1, 1].
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
@@ -44,7 +44,7 @@ impl Lpips {
     ///
     /// # Errors
     /// A file that cannot be read, and a network of which a part is missing or has another shape.
-    pub fn load(files: &[PathBuf], device: &Device) -> Result<Vec<Self>, TrainError> {
+    pub fn load(files: &[PathBuf], device: &Device) -> Result<Vec<Self>, DataError> {
         weights::load(files, device)
     }
 

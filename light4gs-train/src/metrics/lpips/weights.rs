@@ -16,7 +16,6 @@ use safetensors::{Dtype, SafeTensors};
 
 use super::network::LayerShape;
 use super::{Lpips, LpipsNetwork};
-use crate::error::TrainError;
 
 const REMEDY: &str = "see docs/metrics.md for where the weights are published";
 
@@ -27,14 +26,14 @@ struct WeightFile {
 }
 
 /// The networks that the files make up.
-pub(super) fn load(files: &[PathBuf], device: &Device) -> Result<Vec<Lpips>, TrainError> {
+pub(super) fn load(files: &[PathBuf], device: &Device) -> Result<Vec<Lpips>, DataError> {
     let files = files.iter().map(|path| WeightFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     for file in &files {
         if LpipsNetwork::ALL.into_iter().all(|network| !file.has_network(network) && !file.has_heads(network)) {
             let names: Vec<&str> = file.tensors.keys().take(4).map(String::as_str).collect();
             let problem =
                 format!("neither convolutions nor heads of AlexNet or VGG-16 (it has {}, ...)", names.join(", "));
-            return Err(DataError::field(&file.path, "tensors", problem, REMEDY).into());
+            return Err(DataError::field(&file.path, "tensors", problem, REMEDY));
         }
     }
     let mut found = Vec::new();
@@ -52,15 +51,15 @@ pub(super) fn load(files: &[PathBuf], device: &Device) -> Result<Vec<Lpips>, Tra
 }
 
 impl WeightFile {
-    fn read(path: &Path) -> Result<Self, TrainError> {
+    fn read(path: &Path) -> Result<Self, DataError> {
         let is_safetensors = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("safetensors"));
         let tensors = if is_safetensors { read_safetensors(path)? } else { read_pytorch(path)? };
         Ok(Self { path: path.to_owned(), tensors })
     }
 
-    fn lacks(&self, network: LpipsNetwork, what: &str) -> TrainError {
+    fn lacks(&self, network: LpipsNetwork, what: &str) -> DataError {
         let problem = format!("it belongs to {network}, whose {what} are in none of the files named");
-        DataError::field(&self.path, "tensors", problem, "name the file that has them too").into()
+        DataError::field(&self.path, "tensors", problem, "name the file that has them too")
     }
 
     /// The first of the names that is there.
@@ -81,10 +80,10 @@ impl WeightFile {
     }
 
     /// A tensor of a given shape; the first of the names is the one that errors tell.
-    fn take(&self, names: &[String], shape: &[usize]) -> Result<Vec<f32>, TrainError> {
+    fn take(&self, names: &[String], shape: &[usize]) -> Result<Vec<f32>, DataError> {
         let wrong = |field: &str, problem: String| {
             let known = names.join("`, `");
-            DataError::field(&self.path, field, format!("{problem} (known names: `{known}`)"), REMEDY).into()
+            DataError::field(&self.path, field, format!("{problem} (known names: `{known}`)"), REMEDY)
         };
         let (name, tensor) = self.find(names).ok_or_else(|| wrong(&names[0], "it is missing".into()))?;
         if tensor.shape != shape {
@@ -129,7 +128,7 @@ fn assemble(
     convolutions: &WeightFile,
     heads: &WeightFile,
     device: &Device,
-) -> Result<Lpips, TrainError> {
+) -> Result<Lpips, DataError> {
     let constant = |values: Vec<f32>, shape: [usize; 4]| {
         Param::from_tensor(Tensor::<4>::from_data(TensorData::new(values, shape), device)).set_require_grad(false)
     };
@@ -139,7 +138,7 @@ fn assemble(
         let bias = convolutions.take(&convolution_names(number, layer, "bias"), &[layer.outputs])?;
         let bias = Tensor::<1>::from_data(TensorData::new(bias, [layer.outputs]), device);
         let LayerShape { stride, kernel, padding, .. } = *layer;
-        Ok::<_, TrainError>(Conv2d {
+        Ok::<_, DataError>(Conv2d {
             weight: constant(weight, shape),
             bias: Some(Param::from_tensor(bias).set_require_grad(false)),
             stride: [stride; 2],
@@ -151,7 +150,7 @@ fn assemble(
     };
     let head = |(tap, channels): (usize, usize)| {
         let shape = [1, channels, 1, 1];
-        Ok::<_, TrainError>(constant(heads.take(&head_names(tap), &shape)?, shape))
+        Ok::<_, DataError>(constant(heads.take(&head_names(tap), &shape)?, shape))
     };
     Ok(Lpips {
         convolutions: network.layers().iter().enumerate().map(convolution).collect::<Result<_, _>>()?,
