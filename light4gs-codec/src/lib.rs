@@ -51,7 +51,7 @@
 //! model](ContextModelArrays), spherical harmonics under [tables or small networks](ShCoding), other [`attributes`] and
 //! [network weights](network_weights) adaptively. Networks that choose a coding interval are evaluated by an executor
 //! of this crate in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
-//! They travel as [descriptions](network): what a network consists of is the model's affair, not this crate's.
+//! They travel as [descriptions](network): what a network consists of is up to the model.
 //! The encoder decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`]
 //! section by section, and [`info`] tells what is inside.
 //!

@@ -1,7 +1,7 @@
 //! Files that are either complete or absent: write beside, flush to the disk, then rename.
 //!
 //! What is being written is locked by its writer, and the lock ends with the process: a temporary file that nobody has
-//! locked was left by a write that was killed, and is swept.
+//! locked was left by a process that was killed, and is removed.
 
 use crate::error::DataError;
 use std::collections::BTreeSet;

@@ -1,4 +1,4 @@
-//! What a dataset was: a value to keep beside a run, and what has changed since, in words.
+//! The digest of a dataset, which a run keeps, and what has changed since it was taken, in words.
 
 mod changes;
 mod content;

@@ -1,4 +1,4 @@
-//! The factorised entropy bottleneck of the hyperprior's latents (Ballé et al. 2018, as in CompressAI; docs/design.md).
+//! The factorized entropy bottleneck of the latents (Ballé et al. 2018, as in CompressAI; docs/design.md).
 
 use std::ops::RangeInclusive;
 

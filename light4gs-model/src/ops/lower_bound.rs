@@ -1,4 +1,4 @@
-//! `max(x, bound)` whose gradient does not die below the bound (Ballé et al. 2018, as in CompressAI).
+//! `max(x, bound)` with a gradient below the bound too (Ballé et al. 2018, as in CompressAI).
 //!
 //! The derivative of a maximum is zero below the bound, so what has once fallen below would never come back. Here a
 //! gradient also passes there if a descent step along it increases x. That depends on the sign of the incoming

@@ -2,7 +2,7 @@
 //!
 //! [`BUILT_IN`] are the attributes of every scene, which the splatter needs. A scene may have further ones: give
 //! [`GaussiansConfig`] an [`Attribute`], and it is trained at its rate, copied where a Gaussian is cloned or split, kept in
-//! checkpoints, and coded with its step. What it does to the image is the affair of a
+//! checkpoints, and coded with its step. What it does to the image is decided by a
 //! [`DeformationField`](crate::DeformationField), which gets everything that a Gaussian has.
 //!
 //! ```

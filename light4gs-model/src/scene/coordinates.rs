@@ -1,4 +1,4 @@
-//! The scene's own coordinates: principal axes of the initial cloud, standardised and contracted (paper III-A).
+//! The scene's own coordinates: principal axes of the initial cloud, standardized and contracted (paper III-A).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
@@ -18,7 +18,7 @@ pub struct Pca {
     pub std: [f32; 3],
 }
 
-/// Spread below this share of the largest one counts as this share, so that flat clouds can be standardised.
+/// Spread below this share of the largest one counts as this share, so that flat clouds can be standardized.
 const MIN_RELATIVE_STD: f64 = 1e-4;
 
 impl Pca {
@@ -157,7 +157,7 @@ impl SceneCoordinates {
         self.mapping
     }
 
-    /// Standardised coordinates along the principal axes: `[N, 3]` to `[N, 3]`.
+    /// Standardized coordinates along the principal axes: `[N, 3]` to `[N, 3]`.
     pub fn standardize(&self, points: Tensor<2>) -> Tensor<2> {
         (points - self.mean.val()).matmul(self.axes.val() / self.std.val())
     }

@@ -1,4 +1,4 @@
-//! The factorised entropy model of the spherical harmonics: a learned density for each channel (paper III-D).
+//! The factorized entropy model of the spherical harmonics: a learned density for each channel (paper III-D).
 
 use std::ops::RangeInclusive;
 

@@ -1,4 +1,4 @@
-//! How coarsely positions, scales, rotations, opacities and constant colors may be quantized.
+//! The coarsest steps of positions, scales, rotations, opacities and constant colors.
 //!
 //! The error that an attribute's step puts into the images grows with its square, and a halved step costs a bit for
 //! each number. So for a given error in total the file is smallest when every number of every attribute brings the

@@ -84,8 +84,8 @@ pub struct PlaneRecord {
     pub step: f32,
     /// Values.
     pub symbols: usize,
-    /// Bytes of the hyperprior.
-    pub hyperprior_bytes: u64,
+    /// Bytes of the latent.
+    pub latent_bytes: u64,
     /// Bytes of the values.
     pub value_bytes: u64,
 }
@@ -189,7 +189,7 @@ fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Com
         name: plane_name(bytes.plane),
         step: steps[bytes.plane],
         symbols: encoded.decoded.hexplane.planes[bytes.plane].values.len(),
-        hyperprior_bytes: bytes.latent,
+        latent_bytes: bytes.latent,
         value_bytes: bytes.anchors + bytes.others,
     };
     encoded.coded.report.planes.iter().map(record).collect()

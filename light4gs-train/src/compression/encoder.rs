@@ -67,7 +67,7 @@ impl BitMap {
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BitEstimate {
-    /// Of the hexplanes' values and hyperpriors.
+    /// Of the hexplanes' values and latents.
     pub hexplanes: f64,
     /// Of the spherical harmonics beyond degree 0.
     pub sh: f64,
@@ -117,9 +117,10 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 const FREEZING_ROUNDS: usize = 8;
 
 /// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
-/// hyperprior is made from the planes, so decoded planes may ask for another one, and decode to others in turn. A hyperprior
-/// that answers strongly to rounding never settles, and rounding what has been rounded would carry the planes further away
-/// in every round: then they are those that are decoded first, and encoding them again rounds them once more.
+/// latent is computed from the planes, so decoded planes may have another latent, and decode to other values in turn. So they
+/// are encoded and decoded again until they no longer change. For some hyperpriors that never happens, and each round would
+/// take the planes further from the trained ones: then the result is what was decoded first, and encoding that again rounds
+/// it once more.
 ///
 /// None if there are no planes or no models of them. `device`, with autodiff, is where the result lives.
 ///

@@ -6,8 +6,8 @@
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: a scene and its models into the bytes of a file
 //! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
-//! - `attribute_step_search`: how coarsely the other attributes may be quantized
-//! - `plane_and_sh_step_search`: how coarsely planes and harmonics may be that never saw noise in training
+//! - `attribute_step_search`: the coarsest steps of the other attributes
+//! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
 
 mod attribute_step_search;
 mod code_scene;

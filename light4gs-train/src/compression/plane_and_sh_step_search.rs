@@ -1,7 +1,7 @@
-//! How coarsely planes and spherical harmonics may be quantized that were trained without noise: by another program, say.
+//! The coarsest steps of planes and spherical harmonics that were trained without noise, for example by another program.
 //!
-//! A scene that is trained for a rate gets used to its steps. One that was not may need finer ones; how fine, renderings
-//! tell. The error grows with the square of the step, so that a look at one step says nearly what to take.
+//! A scene that is trained with the rate adapts to its steps. Another one may need finer ones, and renderings tell how fine:
+//! the error grows with the square of the step, so the error of one step says nearly which to take.
 
 use light4gs_codec::SceneData;
 use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_TIME_PLANES};

@@ -24,7 +24,7 @@ pub struct NoisyScene<F: DeformationField = HexPlaneField> {
 /// Estimated bits of a file's planes and spherical harmonics.
 #[derive(Clone, Debug)]
 pub struct Rate {
-    /// `[1]`: of all planes, hyperpriors included; 0 for frozen planes.
+    /// `[1]`: of all planes, latents included; 0 for frozen planes.
     pub planes: Tensor<1>,
     /// Values of all planes.
     pub plane_symbols: usize,

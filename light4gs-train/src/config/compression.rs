@@ -71,8 +71,8 @@ keys! {
         /// distortion, or `"per_symbol"`, bits per plane symbol plus bits per symbol of the spherical harmonics.
         weighting: RateWeighting = RateWeighting::Megabytes;
             Word(RateWeighting::NAMES), "ours; paper", "what lambda weighs; or \"per_symbol\", as the paper";
-        /// The rate of the planes shapes the planes. Off: their entropy model learns beside them, and they do not
-        /// hear of it.
+        /// The rate of the planes shapes the planes. Off: their entropy model is trained, but its gradient does
+        /// not reach the planes.
         planes: bool = true;
             Flag, "ours, for the ablation", "false = the rate trains the planes' model only, not the planes";
         /// The same for the spherical harmonics.
@@ -81,7 +81,7 @@ keys! {
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
         /// Share of the planes, and of the Gaussians, on which it is estimated; the estimate is unbiased.
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours", "of the planes and the Gaussians";
-        /// Iteration of the fine stage from which planes carry the noise of quantization and the rate counts.
+        /// Iteration of the fine stage from which planes have quantization noise and the rate counts.
         /// Spherical harmonics join once densification is over.
         from: usize = 1000; ITERATION, "reference: 3; SH 2000";
         /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will
@@ -108,15 +108,15 @@ keys! {
         /// (`"reference"`).
         architecture: ContextArchitecture = ContextArchitecture::Compact;
             Word(ContextArchitecture::NAMES), "ours; reference", "or \"reference\", the public code's sizes";
-        /// The lowest scale's space-time planes send a hyperprior.
+        /// The lowest scale's space-time planes have a hyperprior.
         hyperprior: bool = true; Flag, "paper";
-        /// Half of the lowest scale's positions are coded in sight of the other half.
+        /// Half of the lowest scale's positions are coded with the other half as context.
         checkerboard: bool = true; Flag, "paper";
         /// Space-only planes are predicted from the space-time planes over their axes.
         inter_plane: bool = true; Flag, "paper";
         /// Higher scales are predicted from the scale below.
         inter_scale: bool = true; Flag, "paper";
-        /// Higher scales send a hyperprior as well. Needs `hyperprior` and `inter_scale`.
+        /// Higher scales have a hyperprior as well. Needs `hyperprior` and `inter_scale`.
         high_scale_hyperprior: bool = false; Flag, "reference", "the public code's";
         /// Learning rate of the context model at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";

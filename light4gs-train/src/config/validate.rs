@@ -131,7 +131,7 @@ impl Check {
     fn encodable(&mut self, key: &str, answer: Result<(), CodecError>) {
         let known = self.problems.iter().any(|problem| problem.key == key);
         if let (Err(error), false) = (answer, known) {
-            self.that(key, false, || format!("is nothing that the encoder takes: {error}"));
+            self.that(key, false, || format!("cannot be encoded: {error}"));
         }
     }
 }

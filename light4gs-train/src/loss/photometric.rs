@@ -13,7 +13,7 @@ keys! {
         /// Weight of D-SSIM in the loss, 0 to 1; L1 has the rest.
         lambda_dssim: f32 = 0.0; SHARE, "reference";
         /// The loss is the squared difference until this iteration of the fine stage (and in the coarse stage, if not
-        /// 0). L1 is content with the median, which for a fast object is the background behind it.
+        /// 0). L1 is smallest at the median, which for a fast object is the background behind it.
         l2_until: usize = 0; ITERATION, "ours", "iteration; squared differences until then keep fast objects alive";
     }
 }

@@ -37,7 +37,7 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
          <th scope=\"col\" class=\"number\">Bits a value</th></tr></thead>\n<tbody>\n",
     );
     for plane in &record.planes {
-        let bits = 8.0 * (plane.value_bytes + plane.hyperprior_bytes) as f64 / plane.symbols.max(1) as f64;
+        let bits = 8.0 * (plane.value_bytes + plane.latent_bytes) as f64 / plane.symbols.max(1) as f64;
         let _ = writeln!(
             html,
             "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td><td class=\"number\">{}</td><td class=\"number\">{}</td>\
@@ -46,7 +46,7 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
             fixed(plane.step.into(), 5),
             count(plane.symbols as u64),
             count(plane.value_bytes),
-            count(plane.hyperprior_bytes),
+            count(plane.latent_bytes),
             fixed(bits, 3)
         );
     }

@@ -61,7 +61,7 @@ fn bit_map() -> BitMap {
 }
 
 fn coding_record() -> CodingRecord {
-    let plane = PlaneRecord { name: "0.xy".into(), step: 0.05, symbols: 512, hyperprior_bytes: 3, value_bytes: 64 };
+    let plane = PlaneRecord { name: "0.xy".into(), step: 0.05, symbols: 512, latent_bytes: 3, value_bytes: 64 };
     CodingRecord {
         profile: crate::config::FileProfile::Compact,
         fit_seconds: None,

@@ -143,7 +143,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
     /// Reads a checkpoint of a run with this configuration, this scene and these entropy models onto an autodiff device. The
     /// scene is the run's before it was trained: its deformation field, and what its Gaussians have.
     ///
-    /// Nothing in the file is believed: every tensor must be there, of the shape that the configuration and the number of
+    /// Nothing in the file is trusted: every tensor must be there, of the shape that the configuration and the number of
     /// Gaussians give it, with finite values that training can have led to, and no other; the place in the run must be on
     /// its schedule.
     ///

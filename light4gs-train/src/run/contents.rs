@@ -124,7 +124,7 @@ fn is_leftover(name: &str) -> bool {
     is_temporary_name(name) || of_a_process() == Some(true)
 }
 
-/// Removes what killed writes have left anywhere in a run folder. The caller holds its lock.
+/// Removes temporary files of killed processes from a run folder. The caller holds its lock.
 pub(super) fn sweep(root: &Path) {
     let renders = root.join("renders");
     let splits = fs::read_dir(&renders).into_iter().flatten().flatten().map(|entry| entry.path());

@@ -2,7 +2,7 @@
 //! `eval.json`, `renders/`, `report.html`.
 //!
 //! `run.json` is written last when a run is made, and removed first when it is replaced: where it is, the rest is whole.
-//! Whatever a process that was killed leaves can be gone on from, or begun anew (see [`contents`](super::contents)).
+//! A run whose process was killed can be continued, or begun anew (see [`contents`](super::contents)).
 
 use std::fs;
 use std::io::Write;
@@ -184,7 +184,7 @@ impl RunFolder {
         Ok((folder, record, config))
     }
 
-    /// Makes sure that this process is the only one that writes into the folder, and sweeps what killed writes have left
+    /// Makes sure that this process is the only one that writes into the folder, and removes what killed processes left
     /// in it. Nothing happens where the folder is locked by this value already.
     ///
     /// # Errors

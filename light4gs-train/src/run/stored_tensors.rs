@@ -1,4 +1,4 @@
-//! The tensors of a checkpoint's file, each of which is checked before it is believed.
+//! The tensors of a checkpoint's file, each checked before it is used.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 

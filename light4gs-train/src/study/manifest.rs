@@ -1,5 +1,5 @@
-//! `study.json`: what a study's folder is to hold. Tasks and tables read it alone, so that a study goes on as it was begun,
-//! on whatever machine.
+//! `study.json`: what a study's folder is to hold. Tasks and tables read it alone, so that a study continues as it was begun,
+//! on any machine.
 
 use std::fs;
 use std::io::Write;

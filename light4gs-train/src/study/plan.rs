@@ -23,7 +23,7 @@ pub struct PlanOptions {
     pub overrides: Vec<String>,
     /// Runs of each variant on each scene, which differ in their seed. At least 1.
     pub seeds: u64,
-    /// Folders of other studies, whose trainings are taken over.
+    /// Folders of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
 }
 
@@ -77,7 +77,7 @@ pub struct Plan {
     pub seeds: u64,
     /// Scene by scene, seed by seed, variant by variant.
     pub runs: Vec<PlannedRun>,
-    /// Absolute paths of other studies, whose trainings are taken over.
+    /// Absolute paths of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
 }
 

@@ -1,7 +1,7 @@
-//! What the runs have come to so far.
+//! The results of the runs so far.
 //!
 //! `results.json` and `results.csv` hold what every repetition of the study must give again, `times.csv` what depends on the
-//! machine and the hour.
+//! machine and its load.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Inputs that nobody should be able to hurt the program with, made by the hundred from a seed.
+//! Hostile inputs, made by the hundred from a seed.
 //!
 //! `LIGHT4GS_HOSTILE_CASES` says how many each test makes (short runs in CI are in the tests themselves), and
 //! `LIGHT4GS_HOSTILE_SEED` which ones.

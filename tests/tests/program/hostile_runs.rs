@@ -1,5 +1,5 @@
 //! Damaged checkpoints, configurations, run folders and datasets by the hundred: refused with file and field named, or
-//! borne; never a panic. `LIGHT4GS_HOSTILE_CASES=5000` makes a long run of it.
+//! accepted; never a panic. `LIGHT4GS_HOSTILE_CASES=5000` makes a long run of it.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -170,7 +170,7 @@ fn odd_configurations_are_refused_or_train() {
 }
 
 #[test]
-fn damaged_run_folders_are_borne() {
+fn damaged_run_folders_do_no_harm() {
     let w = Workspace::new(PROGRAM);
     assert_success(&w.train("run", &TINY_COMPRESSION).output().unwrap());
     let checkpoint = format!("checkpoints/{}", w.names("run/checkpoints").last().unwrap());
@@ -212,7 +212,7 @@ fn damaged_run_folders_are_borne() {
 }
 
 #[test]
-fn damaged_datasets_are_borne() {
+fn damaged_datasets_do_no_harm() {
     let folder = tempfile::tempdir().unwrap();
     let scene = scene(folder.path());
     let files = ["transforms_train.json", "transforms_test.json", "train/r_000.png", "test/r_000.png"];

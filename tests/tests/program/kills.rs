@@ -1,4 +1,4 @@
-//! SIGKILL at any moment: every folder can be resumed or begun again, to the same bytes, and nothing is left lying around.
+//! SIGKILL at any moment: every folder can be resumed or begun again and ends with the same bytes, and no temporary file stays.
 //!
 //! `LIGHT4GS_KILLS=100` spreads a hundred kills over a run; a short run has a few.
 
@@ -147,7 +147,7 @@ fn starts_that_were_stopped_are_begun_again() {
     let expected = fs::read(w.path("whole/scene.l4gs")).unwrap();
     let config = fs::read(w.path("whole/config.toml")).unwrap();
 
-    // Between `config.toml` and `run.json`, with what killed writes leave; by this version, which locks, and without.
+    // Between `config.toml` and `run.json`, with temporary files of killed processes; by this version, which locks, and without.
     for (run, locked) in [("locked", true), ("unlocked", false)] {
         let root = w.path(run);
         fs::create_dir_all(root.join("checkpoints")).unwrap();

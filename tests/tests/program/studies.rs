@@ -84,7 +84,7 @@ fn a_study_from_plan_to_table() {
     assert_eq!(fs::read(lost.join("scene.l4gs")).unwrap(), bytes);
     assert_eq!(fs::read_to_string(w.path("study/table.md")).unwrap(), table);
 
-    // Another study takes over what this one has trained, and says so; its files are those of its own training.
+    // Another study reuses what this one has trained, and says so; its files are those of its own training.
     let command = |more: &[&str]| study(&w, "latency", &[&["--out", "other", "--reuse", "study"], more].concat());
     let plan = String::from_utf8(run(command(&["--dry-run"])).stdout).unwrap();
     assert!(plan.contains("reused") && plan.contains("4 runs in 4 tasks, 0 iterations"), "{plan}");

@@ -1,4 +1,4 @@
-//! What pruning leaves: the first and the last frame, and the Gaussians that draw them.
+//! What pruning leaves of the Gaussians: the first and the last frame, and the Gaussians that draw them.
 
 use burn::tensor::Device;
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene};
