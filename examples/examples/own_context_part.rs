@@ -106,7 +106,7 @@ impl EntropyModels for WithProfile {
 }
 
 /// The weights of our part, as they are in a training.
-fn weights(trainer: &Trainer<light4gs_model::HexPlaneField, WithProfile>) -> Vec<f32> {
+fn weights(trainer: &Trainer<light4gs_model::BuiltInField, WithProfile>) -> Vec<f32> {
     let models = trainer.compression().and_then(|models| models.planes.as_ref()).expect("the rate is in the loss");
     models.context.profile.conv.to_layer().weight
 }

@@ -11,7 +11,7 @@ use light4gs_codec::{Network, ShPrior, ShSource, decode, network::Operation};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    ContextModel, DynamicScene, HexPlaneField, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first,
+    BuiltInField, ContextModel, DynamicScene, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first,
     channels_last, gaussian_bits, round_around,
 };
 use light4gs_train::compression::{ConfiguredModels, EntropyModels};
@@ -102,7 +102,7 @@ fn main() -> Outcome {
 
     // Trained: the model learns in the loop, from the rate in the loss.
     let mut trainer = Trainer::builder(config, data).entropy_models(WithColorAndPlace).build()?;
-    let model = |trainer: &Trainer<HexPlaneField, WithColorAndPlace>| {
+    let model = |trainer: &Trainer<BuiltInField, WithColorAndPlace>| {
         trainer.compression().and_then(|models| models.sh.clone()).expect("the rate is in the loss").valid()
     };
     let before = model(&trainer).priors();
@@ -120,7 +120,7 @@ fn main() -> Outcome {
     // Decoded: what comes out is what the Burn module says, but for values on the edge between two symbols. The
     // module looks at what a decoder has.
     let decoded = decode(&coded.bytes)?;
-    let scene = DynamicScene::<HexPlaneField>::from_arrays(&decoded, &Device::flex())?;
+    let scene = DynamicScene::<BuiltInField>::from_arrays(&decoded, &Device::flex())?;
     let again = model.quantize(scene.gaussians.sh_rest.val(), &known(&scene));
     let ours: Vec<f32> = again.into_data().iter::<f32>().collect();
     let exact = &decoded.gaussians.sh_rest;

@@ -18,8 +18,8 @@ use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::parameters::{ParameterMapper, map_parameters, update_parameters};
 use light4gs_model::{
-    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussiansConfig, HexPlaneConfig, HexPlaneFieldConfig,
-    PixelContribution, Significance, Splatter,
+    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussiansConfig, HexPlaneConfig, HexPlaneField,
+    HexPlaneFieldConfig, PixelContribution, Significance, Splatter,
 };
 
 const STEPS: u32 = 10;
@@ -73,7 +73,7 @@ fn train(device: &Device) -> [f32; 3] {
         splatter.render(gaussians, &camera, None).image
     });
 
-    let loss = |scene: &DynamicScene| {
+    let loss = |scene: &DynamicScene<HexPlaneField>| {
         let terms = cameras.iter().zip(&images).enumerate().map(|(time, (camera, image))| {
             let rendering = splatter.render(scene.at(time as f32), camera, None);
             (rendering.image - Tensor::from_inner(image.clone())).abs().mean()
@@ -132,7 +132,7 @@ impl ParameterMapper for Adam<'_> {
 }
 
 /// The field's numbers are the same on every back end, whose random numbers are not.
-fn scene(cloud: &PointCloud, device: &Device) -> DynamicScene {
+fn scene(cloud: &PointCloud, device: &Device) -> DynamicScene<HexPlaneField> {
     let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
     let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(16));
     let scene = DynamicSceneConfig::new(GaussiansConfig::new(), field).init(cloud, device);

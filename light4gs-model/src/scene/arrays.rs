@@ -51,6 +51,16 @@ pub enum ModelError {
     Planes(String),
 }
 
+impl ModelError {
+    /// That a file is not of one of these kinds.
+    pub(crate) fn kind(found: &str, known: &[&str]) -> Self {
+        // Where nothing moves a file has no name for it.
+        let named = |kind: &&str| if kind.is_empty() { "still".to_owned() } else { (*kind).to_owned() };
+        let expected = known.iter().map(named).collect::<Vec<_>>().join("` or `");
+        Self::MotionKind { found: named(&found), expected }
+    }
+}
+
 /// Row-major values of a tensor.
 fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().iter::<f32>().collect()
@@ -197,8 +207,7 @@ impl<F: DeformationField> DynamicScene<F> {
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
         data.check_attributes_are_known().map_err(|error| ModelError::UnknownAttribute(error.to_string()))?;
         if !F::KINDS.contains(&data.motion.kind.as_str()) {
-            let expected = F::KINDS.join("` or `");
-            return Err(ModelError::MotionKind { found: data.motion.kind.clone(), expected });
+            return Err(ModelError::kind(&data.motion.kind, F::KINDS));
         }
         let planes = match data.hexplane.planes.is_empty() {
             true => None,

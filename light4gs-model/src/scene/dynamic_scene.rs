@@ -5,14 +5,13 @@ use burn::tensor::Device;
 use light4gs_data::PointCloud;
 
 use super::coordinates::{CoordinatesConfig, SceneCoordinates};
-use super::field::DeformationField;
+use super::field::{BuiltInField, DeformationField};
 use super::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
 use super::hexplane::HexPlane;
-use super::hexplane_field::HexPlaneField;
 
 /// Configuration of a [`DynamicScene`].
 #[derive(Clone, Debug)]
-pub struct DynamicSceneConfig<F: DeformationField = HexPlaneField> {
+pub struct DynamicSceneConfig<F: DeformationField = BuiltInField> {
     /// The Gaussians.
     pub gaussians: GaussiansConfig,
     /// What moves them.
@@ -68,7 +67,7 @@ impl<F: DeformationField> DynamicSceneConfig<F> {
 /// assert_eq!(scene.at(0.25).means.dims(), [3, 3]);
 /// ```
 #[derive(Module, Debug)]
-pub struct DynamicScene<F: Module = HexPlaneField> {
+pub struct DynamicScene<F: Module = BuiltInField> {
     /// At rest.
     pub gaussians: Gaussians,
     /// From world coordinates to the field's.

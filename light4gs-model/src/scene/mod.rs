@@ -8,25 +8,22 @@ mod arrays;
 pub mod attributes;
 pub(crate) mod contraction;
 pub(crate) mod coordinates;
-pub(crate) mod deformation;
 pub(crate) mod dynamic_scene;
 pub(crate) mod field;
 mod further;
 pub(crate) mod gaussians;
 pub(crate) mod hexplane;
-pub(crate) mod hexplane_field;
 pub mod regularizer;
-mod still_field;
 
 pub use arrays::ModelError;
 pub use attributes::Attribute;
 pub use contraction::contract;
 pub use coordinates::{CoordinatesConfig, Pca, SceneCoordinates};
-pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
-pub use field::{DeformationField, FinePosition, LearningRate, Offsets, SceneAtRest};
+pub use field::{
+    BuiltInField, BuiltInFieldConfig, Deformation, DeformationConfig, DeformationField, DeformationHead, FinePosition,
+    HexPlaneField, HexPlaneFieldConfig, LearningRate, Offsets, SceneAtRest, StillField,
+};
 pub use further::{FurtherParameters, FurtherTensor};
 pub use gaussians::{ActivatedGaussians, AttributeMapper, GaussianTensors, Gaussians, GaussiansConfig};
 pub use hexplane::{HexPlane, HexPlaneConfig, query_planes};
-pub use hexplane_field::{HexPlaneField, HexPlaneFieldConfig};
-pub use still_field::StillField;

@@ -53,7 +53,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
     let vary = |spread: f64, shape: [usize; 3]| Tensor::random(shape, Distribution::Normal(0.0, spread), device);
     let rest = scene.gaussians.sh_rest.dims();
     scene.gaussians.sh_rest = Param::from_tensor(vary(0.05, rest));
-    for plane in &mut scene.field.hexplane.planes {
+    for plane in scene.planes_mut().into_iter().flat_map(|hexplane| &mut hexplane.planes) {
         *plane = Param::from_tensor(plane.val() + vary(0.05, plane.dims()));
     }
     scene

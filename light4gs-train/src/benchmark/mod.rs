@@ -306,7 +306,7 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
     let regularizer = small.train.regularizer.build();
     let loss_of = |scene_model: &DynamicScene, frame: usize| {
         let image = splatter.render(scene_model.at(0.3), &scene.camera_at(frame), None).image;
-        l1(image, truth.clone()) + regularizer.loss(&scene_model.field.hexplane)
+        l1(image, truth.clone()) + regularizer.loss(scene_model.planes().expect("the preset's field has planes"))
     };
     let mut adam = Adam::default();
     // Rates so small that the scene stays what it is while it is timed.

@@ -6,7 +6,6 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use light4gs_codec::{GaussianArrays, read_info};
 use light4gs_data::{DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb};
-use light4gs_model::{DeformationField, HexPlaneField, StillField};
 use light4gs_web::page::{Content, page};
 
 use super::check_output;
@@ -17,7 +16,7 @@ use super::view::dataset_cameras;
 use crate::config::DeviceName;
 use crate::device;
 use crate::error::TrainError;
-use crate::evaluation::{DecodedScene, is_still};
+use crate::evaluation::DecodedScene;
 
 /// Cameras of each split that a page holds: enough to choose from, few enough to send.
 const MOST_CAMERAS: usize = 60;
@@ -91,8 +90,7 @@ impl Export {
         }
         match (&self.html, &self.out) {
             (Some(html), _) => self.write_page(html),
-            (None, Some(out)) if is_still(&self.file)? => self.export::<StillField>(out),
-            (None, Some(out)) => self.export::<HexPlaneField>(out),
+            (None, Some(out)) => self.export(out),
             (None, None) => unreachable!("one of the two is required"),
         }
     }
@@ -109,12 +107,12 @@ impl Export {
         say(format_args!("wrote {} ({:.2} MB)", html.display(), page.len() as f64 / 1e6))
     }
 
-    fn export<F: DeformationField>(&self, path: &Path) -> Result<(), TrainError> {
+    fn export(&self, path: &Path) -> Result<(), TrainError> {
         let target = Target::of(path)?;
         if !matches!(target, Target::PlySequence) {
             check_output(path, &self.file)?;
         }
-        let decoded: DecodedScene<F> =
+        let decoded: DecodedScene =
             DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
         let at = |time: f32| plain_gaussians(decoded.model.at(time).to_arrays());
         let meta = &decoded.data.meta;

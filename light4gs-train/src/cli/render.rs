@@ -5,7 +5,6 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use light4gs_codec::SceneMeta;
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
-use light4gs_model::{DeformationField, HexPlaneField, StillField};
 
 use super::check_output;
 use super::limits::LimitsArgument;
@@ -14,7 +13,7 @@ use super::output::say;
 use crate::config::DeviceName;
 use crate::device;
 use crate::error::TrainError;
-use crate::evaluation::{DecodedScene, is_still};
+use crate::evaluation::DecodedScene;
 use crate::video::{Looping, write_gif, write_mp4, write_png_sequence};
 
 /// Radius in world units and elevation in degrees of the orbit, as the D-NeRF video path has them.
@@ -80,14 +79,7 @@ impl Render {
             return Err(TrainError::Input(format!("--elevation must be -90 to 90 degrees, not {}", self.elevation)));
         }
         check_output(&self.out, &self.file)?;
-        match is_still(&self.file)? {
-            true => self.render::<StillField>(),
-            false => self.render::<HexPlaneField>(),
-        }
-    }
-
-    fn render<F: DeformationField>(self) -> Result<(), TrainError> {
-        let decoded: DecodedScene<F> =
+        let decoded: DecodedScene =
             DecodedScene::open_with_limits(&self.file, &self.limits.get(), &device::open(self.device)?)?;
         let frames = self.camera_frames(&decoded.data.meta)?;
         let images = frames.iter().map(|frame| Ok::<_, TrainError>(decoded.render(frame).to_u8()));

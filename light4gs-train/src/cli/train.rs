@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{Layouts, Scene};
-use light4gs_model::{DeformationField, HexPlaneField, StillField};
+use light4gs_model::BuiltInField;
 
 use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
@@ -17,7 +17,7 @@ use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::finish::evaluate_run;
-use crate::evaluation::{DecodedScene, Evaluation, is_still};
+use crate::evaluation::{DecodedScene, Evaluation};
 use crate::metrics::lpips::Lpips;
 use crate::metrics::scores::Scores;
 use crate::report::table::{Align, Table};
@@ -138,7 +138,7 @@ pub(super) fn train_to_evaluation(
         run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
     let scene = Scene::open(record.dataset()?, &load_options(&config))?;
-    evaluate_run::<HexPlaneField>(&folder, &config, &scene)
+    evaluate_run::<BuiltInField>(&folder, &config, &scene)
 }
 
 /// Checks what a run needs from its first iteration to its evaluation, before its folder is made or emptied, so that a
@@ -176,7 +176,7 @@ fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
 
 fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &RunOutput) -> Result<(), TrainError> {
     run(&mut trainer, output)?;
-    let evaluation = evaluate_run::<HexPlaneField>(folder, config, trainer.data())?;
+    let evaluation = evaluate_run::<BuiltInField>(folder, config, trainer.data())?;
     print_evaluation(&evaluation, output.json)?;
     if !output.json {
         say(format_args!("\nreport: {}", folder.path("report.html").display()))?;
@@ -264,29 +264,22 @@ impl Eval {
         }
         record.scene = self.scene.or(record.scene);
         let scene = Scene::open(record.dataset()?, &load_options(&config))?;
-        print_evaluation(&evaluate_run::<HexPlaneField>(&folder, &config, &scene)?, self.json)
+        print_evaluation(&evaluate_run::<BuiltInField>(&folder, &config, &scene)?, self.json)
     }
 
     fn eval_file(self) -> Result<(), TrainError> {
         let Some(scene) = self.scene.clone() else {
             return Err(TrainError::Input("a .l4gs file holds no images; name the dataset with --scene DIR".into()));
         };
-        match is_still(&self.run)? {
-            true => self.eval_decoded::<StillField>(&scene),
-            false => self.eval_decoded::<HexPlaneField>(&scene),
-        }
-    }
-
-    fn eval_decoded<F: DeformationField>(&self, scene: &Path) -> Result<(), TrainError> {
         let name = self.device.unwrap_or_default();
         let device = device::open(name)?;
-        let decoded: DecodedScene<F> = DecodedScene::open_with_limits(&self.run, &self.limits.get(), &device)?;
+        let decoded: DecodedScene = DecodedScene::open_with_limits(&self.run, &self.limits.get(), &device)?;
         let mut config = Config::default();
         config.data.resolution = Some(decoded.data.meta.width.max(decoded.data.meta.height));
         config.data.background = decoded.data.meta.background;
         config.eval.lpips = self.lpips.clone();
         let options = load_options(&config);
-        let scene = Scene::open(scene, &options)?;
+        let scene = Scene::open(&scene, &options)?;
         let images = image_store(&config);
         let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)

@@ -8,7 +8,7 @@ use burn::tensor::Device;
 use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
-use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
+use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
 use serde::{Deserialize, Serialize};
 
 use super::{
@@ -91,7 +91,7 @@ pub struct PlaneRecord {
 }
 
 /// A scene as trained, and where its images are.
-pub struct TrainedScene<'a, F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
+pub struct TrainedScene<'a, F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
     /// The model.
     pub scene: &'a DynamicScene<F>,
     /// Its entropy models, if it was trained with them.

@@ -3,7 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::{
-    DeformationField, DynamicScene, HexPlane, HexPlaneField, Latent, PlaneEntropy, PlaneSteps, ShKnown,
+    BuiltInField, DeformationField, DynamicScene, HexPlane, Latent, PlaneEntropy, PlaneSteps, ShKnown,
 };
 use rand::Rng;
 use rand::seq::index;
@@ -12,7 +12,7 @@ use super::{Compression, ShModel};
 
 /// A scene with the noise of quantization, which both the image and the rate see.
 #[derive(Clone, Debug)]
-pub struct NoisyScene<F: DeformationField = HexPlaneField> {
+pub struct NoisyScene<F: DeformationField = BuiltInField> {
     /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the
     /// scene's, since noise only adds to them; by the steps see [`NoisyScene::step_gradients`].
     pub scene: DynamicScene<F>,

@@ -1,9 +1,9 @@
 //! `[model]`: what is trained.
 
-use light4gs_model::{DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig};
+use light4gs_model::{BuiltInFieldConfig, DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig};
 
-use crate::keys::Bounds::{Flag, List, Whole};
-use crate::keys::keys;
+use crate::keys::Bounds::{Flag, List, Whole, Word};
+use crate::keys::{choice, keys};
 
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
 pub(super) const MOST_PLANE_RESOLUTION: u64 = 4096;
@@ -13,12 +13,25 @@ keys! {
     pub struct ModelConfig {
         /// Highest degree of the spherical harmonics, 0 to 3.
         sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";
+        /// What moves the Gaussians: `"hexplane"`, of which `model.hexplane` and `model.deformation` are the keys, or
+        /// `"still"`, nothing.
+        field: FieldKind = FieldKind::HexPlane; Word(FieldKind::NAMES), "paper", "or \"still\": nothing moves";
         /// From world coordinates to those of the planes.
         coordinates: CoordinatesConfig;
         /// The feature planes.
         hexplane: HexPlaneConfig;
         /// The network that turns features into motion.
         deformation: DeformationConfig;
+    }
+}
+
+choice! {
+    /// The built-in deformation fields.
+    pub enum FieldKind: "field" {
+        /// The paper's: hexplane and network.
+        HexPlane = "hexplane",
+        /// Nothing moves.
+        Still = "still",
     }
 }
 
@@ -95,8 +108,16 @@ impl ModelConfig {
             .with_differentiate_points(self.deformation.differentiate_points)
     }
 
-    /// The built-in deformation field.
-    pub fn field(&self) -> HexPlaneFieldConfig {
+    /// The built-in deformation field that is chosen, with its keys.
+    pub fn field(&self) -> BuiltInFieldConfig {
+        match self.field {
+            FieldKind::HexPlane => BuiltInFieldConfig::HexPlane(self.hexplane_field()),
+            FieldKind::Still => BuiltInFieldConfig::Still(()),
+        }
+    }
+
+    /// The keys of the paper's field.
+    pub(super) fn hexplane_field(&self) -> HexPlaneFieldConfig {
         let HexPlaneConfig { channels, resolution, multipliers } = self.hexplane.clone();
         let network = &self.deformation;
         let hexplane = light4gs_model::HexPlaneConfig::new()

@@ -58,7 +58,7 @@ fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
 
 /// Width and depth are legal by themselves and not together.
 fn deformation(check: &mut Check, model: &ModelConfig) {
-    check.encodable("model.deformation.width", model.field().deformation.check_size());
+    check.encodable("model.deformation.width", model.hexplane_field().deformation.check_size());
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {

@@ -8,7 +8,7 @@ use std::time::Instant;
 use burn::tensor::Device;
 use light4gs_codec::{Limits, SceneData, StreamInfo};
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
-use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter};
+use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
 use serde::Serialize;
 
 use crate::compression::CodingRecord;
@@ -96,7 +96,7 @@ pub struct RenderedView {
 }
 
 /// A decoded file, ready to render.
-pub struct DecodedScene<F: DeformationField = HexPlaneField> {
+pub struct DecodedScene<F: DeformationField = BuiltInField> {
     /// The model on the device.
     pub model: DynamicScene<F>,
     /// What the file says of itself.
@@ -206,14 +206,6 @@ impl<F: DeformationField> DecodedScene<F> {
         };
         Ok((evaluation, rendered))
     }
-}
-
-/// Whether nothing moves in a file.
-///
-/// # Errors
-/// A file that cannot be read, or is damaged.
-pub fn is_still(path: &Path) -> Result<bool, TrainError> {
-    Ok(light4gs_codec::read_info_with_limits(path, &Limits::large())?.motion.kind.is_empty())
 }
 
 /// Sections of a file with the header in front; they add up to the file.

@@ -14,7 +14,7 @@ mod views;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use light4gs_model::DynamicScene;
+use light4gs_model::{DynamicScene, HexPlaneField};
 
 pub use views::scene_around;
 
@@ -28,7 +28,7 @@ use crate::stage::Stage;
 #[derive(Debug)]
 pub struct ImportedScene {
     /// The model, which renders as the program's own did.
-    pub scene: DynamicScene,
+    pub scene: DynamicScene<HexPlaneField>,
     /// Color behind the Gaussians.
     pub background: [f32; 3],
     /// Folder of the files.
@@ -80,7 +80,7 @@ impl ImportedScene {
         let config = self.config(base)?;
         let folder = RunFolder::create(root, dataset, &config, overwrite)?;
         let iteration = config.train.fine_iterations;
-        let state: Checkpoint = Checkpoint {
+        let state: Checkpoint<HexPlaneField> = Checkpoint {
             scene: self.scene,
             compression: None,
             adam: Adam::default(),

@@ -145,7 +145,11 @@ impl Weights<'_> {
     }
 }
 
-fn scene(weights: &mut Weights, gaussians: &GaussianArrays, settings: &Settings) -> Result<DynamicScene, TrainError> {
+fn scene(
+    weights: &mut Weights,
+    gaussians: &GaussianArrays,
+    settings: &Settings,
+) -> Result<DynamicScene<HexPlaneField>, TrainError> {
     for part in ["static_mlp.1.weight", "empty_voxel.grid"] {
         if weights.has(&format!("deformation_net.{part}")) {
             return Err(weights.wrong(part, "a part that 4DGaussians calls useless, and that is not supported"));

@@ -13,7 +13,7 @@ use light4gs_codec::CoordinateMapping;
 use light4gs_data::{DataError, PointCloud, read_regular_file, write_atomically};
 use light4gs_model::attributes::{MEANS, attribute_of_path};
 use light4gs_model::parameters::{ParameterMapper, ParameterVisitor, map_parameters, visit_parameters};
-use light4gs_model::{Attribute, DeformationField, DynamicScene, DynamicSceneConfig, Gaussians, HexPlaneField};
+use light4gs_model::{Attribute, BuiltInField, DeformationField, DynamicScene, DynamicSceneConfig, Gaussians};
 
 use super::stored_tensors::{self, Entry, StoredTensors, floats, not_finite};
 use crate::compression::{Compression, CompressionOf, ConfiguredModels, EntropyModels};
@@ -25,7 +25,7 @@ use crate::stage::Stage;
 
 /// A run's state after an iteration.
 #[derive(Debug)]
-pub struct Checkpoint<F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
+pub struct Checkpoint<F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
     /// The model, on the run's device.
     pub scene: DynamicScene<F>,
     /// Entropy models and quantization steps, where the run trains them.

@@ -9,7 +9,7 @@ use burn::tensor::Device;
 use light4gs_codec::checks;
 use light4gs_data::Scene;
 use light4gs_model::attributes::check_further;
-use light4gs_model::{Attribute, DeformationField, DynamicSceneConfig, HexPlaneField, ModelError};
+use light4gs_model::{Attribute, BuiltInField, DeformationField, DynamicSceneConfig, ModelError};
 
 use super::Trainer;
 use super::profile::Profile;
@@ -32,7 +32,7 @@ use crate::sampling::{FrameSampler, StageFrames};
 use crate::stage::Stage;
 
 /// The parts of a [`Trainer`]: those that are not given are the ones that the configuration describes.
-pub struct TrainerBuilder<F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
+pub struct TrainerBuilder<F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
     config: Config,
     data: Scene,
     field: F::Config,

@@ -27,8 +27,8 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_data::{Scene, Split};
-use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlaneField, Splatter};
+use light4gs_data::{Frame, Scene, Split};
+use light4gs_model::{BuiltInField, DeformationField, DynamicScene, GaussianTensors, Splatter};
 
 pub use builder::TrainerBuilder;
 
@@ -99,7 +99,7 @@ use views::ViewPools;
 /// assert_eq!(losses.len(), 10);
 /// # Ok::<(), light4gs_train::error::TrainError>(())
 /// ```
-pub struct Trainer<F: DeformationField = HexPlaneField, E: EntropyModels = ConfiguredModels> {
+pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
     config: Config,
     device: Device,
     data: Scene,
@@ -386,15 +386,34 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if !due || eval.views == 0 || frames.is_empty() {
             return Ok(None);
         }
-        let splatter = self.splatter(stage, iteration);
         let stride = frames.len().div_ceil(eval.views);
+        self.mean_psnr(frames.iter().step_by(stride), stage, iteration).map(Some)
+    }
+
+    /// Mean PSNR in dB over all views of a split, by the model in memory: without coding, which also costs some quality. NaN for
+    /// a split without views.
+    ///
+    /// # Errors
+    /// An image that cannot be read.
+    pub fn psnr(&self, split: Split) -> Result<f64, TrainError> {
+        let (stage, iteration) = self.position();
+        self.mean_psnr(self.data.frames(split).iter(), stage, iteration)
+    }
+
+    fn mean_psnr<'f>(
+        &self,
+        frames: impl Iterator<Item = &'f Frame>,
+        stage: Stage,
+        iteration: usize,
+    ) -> Result<f64, TrainError> {
+        let splatter = self.splatter(stage, iteration);
         let scene = Snapshot { scene: &self.state.scene, stage };
         let mut values = Vec::new();
-        for frame in frames.iter().step_by(stride) {
+        for frame in frames {
             let image = splatter.render(scene.gaussians_at(frame.time), &frame.camera, None).image.clamp(0.0, 1.0);
             values.push(psnr(image, image_tensor(&*self.images.image(frame)?, &self.device.clone().inner())));
         }
-        Ok(Some(values.iter().sum::<f64>() / values.len() as f64))
+        Ok(values.iter().sum::<f64>() / values.len() as f64)
     }
 }
 

@@ -154,7 +154,7 @@ mod tests {
         let log_steps = quantization.log_steps.id;
 
         let leaves = noisy.steps.clone().unwrap();
-        let mut tape = loss(&noisy.scene.field.hexplane.tensors(), &|i| leaves.of(i)).backward();
+        let mut tape = loss(&noisy.scene.planes().unwrap().tensors(), &|i| leaves.of(i)).backward();
         let direct = noisy.step_gradients(&tape);
         let mut apart = GradientSums::default();
         apart.add_module(&noisy.scene, &mut tape);
@@ -162,7 +162,8 @@ mod tests {
         apart.add_module(&compression, &mut term.backward());
 
         let steps = quantization.steps();
-        let pairs = scene.field.hexplane.tensors().into_iter().zip(noisy.scene.field.hexplane.tensors()).enumerate();
+        let pairs =
+            scene.planes().unwrap().tensors().into_iter().zip(noisy.scene.planes().unwrap().tensors()).enumerate();
         let planes: Vec<_> = pairs
             .map(|(i, (plane, noisy))| {
                 let step = steps.broadcast(i);

@@ -182,18 +182,19 @@ fn frozen_planes_are_those_of_the_file() {
         let device = device.autodiff();
         let config = config(&["model.hexplane.resolution=[16,16,16,8]", "compression.steps.space_time=0.01"]);
         let mut scene = scene(&config, &device);
-        for plane in &mut scene.field.hexplane.planes {
+        for plane in &mut scene.planes_mut().unwrap().planes {
             let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.05), &device);
             *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
         }
         let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let mut models = compression.planes.unwrap();
         models.context =
-            shaken(models.context, &scene.field.hexplane.tensors(), &models.quantization.steps_without_gradient());
+            shaken(models.context, &scene.planes().unwrap().tensors(), &models.quantization.steps_without_gradient());
         compression.planes = Some(models);
-        let before = scene.field.hexplane.to_arrays();
-        scene.field.hexplane = freeze_planes(&scene, &compression, &config.compression, &device).unwrap().unwrap();
-        let frozen = scene.field.hexplane.to_arrays();
+        let before = scene.planes().unwrap().to_arrays();
+        *scene.planes_mut().unwrap() =
+            freeze_planes(&scene, &compression, &config.compression, &device).unwrap().unwrap();
+        let frozen = scene.planes().unwrap().to_arrays();
         assert_ne!(frozen, before, "{name}");
         let file =
             encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
@@ -210,14 +211,14 @@ fn freezing_does_not_carry_planes_away() {
     device.seed(5);
     let config = config(&["model.hexplane.resolution=[16,16,16,8]"]);
     let mut scene = scene(&config, &device);
-    for plane in &mut scene.field.hexplane.planes {
+    for plane in &mut scene.planes_mut().unwrap().planes {
         let noise = Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.2), &device);
         *plane = burn::module::Param::from_tensor((plane.val() + noise).detach());
     }
     let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
     let mut models = compression.planes.unwrap();
     let steps = models.quantization.steps_without_gradient();
-    models.context = shaken(models.context, &scene.field.hexplane.tensors(), &steps);
+    models.context = shaken(models.context, &scene.planes().unwrap().tensors(), &steps);
     models.context.hyperprior = models.context.hyperprior.map(|mut hyperprior| {
         let [.., last] = &mut hyperprior.analysis;
         last.weight = burn::module::Param::from_tensor((last.weight.val() * 40.0).detach());
@@ -225,9 +226,9 @@ fn freezing_does_not_carry_planes_away() {
         *weight = burn::module::Param::from_tensor((weight.val() * 100.0).detach());
         hyperprior
     });
-    let steps: Vec<f32> = (0..scene.field.hexplane.planes.len()).map(|i| steps.of(i).into_scalar()).collect();
+    let steps: Vec<f32> = (0..scene.planes().unwrap().planes.len()).map(|i| steps.of(i).into_scalar()).collect();
     compression.planes = Some(models);
-    let before = scene.field.hexplane.to_arrays();
+    let before = scene.planes().unwrap().to_arrays();
     let frozen = freeze_planes(&scene, &compression, &config.compression, &device).unwrap().unwrap().to_arrays();
     for ((before, frozen), step) in before.planes.iter().zip(&frozen.planes).zip(steps) {
         let moved = before.values.iter().zip(&frozen.values).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);

@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 const COUNT: usize = 61;
 
 /// A scene whose planes and networks are far from their start, and which moves in every attribute.
-fn scene(depth: usize, device: &Device) -> DynamicScene {
+fn scene(depth: usize, device: &Device) -> DynamicScene<HexPlaneField> {
     device.seed(5);
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let positions = (0..COUNT).map(|_| std::array::from_fn(|_| random.random_range(-2.0..2.0))).collect();
@@ -49,7 +49,7 @@ fn positions_are_those_of_the_model() {
                 assert!(moved, "{name}: nothing moves");
                 assert_close(name, exact.as_flattened(), &values_of(&scene.at(time).means), 2e-5);
             }
-            let again: DynamicScene = DynamicScene::from_arrays(&data, &device).unwrap();
+            let again: DynamicScene<HexPlaneField> = DynamicScene::from_arrays(&data, &device).unwrap();
             assert_eq!(again.to_arrays(SceneMeta::default()).unwrap(), data, "{name}");
         }
     }

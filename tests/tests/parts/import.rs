@@ -104,7 +104,7 @@ fn the_reference_deforms_as_its_golden_vectors_say() {
 }
 
 /// Features of an imported scene at points and a time of each.
-fn features(scene: &DynamicScene, points: Tensor<2>, times: &[f32]) -> Tensor<2> {
+fn features(scene: &DynamicScene<HexPlaneField>, points: Tensor<2>, times: &[f32]) -> Tensor<2> {
     let device = points.device();
     let times: Vec<f32> = times.iter().map(|time| 2.0 * scene.coordinates.field_time(*time) - 1.0).collect();
     let times = Tensor::<2>::from_data(TensorData::new(times.clone(), [times.len(), 1]), &device);

@@ -4,10 +4,8 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
 
-use super::arrays::ModelError;
-use super::field::DeformationField;
-use super::gaussians::GaussianTensors;
-use super::hexplane::HexPlane;
+use super::DeformationField;
+use crate::scene::{GaussianTensors, HexPlane, ModelError};
 
 /// A field that moves nothing.
 ///

@@ -1,4 +1,14 @@
 //! What moves the Gaussians: one trait, so that another motion model is another implementation.
+//!
+//! - here: [`DeformationField`], and what it is asked with
+//! - `hexplane`, `deformation`: the paper's field, and its network
+//! - `still`: nothing moves
+//! - `built_in`: those of this crate as one type, of which a configuration or a file chooses one
+
+mod built_in;
+mod deformation;
+mod hexplane;
+mod still;
 
 use std::collections::BTreeMap;
 use std::fmt::Debug;
@@ -6,6 +16,11 @@ use std::fmt::Debug;
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::MotionArrays;
+
+pub use built_in::{BuiltInField, BuiltInFieldConfig};
+pub use deformation::{Deformation, DeformationConfig, DeformationHead};
+pub use hexplane::{HexPlaneField, HexPlaneFieldConfig};
+pub use still::StillField;
 
 use super::arrays::ModelError;
 use super::attributes::Attribute;

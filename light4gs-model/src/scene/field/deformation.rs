@@ -8,8 +8,8 @@ use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::network::{Layer, Value};
 use light4gs_codec::{CodecError, MotionNetwork, MotionOutput, MotionSource, Network, checks};
 
-use super::arrays::ModelError;
-use super::field::Offsets;
+use super::Offsets;
+use crate::scene::ModelError;
 
 /// Configuration of a [`Deformation`].
 #[derive(Config, Debug)]
@@ -241,14 +241,14 @@ impl Deformation {
 }
 
 /// Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
-fn to_layer(linear: &Linear) -> Layer {
+pub(super) fn to_layer(linear: &Linear) -> Layer {
     let [_, outputs] = linear.weight.dims();
     let bias = linear.bias.as_ref().map(|bias| bias.val().into_data().iter().collect());
     let weight = linear.weight.val().transpose().into_data().iter().collect();
     Layer::linear(weight, bias.unwrap_or_else(|| vec![0.0; outputs]))
 }
 
-fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
+pub(super) fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
     let (inputs, outputs) = (layer.inputs as usize, layer.outputs as usize);
     let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), [outputs, inputs]), device);
     let bias = Tensor::<1>::from_data(TensorData::new(layer.bias.clone(), [outputs]), device);

@@ -5,11 +5,9 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
 
-use super::arrays::ModelError;
 use super::deformation::{Deformation, DeformationConfig};
-use super::field::{DeformationField, Offsets};
-use super::gaussians::GaussianTensors;
-use super::hexplane::{HexPlane, HexPlaneConfig};
+use super::{DeformationField, Offsets};
+use crate::scene::{GaussianTensors, HexPlane, HexPlaneConfig, ModelError};
 
 /// Configuration of a [`HexPlaneField`].
 #[derive(Config, Debug)]

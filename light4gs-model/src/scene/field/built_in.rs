@@ -1,0 +1,121 @@
+//! The built-in deformation fields as one type: what a configuration and a file choose from when a program runs.
+
+use std::collections::BTreeMap;
+
+use burn::module::Module;
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::MotionArrays;
+
+use super::hexplane::HexPlaneField;
+use super::still::StillField;
+use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
+use crate::scene::{Attribute, GaussianTensors, HexPlane, ModelError};
+
+/// Makes one field of several: whatever is asked of it is asked of the one that it is.
+macro_rules! built_in_fields {
+    ($($(#[$about:meta])* $variant:ident($field:ident),)+) => {
+        /// One of the built-in deformation fields. Paths of its parameters are those of the field that it is.
+        ///
+        /// ```
+        /// use burn::tensor::Device;
+        /// use light4gs_model::{BuiltInField, BuiltInFieldConfig, DeformationField};
+        ///
+        /// let field = BuiltInField::init(&BuiltInFieldConfig::Still(()), &Device::flex());
+        /// assert_eq!(field.kind(), "");
+        /// assert!(field.planes().is_none());
+        /// ```
+        // There is one of it in a scene, so its size does not matter.
+        #[allow(clippy::large_enum_variant)]
+        #[derive(Module, Debug)]
+        pub enum BuiltInField {
+            $($(#[$about])* $variant($field),)+
+        }
+
+        /// Which field, with its configuration.
+        #[derive(Clone, Debug)]
+        pub enum BuiltInFieldConfig {
+            $($(#[$about])* $variant(<$field as DeformationField>::Config),)+
+        }
+
+        /// Evaluates an expression with the field that it is.
+        macro_rules! each {
+            ($self:expr, $it:ident => $result:expr) => {
+                match $self {
+                    $(BuiltInField::$variant($it) => $result,)+
+                }
+            };
+        }
+
+        impl DeformationField for BuiltInField {
+            type Config = BuiltInFieldConfig;
+
+            const KINDS: &'static [&'static str] = &[$($field::KINDS[0]),+];
+
+            fn attributes(config: &BuiltInFieldConfig) -> Vec<Attribute> {
+                match config {
+                    $(BuiltInFieldConfig::$variant(config) => $field::attributes(config),)+
+                }
+            }
+
+            fn init(config: &BuiltInFieldConfig, device: &Device) -> Self {
+                match config {
+                    $(BuiltInFieldConfig::$variant(config) => Self::$variant($field::init(config, device)),)+
+                }
+            }
+
+            fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+                $(if $field::KINDS.contains(&arrays.kind.as_str()) {
+                    return $field::from_arrays(arrays, planes, device).map(Self::$variant);
+                })+
+                Err(ModelError::kind(&arrays.kind, Self::KINDS))
+            }
+
+            fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+                each!(self, field => field.deform(rest, points, time))
+            }
+
+            fn kind(&self) -> &'static str {
+                each!(self, field => field.kind())
+            }
+
+            fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
+                each!(self, field => field.begin_motion(scene, position));
+            }
+
+            fn begin_step(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
+                each!(self, field => field.begin_step(scene, position));
+            }
+
+            fn regularizer(&self, scene: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
+                each!(self, field => field.regularizer(scene, position))
+            }
+
+            fn learning_rate(&self, path: &str, usual: LearningRate) -> LearningRate {
+                each!(self, field => field.learning_rate(path, usual))
+            }
+
+            fn resize(&mut self, shapes: &BTreeMap<String, Vec<usize>>) -> Result<(), ModelError> {
+                each!(self, field => field.resize(shapes))
+            }
+
+            fn planes(&self) -> Option<&HexPlane> {
+                each!(self, field => field.planes())
+            }
+
+            fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+                each!(self, field => field.planes_mut())
+            }
+
+            fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
+                each!(self, field => field.to_arrays())
+            }
+        }
+    };
+}
+
+built_in_fields! {
+    /// The paper's: multiscale hexplane and network.
+    HexPlane(HexPlaneField),
+    /// Nothing moves.
+    Still(StillField),
+}
