@@ -71,6 +71,28 @@ fn large_folders(folder: &str) -> Vec<String> {
 }
 
 #[test]
+fn the_map_has_every_room() {
+    let map = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md");
+    let mut lacking = Vec::new();
+    for name in CRATES {
+        // The player's crate has a map of its own, in its documentation.
+        let Some((_, rest)) = map.split_once(&format!("| **{name}/src** |")) else { continue };
+        let part = rest.split_once("| **").map_or(rest, |(part, _)| part);
+        for entry in fs::read_dir(root().join(name).join("src")).expect("sources") {
+            let entry = entry.expect("an entry");
+            let mut room = entry.file_name().into_string().expect("UTF-8");
+            if entry.path().is_dir() {
+                room.push('/');
+            }
+            if !["lib.rs", "main.rs"].contains(&room.as_str()) && !part.contains(&format!("`{room}`")) {
+                lacking.push(format!("{name}/src/{room}"));
+            }
+        }
+    }
+    assert!(lacking.is_empty(), "not in ARCHITECTURE.md: {}", lacking.join(", "));
+}
+
+#[test]
 fn a_circle_is_found() {
     let folder = std::env::temp_dir().join(format!("light4gs-rooms-{}", std::process::id()));
     let source = folder.join("src");
