@@ -27,7 +27,7 @@ pub fn tiny_scene(folder: &Path) -> Result<PathBuf, DataError> {
 /// # Errors
 /// None that a test has not seen: the preset is part of the library.
 pub fn tiny_config() -> Outcome<Config> {
-    let mut config = Config::from_preset("dnerf-small")?;
+    let mut config = Config::from_preset("dnerf-cpu")?;
     config.device = DeviceName::Flex;
     config.data.initial_points = 400;
     config.model.sh_degree = 1;

@@ -71,7 +71,7 @@ impl Workspace {
 
     /// `train scene --out RUN` in seconds, with more `--set` on top.
     pub fn train(&self, run: &str, overrides: &[&str]) -> Command {
-        let mut command = self.command(["train", "scene", "--quiet", "--config", "dnerf-small", "--out", run]);
+        let mut command = self.command(["train", "scene", "--quiet", "--config", "dnerf-cpu", "--out", run]);
         for key_value in TINY.iter().chain(overrides) {
             command.args(["--set", key_value]);
         }

@@ -37,7 +37,7 @@ impl DatasetLayout for DNerf {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("dnerf-small")
+        Some("dnerf-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {

@@ -46,7 +46,7 @@ impl DatasetLayout for HyperNerf {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("hypernerf-small")
+        Some("hypernerf-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {
@@ -68,7 +68,7 @@ impl DatasetLayout for NerfDs {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("nerfds-small")
+        Some("nerfds-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {

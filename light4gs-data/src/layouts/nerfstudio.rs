@@ -42,7 +42,7 @@ impl DatasetLayout for Nerfstudio {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("nerfstudio-small")
+        Some("nerfstudio-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {

@@ -240,7 +240,7 @@ pub fn benchmark(
     let matrix = || Tensor::<2>::random([CALIBRATION, CALIBRATION], Distribution::Default, device);
     let (a, b) = (matrix(), matrix());
     let calibration_ms = median(device, repeats, || (a.clone(), b.clone()), |(a, b)| a.matmul(b));
-    let small = Config::from_preset("dnerf-small")?;
+    let small = Config::from_preset("dnerf-cpu")?;
     let scenes = scenes
         .iter()
         .map(|scene| SceneTimes {

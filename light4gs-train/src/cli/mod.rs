@@ -47,7 +47,7 @@ enum Command {
     Prepare(prepare::Prepare),
     /// Train on a dataset.
     #[command(
-        after_help = "Example:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-small --out runs/bouncing"
+        after_help = "Example:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing"
     )]
     Train(train::Train),
     /// Continue a run from its last checkpoint, to the same result as if it had not been interrupted.
@@ -87,7 +87,7 @@ enum Command {
     Synth(synth::Synth),
     /// Make a table or a figure of the paper: train a scene several times, and show what varies.
     #[command(
-        after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-small --seeds 3 --out runs/context"
+        after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
     Study(study::Study),
     /// Write a study's tables and report anew from the runs that are finished, and say which are missing.

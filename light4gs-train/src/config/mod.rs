@@ -6,7 +6,7 @@
 //! the full key path. `docs/configuration.md` lists every key.
 //!
 //! ```toml
-//! extends = "dnerf-small"      # a built-in preset, or a path relative to this file
+//! extends = "dnerf-cpu"      # a built-in preset, or a path relative to this file
 //!
 //! [train]
 //! fine_iterations = 2000
@@ -110,7 +110,7 @@ impl Config {
     /// `train.fine_iterations=200`, each one a line of TOML (a bare word is taken as a string).
     ///
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
-    /// may follow, each after a `+`, as in `dnerf-lego-small+medium`: they are laid on top in that order.
+    /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order.
     pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
         let mut names = name_or_path.split('+').map(|name| layers::named(name, None));
         let first = names.next().expect("splitting gives at least one part");

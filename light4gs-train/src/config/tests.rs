@@ -179,9 +179,9 @@ fn extends_in_a_circle_is_refused() {
 
 #[test]
 fn tables_merge_deeply_and_the_top_wins() {
-    let folder = folder_with("mine.toml", "extends = \"dnerf-small\"\n[model.hexplane]\nmultipliers = [1]\n");
+    let folder = folder_with("mine.toml", "extends = \"dnerf-cpu\"\n[model.hexplane]\nmultipliers = [1]\n");
     let mine = Config::from_file(folder.path().join("mine.toml")).expect("a configuration");
-    let small = Config::from_preset("dnerf-small").expect("a preset");
+    let small = Config::from_preset("dnerf-cpu").expect("a preset");
     assert_eq!(mine.model.hexplane.multipliers, [1]);
     assert_eq!(mine.model.hexplane.channels, small.model.hexplane.channels);
     assert_eq!(mine.train, small.train);
@@ -190,7 +190,7 @@ fn tables_merge_deeply_and_the_top_wins() {
 #[test]
 fn overrides_come_last() {
     let overrides = ["train.fine_iterations=200", "device = flex", "data.resolution=0", "eval.splits=[\"val\"]"];
-    let config = Config::load("dnerf-small", &overrides.map(str::to_owned)).expect("a configuration");
+    let config = Config::load("dnerf-cpu", &overrides.map(str::to_owned)).expect("a configuration");
     assert_eq!(config.train.fine_iterations, 200);
     assert_eq!(config.device, DeviceName::Flex);
     assert_eq!(config.data.resolution, None);
@@ -236,7 +236,7 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
 fn density_strategies_are_checked_with_the_rest() {
     // Where none is to come, pruning may begin at once; where some are, they come first.
     let overrides = ["train.densify.strategy=none", "train.prune.fraction=0.1", "train.prune.iterations=[5]"];
-    let text = format!("extends = 'dnerf-small'\n{}", overrides.join("\n").replace("=none", "='none'"));
+    let text = format!("extends = 'dnerf-cpu'\n{}", overrides.join("\n").replace("=none", "='none'"));
     Config::from_toml(&text, "text").expect("a configuration");
     let text = problem_text(Config::from_toml(&text.replace("'none'", "'adaptive'"), "text"));
     assert!(text.contains("pruning follows densification, which ends at 3500"), "{text}");
@@ -244,8 +244,8 @@ fn density_strategies_are_checked_with_the_rest() {
 
 #[test]
 fn unknown_presets_and_missing_files_are_named() {
-    let text = problem_text(Config::load("dnerf-smal", &[]));
-    assert!(text.contains("\"dnerf-smal\"") && text.contains("the nearest preset is \"dnerf-small\""), "{text}");
+    let text = problem_text(Config::load("dnerf-cp", &[]));
+    assert!(text.contains("\"dnerf-cp\"") && text.contains("the nearest preset is \"dnerf-cpu\""), "{text}");
     let text = problem_text(Config::load("nowhere/mine.toml", &[]));
     assert!(text.starts_with("nowhere/mine.toml: cannot read the configuration"), "{text}");
     let folder = folder_with("mine.toml", "extends = \"dnref\"");

@@ -239,7 +239,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
 
     fn options(scene: &Path) -> PlanOptions {
         PlanOptions {
-            config: "dnerf-small".into(),
+            config: "dnerf-cpu".into(),
             scenes: vec![scene.into()],
             overrides: Vec::new(),
             seeds: 1,
@@ -297,7 +297,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let scene = folder.path().join("flag");
         std::fs::create_dir(&scene).unwrap();
         for name in super::super::catalog::NAMES {
-            for config in ["dnerf-{scene}-small", "dnerf-{scene}"] {
+            for config in ["dnerf-{scene}-cpu", "dnerf-{scene}"] {
                 let options = PlanOptions { config: config.into(), ..options(&scene) };
                 let plan = Plan::new(Study::load(name).unwrap(), &options).unwrap_or_else(|e| panic!("{name}: {e}"));
                 assert!(!plan.runs.is_empty(), "{name}");

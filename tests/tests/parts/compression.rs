@@ -99,7 +99,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 fn config(overrides: &[&str]) -> Config {
     let small = ["model.hexplane.channels=4", "model.hexplane.resolution=[8,8,8,4]", "model.deformation.width=8"];
     let overrides: Vec<String> = small.iter().chain(overrides).map(|key| (*key).to_owned()).collect();
-    Config::load("dnerf-small", &overrides).unwrap()
+    Config::load("dnerf-cpu", &overrides).unwrap()
 }
 
 /// Over many draws the estimate on a part is the rate of everything.

@@ -129,8 +129,8 @@ fn a_run_with_the_rate_in_its_loss_on_wgpu() {
 fn layers_on_top() {
     let w = Workspace::new(PROGRAM);
     let train = |config: &str| w.run(["train", "scene", "--quiet", "--config", config, "--out", "run"]);
-    assert_refused(&train("dnerf-small+nothing"), &["nothing"]);
-    assert_refused(&train("medium+dnerf-small"), &["dnerf-small", "extends"]);
+    assert_refused(&train("dnerf-cpu+nothing"), &["nothing"]);
+    assert_refused(&train("medium+dnerf-cpu"), &["dnerf-cpu", "extends"]);
     assert!(w.names("run").is_empty());
 }
 
@@ -220,7 +220,7 @@ fn an_empty_split() {
 #[test]
 fn an_unknown_key() {
     let w = Workspace::new(PROGRAM);
-    fs::write(w.path("mine.toml"), "extends = \"dnerf-small\"\n[train.densify.adaptive]\nintervall = 3\n").unwrap();
+    fs::write(w.path("mine.toml"), "extends = \"dnerf-cpu\"\n[train.densify.adaptive]\nintervall = 3\n").unwrap();
     let output = w.run(["train", "scene", "--config", "mine.toml", "--out", "run"]);
     assert_refused(&output, &["mine.toml", "train.densify.adaptive.intervall", "train.densify.adaptive.interval"]);
     assert_refused(

@@ -41,7 +41,7 @@ impl DatasetLayout for Colmap {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("colmap-small")
+        Some("colmap-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {

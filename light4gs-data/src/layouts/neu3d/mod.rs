@@ -37,7 +37,7 @@ impl DatasetLayout for Neu3d {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("neu3d-small")
+        Some("neu3d-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {

@@ -44,7 +44,7 @@ pub(super) struct Study {
     #[arg(long)]
     out: Option<PathBuf>,
     /// The preset or TOML file that every variant is laid over; {scene} in it stands for the scene's name.
-    #[arg(long, default_value = "dnerf-small", value_name = "PRESET|FILE")]
+    #[arg(long, default_value = "dnerf-cpu", value_name = "PRESET|FILE")]
     config: String,
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
