@@ -36,7 +36,8 @@ fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let config = tiny_config()?;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
-    let excess = |trainer: &Trainer| (log_ratios(trainer.scene()) - 1.2f32.ln()).clamp_min(0.0).mean().into_scalar::<f32>();
+    let excess =
+        |trainer: &Trainer| (log_ratios(trainer.scene()) - 1.2f32.ln()).clamp_min(0.0).mean().into_scalar::<f32>();
 
     // The same run twice, with the term and without.
     let mut plain = Trainer::builder(config.clone(), data.clone()).build()?;
@@ -48,7 +49,9 @@ fn main() -> Outcome {
     }
     let (first, last) = first_and_last(&losses);
     let (with, without) = (excess(&round), excess(&plain));
-    println!("excess {with:.4} with the regularizer, {without:.4} without; loss {first:.3} at first, {last:.3} at last");
+    println!(
+        "excess {with:.4} with the regularizer, {without:.4} without; loss {first:.3} at first, {last:.3} at last"
+    );
     assert!(last < 0.7 * first && with < 0.5 * without);
     Ok(())
 }

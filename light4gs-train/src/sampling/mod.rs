@@ -111,12 +111,8 @@ mod tests {
             let frames = frames(cameras, times);
             for kind in KINDS {
                 let sampler = sampler(kind, batch, None, &frames);
-                let length = match kind {
-                    SamplerKind::Shuffled => frames.len().div_ceil(batch),
-                    SamplerKind::SameTime => {
-                        batches_a_pass(&StageFrames::new(None, &frames).of(Stage::Fine).times, batch)
-                    }
-                };
+                let same_time = batches_a_pass(&StageFrames::new(None, &frames).of(Stage::Fine).times, batch);
+                let length = if kind == SamplerKind::SameTime { same_time } else { frames.len().div_ceil(batch) };
                 let seen: Vec<Vec<usize>> = (1..=length).map(|i| sampler(3, Stage::Fine, i)).collect();
                 assert!(seen.iter().all(|views| views.len() == batch));
                 let different: BTreeSet<usize> = seen.into_iter().flatten().collect();
