@@ -2,6 +2,9 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
+use std::time::Duration;
+use std::{fs, io};
 
 use tempfile::TempDir;
 
@@ -41,9 +44,28 @@ pub const TINY_COMPRESSION: [&str; 6] = [
 ];
 
 impl Workspace {
+    /// A copy of a folder in which a tiny run, `run`, has been trained: once for all tests of a process. `temporary` is
+    /// `env!("CARGO_TARGET_TMPDIR")`, where the original stays until a later process finds it to be old.
+    pub fn trained(program: &str, temporary: &str) -> Self {
+        static TRAINED: OnceLock<Workspace> = OnceLock::new();
+        let original = TRAINED.get_or_init(|| {
+            remove_old(Path::new(temporary), "trained-");
+            let folder = tempfile::Builder::new().prefix("trained-").tempdir_in(temporary);
+            let workspace = Self::within(folder.expect("a temporary folder"), program);
+            assert_success(&workspace.train("run", &[]).output().expect("the program starts"));
+            workspace
+        });
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        copy(original.folder.path(), folder.path()).expect("a readable folder");
+        Self { folder, program: program.into() }
+    }
+
     /// Makes the folder and the scene. `program` is `env!("CARGO_BIN_EXE_light4gs-under-test")`.
     pub fn new(program: &str) -> Self {
-        let folder = tempfile::tempdir().expect("a temporary folder");
+        Self::within(tempfile::tempdir().expect("a temporary folder"), program)
+    }
+
+    fn within(folder: TempDir, program: &str) -> Self {
         let workspace = Self { folder, program: program.into() };
         let scene = workspace.path("scene");
         let frames = ["--train-frames", "8", "--test-frames", "3", "--val-frames", "2"];
@@ -81,6 +103,32 @@ impl Workspace {
     /// Names in the folder or one below it, sorted.
     pub fn names(&self, below: &str) -> Vec<String> {
         names(&self.path(below))
+    }
+}
+
+fn copy(from: &Path, to: &Path) -> io::Result<()> {
+    for entry in fs::read_dir(from)? {
+        let entry = entry?;
+        let (source, target) = (entry.path(), to.join(entry.file_name()));
+        if source.is_dir() {
+            fs::create_dir(&target)?;
+            copy(&source, &target)?;
+        } else {
+            fs::copy(&source, &target)?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes what earlier processes have left, but not what one may be at work on.
+fn remove_old(folder: &Path, prefix: &str) {
+    const OLD: Duration = Duration::from_secs(3600);
+    for name in names(folder).into_iter().filter(|name| name.starts_with(prefix)) {
+        let path = folder.join(name);
+        let changed = fs::metadata(&path).and_then(|metadata| metadata.modified());
+        if changed.is_ok_and(|changed| changed.elapsed().is_ok_and(|age| age > OLD)) {
+            let _ = fs::remove_dir_all(path);
+        }
     }
 }
 

@@ -2,15 +2,14 @@
 
 use std::fs;
 
-use crate::PROGRAM;
+use crate::{PROGRAM, trained};
 use light4gs_model::DynamicScene;
 use light4gs_tests::golden::devices;
 use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 
 #[test]
 fn a_scene_goes_all_the_way() {
-    let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("run", &[]).output().unwrap());
+    let w = trained();
     let expected = ["checkpoints", "config.toml", "eval.json", "events", "metrics.jsonl", "renders", "report.html"];
     for name in expected.iter().chain(&["run.json", "scene.l4gs"]) {
         assert!(w.names("run").contains(&name.to_string()), "{name} is missing: {:?}", w.names("run"));
@@ -136,8 +135,7 @@ fn layers_on_top() {
 
 #[test]
 fn a_run_is_never_overwritten_by_accident() {
-    let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("run", &[]).output().unwrap());
+    let w = trained();
     let before = fs::read(w.path("run/scene.l4gs")).unwrap();
     assert_refused(&w.train("run", &[]).output().unwrap(), &["run", "--overwrite"]);
     assert_eq!(fs::read(w.path("run/scene.l4gs")).unwrap(), before);
@@ -233,8 +231,7 @@ fn an_unknown_key() {
 
 #[test]
 fn damaged_streams() {
-    let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("run", &[]).output().unwrap());
+    let w = trained();
     let bytes = fs::read(w.path("run/scene.l4gs")).unwrap();
     fs::write(w.path("short.l4gs"), &bytes[..bytes.len() - 7]).unwrap();
     let mut flipped = bytes.clone();
@@ -257,8 +254,7 @@ fn damaged_streams() {
 #[cfg(unix)]
 #[test]
 fn a_full_disk() {
-    let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("run", &[]).output().unwrap());
+    let w = trained();
     let before = w.names("");
     for arguments in ["encode run --out out.l4gs", "decode run/scene.l4gs --out out.safetensors"] {
         // The signal that would kill the program on reaching the limit is ignored, so that it sees the error.
@@ -273,8 +269,7 @@ fn a_full_disk() {
 #[cfg(target_os = "linux")]
 #[test]
 fn standard_output_that_takes_nothing() {
-    let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("run", &[]).output().unwrap());
+    let w = trained();
     let info = |stdout: std::process::Stdio| w.command(["info", "run/scene.l4gs"]).stdout(stdout).output().unwrap();
     let (reader, writer) = std::io::pipe().unwrap();
     drop(reader);

@@ -9,3 +9,8 @@ mod studies;
 
 /// The program under test: Cargo builds it before these tests.
 const PROGRAM: &str = env!("CARGO_BIN_EXE_light4gs-under-test");
+
+/// A folder with a tiny scene and a finished run on it, `run`.
+fn trained() -> light4gs_tests::program::Workspace {
+    light4gs_tests::program::Workspace::trained(PROGRAM, env!("CARGO_TARGET_TMPDIR"))
+}
