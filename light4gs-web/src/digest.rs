@@ -8,12 +8,11 @@ pub fn digest(scene: &SceneData) -> u64 {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
     let SceneData { gaussians, frame, hexplane, motion, .. } = scene;
     hash.bytes(&[gaussians.sh_degree]);
-    hash.floats(gaussians.means.as_flattened());
-    hash.floats(gaussians.log_scales.as_flattened());
-    hash.floats(gaussians.quats.as_flattened());
-    hash.floats(&gaussians.opacity_logits);
-    hash.floats(gaussians.sh_dc.as_flattened());
-    hash.floats(&gaussians.sh_rest);
+    gaussians.attributes().for_each(|attribute| hash.floats(attribute.values));
+    for attribute in &gaussians.further {
+        hash.bytes(attribute.name.as_bytes());
+        hash.integers(&[attribute.width]);
+    }
     hash.floats(&frame.mean);
     hash.floats(frame.axes.as_flattened());
     hash.floats(&frame.std);

@@ -3,12 +3,13 @@
 use light4gs_codec::{
     CompressionInput, Condition, ContextModelArrays, FrequencyTable, HexPlaneArrays, LatentArrays, Network, PerGroup,
     PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
+    attributes::AttributeSteps,
     network::{Layer, LayerKind, Operation, Value},
     plane_layout::SPACE_TIME_PLANES,
     sh_rest_coefficients,
 };
 
-use super::{hexplane, sample};
+use super::{further, hexplane, sample};
 
 /// A linear congruential generator.
 #[derive(Clone, Debug)]
@@ -326,6 +327,7 @@ pub fn scene(count: usize, sh_degree: u8, channels: u32, resolution: [u32; 4], m
     gaussians.sh_rest = (0..count * 3 * sh_rest_coefficients(sh_degree))
         .map(|_| 0.02 * laplace_symbol(&mut random, 0.6) as f32 + 0.004 * random.uniform())
         .collect();
+    gaussians.further = vec![further("age", 2, count), further("label", 1, count)];
     scene.hexplane = hexplane(channels, resolution, multipliers);
     scene.motion = match channels * multipliers.len() as u32 {
         0 => Default::default(),
@@ -344,7 +346,8 @@ pub fn input(scene: &SceneData, profile: Profile, shape: Shape) -> CompressionIn
         profile,
         planes: Some(plane_coding(&scene.hexplane, model(shape, 3), step(0.1))),
         sh: sh_tables(scene.gaussians.sh_degree),
-        attributes: Default::default(),
+        // The label has no step.
+        attributes: AttributeSteps::default().with("age", 0.01),
         weights: Default::default(),
     }
 }

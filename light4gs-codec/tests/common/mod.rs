@@ -5,8 +5,8 @@
 pub mod compression;
 
 use light4gs_codec::{
-    CoordinateMapping, GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource,
-    NamedTensor, Network, Plane, SceneData, SceneFrameArrays, SceneMeta,
+    CoordinateMapping, FurtherAttribute, GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput,
+    MotionSource, NamedTensor, Network, Plane, SceneData, SceneFrameArrays, SceneMeta,
     network::{Layer, Operation},
     sh_rest_coefficients,
 };
@@ -33,6 +33,11 @@ pub fn gaussians(count: usize, sh_degree: u8) -> GaussianArrays {
         sh_rest: numbers(count * sh_rest_coefficients(sh_degree) * 3),
         further: Vec::new(),
     }
+}
+
+/// An attribute beyond those of all scenes, which may be left out.
+pub fn further(name: &str, width: usize, count: usize) -> FurtherAttribute {
+    FurtherAttribute { name: name.into(), width: width as u32, values: numbers(width * count), optional: true }
 }
 
 /// A hexplane whose time axis is not multiplied.
@@ -83,7 +88,7 @@ pub fn sample() -> SceneData {
             fov_x: 0.75,
             extra: [("author".to_owned(), "a test".to_owned()), ("writer".to_owned(), String::new())].into(),
         },
-        gaussians: gaussians(2, 1),
+        gaussians: GaussianArrays { further: vec![further("age", 2, 2)], ..gaussians(2, 1) },
         frame: SceneFrameArrays {
             mean: [0.5, -0.25, 0.125],
             axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],

@@ -99,9 +99,10 @@ fn the_bytes_lie_where_the_document_says() {
     assert_eq!(starts[sections], bytes.len());
     let scene = sample();
     let gaussians = starts[0];
-    // Two Gaussians; five attributes: name, width, coder 0. Their numbers follow in the same order.
-    let list = b"\x02\0\0\0\x05\
-        \x05means\x03\0\x0alog_scales\x03\0\x05quats\x04\0\x0eopacity_logits\x01\0\x05sh_dc\x03\0";
+    // Two Gaussians; six attributes: name, width, coder 0, the last with the mark of what may be left out. Their numbers follow
+    // in the same order.
+    let list = b"\x02\0\0\0\x06\
+        \x05means\x03\0\x0alog_scales\x03\0\x05quats\x04\0\x0eopacity_logits\x01\0\x05sh_dc\x03\0\x03age\x02\x80";
     assert_eq!(&bytes[gaussians..][..list.len()], list);
     let numbers = gaussians + list.len();
     assert_eq!(f32_at(numbers + 12), scene.gaussians.means[1][0]);

@@ -4,7 +4,8 @@ use crate::common;
 
 use common::{hexplane, sample};
 use light4gs_codec::{
-    MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, SceneData, SceneFrameArrays, decode, encode,
+    CodecError, FurtherAttribute, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource, Network,
+    SceneData, SceneFrameArrays, decode, encode, info,
     network::{Layer, Operation},
 };
 
@@ -92,4 +93,44 @@ fn a_network_that_does_not_fit_is_refused() {
     assert!(message(|scene| network(scene).inputs = vec![2]).contains("inputs of node 0 is 1, expected 2"));
     assert!(message(|scene| scene.hexplane.channels = 2).contains("planes[0].values"));
     assert!(message(|scene| network(scene).outputs.clear()).contains("number of named outputs is 1, expected 0"));
+}
+
+/// A scene would look wrong without an attribute that nobody knows: it decodes, and is not shown.
+#[test]
+fn unknown_attributes_are_refused_where_a_scene_is_shown() {
+    let age = FurtherAttribute { name: "age".into(), width: 1, values: vec![0.5, 1.5], optional: false };
+    let mut scene = sample();
+    scene.gaussians.further = vec![age];
+    let refused = |scene: &SceneData| {
+        let error = scene.check_attributes_are_known().unwrap_err();
+        assert_eq!(MotionEvaluator::new(scene).unwrap_err().to_string(), error.to_string());
+        assert!(matches!(&error, CodecError::UnknownAttribute { name } if name == "age"), "{error}");
+    };
+    let bytes = encode(&scene).unwrap();
+    assert_eq!(decode(&bytes).unwrap(), scene);
+    let described = &info(&bytes).unwrap().attributes[5];
+    assert_eq!((&described.name[..], described.width, described.bytes, described.optional), ("age", 1, 8, false));
+    refused(&scene);
+
+    // It may be left out, or the network reads it, or what moves the Gaussians is known by its kind alone.
+    let mut optional = scene.clone();
+    optional.gaussians.further[0].optional = true;
+    assert!(MotionEvaluator::new(&decode(&encode(&optional).unwrap()).unwrap()).is_ok());
+
+    let mut read = scene.clone();
+    let (mut network, [age]) = Network::new([1]);
+    network.output(age);
+    let sources = vec![MotionSource::Attribute("age".into())];
+    let outputs = vec![MotionOutput::NewOpacityLogit];
+    read.motion.network = Some(MotionNetwork { network, sources, outputs });
+    let read = decode(&encode(&read).unwrap()).unwrap();
+    let mut moved = read.gaussians.clone();
+    MotionEvaluator::new(&read).unwrap().apply(&read.gaussians, 0.5, 0..2, &mut moved);
+    assert_eq!(moved.opacity_logits, [0.5, 1.5]);
+
+    let mut other = scene.clone();
+    other.motion.network = None;
+    assert!(other.check_attributes_are_known().is_ok());
+    other.motion = MotionArrays::default();
+    refused(&other);
 }

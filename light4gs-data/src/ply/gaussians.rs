@@ -26,6 +26,8 @@ pub struct GaussianPly {
     pub log_scales: Vec<[f32; 3]>,
     /// `[N, 4]`, `(w, x, y, z)`, not necessarily normalized.
     pub quats: Vec<[f32; 4]>,
+    /// Properties beyond the layout, by name: `[N]` each. Viewers pass over them.
+    pub further: Vec<(String, Vec<f32>)>,
 }
 
 impl GaussianPly {
@@ -39,7 +41,8 @@ impl GaussianPly {
         self.means.is_empty()
     }
 
-    /// Reads a file of any SH degree from 0 to 3; missing higher coefficients are 0.
+    /// Reads a file of any SH degree from 0 to 3; missing higher coefficients are 0. Properties that the layout does not have
+    /// are further ones, whatever their values are.
     ///
     /// # Errors
     /// [`DataError::Io`] when it cannot be read; [`DataError::Ply`] when it is damaged, a property is
@@ -62,6 +65,7 @@ impl GaussianPly {
             opacity_logits: table.column("opacity")?,
             log_scales: columns(&table, ["scale_0", "scale_1", "scale_2"])?,
             quats: columns(&table, ["rot_0", "rot_1", "rot_2", "rot_3"])?,
+            further: further_columns(&table)?,
         };
         match gaussians.first_non_finite() {
             Some(i) => Err(DataError::ply(
@@ -73,22 +77,32 @@ impl GaussianPly {
         }
     }
 
-    /// Writes the layout above, binary little endian, SH degree 3, normals 0; the file is complete
-    /// or absent, never half-written.
+    /// Writes the layout above, binary little endian, SH degree 3, normals 0, further properties at the end; the file is
+    /// complete or absent, never half-written.
     ///
     /// # Errors
-    /// [`DataError::Io`] when it cannot be written; [`DataError::Ply`] when the lists differ in length.
+    /// [`DataError::Io`] when it cannot be written; [`DataError::Ply`] when the lists differ in length, or a further property
+    /// has a name of the layout, one of another, or one with spaces or control characters.
     pub fn write(&self, path: &Path) -> Result<(), DataError> {
         let lengths =
             [self.sh_dc.len(), self.sh_rest.len(), self.opacity_logits.len(), self.log_scales.len(), self.quats.len()];
-        if lengths.iter().any(|&length| length != self.len()) {
+        let mut names = names();
+        for (name, _) in &self.further {
+            if name.is_empty() || name.contains(|c: char| c.is_whitespace() || c.is_control()) || names.contains(name) {
+                let problem = format!("a property cannot have the name {name:?}, or stands twice");
+                return Err(DataError::ply(path, problem, "give it a name of its own, in one word"));
+            }
+            names.push(name.clone());
+        }
+        let further_lengths = self.further.iter().map(|(_, values)| values.len());
+        if lengths.into_iter().chain(further_lengths).any(|length| length != self.len()) {
             return Err(DataError::ply(
                 path,
                 format!("{} means, but the other lists have {lengths:?} entries", self.len()),
                 "pass lists of one length",
             ));
         }
-        let properties: Vec<Property> = names().into_iter().map(|name| Property::new(name, Scalar::F32)).collect();
+        let properties: Vec<Property> = names.into_iter().map(|name| Property::new(name, Scalar::F32)).collect();
         table::write(path, Encoding::BinaryLittleEndian, &properties, self.len(), |i, row| {
             row.extend(self.means[i]);
             row.extend([0.0; 3]);
@@ -99,6 +113,7 @@ impl GaussianPly {
             row.push(self.opacity_logits[i]);
             row.extend(self.log_scales[i]);
             row.extend(self.quats[i]);
+            row.extend(self.further.iter().map(|(_, values)| values[i]));
         })
     }
 
@@ -140,6 +155,13 @@ fn columns<const C: usize>(table: &VertexTable, names: [&str; C]) -> Result<Vec<
     Ok(rows)
 }
 
+/// Properties that the layout does not have, in the order of the file.
+fn further_columns(table: &VertexTable) -> Result<Vec<(String, Vec<f32>)>, DataError> {
+    let known = names();
+    let further = table.properties().iter().filter(|property| !known.contains(&property.name));
+    further.map(|property| Ok((property.name.clone(), table.column(&property.name)?))).collect()
+}
+
 /// `f_rest_{channel * per_channel + k}` as `[N, 15, 3]`.
 fn rest_columns(table: &VertexTable, per_channel: usize) -> Result<Vec<[[f32; 3]; REST]>, DataError> {
     let mut rows = vec![[[0.0; 3]; REST]; table.rows()];
@@ -170,6 +192,7 @@ mod tests {
             opacity_logits: (0..count).map(|i| value(i, 60)).collect(),
             log_scales: (0..count).map(|i| [61, 62, 63].map(|k| value(i, k))).collect(),
             quats: (0..count).map(|i| [64, 65, 66, 67].map(|k| value(i, k))).collect(),
+            further: Vec::new(),
         }
     }
 
@@ -182,6 +205,25 @@ mod tests {
             gaussians.write(&path).unwrap();
             assert_eq!(GaussianPly::read(&path).unwrap(), gaussians);
         }
+    }
+
+    #[test]
+    fn further_properties_stand_behind_the_layout() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("g.ply");
+        let mut gaussians = example(3);
+        gaussians.further =
+            vec![("lifetime_0".into(), vec![1.0, 2.0, 3.0]), ("lifetime_1".into(), vec![4.0, 5.0, 6.0])];
+        gaussians.write(&path).unwrap();
+        assert_eq!(GaussianPly::read(&path).unwrap(), gaussians);
+        let table = table::read(&path).unwrap();
+        assert_eq!(table.properties()[62].name, "lifetime_0");
+        for name in ["lifetime_0", "opacity", "two words", ""] {
+            gaussians.further[1].0 = name.into();
+            assert!(gaussians.write(&path).is_err(), "{name}");
+        }
+        gaussians.further = vec![("age".into(), vec![0.0; 2])];
+        assert!(gaussians.write(&path).is_err());
     }
 
     #[test]

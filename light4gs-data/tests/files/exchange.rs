@@ -15,6 +15,7 @@ fn example(count: usize) -> GaussianPly {
         opacity_logits: (0..count).map(|i| 4.0 * random(i + 7)).collect(),
         log_scales: (0..count).map(|i| triple(i + 200).map(|v| v - 3.0)).collect(),
         quats: (0..count).map(|i| [2.0, random(i), random(i + 1), random(i + 2)]).collect(),
+        further: Vec::new(),
     }
 }
 

@@ -5,10 +5,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use light4gs_codec::attributes::AttributeInfo;
 use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
 use light4gs_model::DeformationField;
+use light4gs_model::attributes::BUILT_IN;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
@@ -159,6 +161,8 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
             "name": name, "frames": frame_count, "fps": fps, "bounds": bounds, "background": background,
             "config_digest": digest, "width": width, "height": height, "fov_x": fov_x,
             "gaussians": info.gaussian_count, "sh_degree": info.sh_degree,
+            "attributes": info.attributes.iter().map(|a| json!({"name": a.name, "width": a.width, "coder": a.coder.name(),
+                "optional": a.optional, "bytes": a.bytes})).collect::<Vec<_>>(),
             "hexplane": {"channels": info.hexplane_channels, "resolution": info.hexplane_resolution,
                 "multipliers": info.hexplane_multipliers},
             "motion": {"kind": info.motion.kind, "layers": motion_layers(info)},
@@ -171,6 +175,11 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let rate = if *fps > 0.0 { format!(" at {fps} frames a second") } else { String::new() };
     say(format_args!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version))?;
     say(format_args!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree))?;
+    let built_in = |name: &str| BUILT_IN.iter().any(|attribute| attribute.name == name);
+    for AttributeInfo { name, width, coder, optional, bytes } in info.attributes.iter().filter(|a| !built_in(&a.name)) {
+        let optional = if *optional { ", optional" } else { "" };
+        say(format_args!("their attribute {name}: {width} numbers each, {}, {bytes} bytes{optional}", coder.name()))?;
+    }
     say(format_args!(
         "hexplanes: {} channels, {:?} cells times {:?}; motion: {}, {} layers",
         info.hexplane_channels,
@@ -230,13 +239,13 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
     };
     let gaussians = &data.gaussians;
     let count = gaussians.len();
-    let rest = if count == 0 { 0 } else { gaussians.sh_rest.len() / (3 * count) };
-    add("gaussians.means".into(), vec![count, 3], gaussians.means.as_flattened());
-    add("gaussians.log_scales".into(), vec![count, 3], gaussians.log_scales.as_flattened());
-    add("gaussians.quats".into(), vec![count, 4], gaussians.quats.as_flattened());
-    add("gaussians.opacity_logits".into(), vec![count, 1], &gaussians.opacity_logits);
-    add("gaussians.sh_dc".into(), vec![count, 1, 3], gaussians.sh_dc.as_flattened());
-    add("gaussians.sh_rest".into(), vec![count, rest, 3], &gaussians.sh_rest);
+    for attribute in gaussians.attributes() {
+        let shape = match attribute.name {
+            "sh_dc" | "sh_rest" => vec![count, attribute.width / 3, 3],
+            _ => vec![count, attribute.width],
+        };
+        add(format!("gaussians.{}", attribute.name), shape, attribute.values);
+    }
     add("frame.mean".into(), vec![3], &data.frame.mean);
     add("frame.axes".into(), vec![3, 3], data.frame.axes.as_flattened());
     add("frame.std".into(), vec![3], &data.frame.std);

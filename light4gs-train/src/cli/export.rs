@@ -134,7 +134,7 @@ impl Export {
             Target::Glb => {
                 let options = GlbOptions { sh_degree: decoded.data.gaussians.sh_degree, z_is_up: self.z_up };
                 write_glb(path, &at(self.time), &options)?;
-                say(format_args!("wrote {out}"))
+                say(format_args!("wrote {out}{}", left_out(&decoded.data.gaussians)))
             }
             Target::FourDgs => {
                 let source = Some(meta.fps).filter(|fps| *fps > 0.0);
@@ -145,13 +145,20 @@ impl Export {
                 let sample = |(k, time): (usize, f32)| MotionSample { begin: k as f64 / fps, gaussians: at(time) };
                 let samples: Vec<MotionSample> = times().enumerate().map(sample).collect();
                 write_four_dgs(path, &samples, f64::from(frames) / fps)?;
-                say(format_args!("wrote {out} ({frames} samples, {fps} a second)"))
+                let left_out = left_out(&decoded.data.gaussians);
+                say(format_args!("wrote {out} ({frames} samples, {fps} a second){left_out}"))
             }
         }
     }
 }
 
-/// For files of other programs, whose harmonics have degree 3.
+/// Says which attributes a file of another program has no place for.
+fn left_out(gaussians: &GaussianArrays) -> String {
+    let names: Vec<&str> = gaussians.further.iter().map(|attribute| attribute.name.as_str()).collect();
+    if names.is_empty() { String::new() } else { format!(", without the attributes {}", names.join(", ")) }
+}
+
+/// For files of other programs, whose harmonics have degree 3. A further attribute becomes properties `NAME_0`, `NAME_1`...
 fn plain_gaussians(arrays: GaussianArrays) -> GaussianPly {
     let per_gaussian = if arrays.is_empty() { 0 } else { arrays.sh_rest.len() / (3 * arrays.len()) };
     let rest = |i: usize| {
@@ -163,7 +170,15 @@ fn plain_gaussians(arrays: GaussianArrays) -> GaussianPly {
             [arrays.sh_rest[at], arrays.sh_rest[at + 1], arrays.sh_rest[at + 2]]
         })
     };
+    let further = arrays.further.iter().flat_map(|attribute| {
+        let column = move |channel: usize| {
+            let values = attribute.values.iter().skip(channel).step_by(attribute.width as usize);
+            (format!("{}_{channel}", attribute.name), values.copied().collect())
+        };
+        (0..attribute.width as usize).map(column)
+    });
     GaussianPly {
+        further: further.collect(),
         sh_rest: (0..arrays.means.len()).map(rest).collect(),
         means: arrays.means,
         sh_dc: arrays.sh_dc,

@@ -96,7 +96,10 @@ impl Import {
         }
         check_output(&self.out, &self.source)?;
         let device = device::open(config.device)?.autodiff();
-        let scene = still::read(&self.source, &device)?;
+        let (scene, left_out) = still::read(&self.source, &device)?;
+        if !left_out.is_empty() && !self.json {
+            say(format_args!("left out, since 3DGS does not have it: {}", left_out.join(", ")))?;
+        }
         config.model.sh_degree = scene.gaussians.sh_degree() as u8;
         let folder = self.source.parent().unwrap_or(Path::new("."));
         let mut data = match &self.scene {

@@ -38,7 +38,7 @@ pub fn read(folder: &Path, device: &Device) -> Result<ImportedScene, TrainError>
         Some(path) => Settings::read(&path)?,
         None => Settings::default(),
     };
-    let gaussians = read_gaussians(&folder.join("point_cloud.ply"))?;
+    let (gaussians, _) = read_gaussians(&folder.join("point_cloud.ply"))?;
     check_table(&folder, &gaussians)?;
     let path = folder.join("deformation.pth");
     let mut weights = Weights { tensors: read_pytorch(&path)?, path, device };

@@ -13,31 +13,36 @@ use crate::error::TrainError;
 /// Degree that a [`GaussianPly`] is padded to.
 const FULL_DEGREE: u8 = 3;
 
-/// Reads Gaussians that do not move, with the highest degree of harmonics that any of them uses.
+/// Reads Gaussians that do not move, with the highest degree of harmonics that any of them uses; and the names of properties
+/// that are left out, since 3DGS does not have them.
 ///
 /// # Errors
 /// As [`GaussianPly::read`]; a file without Gaussians.
-pub fn read(path: &Path, device: &Device) -> Result<DynamicScene<StillField>, TrainError> {
-    let gaussians = with_used_degree(read_gaussians(path)?);
+pub fn read(path: &Path, device: &Device) -> Result<(DynamicScene<StillField>, Vec<String>), TrainError> {
+    let (gaussians, left_out) = read_gaussians(path)?;
+    let gaussians = with_used_degree(gaussians);
     let pca = Pca::fit(&gaussians.means);
-    Ok(DynamicScene {
+    let scene = DynamicScene {
         gaussians: Gaussians::from_arrays(&gaussians, device),
         coordinates: SceneCoordinates::new(&pca, device),
         field: StillField,
         differentiate_points: false,
     }
-    .no_grad())
+    .no_grad();
+    Ok((scene, left_out))
 }
 
-/// Gaussians of degree 3; coefficients that the file lacks are 0.
-pub(super) fn read_gaussians(path: &Path) -> Result<GaussianArrays, DataError> {
-    let GaussianPly { means, sh_dc, sh_rest, opacity_logits, log_scales, quats } = GaussianPly::read(path)?;
+/// Gaussians of degree 3; coefficients that the file lacks are 0. And the names of further properties.
+pub(super) fn read_gaussians(path: &Path) -> Result<(GaussianArrays, Vec<String>), DataError> {
+    let GaussianPly { means, sh_dc, sh_rest, opacity_logits, log_scales, quats, further } = GaussianPly::read(path)?;
     if means.is_empty() {
         return Err(DataError::ply(path, "it holds no Gaussians", "export the scene again"));
     }
     let sh_rest = sh_rest.into_iter().flatten().flatten().collect();
+    let left_out = further.into_iter().map(|(name, _)| name.escape_debug().to_string()).collect();
     let further = Vec::new();
-    Ok(GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, sh_degree: FULL_DEGREE, sh_rest, further })
+    let sh_degree = FULL_DEGREE;
+    Ok((GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further }, left_out))
 }
 
 /// Leaves out the degrees in which every coefficient of every Gaussian is 0.

@@ -376,3 +376,54 @@ pub fn list_checkpoints(folder: &Path) -> Vec<PathBuf> {
     found.sort();
     found.into_iter().map(|(_, path)| path).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use light4gs_codec::GaussianArrays;
+
+    use super::*;
+
+    /// A scene of two Gaussians with a further attribute of so many numbers, if any.
+    fn scene(config: &Config, width: Option<usize>) -> DynamicSceneConfig<HexPlaneField> {
+        let mut scene = config.model.build();
+        let start = |width| Attribute::new("age", width).with_start((0..width).map(|i| i as f32).collect());
+        scene.gaussians.further.extend(width.map(start));
+        scene
+    }
+
+    #[test]
+    fn further_attributes_are_kept_and_their_shapes_checked() {
+        let mut config = Config::default();
+        config.model.hexplane.channels = 2;
+        config.model.hexplane.resolution = [8, 8, 8, 4];
+        let device = Device::flex().autodiff();
+        let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
+        let zeros = || vector(vec![0.0; 4], &device.clone().inner());
+        let state = AdamState { first: zeros(), second: zeros(), time: 1 };
+        let checkpoint = Checkpoint::<HexPlaneField> {
+            scene: scene(&config, Some(2)).init(&cloud, &device),
+            compression: None,
+            adam: Adam { states: [("gaussians.further.age".to_owned(), state)].into() },
+            density: BTreeMap::new(),
+            stage: Stage::Coarse,
+            iteration: 1,
+            seconds: 0.0,
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(Checkpoint::<HexPlaneField>::file_name(Stage::Coarse, 1));
+        checkpoint.save(&path).unwrap();
+
+        let load = |width: Option<usize>| -> Result<GaussianArrays, TrainError> {
+            let loaded: Checkpoint =
+                Checkpoint::load(&path, &config, &scene(&config, width), &ConfiguredModels, &device)?;
+            assert!(loaded.adam.states.contains_key("gaussians.further.age"));
+            Ok(loaded.scene.gaussians.to_arrays())
+        };
+        let loaded = load(Some(2)).unwrap();
+        assert_eq!(loaded, checkpoint.scene.gaussians.to_arrays());
+        assert_eq!(loaded.further[0].values, [0.0, 1.0, 0.0, 1.0]);
+        let refused = |width| load(width).unwrap_err().to_string();
+        assert!(refused(Some(3)).contains("`scene.gaussians.further.age` has the shape [2, 2], expected [2, 3]"));
+        assert!(refused(None).contains("gaussians.further.age"), "{}", refused(None));
+    }
+}

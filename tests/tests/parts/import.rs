@@ -81,6 +81,7 @@ fn the_reference_deforms_as_its_golden_vectors_say() {
         opacity_logits: golden.values("full.in.opacity"),
         log_scales: triples(&golden.values("full.in.scales")),
         quats: golden.values("full.in.rotations").as_chunks().0.to_vec(),
+        further: Vec::new(),
     };
     write_checkpoint(folder.path(), &gaussians, &state, "Namespace(no_do=False, no_dshs=False)");
     let time = golden.scalar("full.t");
@@ -119,6 +120,7 @@ fn one_gaussian() -> GaussianPly {
         opacity_logits: vec![0.0],
         log_scales: vec![[-2.0; 3]],
         quats: vec![[1.0, 0.0, 0.0, 0.0]],
+        further: Vec::new(),
     }
 }
 
@@ -300,6 +302,7 @@ fn blob(count: usize) -> GaussianPly {
         opacity_logits: (0..count).map(|_| triple(0.0, 4.0)[0]).collect(),
         log_scales: (0..count).map(|_| triple(-3.5, -2.0)).collect(),
         quats: (0..count).map(|_| [1.0, triple(-1.0, 1.0)[0], triple(-1.0, 1.0)[1], triple(-1.0, 1.0)[2]]).collect(),
+        further: Vec::new(),
     }
 }
 
@@ -392,7 +395,8 @@ fn a_ply_becomes_a_file_that_renders_alike() {
     let path = folder.path().join("blob.ply");
     blob(500).write(&path).unwrap();
     let device = Device::flex().autodiff();
-    let scene = still::read(&path, &device).unwrap();
+    let (scene, left_out) = still::read(&path, &device).unwrap();
+    assert!(left_out.is_empty(), "{left_out:?}");
     let config = small_fit("imported");
     let data = scene_around(&scene.gaussians.to_arrays(), folder.path(), [0.0; 3]).unwrap();
     let trained = TrainedScene {
