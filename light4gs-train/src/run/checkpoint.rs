@@ -384,7 +384,7 @@ mod tests {
     use super::*;
 
     /// A scene of two Gaussians with a further attribute of so many numbers, if any.
-    fn scene(config: &Config, width: Option<usize>) -> DynamicSceneConfig<HexPlaneField> {
+    fn scene(config: &Config, width: Option<usize>) -> DynamicSceneConfig<BuiltInField> {
         let mut scene = config.model.build();
         let start = |width| Attribute::new("age", width).with_start((0..width).map(|i| i as f32).collect());
         scene.gaussians.further.extend(width.map(start));
@@ -400,7 +400,7 @@ mod tests {
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let zeros = || vector(vec![0.0; 4], &device.clone().inner());
         let state = AdamState { first: zeros(), second: zeros(), time: 1 };
-        let checkpoint = Checkpoint::<HexPlaneField> {
+        let checkpoint = Checkpoint::<BuiltInField> {
             scene: scene(&config, Some(2)).init(&cloud, &device),
             compression: None,
             adam: Adam { states: [("gaussians.further.age".to_owned(), state)].into() },
@@ -410,7 +410,7 @@ mod tests {
             seconds: 0.0,
         };
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(Checkpoint::<HexPlaneField>::file_name(Stage::Coarse, 1));
+        let path = folder.path().join(Checkpoint::<BuiltInField>::file_name(Stage::Coarse, 1));
         checkpoint.save(&path).unwrap();
 
         let load = |width: Option<usize>| -> Result<GaussianArrays, TrainError> {
