@@ -410,7 +410,7 @@ mod tests {
             seconds: 0.0,
         };
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join(Checkpoint::<BuiltInField>::file_name(Stage::Coarse, 1));
+        let path = folder.path().join(checkpoint_name(Stage::Coarse, 1));
         checkpoint.save(&path).unwrap();
 
         let load = |width: Option<usize>| -> Result<GaussianArrays, TrainError> {
