@@ -47,7 +47,7 @@ pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin, Problem};
 pub use eval::{EvalConfig, EvalSplit};
 pub use layering::presets::preset_names;
-pub use model::{CoordinatesConfig, DeformationConfig, FieldKind, HexPlaneConfig, ModelConfig};
+pub use model::{CoordinatesTable, DeformationTable, FieldKind, HexPlaneTable, ModelConfig};
 pub use train::{LearningRates, RegularizerConfig, TrainConfig};
 
 /// Files of configurations are far shorter.

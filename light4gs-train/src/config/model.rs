@@ -17,11 +17,11 @@ keys! {
         /// `"still"`, nothing.
         field: FieldKind = FieldKind::HexPlane; Word(FieldKind::NAMES), "paper", "or \"still\": nothing moves";
         /// From world coordinates to those of the planes.
-        coordinates: CoordinatesConfig;
+        coordinates: CoordinatesTable;
         /// The feature planes.
-        hexplane: HexPlaneConfig;
+        hexplane: HexPlaneTable;
         /// The network that turns features into motion.
-        deformation: DeformationConfig;
+        deformation: DeformationTable;
     }
 }
 
@@ -37,7 +37,7 @@ choice! {
 
 keys! {
     /// From world coordinates to those of the planes (paper III-A).
-    pub struct CoordinatesConfig {
+    pub struct CoordinatesTable {
         /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, with the
         /// cloud's standard deviation along each.
         pca: bool = light4gs_model::CoordinatesConfig::default().pca;
@@ -51,7 +51,7 @@ keys! {
 
 keys! {
     /// Sizes of the multiscale hexplane.
-    pub struct HexPlaneConfig {
+    pub struct HexPlaneTable {
         /// Features a plane.
         channels: usize = light4gs_model::HexPlaneConfig::new().channels;
             Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
@@ -68,7 +68,7 @@ keys! {
 
 keys! {
     /// Sizes and heads of the deformation network.
-    pub struct DeformationConfig {
+    pub struct DeformationTable {
         /// Width of the deformation network.
         width: usize = network().width; Whole { least: 1, most: 4096 }, "paper, D-NeRF";
         /// Layers before the heads. 0 means the same as 1.
@@ -102,7 +102,7 @@ impl ModelConfig {
     /// The same with another deformation field.
     pub fn scene<F: DeformationField>(&self, field: F::Config) -> DynamicSceneConfig<F> {
         let gaussians = GaussiansConfig::new().with_sh_degree(usize::from(self.sh_degree));
-        let CoordinatesConfig { pca, contraction } = self.coordinates;
+        let CoordinatesTable { pca, contraction } = self.coordinates;
         DynamicSceneConfig::new(gaussians, field)
             .with_coordinates(light4gs_model::CoordinatesConfig { pca, contraction })
             .with_differentiate_points(self.deformation.differentiate_points)
@@ -118,7 +118,7 @@ impl ModelConfig {
 
     /// The keys of the paper's field.
     pub(super) fn hexplane_field(&self) -> HexPlaneFieldConfig {
-        let HexPlaneConfig { channels, resolution, multipliers } = self.hexplane.clone();
+        let HexPlaneTable { channels, resolution, multipliers } = self.hexplane.clone();
         let network = &self.deformation;
         let hexplane = light4gs_model::HexPlaneConfig::new()
             .with_channels(channels)

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use super::model::MOST_PLANE_RESOLUTION;
 use super::{
-    CompressionConfig, Config, ConfigError, EvalConfig, HexPlaneConfig, KEYS, Key, ModelConfig, Problem, TrainConfig,
+    CompressionConfig, Config, ConfigError, EvalConfig, HexPlaneTable, KEYS, Key, ModelConfig, Problem, TrainConfig,
 };
 use crate::density::PruneConfig;
 
@@ -31,7 +31,7 @@ fn out_of_bounds(config: &Config) -> Vec<Problem> {
     KEYS.iter().filter_map(check).collect()
 }
 
-fn hexplane(check: &mut Check, planes: &HexPlaneConfig) {
+fn hexplane(check: &mut Check, planes: &HexPlaneTable) {
     let illegal = check_resolution(planes.resolution).err();
     let legal = illegal.is_none();
     check.that("model.hexplane.resolution", legal, || format!("is {}", illegal.expect("it is illegal")));
