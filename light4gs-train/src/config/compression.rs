@@ -10,7 +10,7 @@ use light4gs_model::AdaptiveQuantizationConfig;
 use light4gs_model::ShKind;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
 
-use crate::keys::Bounds::{self, Flag, Number, Whole, Word};
+use crate::keys::Bounds::{self, Flag, Kind, Number, Whole, Word};
 use crate::keys::{ITERATION, RATE, STEP, TOLERANCE, UnknownChoice, WEIGHT, choice, keys};
 
 keys! {
@@ -168,7 +168,7 @@ keys! {
         /// `"channel_autoregressive"` or `"hexplane_coupled"`. Trained for degree 3; lower degrees are coded with the
         /// frequencies of their symbols.
         model: ShModel = ShModel(ShKind::Factorized);
-            Word(&ShKind::NAMES),
+            Kind { names: &ShKind::NAMES, list: "light4gs-model/src/sh/mod.rs" },
             "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";
         /// Their quantization step.
         step: f64 = 0.02; STEP, "paper";
