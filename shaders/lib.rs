@@ -6,7 +6,7 @@
 #![no_std]
 
 use include::{
-    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, HEXPLANE, PIXELS, QUATERNION, SPHERICAL_HARMONICS, SPLAT,
+    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, PIXELS, PLANES, QUATERNION, SPHERICAL_HARMONICS, SPLAT,
     VIEW,
 };
 
@@ -39,14 +39,14 @@ shaders! {
     /// Color of every Gaussian from its spherical harmonics, seen from the camera.
     COLOR = "splatting" / "color" [ARITHMETIC, VIEW, COVARIANCE, QUATERNION, SPHERICAL_HARMONICS];
     /// Second half of the query's derivative: every cell gathers what the samples around it hand over.
-    HEXPLANE_GATHER = "hexplane" / "hexplane_gather" [HEXPLANE];
-    /// Brings one plane from [C, H · W] to the layout of `include/hexplane.wgsl`.
-    HEXPLANE_PACK = "hexplane" / "hexplane_pack" [];
-    /// Features at points: the product over six planes of their bilinear samples.
-    HEXPLANE_QUERY = "hexplane" / "hexplane_query" [HEXPLANE];
-    /// First half of the query's derivative: what every point hands to each of its six samples, and the points'
+    PLANE_GATHER = "planes" / "plane_gather" [PLANES];
+    /// Brings one plane from [C, H · W] to the layout of `include/planes.wgsl`.
+    PLANE_PACK = "planes" / "plane_pack" [];
+    /// Features at points: the product over the planes of a scale of their bilinear samples.
+    PLANE_QUERY = "planes" / "plane_query" [PLANES];
+    /// First half of the query's derivative: what every point hands to each of its samples, and the points'
     /// own gradients.
-    HEXPLANE_QUERY_BACKWARD = "hexplane" / "hexplane_query_backward" [HEXPLANE];
+    PLANE_QUERY_BACKWARD = "planes" / "plane_query_backward" [PLANES];
     /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
     INTERSECT = "splatting" / "intersect" [ARITHMETIC, VIEW, SPLAT];
     /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
@@ -103,8 +103,8 @@ pub mod include {
         EXPONENTIAL = "include/exponential";
         /// A splat's alpha at four pixels of a column.
         FOOTPRINT = "include/footprint";
-        /// Bilinear samples of the six planes of a scale, over xy, xz, xt, yz, yt, zt.
-        HEXPLANE = "include/hexplane";
+        /// Bilinear samples of the planes of a scale.
+        PLANES = "include/planes";
         /// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows
         /// to a vector.
         PIXELS = "include/pixels";

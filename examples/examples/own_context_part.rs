@@ -9,11 +9,12 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network::Operation;
+use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, PlaneShape};
 use light4gs_codec::{Network, PlaneCoding, PlaneSource, decode, plane_distributions};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    CenteredPlanes, ContextModel, DescribedCondition, DescribedPrior, HexPlane, Latent, Passes, PlaneConv,
+    CenteredPlanes, ContextModel, DescribedCondition, DescribedPrior, FeaturePlanes, Latent, Passes, PlaneConv,
     PlaneConvConfig, PlaneEntropy, Prior, PriorPart, ShEntropyModel,
 };
 use light4gs_train::compression::{ConfiguredModels, EntropyModels, PlaneModels};
@@ -23,8 +24,7 @@ use light4gs_train::error::TrainError;
 use light4gs_train::run::RunFolder;
 use light4gs_train::trainer::Trainer;
 
-/// Places of these planes among the six of a scale.
-const XY: usize = 0;
+/// The place of the plane xz in the list of a hexplane's planes.
 const XZ: usize = 1;
 
 /// xz from the mean of xy over y.
@@ -36,21 +36,29 @@ struct ProfileAlongX {
     channels: usize,
 }
 
+impl ProfileAlongX {
+    /// The planes that this part speaks for: xz of the lowest scale, where there is xy. Above, the plane one scale below says
+    /// more.
+    fn applies(layout: &PlaneLayout, plane: usize) -> bool {
+        let PlaneShape { scale, axes, .. } = layout.planes()[plane];
+        scale == 0 && axes == PlaneAxes::Xz && layout.in_same_scale(plane, PlaneAxes::Xy).is_some()
+    }
+}
+
 impl PriorPart for ProfileAlongX {
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
-        // Of the lowest scale alone; above, the plane one scale below says more.
-        if plane != XZ {
+        if !Self::applies(planes.layout(), plane) {
             return None;
         }
         let [channels, height, width] = planes.planes[plane].dims();
         // xy is [M, y, x]. Its mean over the rows is spread over the rows of xz, [M, z, x].
-        let profile = planes.in_same_scale(plane, XY).mean_dim(1).expand([channels, height, width]);
+        let profile = planes.in_same_scale(plane, PlaneAxes::Xy)?.mean_dim(1).expand([channels, height, width]);
         let parameters = Some(self.conv.forward(profile));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
     }
 
-    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
-        if plane != XZ {
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
+        if !Self::applies(layout, plane) {
             return None;
         }
         let (mut network, [xy]) = Network::new([self.channels as u32]);
@@ -58,7 +66,8 @@ impl PriorPart for ProfileAlongX {
         let profile = network.node(Operation::Spread, &[profile]);
         let parameters = network.layer(profile, self.conv.to_layer());
         network.output(parameters);
-        let parameters = Some(DescribedCondition { network, sources: vec![PlaneSource::SameScale(XY as u8)] });
+        let sources = vec![PlaneSource::SameScale(PlaneAxes::Xy)];
+        let parameters = Some(DescribedCondition { network, sources });
         Some(DescribedPrior { parameters, context: None, passes: Passes::AnchorsFirst })
     }
 }
@@ -149,13 +158,13 @@ fn main() -> Outcome {
         trainer.compression().cloned().and_then(|models| models.planes).expect("the rate is in the loss").valid();
     model.base_mut().update_quantiles();
     let steps = quantization.steps_without_gradient();
-    let arrays = &decoded.hexplane;
-    let planes = HexPlane::from_arrays(arrays, &Device::flex())?.tensors();
+    let arrays = &decoded.feature_planes;
+    let planes = FeaturePlanes::from_arrays(arrays, &Device::flex())?.tensors();
     let symbols = |latent: Tensor<3>| latent.into_data().iter::<f32>().map(|symbol| symbol as i32).collect();
     let latents = model.latent_symbols(&planes, &steps).into_iter();
     let coding = PlaneCoding {
-        model: model.to_arrays()?,
-        steps: steps.to_groups(),
+        model: model.to_arrays(planes.layout())?,
+        steps: steps.to_groups(planes.layout()),
         latent_symbols: latents.map(|latent| latent.map_or_else(Vec::new, symbols)).collect(),
     };
     let exact = plane_distributions(arrays, &coding, XZ)?;

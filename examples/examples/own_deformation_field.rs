@@ -5,15 +5,15 @@
 //! field describes its network as a list of layers, the stream carries the list, and any decoder can run it.
 
 use burn::config::Config;
-use burn::module::{Module, Param};
+use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::leaky_relu;
-use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_codec::network::{Layer, Operation};
+use burn::tensor::{Device, Tensor};
+use light4gs_codec::network::Operation;
 use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, decode};
 use light4gs_data::Scene;
-use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{DeformationField, DynamicScene, GaussianTensors, HexPlane, HexPlaneField, ModelError};
+use light4gs_examples::{Outcome, first_and_last, linear_from_layer, linear_to_layer, tiny_config, tiny_scene};
+use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, HexPlaneField, ModelError};
 use light4gs_train::dataset::load_options;
 use light4gs_train::trainer::Trainer;
 
@@ -79,24 +79,24 @@ impl DeformationField for SharedTrajectories {
         // The same as `deform`, as data. `Point` and `Time` are what the codec calls these inputs.
         let (mut network, [point, time]) = Network::new([3, 1]);
         let branch = |network: &mut Network, [first, second]: &[Linear; 2], input| {
-            let hidden = network.layer(input, to_layer(first));
+            let hidden = network.layer(input, linear_to_layer(first));
             let hidden = network.leaky_relu(hidden, SLOPE);
-            network.layer(hidden, to_layer(second))
+            network.layer(hidden, linear_to_layer(second))
         };
         let place = branch(&mut network, &self.place, point);
         let pace = branch(&mut network, &self.pace, time);
         let along = network.node(Operation::Multiply, &[place, pace]);
-        let offset = network.layer(along, to_layer(&self.directions));
+        let offset = network.layer(along, linear_to_layer(&self.directions));
         network.output(offset);
         let sources = vec![MotionSource::Point, MotionSource::Time];
         let network = MotionNetwork { network, sources, outputs: vec![MotionOutput::Position] };
         Ok(MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() })
     }
 
-    fn from_arrays(arrays: &MotionArrays, _planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(arrays: &MotionArrays, _planes: Option<FeaturePlanes>, device: &Device) -> Result<Self, ModelError> {
         let wrong = |what: &str| ModelError::Motion(format!("{what}, expected those of shared trajectories"));
         let motion = arrays.network.as_ref().ok_or_else(|| wrong("no network"))?;
-        let layers: Vec<&Layer> = motion.network.layers().collect();
+        let layers: Vec<_> = motion.network.layers().collect();
         let &[place, _, _, _, directions] = layers.as_slice() else { return Err(wrong("other layers")) };
         // A file may come from anybody. The field is made with the file's sizes, which the codec has checked and bounded, and
         // compared node by node before its numbers are taken over.
@@ -107,25 +107,10 @@ impl DeformationField for SharedTrajectories {
             return Err(wrong("other nodes"));
         }
         for (linear, layer) in field.layers_mut().into_iter().zip(layers) {
-            load(linear, layer, device);
+            *linear = linear_from_layer(layer, device);
         }
         Ok(field)
     }
-}
-
-/// Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
-fn to_layer(linear: &Linear) -> Layer {
-    let values = |tensor: burn::tensor::TensorData| tensor.iter::<f32>().collect::<Vec<f32>>();
-    let bias = linear.bias.as_ref().expect("these layers have a bias");
-    Layer::linear(values(linear.weight.val().transpose().into_data()), values(bias.val().into_data()))
-}
-
-/// From the layers of a stream.
-fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
-    let shape = [layer.outputs as usize, layer.inputs as usize];
-    let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), shape), device).transpose();
-    linear.weight = Param::from_tensor(Tensor::from_data(weight.into_data(), device));
-    linear.bias = Some(Param::from_tensor(Tensor::from_floats(layer.bias.as_slice(), device)));
 }
 
 fn main() -> Outcome {

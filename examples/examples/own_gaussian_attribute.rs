@@ -13,7 +13,7 @@ use light4gs_codec::{
 };
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{Attribute, DeformationField, DynamicScene, GaussianTensors, HexPlane, ModelError};
+use light4gs_model::{Attribute, DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, ModelError};
 use light4gs_train::dataset::load_options;
 use light4gs_train::run::RunFolder;
 use light4gs_train::trainer::Trainer;
@@ -81,7 +81,7 @@ impl DeformationField for Lifetimes {
     }
 
     /// There is nothing to take over but the attribute, which comes with the Gaussians.
-    fn from_arrays(arrays: &MotionArrays, _planes: Option<HexPlane>, _: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(arrays: &MotionArrays, _planes: Option<FeaturePlanes>, _: &Device) -> Result<Self, ModelError> {
         match *arrays == Self.to_arrays()? {
             true => Ok(Self),
             false => Err(ModelError::Motion("another network, expected that of lifetimes".to_owned())),

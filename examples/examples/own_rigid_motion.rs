@@ -17,7 +17,7 @@ use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput,
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
 use light4gs_model::{
-    DeformationField, DynamicScene, FinePosition, GaussianTensors, HexPlane, LearningRate, ModelError, SceneAtRest,
+    DeformationField, DynamicScene, FeaturePlanes, FinePosition, GaussianTensors, LearningRate, ModelError, SceneAtRest,
 };
 use light4gs_train::dataset::load_options;
 use light4gs_train::run::RunFolder;
@@ -330,7 +330,7 @@ impl DeformationField for RigidNodes {
         Ok(MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() })
     }
 
-    fn from_arrays(arrays: &MotionArrays, _planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(arrays: &MotionArrays, _planes: Option<FeaturePlanes>, device: &Device) -> Result<Self, ModelError> {
         let wrong = || ModelError::Motion("the network is not that of rigid nodes".to_owned());
         let layers: Vec<&Layer> = arrays.network.iter().flat_map(|motion| motion.network.layers()).collect();
         let &[anchors, shifts, turns, log_radii] = layers.as_slice() else { return Err(wrong()) };

@@ -11,7 +11,7 @@ use light4gs_codec::{Network, ShPrior, ShSource, decode, network::Operation};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    BuiltInField, ContextModel, DynamicScene, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first,
+    BuiltInField, ContextModel, DynamicScene, PlaneTensors, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first,
     channels_last, gaussian_bits, round_around,
 };
 use light4gs_train::compression::{ConfiguredModels, EntropyModels};
@@ -85,7 +85,11 @@ impl EntropyModels for WithColorAndPlace {
 /// What the decoder has before it reads `sh_rest`.
 fn known(scene: &DynamicScene) -> ShKnown {
     let tensors = scene.gaussians.tensors();
-    ShKnown { sh_dc: tensors.sh_dc, positions: scene.coordinates.normalize(tensors.means), planes: Vec::new() }
+    ShKnown {
+        sh_dc: tensors.sh_dc,
+        positions: scene.coordinates.normalize(tensors.means),
+        planes: PlaneTensors::default(),
+    }
 }
 
 fn main() -> Outcome {

@@ -8,13 +8,13 @@ use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::{Device, Tensor, activation::tanh};
 use light4gs_data::{ImageStore, LoadOptions, Scene};
 use light4gs_examples::{Outcome, image_tensor, tiny_scene};
-use light4gs_model::{GaussianTensors, Gaussians, GaussiansConfig, HexPlane, HexPlaneConfig, Splatter};
+use light4gs_model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, HexPlaneConfig, Splatter};
 
 /// Gaussians, features over space and time, and one layer that turns a feature into a shift.
 #[derive(Module, Debug)]
 struct MovingGaussians {
     gaussians: Gaussians,
-    hexplane: HexPlane,
+    hexplane: FeaturePlanes,
     shift: Linear,
 }
 

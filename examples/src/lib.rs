@@ -1,8 +1,12 @@
-//! What the examples share: a tiny synthetic scene, and a configuration that trains on it in seconds.
+//! What the examples share: a tiny synthetic scene, a configuration that trains on it in seconds, linear layers as the codec
+//! has them.
 
 use std::path::{Path, PathBuf};
 
+use burn::module::Param;
+use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::network::Layer;
 use light4gs_data::{DataError, RgbImage8, SyntheticOptions, write_synthetic};
 use light4gs_train::config::{Config, DeviceName};
 
@@ -56,4 +60,21 @@ pub fn first_and_last(losses: &[f32]) -> (f32, f32) {
     let tenth = (losses.len() / 10).max(1);
     let mean = |part: &[f32]| part.iter().sum::<f32>() / part.len() as f32;
     (mean(&losses[..tenth]), mean(&losses[losses.len() - tenth..]))
+}
+
+/// A linear layer as the codec has it. Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
+pub fn linear_to_layer(linear: &Linear) -> Layer {
+    let values = |tensor: TensorData| tensor.iter::<f32>().collect::<Vec<f32>>();
+    let bias = linear.bias.as_ref().expect("these layers have a bias");
+    Layer::linear(values(linear.weight.val().transpose().into_data()), values(bias.val().into_data()))
+}
+
+/// A linear layer from the layer of a stream.
+pub fn linear_from_layer(layer: &Layer, device: &Device) -> Linear {
+    let shape = [layer.outputs as usize, layer.inputs as usize];
+    let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), shape), device).transpose();
+    Linear {
+        weight: Param::from_tensor(Tensor::from_data(weight.into_data(), device)),
+        bias: Some(Param::from_tensor(Tensor::from_floats(layer.bias.as_slice(), device))),
+    }
 }

@@ -1,34 +1,44 @@
 //! What the encoder refuses, for those who want to know before they train.
 //!
-//! [`crate::encode`] and [`crate::encode_compressed`] ask the same functions. A configuration asks [`hexplane`],
+//! [`crate::encode`] and [`crate::encode_compressed`] ask the same functions. A configuration asks [`feature_planes`],
 //! [`plane_step`], [`sh_step`] and [`AttributeSteps::check`](crate::attributes::AttributeSteps::check) before there is a scene; a
 //! trainer asks [`scene`] and [`coding`] about the scene that it starts from, and [`positions`] about its points. What is
 //! left for the end are numbers that training makes: NaN, infinities, and values beyond 2^22 steps.
 //!
 //! ```
 //! use light4gs_codec::checks;
+//! use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 //!
-//! assert!(checks::hexplane(32, [64, 64, 64, 24], &[1, 2]).is_ok());
-//! let problem = checks::hexplane(32, [64, 64, 64, 24], &[1; 17]).unwrap_err().to_string();
+//! let hexplane = |multipliers: &[usize]| PlaneLayout::multiscale(&PlaneAxes::ALL, [64, 64, 64, 24], multipliers);
+//! assert!(checks::feature_planes(32, &hexplane(&[1, 2])).is_ok());
+//! let problem = checks::feature_planes(32, &hexplane(&[1; 17])).unwrap_err().to_string();
 //! assert!(problem.contains("number of scales is 17, at most 16"), "{problem}");
 //! assert!(checks::plane_step(1e-45).is_err());
 //! ```
 
 use crate::{
-    CodecError, CompressionInput, Limits, SceneData, attributes, bytes::Section, limits::at_most, plane_layout, planes,
-    stream,
+    CodecError, CompressionInput, Limits, SceneData, attributes,
+    bytes::Section,
+    limits::at_most,
+    plane_layout::{PlaneLayout, check_size},
+    planes, stream,
 };
 
 pub use crate::steps::{LEAST_STEP, attribute_step, nearest_plane_steps, plane_step, sh_step};
 
-/// Refuses a hexplane that no stream can hold, or whose planes cannot be coded: channels, resolution, and multipliers of it.
+/// Refuses feature planes that no stream can hold, or that cannot be coded: too many channels or scales, sizes.
 ///
 /// # Errors
-/// Names the number that is too large, or the axis.
-pub fn hexplane(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> Result<(), CodecError> {
-    planes::head::Head::from_shape(channels, resolution, multipliers).check(&Limits::large())?;
-    plane_layout::check_resolution(resolution.map(|side| side as usize)).map_err(|illegal| {
-        CodecError::invalid(Section::HexPlanes.name(), "resolution", illegal, "what a latent can have")
+/// Names the number that is too large, or the plane and the axis.
+pub fn feature_planes(channels: u32, layout: &PlaneLayout) -> Result<(), CodecError> {
+    planes::head::Head { channels, layout: layout.clone() }.check(&Limits::large())?;
+    layout.planes().iter().try_for_each(|plane| {
+        let [a, b] = plane.axes.axes();
+        let [height, width] = plane.size;
+        [(a, width), (b, height)].into_iter().try_for_each(|(axis, size)| check_size(size, axis)).map_err(|illegal| {
+            let field = format!("size of plane {}", plane.name());
+            CodecError::invalid(Section::FeaturePlanes.name(), field, illegal, "what a latent can have")
+        })
     })
 }
 

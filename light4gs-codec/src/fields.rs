@@ -13,7 +13,7 @@ struct Field<'a> {
 
 /// All numbers of `scene`, in the order of the stream.
 fn fields(scene: &SceneData) -> Vec<Field<'_>> {
-    let SceneData { meta, gaussians, frame, hexplane, motion } = scene;
+    let SceneData { meta, gaussians, frame, feature_planes, motion } = scene;
     let mut fields = Vec::new();
     let mut add = |section, name: String, values| fields.push(Field { section, name, values });
 
@@ -46,9 +46,9 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
         add(section, tensor.name.clone(), &tensor.values);
     }
 
-    let section = Section::HexPlanes.name();
-    for (index, plane) in hexplane.planes.iter().enumerate() {
-        add(section, format!("planes[{index}].values"), &plane.values);
+    let section = Section::FeaturePlanes.name();
+    for plane in &feature_planes.planes {
+        add(section, format!("values of plane {}", plane.shape().name()), &plane.values);
     }
     fields
 }

@@ -1,6 +1,6 @@
 //! The `.l4gs` stream: plain arrays in, bytes out.
 //!
-//! A dynamic scene is a set of Gaussians, a frame that normalizes their positions, a multiscale hexplane and a
+//! A dynamic scene is a set of Gaussians, a frame that normalizes their positions, multiscale feature planes and a
 //! small deformation network. [`SceneData`] holds all of it as plain arrays, [`encode`] turns it into one byte
 //! stream and [`decode`] turns the stream back, bit for bit, on every machine. `docs/format.md` describes the
 //! stream byte by byte.
@@ -21,7 +21,7 @@
 //!         further: Vec::new(),
 //!     },
 //!     frame: SceneFrameArrays::default(), // no normalization
-//!     ..Default::default()                // no hexplane, no network: a scene that does not move
+//!     ..Default::default()                // no planes, no network: a scene that does not move
 //! };
 //!
 //! let bytes = encode(&scene)?;
@@ -107,7 +107,7 @@ pub use planes::{
     Condition, ContextModelArrays, LatentArrays, PlaneCoding, PlanePrior, PlaneSource, section::PlaneBytes,
 };
 pub use scene::{
-    AttributeValues, Coder, CoordinateMapping, FurtherAttribute, GaussianArrays, HexPlaneArrays,
+    AttributeValues, Coder, CoordinateMapping, FeaturePlaneArrays, FurtherAttribute, GaussianArrays,
     LONGEST_ATTRIBUTE_NAME, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Plane, SceneData,
     SceneFrameArrays, SceneMeta, legal_attribute_name, sh_rest_coefficients,
 };

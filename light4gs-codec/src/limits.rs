@@ -1,6 +1,6 @@
 //! The most that a reader accepts.
 
-use crate::CodecError;
+use crate::{CodecError, plane_layout::PlaneAxes};
 
 /// The most that a reader accepts, checked before memory and time are taken.
 ///
@@ -46,7 +46,7 @@ pub struct Limits {
     pub channels: u32,
     /// Samples of a plane along one axis.
     pub resolution: u32,
-    /// Scales of the hexplane.
+    /// Scales of the planes.
     pub scales: u32,
     /// Networks of a section, and priors that use them.
     pub networks: u32,
@@ -104,6 +104,11 @@ impl Limits {
             nanoseconds: 1_800_000_000_000,
             ..Self::default()
         }
+    }
+
+    /// Planes of all scales.
+    pub(crate) fn planes(&self) -> u32 {
+        self.scales.saturating_mul(PlaneAxes::ALL.len() as u32)
     }
 
     /// These limits for a stream of some length, which raises what it may take.

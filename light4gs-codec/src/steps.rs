@@ -1,6 +1,6 @@
 //! Quantization steps: which an encoder takes, and which a decoder takes.
 
-use crate::{CodecError, adaptive::LARGEST_STEP, bytes::Section};
+use crate::{CodecError, adaptive::LARGEST_STEP, bytes::Section, plane_layout::PlaneAxes};
 
 /// The smallest step that the encoder takes. Under it the numbers of a trained scene, some tens on either side of 0, still
 /// fit into the 2^22 steps that a symbol can count.
@@ -12,15 +12,16 @@ pub(crate) const LEAST_STEP_IN_STREAM: f32 = 1.0 / (1u64 << 60) as f32;
 /// A number for the planes over space and one for the planes over an axis and time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PerGroup {
-    /// For xy, xz and yz.
+    /// For planes without time.
     pub space_only: f32,
-    /// For xt, yt and zt.
+    /// For planes with time.
     pub space_time: f32,
 }
 
 impl PerGroup {
-    pub(crate) fn of(self, space_time: bool) -> f32 {
-        if space_time { self.space_time } else { self.space_only }
+    /// That for planes over these axes.
+    pub fn of(self, axes: PlaneAxes) -> f32 {
+        if axes.is_space_time() { self.space_time } else { self.space_only }
     }
 }
 
@@ -29,7 +30,7 @@ impl PerGroup {
 /// # Errors
 /// A step below [`LEAST_STEP`], above 1e30, or NaN.
 pub fn plane_step(step: f32) -> Result<(), CodecError> {
-    check_step(Section::HexPlanes.name(), "step", step, LEAST_STEP)
+    check_step(Section::FeaturePlanes.name(), "step", step, LEAST_STEP)
 }
 
 /// The nearest steps that [`plane_step`] takes: learned steps are not bounded by anything else.

@@ -104,9 +104,9 @@ fn a_table_that_lies() {
     let length = |section: usize| u64_at(&bytes, table_at(&bytes) + ENTRY * section + 8);
     let lied = |section, value: u64| forged_entry(section, 8, &value.to_le_bytes());
     // Too long: the last one is cut short. Too short: something is left at the end, or the bytes are others'.
-    assert!(matches!(lied(0, length(0) + 1), CodecError::Truncated { section: "hexplanes", .. }));
+    assert!(matches!(lied(0, length(0) + 1), CodecError::Truncated { section: "feature_planes", .. }));
     assert!(matches!(lied(2, u64::MAX), CodecError::Truncated { section: "scene_frame", .. }));
-    assert!(matches!(lied(4, length(4) + 1), CodecError::Truncated { section: "hexplanes", .. }));
+    assert!(matches!(lied(4, length(4) + 1), CodecError::Truncated { section: "feature_planes", .. }));
     assert!(matches!(lied(4, length(4) - 1), CodecError::TrailingBytes { section: "stream", bytes: 1 }));
     assert!(matches!(lied(1, length(1) - 1), CodecError::TrailingBytes { section: "stream", bytes: 1 }));
 
@@ -114,9 +114,9 @@ fn a_table_that_lies() {
     assert!(matches!(error, CodecError::UnknownSection { index: 3, id: 99 }));
     assert!(matches!(forged_entry(3, 0, &1u16.to_le_bytes()), CodecError::DuplicateSection { section: "gaussians" }));
     let error = forged_entry(4, 2, &[7]);
-    assert_eq!(error.to_string(), "hexplanes: unknown kind 7; use a newer program");
+    assert_eq!(error.to_string(), "feature_planes: unknown kind 7; use a newer program");
     let error = forged_entry(4, 3, &[7]);
-    assert_eq!(error.to_string(), "hexplanes: unknown encoding 7 of the kind \"explicit\"; use a newer program");
+    assert_eq!(error.to_string(), "feature_planes: unknown encoding 7 of the kind \"explicit\"; use a newer program");
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn a_missing_section() {
     let length = shorter.len() as u64;
     put(&mut shorter, 20, &length.to_le_bytes());
     forge_header(&mut shorter);
-    assert!(matches!(refuse(&shorter), CodecError::MissingSection { section: "hexplanes" }));
+    assert!(matches!(refuse(&shorter), CodecError::MissingSection { section: "feature_planes" }));
 }
 
 /// The sample with the first bytes of a section replaced, whatever their number.
@@ -156,8 +156,10 @@ fn huge_counts_in_sections() {
     for at in 12..16 {
         over(replaced(3, at + 1, &[&head[..at], &HUGE].concat()));
     }
-    for at in 0..6 {
-        over(replaced(4, at + 1, &[&payload(&bytes, 4)[..at], &HUGE].concat())); // channels, resolution, scales
+    // Planes: channels, 2 scales, which planes there are, cells along x, y, z, t.
+    assert_eq!(payload(&bytes, 4)[..12], [1, 2, 0b11_1111, 2, 1, 1, 3, 0b11_1111, 4, 2, 2, 3]);
+    for at in [0, 1, 3, 4, 5, 6, 8] {
+        over(replaced(4, at + 1, &[&payload(&bytes, 4)[..at], &HUGE].concat()));
     }
     // The most that the limits allow is not there either.
     let cut = |error: CodecError| assert!(matches!(error, CodecError::Truncated { .. }), "{error}");
@@ -175,7 +177,7 @@ fn contradictions_in_sections() {
     assert!(forged(3, 11, &[2]).to_string().contains("presence of a network is 2"));
     assert!(forged(3, 16, &[77]).to_string().contains("operation of the network, node 0 is 77"));
     assert!(forged(4, 0, &[0]).to_string().contains("channels"));
-    assert!(forged(4, 6, &[0]).to_string().contains("planes[0]"));
+    assert!(forged(4, 3, &[0]).to_string().contains("width of plane 0.xy is 0"));
     let nan = f32::NAN.to_le_bytes();
     // Behind the count and the list of attributes.
     assert!(forged(0, 65, &nan).to_string().contains("value 0 of means is NaN"));

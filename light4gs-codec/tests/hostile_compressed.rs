@@ -121,9 +121,9 @@ fn the_largest_planes_of_a_small_stream() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
     let (_, input) = tiny(Profile::Paper);
     let mut scene = common::compression::scene(0, 2, 4, [20_480, 8, 4, 4], &[1, 2]);
-    scene.hexplane.planes.iter_mut().for_each(|plane| plane.values.fill(0.0));
+    scene.feature_planes.planes.iter_mut().for_each(|plane| plane.values.fill(0.0));
     let planes = input.planes.unwrap();
-    let planes = common::compression::plane_coding(&scene.hexplane, planes.model, planes.steps);
+    let planes = common::compression::plane_coding(&scene.feature_planes, planes.model, planes.steps);
     let bytes =
         encode_compressed(&scene, &CompressionInput { planes: Some(planes), ..tiny(Profile::Paper).1 }).unwrap();
     drop(scene);
@@ -216,7 +216,7 @@ fn values_that_take_no_bytes_are_limited() {
     assert!(error.to_string().contains("memory that decoding takes in bytes is"), "{error}");
     assert!(error.to_string().contains("--limits large"), "{error}");
     let mut planes = common::compression::scene(0, 2, 4, [64, 64, 64, 4], &[1, 2]);
-    planes.hexplane.planes.iter_mut().for_each(|plane| plane.values.fill(0.0));
+    planes.feature_planes.planes.iter_mut().for_each(|plane| plane.values.fill(0.0));
     let coding = common::compression::input(
         &planes,
         Profile::Compact,

@@ -3,9 +3,10 @@
 //! | room | what is in it | paper |
 //! |---|---|---|
 //! | [`scene`] | [`Gaussians`]; world coordinates to [-1, 1] ([`SceneCoordinates`]); what moves the Gaussians ([`DeformationField`], and the paper's, [`HexPlaneField`]); all of it together ([`DynamicScene`]) | III-A |
+//! | [`planes`] | feature planes ([`FeaturePlanes`]) and their query; a plane over each pair of axes is a hexplane ([`HexPlaneConfig`]) | III-A |
 //! | [`Splatter`] | differentiable rendering | 3DGS |
 //! | [`Significance`] | what each Gaussian contributes over views and times | III-B |
-//! | [`context`] | what every value of the hexplane costs in the file: the multiscale hexplane [`ContextModel`] | III-C |
+//! | [`context`] | what every value of the planes costs in the file: the multiscale hexplane [`ContextModel`] | III-C |
 //! | [`sh`] | what every spherical harmonic costs in the file: four models behind [`ShEntropy`] | III-D |
 //! | [`entropy`] | what those are made of: densities, convolutions over planes, quantization steps ([`AdaptiveQuantization`]) | III-D |
 //! | [`parameters`] | every float parameter of a module with its path | |
@@ -33,6 +34,7 @@ mod gpu_error;
 mod kernels;
 pub mod ops;
 pub mod parameters;
+pub mod planes;
 pub mod scene;
 pub mod sh;
 mod significance;
@@ -42,6 +44,7 @@ mod splatter;
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;
+pub use planes::*;
 pub use scene::*;
 pub use sh::*;
 pub use significance::{PixelContribution, Significance, VolumeWeight, least_significant};

@@ -4,8 +4,8 @@
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use light4gs_model::{
-    ContextModelConfig, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps, ShAutoregressiveConfig, ShBottleneckConfig,
-    ShEntropy, ShEntropyConfig, ShKnown, ShMixtureConfig,
+    ContextModelConfig, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps, PlaneTensors, ShAutoregressiveConfig,
+    ShBottleneckConfig, ShEntropy, ShEntropyConfig, ShKnown, ShMixtureConfig,
 };
 use light4gs_train::device::{built_in, device_by_name};
 
@@ -60,7 +60,7 @@ fn spherical_harmonics(criterion: &mut Criterion) {
         let known = ShKnown {
             sh_dc: Tensor::random([GAUSSIANS, 1, 3], Distribution::Default, &device),
             positions: Tensor::zeros([GAUSSIANS, 3], &device),
-            planes: Vec::new(),
+            planes: PlaneTensors::default(),
         };
         let mut group = criterion.benchmark_group(format!("spherical harmonics of {GAUSSIANS} Gaussians, {name}"));
         group.sample_size(10);

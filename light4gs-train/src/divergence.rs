@@ -106,7 +106,7 @@ fn group_rates(config: &Config) -> [(ParameterGroup, &'static str, f64); 5] {
     let (rates, compression) = (&config.train.learning_rate, &config.compression);
     let (context, sh) = (&compression.context, &compression.sh);
     [
-        (ParameterGroup::Grid, "train.learning_rate.grid_init", rates.grid_init),
+        (ParameterGroup::Planes, "train.learning_rate.planes_init", rates.planes_init),
         (ParameterGroup::Deformation, "train.learning_rate.deformation_init", rates.deformation_init),
         (ParameterGroup::Context, "compression.context.learning_rate_init", context.learning_rate_init),
         (ParameterGroup::ShModel, "compression.sh.learning_rate_init", sh.learning_rate_init),
@@ -119,9 +119,9 @@ fn other_keys(config: &Config) -> [(&'static str, f64); 7] {
     let (rates, weights) = (&config.train.learning_rate, &config.train.regularizer);
     [
         ("train.learning_rate.means_final", rates.means_final),
-        ("train.learning_rate.grid_final", rates.grid_final),
+        ("train.learning_rate.planes_final", rates.planes_final),
         ("train.learning_rate.deformation_final", rates.deformation_final),
-        ("train.regularizer.plane_tv", weights.plane_tv.into()),
+        ("train.regularizer.plane_smoothness", weights.plane_smoothness.into()),
         ("train.regularizer.time_smoothness", weights.time_smoothness.into()),
         ("train.regularizer.time_l1", weights.time_l1.into()),
         ("compression.rate.lambda", config.compression.rate.lambda),

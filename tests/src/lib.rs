@@ -9,6 +9,7 @@ pub mod golden;
 pub mod hostile;
 pub mod named;
 pub mod odd_scenes;
+pub mod planes;
 pub mod program;
 pub mod pytorch;
 pub mod random;

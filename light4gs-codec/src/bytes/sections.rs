@@ -9,14 +9,14 @@ pub(crate) enum Section {
     Sh,
     SceneFrame,
     Motion,
-    HexPlanes,
+    FeaturePlanes,
     ContextModel,
 }
 
 impl Section {
     /// Every section, in the order of their numbers.
     pub(crate) const ALL: [Self; 6] =
-        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Motion, Self::HexPlanes, Self::ContextModel];
+        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Motion, Self::FeaturePlanes, Self::ContextModel];
 
     /// The number that stands in the table.
     pub(crate) const fn id(self) -> u16 {
@@ -25,7 +25,7 @@ impl Section {
             Self::Sh => 2,
             Self::SceneFrame => 3,
             Self::Motion => 4,
-            Self::HexPlanes => 5,
+            Self::FeaturePlanes => 5,
             Self::ContextModel => 6,
         }
     }
@@ -42,7 +42,7 @@ impl Section {
             Self::Sh => "sh",
             Self::SceneFrame => "scene_frame",
             Self::Motion => "motion",
-            Self::HexPlanes => "hexplanes",
+            Self::FeaturePlanes => "feature_planes",
             Self::ContextModel => "context_model",
         }
     }
@@ -67,9 +67,9 @@ pub enum Kind {
     /// A description of what moves the Gaussians; it says itself what it is.
     MotionDescription,
     /// Planes as they are.
-    HexPlanesExplicit,
+    FeaturePlanesExplicit,
     /// Planes under a context model.
-    HexPlanesContextCoded,
+    FeaturePlanesContextCoded,
     /// A context model as networks.
     ContextModelNetworks,
 }
@@ -83,8 +83,8 @@ impl Kind {
         Self::SceneFramePrincipalAxes,
         Self::SceneFrameMapped,
         Self::MotionDescription,
-        Self::HexPlanesExplicit,
-        Self::HexPlanesContextCoded,
+        Self::FeaturePlanesExplicit,
+        Self::FeaturePlanesContextCoded,
         Self::ContextModelNetworks,
     ];
 
@@ -98,8 +98,8 @@ impl Kind {
             Self::SceneFramePrincipalAxes => (Section::SceneFrame, 1),
             Self::SceneFrameMapped => (Section::SceneFrame, 2),
             Self::MotionDescription => (Section::Motion, 1),
-            Self::HexPlanesExplicit => (Section::HexPlanes, 1),
-            Self::HexPlanesContextCoded => (Section::HexPlanes, 2),
+            Self::FeaturePlanesExplicit => (Section::FeaturePlanes, 1),
+            Self::FeaturePlanesContextCoded => (Section::FeaturePlanes, 2),
             Self::ContextModelNetworks => (Section::ContextModel, 1),
         }
     }
@@ -113,10 +113,10 @@ impl Kind {
     /// The encodings that it may have.
     fn encodings(self) -> &'static [Encoding] {
         match self {
-            Self::ShExplicit | Self::SceneFramePrincipalAxes | Self::SceneFrameMapped | Self::HexPlanesExplicit => {
+            Self::ShExplicit | Self::SceneFramePrincipalAxes | Self::SceneFrameMapped | Self::FeaturePlanesExplicit => {
                 &[Encoding::Float32]
             }
-            Self::ShTables | Self::HexPlanesContextCoded => &[Encoding::Quantized],
+            Self::ShTables | Self::FeaturePlanesContextCoded => &[Encoding::Quantized],
             _ => &[Encoding::Float32, Encoding::Quantized],
         }
     }
@@ -124,13 +124,13 @@ impl Kind {
     /// The name of the kind in its section.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::GaussiansExplicit | Self::ShExplicit | Self::HexPlanesExplicit => "explicit",
+            Self::GaussiansExplicit | Self::ShExplicit | Self::FeaturePlanesExplicit => "explicit",
             Self::ShTables => "tables",
             Self::ShNetworks | Self::ContextModelNetworks => "networks",
             Self::SceneFramePrincipalAxes => "principal axes",
             Self::SceneFrameMapped => "mapped principal axes",
             Self::MotionDescription => "description",
-            Self::HexPlanesContextCoded => "context coded",
+            Self::FeaturePlanesContextCoded => "context coded",
         }
     }
 }

@@ -1,13 +1,12 @@
 //! The Gaussians of a scene at any time: what a player runs for each frame.
 
-use super::query::{Between, multiply_by_sample, normalized};
+use super::query::{Between, multiply_by_space_samples, normalized, scales};
 use crate::{
     CodecError, CoordinateMapping, GaussianArrays, Limits, MotionNetwork, MotionOutput, MotionSource, Plane, SceneData,
     network::{
         Program,
         kernels::{LANES, Lanes, kept},
     },
-    plane_layout::{PLANE_AXES, PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES},
     planes, sh_rest_coefficients,
 };
 
@@ -44,12 +43,13 @@ struct Motion {
     points: Vec<[Lanes; 3]>,
     /// `[blocks, features]`: products of the samples of the planes without time; empty where no source is features.
     space_features: Vec<Lanes>,
-    /// Planes xt, yt, zt of each scale.
-    time_planes: Vec<Plane>,
+    /// For each scale the planes with time.
+    time_planes: Vec<Vec<Plane>>,
 }
 
 /// A plane over an axis and time at one time: `[samples, channels]`.
 struct Line {
+    axis: usize,
     samples: u32,
     values: Vec<f32>,
 }
@@ -58,7 +58,7 @@ impl MotionEvaluator {
     /// Prepares the motion of a scene.
     ///
     /// # Errors
-    /// A network that contradicts itself or the hexplane; an attribute without which the scene would look wrong, and that
+    /// A network that contradicts itself or the planes; an attribute without which the scene would look wrong, and that
     /// nobody knows ([`SceneData::check_attributes_are_known`]).
     pub fn new(scene: &SceneData) -> Result<Self, CodecError> {
         scene.check_attributes_are_known()?;
@@ -67,10 +67,10 @@ impl MotionEvaluator {
         };
         let limits = Limits::large();
         scene.motion.check(&limits)?;
-        planes::head::check(&scene.hexplane, &limits)?;
-        scene.motion.check_sources(scene.hexplane.features(), &scene.gaussians)?;
-        let channels = scene.hexplane.channels as usize;
-        let features = scene.hexplane.features() as usize;
+        planes::head::check(&scene.feature_planes, &limits)?;
+        scene.motion.check_sources(scene.feature_planes.features(), &scene.gaussians)?;
+        let channels = scene.feature_planes.channels as usize;
+        let features = scene.feature_planes.features() as usize;
         let uniform: Vec<bool> = sources.iter().map(|source| *source == MotionSource::Time).collect();
         let mut motion = Motion {
             program: Program::pointwise_with_uniform(network, &uniform),
@@ -92,10 +92,10 @@ impl MotionEvaluator {
             motion.points.push(points);
         }
         if features > 0 && sources.contains(&MotionSource::Features) {
-            let scales = scene.hexplane.planes.chunks_exact(PLANES_PER_SCALE);
-            motion.time_planes =
-                scales.flat_map(|planes| SPACE_TIME_PLANES.map(|position| planes[position].clone())).collect();
-            motion.space_features = motion.products_over_space(&scene.hexplane.planes);
+            let with_time =
+                |scale: &[Plane]| scale.iter().filter(|plane| plane.axes.is_space_time()).cloned().collect();
+            motion.time_planes = scales(&scene.feature_planes.planes).map(with_time).collect();
+            motion.space_features = motion.products_over_space(&scene.feature_planes.planes);
         }
         Ok(Self { motion: Some(motion) })
     }
@@ -172,19 +172,15 @@ impl MotionEvaluator {
 }
 
 impl Motion {
-    /// `[blocks, features]`: the product of the samples of xy, xz and yz.
+    /// `[blocks, features]`: the product of the samples of the planes without time.
     fn products_over_space(&self, planes: &[Plane]) -> Vec<Lanes> {
         let mut products = vec![[1.0; LANES]; self.points.len() * self.features];
         let mut product = vec![0.0; self.channels];
         for (points, block) in self.points.iter().zip(products.chunks_exact_mut(self.features.max(1))) {
             for lane in 0..LANES {
-                let scales = planes.chunks_exact(PLANES_PER_SCALE).zip(block.chunks_exact_mut(self.channels));
-                for (planes, features) in scales {
+                for (planes, features) in scales(planes).zip(block.chunks_exact_mut(self.channels)) {
                     product.fill(1.0);
-                    for position in SPACE_ONLY_PLANES {
-                        let [across, down] = PLANE_AXES[position];
-                        multiply_by_sample(&planes[position], points[across][lane], points[down][lane], &mut product);
-                    }
+                    multiply_by_space_samples(planes, points.map(|lanes| lanes[lane]), &mut product);
                     features.iter_mut().zip(&product).for_each(|(feature, &product)| feature[lane] = product);
                 }
             }
@@ -192,8 +188,8 @@ impl Motion {
         products
     }
 
-    /// The space-time planes at a time.
-    fn lines_at(&self, time: f32) -> Vec<Line> {
+    /// The planes with time at a time, scale by scale.
+    fn lines_at(&self, time: f32) -> Vec<Vec<Line>> {
         let line = |plane: &Plane| {
             let row = Between::of(2.0 * time - 1.0, plane.height);
             let width = plane.width as usize;
@@ -204,31 +200,40 @@ impl Motion {
                     values[x * self.channels + channel] = row.between(low[x], high[x]);
                 }
             }
-            Line { samples: plane.width, values }
+            let [axis, _] = plane.axes.axes();
+            Line { axis, samples: plane.width, values }
         };
-        self.time_planes.iter().map(line).collect()
+        self.time_planes.iter().map(|planes| planes.iter().map(line).collect()).collect()
     }
 
     /// Features of eight Gaussians, `[features]`. `product` is memory.
-    fn set_features(&self, block: usize, lines: &[Line], product: &mut [f32], inputs: &mut [Lanes]) {
+    fn set_features(&self, block: usize, lines: &[Vec<Line>], product: &mut [f32], inputs: &mut [Lanes]) {
         inputs.copy_from_slice(&self.space_features[block * self.features..][..self.features]);
-        let channels = self.channels;
         for lane in 0..LANES {
-            for (lines, product) in lines.chunks_exact(3).zip(product.chunks_exact_mut(channels)) {
-                let place = |axis: usize| {
-                    let line: &Line = &lines[axis];
-                    let x = Between::of(self.points[block][axis][lane], line.samples);
-                    (&line.values[x.low * channels..][..channels], &line.values[x.high * channels..][..channels], x)
-                };
-                let ((x0, x1, x), (y0, y1, y), (z0, z1, z)) = (place(0), place(1), place(2));
-                for channel in 0..channels {
-                    product[channel] = x.between(x0[channel], x1[channel])
-                        * y.between(y0[channel], y1[channel])
-                        * z.between(z0[channel], z1[channel]);
+            let point = self.points[block].map(|lanes| lanes[lane]);
+            for (lines, product) in lines.iter().zip(product.chunks_exact_mut(self.channels)) {
+                match &lines[..] {
+                    [] => product.fill(1.0),
+                    [x] => set_to_product([x], point, product),
+                    [x, y] => set_to_product([x, y], point, product),
+                    [x, y, z, ..] => set_to_product([x, y, z], point, product),
                 }
             }
             inputs.iter_mut().zip(&*product).for_each(|(input, &product)| input[lane] *= product);
         }
+    }
+}
+
+/// Sets `product [channels]` to the product of the lines' samples at a point.
+fn set_to_product<const N: usize>(lines: [&Line; N], point: [f32; 3], product: &mut [f32]) {
+    let channels = product.len();
+    let samples = lines.map(|line| {
+        let place = Between::of(point[line.axis], line.samples);
+        (&line.values[place.low * channels..][..channels], &line.values[place.high * channels..][..channels], place)
+    });
+    for (channel, product) in product.iter_mut().enumerate() {
+        let sample = |(low, high, place): (&[f32], &[f32], Between)| place.between(low[channel], high[channel]);
+        *product = samples[1..].iter().fold(sample(samples[0]), |product, &other| product * sample(other));
     }
 }
 
@@ -276,7 +281,7 @@ impl SceneData {
     /// call.
     ///
     /// # Errors
-    /// A network that contradicts itself or the hexplane.
+    /// A network that contradicts itself or the planes.
     pub fn positions_at(&self, time: f32) -> Result<Vec<[f32; 3]>, CodecError> {
         let motion = self.motion.network.as_ref();
         let moves = |output: &MotionOutput| output.added() == MotionOutput::Position;

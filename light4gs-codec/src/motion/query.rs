@@ -1,4 +1,4 @@
-//! Points, their coordinates in the hexplane, and samples of a plane there.
+//! Points, their coordinates in the planes, and samples of a plane there.
 //!
 //! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
 //! hexplane-coupled harmonics are coded by these numbers.
@@ -48,7 +48,7 @@ impl Between {
 }
 
 /// Multiplies `product [channels]` by the bilinear samples of a plane at `across` (width) and `down` (height).
-pub(crate) fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product: &mut [f32]) {
+fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product: &mut [f32]) {
     let (x, y) = (Between::of(across, plane.width), Between::of(down, plane.height));
     let width = plane.width as usize;
     for (product, channel) in product.iter_mut().zip(plane.values.chunks_exact(width * plane.height as usize)) {
@@ -58,4 +58,17 @@ pub(crate) fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product:
         };
         *product = kept(*product * kept(y.between(row(y.low), row(y.high))));
     }
+}
+
+/// Multiplies `product [channels]` by the samples of a scale's planes without time at a point, in their order.
+pub(crate) fn multiply_by_space_samples(planes: &[Plane], point: [f32; 3], product: &mut [f32]) {
+    for plane in planes.iter().filter(|plane| !plane.axes.is_space_time()) {
+        let [across, down] = plane.axes.axes();
+        multiply_by_sample(plane, point[across], point[down], product);
+    }
+}
+
+/// The planes of each scale, which stand one behind the other.
+pub(crate) fn scales(planes: &[Plane]) -> impl Iterator<Item = &[Plane]> {
+    planes.chunk_by(|a, b| a.scale == b.scale)
 }

@@ -8,17 +8,17 @@ use super::{
     walk::{Grid, walk},
 };
 use crate::{
-    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane,
+    CodecError, ContextModelArrays, FeaturePlaneArrays, Limits, PerGroup, Plane,
     adaptive::Damaged,
     budget::Budget,
     bytes::Section,
     entropy::{SymbolCoder, SymbolReader, SymbolWriter, gaussian_table},
     network::kernels::AnchorMap,
     parallel,
-    plane_layout::{is_space_time, scale_of},
+    plane_layout::{PlaneLayout, PlaneShape},
 };
 
-const SECTION: &str = Section::HexPlanes.name();
+const SECTION: &str = Section::FeaturePlanes.name();
 
 /// What [`encode`] makes.
 #[derive(Debug)]
@@ -26,22 +26,23 @@ pub(crate) struct CodedPlanes {
     /// One entry a sub-stream, in the order of [`stream_order`].
     pub(crate) sub_streams: Vec<Vec<u8>>,
     /// The planes as a decoder gets them.
-    pub(crate) decoded: HexPlaneArrays,
+    pub(crate) decoded: FeaturePlaneArrays,
 }
 
-/// Codes planes whose arrays agree with the model and the head. `steps` has one entry, or one a scale; `latent_symbols`
+/// Codes planes whose arrays agree with the model. `steps` has one entry, or one a scale; `latent_symbols`
 /// has those of each plane with a latent, `[N, H/4, W/4]`.
 pub(crate) fn encode(
-    hexplane: &HexPlaneArrays,
+    planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
     steps: &[PerGroup],
     latent_symbols: &[Vec<i32>],
     limits: &Limits,
 ) -> Result<CodedPlanes, CodecError> {
-    let coder = PlaneCoder::new(model, hexplane, steps, &Budget::new(limits))?;
+    let layout = planes.layout()?;
+    let coder = PlaneCoder::new(model, &layout, steps, &Budget::new(limits))?;
     let mut sub_streams = Vec::new();
     let decoded = coder.run(
-        hexplane.clone(),
+        planes.clone(),
         |plane_coder, index, planes| {
             let mut values = planes.planes[index].values.clone();
             let streams = plane_coder.encode_plane(index, planes, &mut values, latent_symbols)?;
@@ -52,24 +53,25 @@ pub(crate) fn encode(
     Ok(CodedPlanes { sub_streams, decoded })
 }
 
-/// Reads planes into `hexplane`, whose planes have their sizes but no values.
+/// Reads planes of a layout.
 pub(crate) fn decode(
-    hexplane: HexPlaneArrays,
+    layout: &PlaneLayout,
     model: &ContextModelArrays,
     steps: &[PerGroup],
     streams: &[&[u8]],
     budget: &Budget,
-) -> Result<HexPlaneArrays, CodecError> {
-    let coder = PlaneCoder::new(model, &hexplane, steps, budget)?;
+) -> Result<FeaturePlaneArrays, CodecError> {
+    let coder = PlaneCoder::new(model, layout, steps, budget)?;
     streams.iter().try_for_each(|stream| budget.stream(SECTION, stream.len()))?;
-    let order = stream_order(model, hexplane.multipliers.len());
+    let order = stream_order(model, layout);
     coder.run(
-        hexplane,
+        FeaturePlaneArrays::without_values(model.channels, layout),
         |plane_coder, index, planes| {
             let first = order.iter().find(|(plane, _)| *plane == index).expect("the order has every plane").1;
             let streams = &streams[first..first + sub_streams(model, index)];
             let values = plane_coder.decode_plane(index, planes, streams).map_err(|Damaged| {
-                CodecError::invalid(SECTION, format!("symbols of planes[{index}]"), "damaged", "what an encoder writes")
+                let field = format!("symbols of plane {}", layout.planes()[index].name());
+                CodecError::invalid(SECTION, field, "damaged", "what an encoder writes")
             })?;
             Ok((values, ()))
         },
@@ -78,12 +80,8 @@ pub(crate) fn decode(
 }
 
 /// Refuses planes that ask for more than the limits allow.
-pub(crate) fn check_cost(
-    hexplane: &HexPlaneArrays,
-    model: &ContextModelArrays,
-    limits: &Limits,
-) -> Result<(), CodecError> {
-    PlaneCoder::new(model, hexplane, &[], &Budget::new(limits)).map(drop)
+pub(crate) fn check_cost(layout: &PlaneLayout, model: &ContextModelArrays, limits: &Limits) -> Result<(), CodecError> {
+    PlaneCoder::new(model, layout, &[], &Budget::new(limits)).map(drop)
 }
 
 struct PlaneCoder<'a> {
@@ -93,47 +91,51 @@ struct PlaneCoder<'a> {
 }
 
 impl<'a> PlaneCoder<'a> {
-    /// For planes of these sizes, whose values are not looked at. Refuses what the limits do not allow.
+    /// Refuses what the limits do not allow.
     fn new(
         model: &'a ContextModelArrays,
-        hexplane: &HexPlaneArrays,
+        layout: &'a PlaneLayout,
         steps: &'a [PerGroup],
         budget: &Budget,
     ) -> Result<Self, CodecError> {
-        let stages = stages(model, hexplane.multipliers.len());
-        let sizes: Vec<_> = hexplane.planes.iter().map(|plane| [plane.height, plane.width]).collect();
-        let model = ExactModel::new(model, budget)?;
-        cost::ask(&model, &stages, &sizes, budget)?;
+        let stages = stages(model, layout);
+        let model = ExactModel::new(model, layout, budget)?;
+        cost::ask(&model, &stages, budget)?;
         Ok(Self { model, stages, steps })
     }
 
     /// Does `work` for every plane, those of a stage at once, and replaces the planes' values by what it returns.
     fn run<T: Send>(
         &self,
-        mut hexplane: HexPlaneArrays,
-        work: impl Fn(&Self, usize, &HexPlaneArrays) -> Result<(Vec<f32>, T), CodecError> + Sync + Send,
+        mut planes: FeaturePlaneArrays,
+        work: impl Fn(&Self, usize, &FeaturePlaneArrays) -> Result<(Vec<f32>, T), CodecError> + Sync + Send,
         mut collect: impl FnMut(T),
-    ) -> Result<HexPlaneArrays, CodecError> {
+    ) -> Result<FeaturePlaneArrays, CodecError> {
         for stage in &self.stages {
-            let results = parallel::map(stage.len(), |i| work(self, stage[i], &hexplane));
+            let results = parallel::map(stage.len(), |i| work(self, stage[i], &planes));
             for (&index, result) in stage.iter().zip(results) {
                 let (values, other) = result?;
-                hexplane.planes[index].values = values;
+                planes.planes[index].values = values;
                 collect(other);
             }
         }
-        Ok(hexplane)
+        Ok(planes)
+    }
+
+    fn name(&self, plane: usize) -> String {
+        self.model.layout.planes()[plane].name()
     }
 
     fn grid(&self, plane: usize) -> Grid {
-        let step = self.steps.get(scale_of(plane)).unwrap_or(&self.steps[0]).of(is_space_time(plane));
+        let PlaneShape { scale, axes, .. } = self.model.layout.planes()[plane];
+        let step = self.steps.get(scale).unwrap_or(&self.steps[0]).of(axes);
         Grid { step, center: self.model.center_of(plane) }
     }
 
     fn encode_plane(
         &self,
         index: usize,
-        planes: &HexPlaneArrays,
+        planes: &FeaturePlaneArrays,
         values: &mut [f32],
         latent_symbols: &[Vec<i32>],
     ) -> Result<Vec<Vec<u8>>, CodecError> {
@@ -144,7 +146,7 @@ impl<'a> PlaneCoder<'a> {
             let mut writer = SymbolWriter::default();
             latent = self.code_latent(size, &mut writer, &latent_symbols[index]).map_err(|Damaged| {
                 let expected = "symbols within ±4194304";
-                CodecError::invalid(SECTION, format!("latent of planes[{index}]"), "out of range", expected)
+                CodecError::invalid(SECTION, format!("latent of plane {}", self.name(index)), "out of range", expected)
             })?;
             streams.push(writer.finish(&self.model.latent_distributions));
         }
@@ -153,14 +155,15 @@ impl<'a> PlaneCoder<'a> {
         let mut coders = coders(&self.model, index, SymbolWriter::default);
         walk(&parameters, grid, size, values, &mut coders).map_err(|Damaged| {
             let found = format!("more than 4194304 steps of {} from its center", grid.step);
-            CodecError::invalid(SECTION, format!("a value of planes[{index}]"), found, "fewer; make the step larger")
+            let field = format!("a value of plane {}", self.name(index));
+            CodecError::invalid(SECTION, field, found, "fewer; make the step larger")
         })?;
         let levels = &gaussian_table().levels;
         streams.extend(coders.iter().map(|(_, writer)| writer.finish(levels)));
         Ok(streams)
     }
 
-    fn decode_plane(&self, index: usize, planes: &HexPlaneArrays, streams: &[&[u8]]) -> Result<Vec<f32>, Damaged> {
+    fn decode_plane(&self, index: usize, planes: &FeaturePlaneArrays, streams: &[&[u8]]) -> Result<Vec<f32>, Damaged> {
         let size = size_of(&planes.planes[index]);
         let mut readers =
             streams.iter().map(|bytes| SymbolReader::new(bytes)).collect::<Result<Vec<_>, _>>()?.into_iter();
@@ -196,17 +199,18 @@ impl<'a> PlaneCoder<'a> {
 /// Scales and means of every value of a plane, given that and the planes that it is coded from, all decoded; and the
 /// symbols of its latent, where it has one. Values are `[M, height, width]`.
 pub(crate) fn parameters(
-    hexplane: &HexPlaneArrays,
+    planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
     latent_symbols: &[i32],
     index: usize,
     limits: &Limits,
 ) -> Result<(Vec<f32>, Vec<f32>), CodecError> {
-    let coder = PlaneCoder::new(model, hexplane, &[], &Budget::new(limits))?;
+    let layout = planes.layout()?;
+    let coder = PlaneCoder::new(model, &layout, &[], &Budget::new(limits))?;
     let model = &coder.model;
-    let plane = &hexplane.planes[index];
+    let plane = &planes.planes[index];
     let size = size_of(plane);
-    let parameters = PlaneParameters::new(model, index, size, hexplane, latent_symbols);
+    let parameters = PlaneParameters::new(model, index, size, planes, latent_symbols);
     let anchors = AnchorMap::new(&plane.values, size, model.center_of(index));
     let (mut scales, mut means) = (vec![0.0; plane.values.len()], vec![0.0; plane.values.len()]);
     for (part, ()) in coders(model, index, || ()) {

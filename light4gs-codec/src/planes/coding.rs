@@ -1,9 +1,9 @@
 //! How planes are coded, as data.
 
 use super::ContextModelArrays;
-use crate::{plane_layout::PLANES_PER_SCALE, steps::PerGroup};
+use crate::steps::PerGroup;
 
-/// How the hexplane is coded.
+/// How the feature planes are coded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlaneCoding {
     /// The networks that give distributions. They are used as the stream holds them, that is, quantized in the compact
@@ -17,12 +17,12 @@ pub struct PlaneCoding {
 }
 
 impl PlaneCoding {
-    /// Channels, height and width of the latent of each plane of a hexplane with these plane sizes `[height, width]`;
-    /// nothing for planes that have none.
+    /// Channels, height and width of the latent of each plane, for planes of these sizes `[height, width]`; nothing for
+    /// planes that have none.
     ///
     /// This says where [`PlaneCoding::latent_symbols`] must not be empty.
     pub fn latent_shapes(model: &ContextModelArrays, sizes: &[[u32; 2]]) -> Vec<Option<[u32; 3]>> {
-        let have = model.have_latents(sizes.len() / PLANES_PER_SCALE);
+        let have = model.have_latents();
         let shape = |&[height, width]: &[u32; 2]| [model.latent_channels(), height / 4, width / 4];
         have.into_iter().zip(sizes).map(|(has_latent, size)| has_latent.then(|| shape(size))).collect()
     }

@@ -1,9 +1,9 @@
-//! The context model of the hexplanes as data (paper III-C, docs/design.md).
+//! The context model of the planes as data (paper III-C, docs/design.md).
 
 use crate::{
     CodecError, FrequencyTable, Limits, Network, PerGroup,
     limits::at_most,
-    plane_layout::{PLANE_NAMES, PLANES_PER_SCALE},
+    plane_layout::{PlaneAxes, PlaneLayout},
 };
 
 pub(super) const SECTION: &str = "context_model";
@@ -23,12 +23,10 @@ pub struct ContextModelArrays {
     pub latent: Option<LatentArrays>,
     /// The networks. Conditions and distributions are places in this list.
     pub networks: Vec<Network>,
-    /// The priors that there are. [`ContextModelArrays::lowest`] and [`ContextModelArrays::higher`] are places in this list.
+    /// The priors that there are. [`ContextModelArrays::plane_priors`] are places in this list.
     pub priors: Vec<PlanePrior>,
-    /// The prior of each plane of the lowest scale, in the order of [`crate::plane_layout::PLANE_NAMES`].
-    pub lowest: [u32; PLANES_PER_SCALE],
-    /// The prior of each plane of the higher scales.
-    pub higher: [u32; PLANES_PER_SCALE],
+    /// The prior of each plane, in the order of the planes.
+    pub plane_priors: Vec<u32>,
 }
 
 /// A latent that is transmitted for a plane: `N` channels of a quarter of the plane's height and width.
@@ -67,8 +65,8 @@ pub enum PlaneSource {
     /// The plane's own anchors: the values at places whose row and column have an odd sum. A plane with such a condition
     /// is coded in two passes, the anchors first; for them the condition says zeros.
     Anchors,
-    /// The decoded plane at this position of [`crate::plane_layout::PLANE_NAMES`] in the same scale.
-    SameScale(u8),
+    /// The decoded plane over these axes in the same scale.
+    SameScale(PlaneAxes),
     /// The decoded plane over the same axes one scale below.
     LowerScale,
 }
@@ -94,22 +92,20 @@ impl ContextModelArrays {
         self.latent.as_ref().map_or(0, |latent| latent.medians.len() as u32)
     }
 
-    /// The prior of a plane, counted scale by scale.
+    /// The prior of a plane, by its place in the list of planes.
     ///
     /// # Panics
     /// Where a plane's prior is not in [`ContextModelArrays::priors`].
     pub fn prior(&self, plane: usize) -> &PlanePrior {
-        let (scale, position) = (plane / PLANES_PER_SCALE, plane % PLANES_PER_SCALE);
-        let priors = if scale == 0 { &self.lowest } else { &self.higher };
-        &self.priors[priors[position] as usize]
+        &self.priors[self.plane_priors[plane] as usize]
     }
 
-    /// Whether each plane of a hexplane with some number of scales has a latent.
+    /// Whether each plane has a latent.
     ///
     /// # Panics
     /// As [`ContextModelArrays::prior`].
-    pub fn have_latents(&self, scales: usize) -> Vec<bool> {
-        (0..PLANES_PER_SCALE * scales).map(|plane| self.prior(plane).has_latent()).collect()
+    pub fn have_latents(&self) -> Vec<bool> {
+        (0..self.plane_priors.len()).map(|plane| self.prior(plane).has_latent()).collect()
     }
 
     /// Refuses arrays that make no context model, or one beyond the limits.
@@ -151,22 +147,34 @@ impl ContextModelArrays {
         for (index, prior) in self.priors.iter().enumerate() {
             self.check_prior(&format!("priors[{index}]"), prior, limits)?;
         }
-        for (scales, priors) in [("lowest", &self.lowest), ("higher", &self.higher)] {
-            for (position, &prior) in priors.iter().enumerate() {
-                if prior as usize >= self.priors.len() {
-                    let field = format!("prior of {} ({scales} scales)", PLANE_NAMES[position]);
-                    return invalid(&field, prior, &format!("less than {}", self.priors.len()));
-                }
+        at_most(SECTION, "number of planes", self.plane_priors.len() as u64, limits.planes())?;
+        for (plane, &prior) in self.plane_priors.iter().enumerate() {
+            if prior as usize >= self.priors.len() {
+                let field = format!("prior of planes[{plane}]");
+                return invalid(&field, prior, &format!("less than {}", self.priors.len()));
             }
-            levels(&priors.map(|prior| &self.priors[prior as usize]))?;
-        }
-        let below =
-            |&prior: &u32| self.priors[prior as usize].sources().any(|source| source == PlaneSource::LowerScale);
-        if let Some(position) = self.lowest.iter().position(below) {
-            let field = format!("a source of {} (lowest scale)", PLANE_NAMES[position]);
-            return invalid(&field, "the scale below", "something that is there");
         }
         Ok(())
+    }
+
+    /// Refuses a sound model that was made for other planes: another number of them, sources that are not there, planes that
+    /// wait for each other.
+    pub(crate) fn check_planes(&self, layout: &PlaneLayout) -> Result<(), CodecError> {
+        if self.plane_priors.len() != layout.len() {
+            let expected = format!("{}, one for each plane", layout.len());
+            return invalid("number of planes with a prior", self.plane_priors.len(), &expected);
+        }
+        for (plane, shape) in layout.planes().iter().enumerate() {
+            for source in self.prior(plane).sources() {
+                let missing = match source {
+                    PlaneSource::SameScale(axes) if layout.in_same_scale(plane, axes).is_none() => axes.name(),
+                    PlaneSource::LowerScale if layout.one_scale_below(plane).is_none() => "the scale below",
+                    _ => continue,
+                };
+                return invalid(&format!("a source of plane {}", shape.name()), missing, "something that is there");
+            }
+        }
+        (0..layout.scales()).try_for_each(|scale| levels(self, layout, scale).map(drop))
     }
 
     fn network(&self, name: &str, index: u32) -> Result<&Network, CodecError> {
@@ -206,9 +214,6 @@ impl ContextModelArrays {
                 }
                 let expected = match source {
                     PlaneSource::Latent => self.latent_channels(),
-                    PlaneSource::SameScale(position) if usize::from(position) >= PLANES_PER_SCALE => {
-                        return invalid(&format!("a source in {name}"), format!("plane {position}"), "less than 6");
-                    }
                     _ => self.channels,
                 };
                 if channels != expected || expected == 0 {
@@ -222,27 +227,31 @@ impl ContextModelArrays {
 }
 
 /// In which round each plane of a scale can be coded: a plane comes after those that it reads. Refuses planes that wait
-/// for each other.
-pub(super) fn levels(priors: &[&PlanePrior; PLANES_PER_SCALE]) -> Result<[usize; PLANES_PER_SCALE], CodecError> {
-    let mut levels = [None; PLANES_PER_SCALE];
-    for level in 0..PLANES_PER_SCALE {
-        let before = levels;
-        for (position, prior) in priors.iter().enumerate() {
-            let ready = prior.sources().all(|source| match source {
-                PlaneSource::SameScale(other) => before.get(usize::from(other)).is_some_and(|level| level.is_some()),
+/// for each other. The planes' sources are there.
+pub(super) fn levels(model: &ContextModelArrays, layout: &PlaneLayout, scale: usize) -> Result<Vec<usize>, CodecError> {
+    let planes = layout.scale(scale);
+    let first = planes.start;
+    let mut levels = vec![None; planes.len()];
+    for level in 0..planes.len() {
+        let before = levels.clone();
+        for plane in planes.clone() {
+            let ready = model.prior(plane).sources().all(|source| match source {
+                PlaneSource::SameScale(axes) => {
+                    layout.in_same_scale(plane, axes).is_some_and(|other| before[other - first].is_some())
+                }
                 _ => true,
             });
-            if ready && levels[position].is_none() {
-                levels[position] = Some(level);
+            if ready && levels[plane - first].is_none() {
+                levels[plane - first] = Some(level);
             }
         }
     }
-    if let Some(position) = levels.iter().position(Option::is_none) {
-        let field = format!("sources of {}", PLANE_NAMES[position]);
+    if let Some(place) = levels.iter().position(Option::is_none) {
+        let field = format!("sources of plane {}", layout.planes()[first + place].name());
         let found = "planes that wait for this one";
         return Err(CodecError::invalid(SECTION, field, found, "planes that can be decoded before it"));
     }
-    Ok(levels.map(|level| level.unwrap_or(0)))
+    Ok(levels.into_iter().flatten().collect())
 }
 
 pub(super) fn network_name(index: usize) -> String {

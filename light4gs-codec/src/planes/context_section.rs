@@ -1,4 +1,4 @@
-//! The context model of the hexplanes as bytes: its description, the latent's tables, the weights.
+//! The context model of the planes as bytes: its description, the latent's tables, the weights.
 
 use super::context_model::{
     Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource, SECTION, network_name,
@@ -12,6 +12,7 @@ use crate::{
         tensors::{read_weights, write_weights},
         weights::WeightPrecision,
     },
+    plane_layout::PlaneAxes,
 };
 
 const ANCHORS: u64 = 6;
@@ -24,7 +25,7 @@ pub(crate) fn write(
     precision: Option<WeightPrecision>,
     writer: &mut Writer,
 ) -> Result<ContextModelArrays, CodecError> {
-    let ContextModelArrays { channels, centers, latent, networks, priors, lowest, higher } = model;
+    let ContextModelArrays { channels, centers, latent, networks, priors, plane_priors } = model;
     writer.varint((*channels).into());
     writer.f32s(&[centers.space_only, centers.space_time]);
     writer.varint(model.latent_channels().into());
@@ -32,7 +33,8 @@ pub(crate) fn write(
     networks.iter().for_each(|network| network.write(writer));
     writer.varint(priors.len() as u64);
     priors.iter().for_each(|prior| write_prior(prior, writer));
-    lowest.iter().chain(higher).for_each(|&prior| writer.varint(prior.into()));
+    writer.varint(plane_priors.len() as u64);
+    plane_priors.iter().for_each(|&prior| writer.varint(prior.into()));
     if let Some(LatentArrays { tables, medians }) = latent {
         writer.block(&write_tables(tables));
         writer.f32s(medians);
@@ -54,7 +56,7 @@ fn write_prior(prior: &PlanePrior, writer: &mut Writer) {
         // How many there are is known: one for each input of the network.
         for &source in sources {
             writer.varint(match source {
-                PlaneSource::SameScale(position) => position.into(),
+                PlaneSource::SameScale(axes) => axes as u64,
                 PlaneSource::Anchors => ANCHORS,
                 PlaneSource::Latent => LATENT,
                 PlaneSource::LowerScale => LOWER_SCALE,
@@ -79,7 +81,7 @@ fn read_prior(reader: &mut Reader<'_>, networks: &[Network], limits: &Limits) ->
         let mut sources = Vec::new();
         for _ in 0..inputs {
             sources.push(match reader.varint("a source of a condition")? {
-                position @ 0..6 => PlaneSource::SameScale(position as u8),
+                axes @ 0..6 => PlaneSource::SameScale(PlaneAxes::ALL[axes as usize]),
                 ANCHORS => PlaneSource::Anchors,
                 LATENT => PlaneSource::Latent,
                 LOWER_SCALE => PlaneSource::LowerScale,
@@ -107,12 +109,10 @@ pub(crate) fn read_description(reader: &mut Reader<'_>, limits: &Limits) -> Resu
         .collect::<Result<Vec<_>, _>>()?;
     let count = reader.varint_at_most("number of priors", limits.networks)?;
     let priors = (0..count).map(|_| read_prior(reader, &networks, limits)).collect::<Result<Vec<_>, _>>()?;
-    let mut planes = [[0; 6]; 2];
-    for prior in planes.as_flattened_mut() {
-        *prior = reader.varint_at_most("prior of a plane", limits.networks)?;
-    }
-    let [lowest, higher] = planes;
-    let model = ContextModelArrays { channels, centers, latent, networks, priors, lowest, higher };
+    let count = reader.varint_at_most("number of planes", limits.planes())?;
+    let plane_priors =
+        (0..count).map(|_| reader.varint_at_most("prior of a plane", limits.networks)).collect::<Result<_, _>>()?;
+    let model = ContextModelArrays { channels, centers, latent, networks, priors, plane_priors };
     model.check_structure(limits)?;
     Ok(model)
 }

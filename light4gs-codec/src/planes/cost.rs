@@ -13,6 +13,7 @@ use crate::{
         blocks,
         kernels::{LANES, PaddedMap},
     },
+    plane_layout::PlaneShape,
 };
 
 /// Nanoseconds of a row besides what its values take.
@@ -22,23 +23,19 @@ const CHANNEL_NANOSECONDS: u64 = 16;
 /// Bytes of a value of a row that is being computed: scale, mean, level.
 const ROW_BYTES: u64 = 10;
 
-/// Asks for the memory and the time of all planes of these sizes, `[height, width]`; those of a stage are in memory at the
-/// same time. Refuses sizes that do not fit the networks.
-pub(super) fn ask(
-    model: &ExactModel<'_>,
-    stages: &[Vec<usize>],
-    sizes: &[[u32; 2]],
-    budget: &Budget,
-) -> Result<(), CodecError> {
+/// Asks for the memory and the time of all planes of a model; those of a stage are in memory at the same time. Refuses
+/// sizes that do not fit the networks.
+pub(super) fn ask(model: &ExactModel<'_>, stages: &[Vec<usize>], budget: &Budget) -> Result<(), CodecError> {
     let channels = u64::from(model.arrays.channels);
-    let area = |plane: usize| u64::from(sizes[plane][0]) * u64::from(sizes[plane][1]);
-    let values = (0..sizes.len()).fold(0u64, |sum, plane| sum.saturating_add(channels.saturating_mul(area(plane))));
+    let area = |plane: &PlaneShape| (plane.size[0] as u64).saturating_mul(plane.size[1] as u64);
+    let planes = model.layout.planes().iter();
+    let values = planes.fold(0u64, |sum, plane| sum.saturating_add(channels.saturating_mul(area(plane))));
     budget.things(SECTION, values, 4, READ_NANOSECONDS)?;
     let mut most = 0u64;
     for stage in stages {
         let mut memory = 0u64;
         for &plane in stage {
-            memory = memory.saturating_add(ask_plane(model, plane, sizes, budget)?);
+            memory = memory.saturating_add(ask_plane(model, plane, budget)?);
         }
         most = most.max(memory);
     }
@@ -46,9 +43,9 @@ pub(super) fn ask(
 }
 
 /// Asks for the time of one plane; returns the memory that it takes besides its values.
-fn ask_plane(model: &ExactModel<'_>, plane: usize, sizes: &[[u32; 2]], budget: &Budget) -> Result<u64, CodecError> {
+fn ask_plane(model: &ExactModel<'_>, plane: usize, budget: &Budget) -> Result<u64, CodecError> {
     let prior = &model.arrays.priors[model.prior_of(plane)];
-    let [height, width] = sizes[plane];
+    let size @ [height, width] = model.layout.planes()[plane].size.map(|side| side as u32);
     let channels = u64::from(model.arrays.channels);
     // Eight places of a row are computed at a time, in each pass.
     let passes = if prior.has_anchors() { 2 } else { 1 };
@@ -60,10 +57,10 @@ fn ask_plane(model: &ExactModel<'_>, plane: usize, sizes: &[[u32; 2]], budget: &
     let mut workspaces = distribution.workspace_bytes();
     let mut numbers = 0u64;
     for Condition { network, sources } in prior.conditions.iter().flatten() {
-        let inputs: Vec<_> = sources.iter().map(|&source| source_size(source, plane, sizes)).collect();
+        let inputs: Vec<_> = sources.iter().map(|&source| source_size(source, plane, model.layout)).collect();
         let (name, program) = (network_name(*network as usize), model.condition(*network));
         let network = &model.arrays.networks[*network as usize];
-        let all = network.sizes(SECTION, &name, &inputs, sizes[plane], &budget.limits)?;
+        let all = network.sizes(SECTION, &name, &inputs, size, &budget.limits)?;
         let cost = program.cost(&all, computed);
         budget.time(SECTION, cost.nanoseconds)?;
         numbers = numbers.saturating_add(cost.numbers);

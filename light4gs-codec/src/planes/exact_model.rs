@@ -2,20 +2,22 @@
 
 use super::context_model::{Condition, PlanePrior, PlaneSource, SECTION};
 use crate::{
-    CodecError, ContextModelArrays, HexPlaneArrays,
+    CodecError, ContextModelArrays, FeaturePlaneArrays,
     budget::Budget,
     entropy::Distribution,
     network::{
         Program,
         kernels::{PaddedMap, kept},
     },
-    plane_layout::{PLANES_PER_SCALE, is_space_time, position_of, scale_of},
+    plane_layout::PlaneLayout,
 };
 
 /// The networks of a context model whose arrays are sound, with weights laid out for the executor.
 #[derive(Debug)]
 pub(super) struct ExactModel<'a> {
     pub(super) arrays: &'a ContextModelArrays,
+    /// The planes that it is for.
+    pub(super) layout: &'a PlaneLayout,
     pub(super) latent_distributions: Vec<Distribution>,
     /// The networks as conditions; nothing for those that are none.
     conditions: Vec<Option<Program>>,
@@ -25,7 +27,11 @@ pub(super) struct ExactModel<'a> {
 
 impl<'a> ExactModel<'a> {
     /// Refuses a model that takes more memory than there is.
-    pub(super) fn new(arrays: &'a ContextModelArrays, budget: &Budget) -> Result<Self, CodecError> {
+    pub(super) fn new(
+        arrays: &'a ContextModelArrays,
+        layout: &'a PlaneLayout,
+        budget: &Budget,
+    ) -> Result<Self, CodecError> {
         let (mut as_distribution, mut as_condition) = (vec![0; arrays.networks.len()], vec![0; arrays.networks.len()]);
         for prior in &arrays.priors {
             // Two programs share the weights of one more.
@@ -55,6 +61,7 @@ impl<'a> ExactModel<'a> {
             latent_distributions: latent
                 .map_or_else(Vec::new, |latent| latent.tables.iter().map(|table| table.distribution()).collect()),
             arrays,
+            layout,
         })
     }
 
@@ -65,12 +72,11 @@ impl<'a> ExactModel<'a> {
 
     /// The place of a plane's prior.
     pub(super) fn prior_of(&self, plane: usize) -> usize {
-        let priors = if scale_of(plane) == 0 { &self.arrays.lowest } else { &self.arrays.higher };
-        priors[position_of(plane)] as usize
+        self.arrays.plane_priors[plane] as usize
     }
 
     pub(super) fn center_of(&self, plane: usize) -> f32 {
-        self.arrays.centers.of(is_space_time(plane))
+        self.arrays.centers.of(self.layout.planes()[plane].axes)
     }
 
     /// The latent `[N, height, width]` of its symbols, symbol plus median, with a border.
@@ -87,7 +93,7 @@ impl<'a> ExactModel<'a> {
     }
 
     /// A decoded plane as networks see it.
-    pub(super) fn plane(&self, decoded: &HexPlaneArrays, plane: usize, border: usize) -> PaddedMap {
+    pub(super) fn plane(&self, decoded: &FeaturePlaneArrays, plane: usize, border: usize) -> PaddedMap {
         let center = self.center_of(plane);
         let plane = &decoded.planes[plane];
         PaddedMap::centered(&plane.values, [plane.height as usize, plane.width as usize], center, border)
@@ -103,12 +109,20 @@ fn present(prior: &PlanePrior, with_anchors: bool) -> Vec<bool> {
     prior.conditions.iter().map(known).collect()
 }
 
-/// Height and width of a source of a plane.
-pub(super) fn source_size(source: PlaneSource, plane: usize, sizes: &[[u32; 2]]) -> [u32; 2] {
+/// The decoded plane that a source of a plane is; none where the source is the plane's own.
+pub(super) fn source_plane(source: PlaneSource, plane: usize, layout: &PlaneLayout) -> Option<usize> {
     match source {
-        PlaneSource::Latent => sizes[plane].map(|side| side / 4),
-        PlaneSource::Anchors => sizes[plane],
-        PlaneSource::SameScale(position) => sizes[plane - position_of(plane) + usize::from(position)],
-        PlaneSource::LowerScale => sizes[plane - PLANES_PER_SCALE],
+        PlaneSource::Latent | PlaneSource::Anchors => None,
+        PlaneSource::SameScale(axes) => Some(layout.in_same_scale(plane, axes).expect("`check_planes` has seen it")),
+        PlaneSource::LowerScale => Some(layout.one_scale_below(plane).expect("`check_planes` has seen it")),
+    }
+}
+
+/// Height and width of a source of a plane.
+pub(super) fn source_size(source: PlaneSource, plane: usize, layout: &PlaneLayout) -> [u32; 2] {
+    let size = |plane: usize| layout.planes()[plane].size.map(|side| side as u32);
+    match source {
+        PlaneSource::Latent => size(plane).map(|side| side / 4),
+        _ => size(source_plane(source, plane, layout).unwrap_or(plane)),
     }
 }

@@ -2,27 +2,25 @@
 
 use super::head::{Head, SECTION};
 use crate::{
-    CodecError, HexPlaneArrays, Plane,
+    CodecError, FeaturePlaneArrays,
     budget::Budget,
     bytes::{Reader, Writer},
 };
 
 /// Writes planes that [`super::head::check`] has passed.
-pub(crate) fn write(hexplane: &HexPlaneArrays, writer: &mut Writer) {
-    Head::write(hexplane, writer);
-    hexplane.planes.iter().for_each(|plane| writer.f32s(&plane.values));
+pub(crate) fn write(planes: &FeaturePlaneArrays, writer: &mut Writer) {
+    Head::of_checked(planes).write(writer);
+    planes.planes.iter().for_each(|plane| writer.f32s(&plane.values));
 }
 
-pub(crate) fn read(bytes: &[u8], budget: &Budget) -> Result<HexPlaneArrays, CodecError> {
+pub(crate) fn read(bytes: &[u8], budget: &Budget) -> Result<FeaturePlaneArrays, CodecError> {
     budget.things(SECTION, bytes.len() as u64, 1, 1)?;
     let mut reader = Reader::new(SECTION, bytes);
     let head = Head::read(&mut reader, &budget.limits)?;
-    let mut planes = Vec::with_capacity(head.sizes.len());
-    for (index, &[height, width]) in head.sizes.iter().enumerate() {
-        let values = reader.f32s(&format!("planes[{index}].values"), head.values([height, width]))?;
-        planes.push(Plane { height, width, values });
+    let mut planes = FeaturePlaneArrays::without_values(head.channels, &head.layout);
+    for (plane, shape) in planes.planes.iter_mut().zip(head.layout.planes()) {
+        plane.values = reader.f32s(&format!("values of plane {}", shape.name()), head.values(shape.size))?;
     }
     reader.finish()?;
-    let Head { channels, resolution, multipliers, .. } = head;
-    Ok(HexPlaneArrays { channels, resolution, multipliers, planes })
+    Ok(planes)
 }

@@ -1,185 +1,150 @@
-//! The sizes of the planes of a multiscale hexplane.
+//! Which planes there are, and their sizes: what stands before the numbers.
 
 use crate::{
-    CodecError, HexPlaneArrays, Limits,
+    CodecError, FeaturePlaneArrays, Limits,
     bytes::{Reader, Section, Writer, check_length},
     limits::at_most,
-    plane_layout::{AXIS_NAMES, PLANE_AXES, TIME_AXIS},
+    plane_layout::{AXIS_NAMES, PlaneAxes, PlaneLayout, PlaneShape},
 };
 
-pub(super) const SECTION: &str = Section::HexPlanes.name();
+pub(super) const SECTION: &str = Section::FeaturePlanes.name();
+/// The bit of a scale whose planes do not agree about the cells along an axis.
+const OWN_SIZES: u8 = 1 << PlaneAxes::ALL.len();
 
-/// What stands before the numbers.
+/// Channels and planes.
 #[derive(Clone, Debug)]
 pub(crate) struct Head {
     pub(crate) channels: u32,
-    pub(crate) resolution: [u32; 4],
-    pub(crate) multipliers: Vec<u32>,
-    /// Height and width of each plane.
-    pub(crate) sizes: Vec<[u32; 2]>,
+    pub(crate) layout: PlaneLayout,
 }
 
 impl Head {
-    pub(crate) fn of(hexplane: &HexPlaneArrays) -> Self {
-        Self {
-            channels: hexplane.channels,
-            resolution: hexplane.resolution,
-            multipliers: hexplane.multipliers.clone(),
-            sizes: hexplane.planes.iter().map(|plane| [plane.height, plane.width]).collect(),
-        }
+    pub(crate) fn of(planes: &FeaturePlaneArrays) -> Result<Self, CodecError> {
+        Ok(Self { channels: planes.channels, layout: planes.layout()? })
     }
 
-    /// Of planes whose time axis is not multiplied.
-    pub(crate) fn from_shape(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> Self {
-        let side = |axis: usize, multiplier: u32| match axis {
-            TIME_AXIS => resolution[axis],
-            _ => resolution[axis].saturating_mul(multiplier),
-        };
-        let sizes = multipliers
-            .iter()
-            .flat_map(|&multiplier| PLANE_AXES.map(|[a, b]| [side(b, multiplier), side(a, multiplier)]));
-        Self { channels, resolution, multipliers: multipliers.to_vec(), sizes: sizes.collect() }
-    }
-
-    pub(crate) fn plane_count(&self) -> usize {
-        self.sizes.len()
+    /// Of planes that [`check`] has passed.
+    pub(super) fn of_checked(planes: &FeaturePlaneArrays) -> Self {
+        Self::of(planes).expect("`check` has looked at the order")
     }
 
     pub(crate) fn read(reader: &mut Reader<'_>, limits: &Limits) -> Result<Self, CodecError> {
         let channels = reader.varint_at_most("channels", limits.channels)?;
-        let mut resolution = [0; 4];
-        for samples in &mut resolution {
-            *samples = reader.varint_at_most("resolution", limits.resolution)?;
-        }
         let scales = reader.varint_at_most("number of scales", limits.scales)?;
-        let multipliers = (0..scales)
-            .map(|_| reader.varint_at_most("multipliers", limits.resolution))
-            .collect::<Result<Vec<_>, _>>()?;
-        let bits = reader.varint("scales with multiplied time")?;
-        let mut sizes = Vec::new();
-        for (scale, &multiplier) in multipliers.iter().enumerate() {
-            for [first, second] in PLANE_AXES {
-                let side = |axis: usize| {
-                    let multiplied = axis != TIME_AXIS || is_set(bits, scale);
-                    resolution[axis].saturating_mul(if multiplied { multiplier } else { 1 })
+        let mut planes = Vec::new();
+        for scale in 0..scales as usize {
+            let bits = reader.u8("planes of a scale")?;
+            let has = |axes: &PlaneAxes| bits >> *axes as u8 & 1 == 1;
+            let own: Vec<PlaneAxes> = PlaneAxes::ALL.into_iter().filter(has).collect();
+            if own.is_empty() || bits > OWN_SIZES | (OWN_SIZES - 1) {
+                let (field, found) = (format!("planes of scale {scale}"), format!("{bits:#010b}"));
+                return Err(CodecError::invalid(SECTION, field, found, "a bit for each of xy, xz, xt, yz, yt, zt"));
+            }
+            let mut side = |name: &str| Ok::<_, CodecError>(reader.varint_at_most(name, limits.resolution)? as usize);
+            let first = planes.len();
+            if bits & OWN_SIZES != 0 {
+                for axes in own {
+                    let (width, height) = (side("width of a plane")?, side("height of a plane")?);
+                    planes.push(PlaneShape { scale, axes, size: [height, width] });
+                }
+                if cells(&planes[first..]).is_some() {
+                    let field = format!("sizes of scale {scale}");
+                    let expected = "cells along each axis, where the planes agree about them";
+                    return Err(CodecError::invalid(SECTION, field, "one for each plane", expected));
+                }
+            } else {
+                let mut cells = [0; AXIS_NAMES.len()];
+                for (axis, cells) in cells.iter_mut().enumerate() {
+                    if own.iter().any(|axes| axes.axes().contains(&axis)) {
+                        *cells = side("cells along an axis")?;
+                    }
+                }
+                let shape = |axes: PlaneAxes| {
+                    let [a, b] = axes.axes();
+                    PlaneShape { scale, axes, size: [cells[b], cells[a]] }
                 };
-                sizes.push([side(second), side(first)]);
+                planes.extend(own.into_iter().map(shape));
             }
         }
-        let has_meaning = |scale: usize| multipliers[scale] != 1 && resolution[TIME_AXIS] != 0;
-        if bits.checked_shr(scales).unwrap_or(0) != 0
-            || (0..scales as usize).any(|scale| is_set(bits, scale) && !has_meaning(scale))
-        {
-            let (field, found) = ("scales with multiplied time", format!("{bits:#b}"));
-            return Err(CodecError::invalid(SECTION, field, found, "bits of scales whose multiplier is not 1"));
-        }
-        let head = Self { channels, resolution, multipliers, sizes };
+        let layout = PlaneLayout::new(planes).expect("scales and bits are read in the order of a layout");
+        let head = Self { channels, layout };
         head.check(limits)?;
         Ok(head)
     }
 
-    /// Writes the head of planes that [`check`] has passed.
-    pub(crate) fn write(hexplane: &HexPlaneArrays, writer: &mut Writer) {
-        writer.varint(hexplane.channels.into());
-        for samples in hexplane.resolution {
-            writer.varint(samples.into());
+    /// Writes a head that [`Head::check`] has passed.
+    pub(crate) fn write(&self, writer: &mut Writer) {
+        writer.varint(self.channels.into());
+        writer.varint(self.layout.scales() as u64);
+        for scale in 0..self.layout.scales() {
+            let planes = &self.layout.planes()[self.layout.scale(scale)];
+            let bits = planes.iter().fold(0, |bits, plane| bits | 1 << plane.axes as u8);
+            match cells(planes) {
+                Some(cells) => {
+                    writer.bytes.push(bits);
+                    cells.into_iter().flatten().for_each(|cells| writer.varint(cells as u64));
+                }
+                None => {
+                    writer.bytes.push(bits | OWN_SIZES);
+                    let sides = planes.iter().flat_map(|PlaneShape { size: [height, width], .. }| [width, height]);
+                    sides.for_each(|&side| writer.varint(side as u64));
+                }
+            }
         }
-        writer.varint(hexplane.multipliers.len() as u64);
-        for &multiplier in &hexplane.multipliers {
-            writer.varint(multiplier.into());
-        }
-        writer.varint(multiplied_time(hexplane).unwrap_or(0));
     }
 
-    /// Refuses sizes that do not follow from the resolution and the multipliers.
+    /// Refuses planes beyond the limits, or without values.
     pub(crate) fn check(&self, limits: &Limits) -> Result<(), CodecError> {
         at_most(SECTION, "channels", self.channels.into(), limits.channels)?;
-        at_most(SECTION, "number of scales", self.multipliers.len() as u64, limits.scales)?;
-        for (axis, samples) in self.resolution.into_iter().enumerate() {
-            at_most(SECTION, format!("resolution along {}", AXIS_NAMES[axis]), samples.into(), limits.resolution)?;
-        }
-        let expected = PLANE_AXES.len() as u64 * self.multipliers.len() as u64;
-        check_length(SECTION, "planes", self.sizes.len(), expected, "6 for each multiplier")?;
-        if !self.sizes.is_empty() && self.channels == 0 {
+        at_most(SECTION, "number of scales", self.layout.scales() as u64, limits.scales)?;
+        if !self.layout.is_empty() && self.channels == 0 {
             return Err(CodecError::invalid(SECTION, "channels", 0, "1 or more where there are planes"));
         }
-        for (index, &[height, width]) in self.sizes.iter().enumerate() {
-            let [a, b] = PLANE_AXES[index % PLANE_AXES.len()];
-            let multiplier = self.multipliers[index / PLANE_AXES.len()];
-            self.check_side(&format!("planes[{index}].width"), width, a, multiplier, limits)?;
-            self.check_side(&format!("planes[{index}].height"), height, b, multiplier, limits)?;
+        for plane in self.layout.planes() {
+            for (side, name) in plane.size.into_iter().zip(["height", "width"]) {
+                let field = format!("{name} of plane {}", plane.name());
+                at_most(SECTION, field.as_str(), side as u64, limits.resolution)?;
+                if side == 0 {
+                    return Err(CodecError::invalid(SECTION, field, 0, "1 or more"));
+                }
+            }
         }
         Ok(())
     }
 
-    /// A spatial axis is multiplied, time may be.
-    fn check_side(
-        &self,
-        field: &str,
-        found: u32,
-        axis: usize,
-        multiplier: u32,
-        limits: &Limits,
-    ) -> Result<(), CodecError> {
-        at_most(SECTION, field, found.into(), limits.resolution)?;
-        let base = u64::from(self.resolution[axis]);
-        let multiplied = base * u64::from(multiplier);
-        let legal = u64::from(found) == multiplied || axis == TIME_AXIS && u64::from(found) == base;
-        if found > 0 && legal {
-            return Ok(());
-        }
-        let name = AXIS_NAMES[axis];
-        let mut expected = format!("{multiplied} (resolution {base} along {name} times multiplier {multiplier})");
-        if axis == TIME_AXIS {
-            expected += &format!(" or {base}");
-        }
-        if multiplied == 0 {
-            expected += ", and more than 0";
-        }
-        Err(CodecError::invalid(SECTION, field, found, expected))
-    }
-
     /// Numbers of one plane.
-    pub(crate) fn values(&self, [height, width]: [u32; 2]) -> u64 {
-        u64::from(self.channels).saturating_mul(u64::from(height)).saturating_mul(u64::from(width))
+    pub(crate) fn values(&self, [height, width]: [usize; 2]) -> u64 {
+        u64::from(self.channels).saturating_mul(height as u64).saturating_mul(width as u64)
     }
 }
 
-/// Refuses planes whose sizes or lengths do not follow from the head.
-pub(crate) fn check(hexplane: &HexPlaneArrays, limits: &Limits) -> Result<(), CodecError> {
-    let head = Head::of(hexplane);
-    head.check(limits)?;
-    for (index, (plane, &size)) in hexplane.planes.iter().zip(&head.sizes).enumerate() {
-        let why = format!("{} channels, height {}, width {}", head.channels, plane.height, plane.width);
-        check_length(SECTION, format!("planes[{index}].values"), plane.values.len(), head.values(size), &why)?;
+/// Cells along each axis that planes of a scale span; nothing where they disagree.
+fn cells(planes: &[PlaneShape]) -> Option<[Option<usize>; AXIS_NAMES.len()]> {
+    let mut cells = [None; AXIS_NAMES.len()];
+    for plane in planes {
+        let [height, width] = plane.size;
+        for (axis, side) in plane.axes.axes().into_iter().zip([width, height]) {
+            if *cells[axis].get_or_insert(side) != side {
+                return None;
+            }
+        }
     }
-    if multiplied_time(hexplane).is_none() {
-        let found = "multiplied in some planes of a scale";
-        return Err(CodecError::invalid(SECTION, "time axis", found, "the same in all planes of a scale"));
+    Some(cells)
+}
+
+/// Refuses planes that are out of order, beyond the limits, or not as long as their sizes say.
+pub(crate) fn check(planes: &FeaturePlaneArrays, limits: &Limits) -> Result<(), CodecError> {
+    let head = Head::of(planes)?;
+    head.check(limits)?;
+    for (plane, shape) in planes.planes.iter().zip(head.layout.planes()) {
+        let why = format!("{} channels, height {}, width {}", head.channels, plane.height, plane.width);
+        check_length(
+            SECTION,
+            format!("values of plane {}", shape.name()),
+            plane.values.len(),
+            head.values(shape.size),
+            &why,
+        )?;
     }
     Ok(())
-}
-
-/// A bit for each scale whose time axis is multiplied, lowest first; none where planes of a scale disagree.
-fn multiplied_time(hexplane: &HexPlaneArrays) -> Option<u64> {
-    let mut bits = 0;
-    let scales = hexplane.planes.chunks_exact(PLANE_AXES.len()).zip(&hexplane.multipliers);
-    for (scale, (planes, &multiplier)) in scales.enumerate() {
-        let times: Vec<u32> = planes
-            .iter()
-            .zip(PLANE_AXES)
-            .filter(|(_, axes)| axes[1] == TIME_AXIS)
-            .map(|(plane, _)| plane.height)
-            .collect();
-        if times.iter().any(|&time| time != times[0]) {
-            return None;
-        }
-        let multiplied = times[0] != hexplane.resolution[TIME_AXIS] && multiplier != 1;
-        bits |= u64::from(multiplied) << scale;
-    }
-    Some(bits)
-}
-
-fn is_set(bits: u64, bit: usize) -> bool {
-    bits.checked_shr(bit as u32).unwrap_or(0) & 1 == 1
 }

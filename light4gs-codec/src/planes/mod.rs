@@ -1,11 +1,11 @@
-//! The hexplanes in a stream: as they are, or entropy coded under a context model (paper III-C, docs/design.md).
+//! The feature planes in a stream: as they are, or entropy coded under a context model (paper III-C, docs/design.md).
 //!
 //! Encoder and decoder run the same walk over the planes and ask the same networks for every value's distribution; they
 //! differ only in the [`SymbolCoder`](crate::entropy::SymbolCoder) that they hand to it.
 //!
 //! | file | what |
 //! |---|---|
-//! | `head.rs`, `explicit.rs` | sizes of planes; planes as plain numbers |
+//! | `head.rs`, `explicit.rs` | which planes there are, and their sizes; planes as plain numbers |
 //! | `coding.rs` | how planes are coded, as data |
 //! | `context_model.rs`, `context_section.rs` | the context model as data, and as bytes |
 //! | `plan.rs` | when each plane is coded |

@@ -1,13 +1,15 @@
 //! Scales and means of a row of a plane.
 
-use super::{context_model::PlaneSource, exact_model::ExactModel};
+use super::{
+    context_model::PlaneSource,
+    exact_model::{ExactModel, source_plane},
+};
 use crate::{
-    HexPlaneArrays,
+    FeaturePlaneArrays,
     network::{
         Maps,
         kernels::{AnchorMap, Columns, LANES, first_anchor},
     },
-    plane_layout::{PLANES_PER_SCALE, position_of},
 };
 
 /// A mean beyond this, or one that is no number, counts as 0: the symbol must stay one that float32 can hold.
@@ -67,7 +69,7 @@ impl<'a> PlaneParameters<'a> {
         model: &'a ExactModel<'a>,
         plane: usize,
         size: [usize; 2],
-        decoded: &HexPlaneArrays,
+        decoded: &FeaturePlaneArrays,
         latent_symbols: &[i32],
     ) -> Self {
         let prior = model.prior_of(plane);
@@ -76,12 +78,9 @@ impl<'a> PlaneParameters<'a> {
             let map = |(input, &source): (usize, &PlaneSource)| {
                 let border = program.border(input);
                 match source {
-                    PlaneSource::Anchors => None,
                     PlaneSource::Latent => Some(model.latent(latent_symbols, size.map(|side| side / 4), border)),
-                    PlaneSource::SameScale(position) => {
-                        Some(model.plane(decoded, plane - position_of(plane) + usize::from(position), border))
-                    }
-                    PlaneSource::LowerScale => Some(model.plane(decoded, plane - PLANES_PER_SCALE, border)),
+                    // Anchors come row by row.
+                    _ => source_plane(source, plane, model.layout).map(|plane| model.plane(decoded, plane, border)),
                 }
             };
             let maps = condition.sources.iter().enumerate().map(map).collect();

@@ -1,4 +1,4 @@
-//! Hexplanes under a context model: sizes, steps, and a sub-stream for each part of each plane.
+//! Planes under a context model: sizes, steps, and a sub-stream for each part of each plane.
 
 use super::{
     coder::{self, CodedPlanes},
@@ -6,7 +6,7 @@ use super::{
     plan::{stream_order, sub_streams},
 };
 use crate::{
-    CodecError, ContextModelArrays, HexPlaneArrays, Limits, PerGroup, Plane, PlaneCoding,
+    CodecError, ContextModelArrays, FeaturePlaneArrays, Limits, PerGroup, PlaneCoding,
     budget::Budget,
     bytes::{Reader, Writer},
     plane_layout::SIZE_MULTIPLE,
@@ -16,7 +16,7 @@ use crate::{
 /// Bytes of one plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlaneBytes {
-    /// Position among [`HexPlaneArrays::planes`].
+    /// Position among [`FeaturePlaneArrays::planes`].
     pub plane: usize,
     /// Of the latent.
     pub latent: u64,
@@ -35,42 +35,42 @@ impl PlaneBytes {
 
 /// Refuses what cannot be coded: a model that is unsound or asks for too much, planes, steps and latents that contradict
 /// it or each other.
-pub(crate) fn check(hexplane: &HexPlaneArrays, coding: &PlaneCoding, limits: &Limits) -> Result<(), CodecError> {
+pub(crate) fn check(planes: &FeaturePlaneArrays, coding: &PlaneCoding, limits: &Limits) -> Result<(), CodecError> {
     let PlaneCoding { model, steps, latent_symbols } = coding;
     model.check(limits)?;
-    check_model(&Head::of(hexplane), model)?;
-    let scales = hexplane.multipliers.len();
-    check_steps(steps, scales)?;
+    let head = Head::of(planes)?;
+    check_model(&head, model)?;
+    check_steps(steps, head.layout.scales())?;
     steps.iter().flat_map(|step| [step.space_only, step.space_time]).try_for_each(plane_step)?;
-    if latent_symbols.len() != hexplane.planes.len() {
-        let expected = format!("{}, one list a plane", hexplane.planes.len());
+    if latent_symbols.len() != head.layout.len() {
+        let expected = format!("{}, one list a plane", head.layout.len());
         return Err(CodecError::invalid(SECTION, "lists of latent symbols", latent_symbols.len(), expected));
     }
-    for (index, (has_latent, symbols)) in model.have_latents(scales).into_iter().zip(latent_symbols).enumerate() {
-        let Plane { height, width, .. } = hexplane.planes[index];
-        let area = u64::from(height / 4) * u64::from(width / 4);
+    let latents = model.have_latents().into_iter().zip(latent_symbols);
+    for (plane, (has_latent, symbols)) in head.layout.planes().iter().zip(latents) {
+        let area = plane.size.into_iter().map(|side| side as u64 / 4).product::<u64>();
         let expected = if has_latent { u64::from(model.latent_channels()) * area } else { 0 };
         if symbols.len() as u64 != expected {
-            let field = format!("number of latent symbols of planes[{index}]");
+            let field = format!("number of latent symbols of plane {}", plane.name());
             return Err(CodecError::invalid(SECTION, field, symbols.len(), expected.to_string()));
         }
     }
-    coder::check_cost(hexplane, model, limits)
+    coder::check_cost(&head.layout, model, limits)
 }
 
-/// Refuses channels other than the model's, and sizes that a latent or a checkerboard cannot have.
+/// Refuses planes other than the model's, and sizes that a latent or a checkerboard cannot have.
 fn check_model(head: &Head, model: &ContextModelArrays) -> Result<(), CodecError> {
     if head.channels != model.channels {
         let expected = format!("{}, those of the context model", model.channels);
         return Err(CodecError::invalid(SECTION, "channels", head.channels, expected));
     }
-    for (index, size) in head.sizes.iter().enumerate() {
-        if let Some(side) = size.iter().find(|side| !side.is_multiple_of(SIZE_MULTIPLE as u32)) {
+    for plane in head.layout.planes() {
+        if let Some(side) = plane.size.iter().find(|side| !side.is_multiple_of(SIZE_MULTIPLE)) {
             let expected = format!("a multiple of {SIZE_MULTIPLE}");
-            return Err(CodecError::invalid(SECTION, format!("a side of planes[{index}]"), side, expected));
+            return Err(CodecError::invalid(SECTION, format!("a side of plane {}", plane.name()), side, expected));
         }
     }
-    Ok(())
+    model.check_planes(&head.layout)
 }
 
 fn check_steps(steps: &[PerGroup], scales: usize) -> Result<(), CodecError> {
@@ -87,17 +87,17 @@ fn check_steps(steps: &[PerGroup], scales: usize) -> Result<(), CodecError> {
 
 /// Writes planes that [`check`] has passed; returns them as a decoder gets them.
 pub(crate) fn write(
-    hexplane: &HexPlaneArrays,
+    planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
     steps: &[PerGroup],
     latent_symbols: &[Vec<i32>],
     limits: &Limits,
     writer: &mut Writer,
-) -> Result<HexPlaneArrays, CodecError> {
-    Head::write(hexplane, writer);
+) -> Result<FeaturePlaneArrays, CodecError> {
+    Head::of_checked(planes).write(writer);
     writer.varint(steps.len() as u64);
     steps.iter().for_each(|step| writer.f32s(&[step.space_only, step.space_time]));
-    let CodedPlanes { sub_streams, decoded } = coder::encode(hexplane, model, steps, latent_symbols, limits)?;
+    let CodedPlanes { sub_streams, decoded } = coder::encode(planes, model, steps, latent_symbols, limits)?;
     sub_streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
     sub_streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
     Ok(decoded)
@@ -115,13 +115,13 @@ impl<'a> Parts<'a> {
         let mut reader = Reader::new(SECTION, bytes);
         let head = Head::read(&mut reader, limits)?;
         check_model(&head, model)?;
-        let scales = head.multipliers.len();
+        let scales = head.layout.scales();
         let count = reader.varint_at_most("number of steps", limits.scales)?;
         let steps = (0..count)
             .map(|_| Ok(PerGroup { space_only: reader.f32("step")?, space_time: reader.f32("step")? }))
             .collect::<Result<Vec<_>, CodecError>>()?;
         check_steps(&steps, scales)?;
-        let count: usize = (0..head.plane_count()).map(|plane| sub_streams(model, plane)).sum();
+        let count: usize = (0..head.layout.len()).map(|plane| sub_streams(model, plane)).sum();
         let lengths = (0..count).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
         let take = |length| reader.take("sub-stream", length);
         let sub_streams = lengths.into_iter().map(take).collect::<Result<_, _>>()?;
@@ -130,12 +130,13 @@ impl<'a> Parts<'a> {
     }
 }
 
-pub(crate) fn read(bytes: &[u8], model: &ContextModelArrays, budget: &Budget) -> Result<HexPlaneArrays, CodecError> {
+pub(crate) fn read(
+    bytes: &[u8],
+    model: &ContextModelArrays,
+    budget: &Budget,
+) -> Result<FeaturePlaneArrays, CodecError> {
     let Parts { head, steps, sub_streams } = Parts::read(bytes, model, &budget.limits)?;
-    let Head { channels, resolution, multipliers, sizes } = head;
-    let planes = sizes.iter().map(|&[height, width]| Plane { height, width, values: Vec::new() }).collect();
-    let hexplane = HexPlaneArrays { channels, resolution, multipliers, planes };
-    coder::decode(hexplane, model, &steps, &sub_streams, budget)
+    coder::decode(&head.layout, model, &steps, &sub_streams, budget)
 }
 
 /// Head, steps and the bytes of every plane, without decoding. The weights of the model are not looked at.
@@ -145,7 +146,7 @@ pub(crate) fn plane_bytes<'a>(
     limits: &Limits,
 ) -> Result<(Parts<'a>, Vec<PlaneBytes>), CodecError> {
     let parts = Parts::read(bytes, model, limits)?;
-    let mut planes: Vec<_> = stream_order(model, parts.head.multipliers.len())
+    let mut planes: Vec<_> = stream_order(model, &parts.head.layout)
         .into_iter()
         .map(|(plane, first)| {
             let prior = model.prior(plane);

@@ -12,6 +12,12 @@ pub use motion::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedT
 
 use std::collections::BTreeMap;
 
+use crate::{
+    CodecError,
+    bytes::Section,
+    plane_layout::{PlaneAxes, PlaneLayout, PlaneShape},
+};
+
 /// A whole dynamic scene: everything that a `.l4gs` stream holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneData {
@@ -19,10 +25,10 @@ pub struct SceneData {
     pub meta: SceneMeta,
     /// The canonical Gaussians.
     pub gaussians: GaussianArrays,
-    /// The frame that normalizes positions before the hexplane is queried.
+    /// The frame that normalizes positions before the planes are queried.
     pub frame: SceneFrameArrays,
-    /// The multiscale hexplane; without scales where nothing moves.
-    pub hexplane: HexPlaneArrays,
+    /// The feature planes; none where nothing reads any.
+    pub feature_planes: FeaturePlaneArrays,
     /// How the Gaussians move.
     pub motion: MotionArrays,
 }
@@ -61,7 +67,7 @@ pub struct SceneFrameArrays {
     pub axes: [[f32; 3]; 3],
     /// Standard deviation along each principal axis.
     pub std: [f32; 3],
-    /// From standardized coordinates to those of the hexplane.
+    /// From standardized coordinates to those of the planes.
     pub mapping: CoordinateMapping,
 }
 
@@ -77,7 +83,7 @@ impl Default for SceneFrameArrays {
     }
 }
 
-/// How standardized coordinates become those of the hexplane, in [-1, 1], and how the time of the scene becomes that of
+/// How standardized coordinates become those of the planes, in [-1, 1], and how the time of the scene becomes that of
 /// the field, in [0, 1]. The default is the paper's; others belong to scenes that other programs have trained.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoordinateMapping {
@@ -107,33 +113,69 @@ impl CoordinateMapping {
     }
 }
 
-/// Feature planes over each pair of the axes x, y, z, t, at several scales.
+/// Feature planes over pairs of the axes x, y, z, t, at several scales. A feature is the product of the samples of a scale's
+/// planes, channel by channel, the scales side by side.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct HexPlaneArrays {
+pub struct FeaturePlaneArrays {
     /// Channels of every plane.
     pub channels: u32,
-    /// Base resolution along x, y, z, t.
-    pub resolution: [u32; 4],
-    /// One multiplier of the resolution a scale.
-    pub multipliers: Vec<u32>,
-    /// Six planes a scale, scale-major, in the order xy, xz, xt, yz, yt, zt.
+    /// In the order of a [`PlaneLayout`].
     pub planes: Vec<Plane>,
 }
 
-impl HexPlaneArrays {
+impl FeaturePlaneArrays {
+    /// Planes of a layout, without their values.
+    pub fn without_values(channels: u32, layout: &PlaneLayout) -> Self {
+        let plane = |&PlaneShape { scale, axes, size: [height, width] }: &PlaneShape| Plane {
+            scale: scale as u32,
+            axes,
+            height: height as u32,
+            width: width as u32,
+            values: Vec::new(),
+        };
+        Self { channels, planes: layout.planes().iter().map(plane).collect() }
+    }
+
+    /// Which planes there are.
+    ///
+    /// # Errors
+    /// Planes that do not stand in the order of a layout.
+    pub fn layout(&self) -> Result<PlaneLayout, CodecError> {
+        let planes = self.planes.iter().map(Plane::shape).collect();
+        PlaneLayout::new(planes).map_err(|illegal| {
+            CodecError::invalid(Section::FeaturePlanes.name(), "order of the planes", illegal, "the order of a layout")
+        })
+    }
+
+    /// Number of scales.
+    pub fn scales(&self) -> usize {
+        self.planes.last().map_or(0, |plane| plane.scale as usize + 1)
+    }
+
     /// Length of a feature: channels times scales.
     pub fn features(&self) -> u64 {
-        u64::from(self.channels) * self.multipliers.len() as u64
+        u64::from(self.channels) * self.scales() as u64
     }
 }
 
 /// One feature plane. Over axes `(a, b)`, `a` before `b`, its width runs along `a` and its height along `b`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Plane {
+    /// From 0, the lowest.
+    pub scale: u32,
+    /// What it spans.
+    pub axes: PlaneAxes,
     /// Samples along the second axis.
     pub height: u32,
     /// Samples along the first axis.
     pub width: u32,
     /// Features, `[channels, height, width]` row-major.
     pub values: Vec<f32>,
+}
+
+impl Plane {
+    /// The plane without its values.
+    pub fn shape(&self) -> PlaneShape {
+        PlaneShape { scale: self.scale as usize, axes: self.axes, size: [self.height as usize, self.width as usize] }
+    }
 }

@@ -40,10 +40,10 @@ pub struct MotionNetwork {
 /// What a [`MotionNetwork`] may read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MotionSource {
-    /// For each scale and channel of the hexplane the product of the six samples at the Gaussian's canonical center and
-    /// the time.
+    /// For each scale and channel of the planes the product of their samples at the Gaussian's canonical center and the
+    /// time.
     Features,
-    /// The canonical center as the hexplane has it: x, y, z in [-1, 1].
+    /// The canonical center as the planes have it: x, y, z in [-1, 1].
     Point,
     /// The time in [0, 1].
     Time,
@@ -196,7 +196,7 @@ impl MotionArrays {
         at_most(SECTION, "number of weights", total, limits.layer_weights)
     }
 
-    /// Refuses a network that reads other features than a hexplane has, or attributes that these Gaussians do not have.
+    /// Refuses a network that reads other features than the planes give, or attributes that these Gaussians do not have.
     pub(crate) fn check_sources(&self, features: u64, gaussians: &GaussianArrays) -> Result<(), CodecError> {
         let Some(MotionNetwork { network, sources, .. }) = &self.network else { return Ok(()) };
         for (source, &found) in sources.iter().zip(&network.inputs) {

@@ -1,7 +1,7 @@
 //! How spherical harmonics are coded, as data.
 
 use crate::{
-    CodecError, FrequencyTable, GaussianArrays, HexPlaneArrays, Limits, Network, SceneFrameArrays, bytes::Section,
+    CodecError, FeaturePlaneArrays, FrequencyTable, GaussianArrays, Limits, Network, SceneFrameArrays, bytes::Section,
     limits::at_most, sh_rest_coefficients, steps::LEAST_STEP_IN_STREAM,
 };
 
@@ -43,10 +43,10 @@ pub enum ShSource {
     Dc,
     /// The channels of the priors before.
     Decoded,
-    /// For each scale and channel of the hexplane the product of the samples of the planes over space at the Gaussian's
+    /// For each scale and channel of the planes the product of the samples of the planes over space at the Gaussian's
     /// center.
     SpaceFeatures,
-    /// The Gaussian's center as the hexplane has it: x, y, z in [-1, 1].
+    /// The Gaussian's center as the planes have it: x, y, z in [-1, 1].
     Position,
     /// Logarithms of the scales.
     LogScale,
@@ -75,7 +75,7 @@ impl ShSource {
         Self::ALL.get(usize::try_from(number).ok()?).copied()
     }
 
-    /// Channels of this source, for a hexplane with so many features and after so many channels.
+    /// Channels of this source, for planes with so many features and after so many channels.
     fn channels(self, features: u64, decoded: u64) -> u64 {
         match self {
             Self::Dc | Self::Position | Self::LogScale => 3,
@@ -92,13 +92,13 @@ impl ShSource {
 pub(crate) struct Conditions<'a> {
     pub(crate) gaussians: &'a GaussianArrays,
     pub(crate) frame: &'a SceneFrameArrays,
-    pub(crate) hexplane: &'a HexPlaneArrays,
+    pub(crate) feature_planes: &'a FeaturePlaneArrays,
 }
 
 impl Conditions<'_> {
-    /// Features of the hexplane.
+    /// Length of a feature.
     pub(super) fn features(&self) -> u64 {
-        self.hexplane.features()
+        self.feature_planes.features()
     }
 }
 
@@ -109,7 +109,7 @@ impl ShCoding {
         }
     }
 
-    /// Refuses a step, tables or networks that do not fit the degree and the features of the hexplane.
+    /// Refuses a step, tables or networks that do not fit the degree and the features of the planes.
     pub(crate) fn check(&self, degree: u8, features: u64, limits: &Limits) -> Result<(), CodecError> {
         let step = self.step();
         if !(step.is_finite() && step >= LEAST_STEP_IN_STREAM) {

@@ -1,9 +1,8 @@
 //! Distributions from networks.
 
 use super::coding::{Conditions, ShPrior, ShSource};
-use crate::plane_layout::PLANE_AXES;
 use crate::{
-    motion::query::{multiply_by_sample, normalized},
+    motion::query::{multiply_by_space_samples, normalized, scales},
     network::{
         Program, Workspace,
         kernels::{LANES, Lanes, kept},
@@ -69,20 +68,16 @@ impl<'a> Networks<'a> {
         if !self.reads_features {
             return;
         }
-        let Conditions { gaussians, frame, hexplane } = self.conditions;
-        let channels = hexplane.channels as usize;
+        let Conditions { gaussians, frame, feature_planes } = self.conditions;
+        let channels = feature_planes.channels as usize;
         self.features.clear();
-        self.features.resize(channels * hexplane.multipliers.len(), [0.0; LANES]);
+        self.features.resize(channels * feature_planes.scales(), [0.0; LANES]);
         let mut product = vec![1.0; channels];
         for (lane, &mean) in gaussians.means[first..].iter().take(LANES).enumerate() {
             let coordinates = normalized(frame, mean);
-            for (planes, features) in hexplane.planes.chunks_exact(6).zip(self.features.chunks_exact_mut(channels)) {
+            for (planes, features) in scales(&feature_planes.planes).zip(self.features.chunks_exact_mut(channels)) {
                 product.fill(1.0);
-                for (plane, [across, down]) in planes.iter().zip(PLANE_AXES) {
-                    if let (Some(&across), Some(&down)) = (coordinates.get(across), coordinates.get(down)) {
-                        multiply_by_sample(plane, across, down, &mut product);
-                    }
-                }
+                multiply_by_space_samples(planes, coordinates, &mut product);
                 features.iter_mut().zip(&product).for_each(|(feature, &value)| feature[lane] = value);
             }
         }

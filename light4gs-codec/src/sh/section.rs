@@ -148,8 +148,8 @@ fn read_priors(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<ShPrior>,
     (0..count as usize).map(read).collect()
 }
 
-/// Whether decoding looks at the hexplanes.
-pub(crate) fn reads_hexplanes(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<bool, CodecError> {
+/// Whether decoding looks at the feature planes.
+pub(crate) fn reads_feature_planes(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<bool, CodecError> {
     if kind != Kind::ShNetworks {
         return Ok(false);
     }

@@ -7,7 +7,7 @@ use super::{
     scene_frame,
 };
 use crate::{
-    CodecError, Demand, GaussianArrays, HexPlaneArrays, Limits, PlaneBytes, PlaneCoding, SceneData, ShBytes,
+    CodecError, Demand, FeaturePlaneArrays, GaussianArrays, Limits, PlaneBytes, PlaneCoding, SceneData, ShBytes,
     attributes::{self, EncodedAttributes},
     bytes::{
         Writer,
@@ -37,7 +37,7 @@ pub struct CompressionReport {
     pub header_bytes: u64,
     /// Every section: its name, what it holds, how its numbers are stored, and its bytes.
     pub sections: Vec<(&'static str, Kind, Encoding, u64)>,
-    /// Every plane, in the order of [`HexPlaneArrays::planes`]; empty where planes are float32.
+    /// Every plane, in the order of [`FeaturePlaneArrays::planes`]; empty where planes are float32.
     pub planes: Vec<PlaneBytes>,
     /// The spherical harmonics.
     pub sh: ShBytes,
@@ -78,9 +78,10 @@ pub fn encode_compressed_with_limits(
     scene_frame::write(&scene.frame, &mut writer);
     push(&mut sections, scene_frame::kind(&scene.frame), Encoding::Float32, writer);
     let precision = compact(input.weights.context_model);
-    let (hexplane, planes) = write_planes(&scene.hexplane, input.planes.as_ref(), precision, limits, &mut sections)?;
+    let (feature_planes, planes) =
+        write_planes(&scene.feature_planes, input.planes.as_ref(), precision, limits, &mut sections)?;
 
-    let conditions = Conditions { gaussians: &attributes, frame: &scene.frame, hexplane: &hexplane };
+    let conditions = Conditions { gaussians: &attributes, frame: &scene.frame, feature_planes: &feature_planes };
     let rest = reordered(&scene.gaussians, &order);
     let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
     let mut writer = Writer::default();
@@ -95,7 +96,7 @@ pub fn encode_compressed_with_limits(
         meta: scene.meta.clone(),
         gaussians: GaussianArrays { sh_rest, ..with_rest },
         frame: scene.frame.clone(),
-        hexplane,
+        feature_planes,
         motion,
     };
     sections.sort_by_key(|section| section.kind.place().0.id());
@@ -140,25 +141,25 @@ fn write_gaussians(
 
 /// The planes as decoded, and what each of them takes.
 fn write_planes(
-    hexplane: &HexPlaneArrays,
+    feature_planes: &FeaturePlaneArrays,
     coding: Option<&PlaneCoding>,
     precision: Option<WeightPrecision>,
     limits: &Limits,
     sections: &mut Vec<NewSection>,
-) -> Result<(HexPlaneArrays, Vec<PlaneBytes>), CodecError> {
+) -> Result<(FeaturePlaneArrays, Vec<PlaneBytes>), CodecError> {
     let mut writer = Writer::default();
     let Some(PlaneCoding { model, steps, latent_symbols }) = coding else {
-        planes::explicit::write(hexplane, &mut writer);
-        push(sections, Kind::HexPlanesExplicit, Encoding::Float32, writer);
-        return Ok((hexplane.clone(), Vec::new()));
+        planes::explicit::write(feature_planes, &mut writer);
+        push(sections, Kind::FeaturePlanesExplicit, Encoding::Float32, writer);
+        return Ok((feature_planes.clone(), Vec::new()));
     };
     let model = planes::context_section::write(model, precision, &mut writer)?;
     push(sections, Kind::ContextModelNetworks, encoding_of(precision), writer);
 
     let mut writer = Writer::default();
-    let decoded = planes::section::write(hexplane, &model, steps, latent_symbols, limits, &mut writer)?;
+    let decoded = planes::section::write(feature_planes, &model, steps, latent_symbols, limits, &mut writer)?;
     let (_, planes) = planes::section::plane_bytes(&writer.bytes, &model, limits)?;
-    push(sections, Kind::HexPlanesContextCoded, Encoding::Quantized, writer);
+    push(sections, Kind::FeaturePlanesContextCoded, Encoding::Quantized, writer);
     Ok((decoded, planes))
 }
 

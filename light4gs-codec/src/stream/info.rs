@@ -9,6 +9,7 @@ use crate::{
         sections::{Encoding, Kind},
     },
     motion::section,
+    plane_layout::PlaneLayout,
     planes, sh,
 };
 
@@ -35,15 +36,11 @@ pub struct StreamInfo {
     pub attributes: Vec<AttributeInfo>,
     /// Degree of the spherical harmonics.
     pub sh_degree: u8,
-    /// Channels of the hexplane.
-    pub hexplane_channels: u32,
-    /// Base resolution of the hexplane along x, y, z, t.
-    pub hexplane_resolution: [u32; 4],
-    /// Multipliers of the resolution, one a scale.
-    pub hexplane_multipliers: Vec<u32>,
-    /// Planes of all scales.
-    pub plane_count: usize,
-    /// Bytes of each plane, in the order xy, xz, xt, yz, yt, zt, scale by scale; empty where they are float32.
+    /// Channels of every feature plane.
+    pub plane_channels: u32,
+    /// The feature planes: scales, axes, sizes.
+    pub planes: PlaneLayout,
+    /// Bytes of each plane, in the order of the planes; empty where they are float32.
     pub plane_bytes: Vec<PlaneBytes>,
     /// Quantization steps of the planes, one entry for all scales or one a scale; empty where they are float32.
     pub plane_steps: Vec<PerGroup>,
@@ -101,9 +98,9 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
     let (sh_kind, _, mut reader) = open(Section::Sh)?;
     let sh = sh::section::Head::read(&mut reader, &limits)?;
     let motion = section::read_description(&mut open(Section::Motion)?.2, &limits)?;
-    let (plane_kind, _, mut reader) = open(Section::HexPlanes)?;
+    let (plane_kind, _, mut reader) = open(Section::FeaturePlanes)?;
     let (mut plane_bytes, mut plane_steps, mut context_model) = (Vec::new(), Vec::new(), None);
-    let hexplane = if plane_kind == Kind::HexPlanesExplicit {
+    let head = if plane_kind == Kind::FeaturePlanesExplicit {
         planes::head::Head::read(&mut reader, &limits)?
     } else {
         let model = planes::context_section::read_description(&mut open(Section::ContextModel)?.2, &limits)?;
@@ -112,7 +109,7 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
         parts.head
     };
     let compact = gaussian_encoding == Encoding::Quantized;
-    let coded = compact || plane_kind != Kind::HexPlanesExplicit || sh_kind != Kind::ShExplicit;
+    let coded = compact || plane_kind != Kind::FeaturePlanesExplicit || sh_kind != Kind::ShExplicit;
     let profile = if compact { Profile::Compact } else { Profile::Paper };
 
     let sections: Vec<_> = container
@@ -138,10 +135,8 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
         gaussian_count: gaussians.count,
         attributes: gaussians.attributes,
         sh_degree: sh.degree,
-        hexplane_channels: hexplane.channels,
-        hexplane_resolution: hexplane.resolution,
-        plane_count: hexplane.plane_count(),
-        hexplane_multipliers: hexplane.multipliers,
+        plane_channels: head.channels,
+        planes: head.layout,
         plane_bytes,
         plane_steps,
         context_model,

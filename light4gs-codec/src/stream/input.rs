@@ -56,10 +56,10 @@ impl CompressionInput {
             }
         }
         if let Some(coding) = planes {
-            planes::section::check(&scene.hexplane, coding, limits)?;
+            planes::section::check(&scene.feature_planes, coding, limits)?;
         }
         steps::sh_step(sh.step())?;
-        sh.check(scene.gaussians.sh_degree, scene.hexplane.features(), limits)
+        sh.check(scene.gaussians.sh_degree, scene.feature_planes.features(), limits)
     }
 }
 

@@ -55,7 +55,7 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
         section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
         section(scene_frame::kind(&scene.frame), &|writer| scene_frame::write(&scene.frame, writer)),
         section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
-        section(Kind::HexPlanesExplicit, &|writer| planes::explicit::write(&scene.hexplane, writer)),
+        section(Kind::FeaturePlanesExplicit, &|writer| planes::explicit::write(&scene.feature_planes, writer)),
     ];
     let bytes = container::write(&scene.meta, &sections, &limits)?;
     let decoded = decode_with_limits(&bytes, &limits)?;
@@ -87,6 +87,6 @@ pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError
     sh::section::check(&scene.gaussians)?;
     fields::check_finite(scene)?;
     scene.motion.check(limits)?;
-    planes::head::check(&scene.hexplane, limits)?;
-    scene.motion.check_sources(scene.hexplane.features(), &scene.gaussians)
+    planes::head::check(&scene.feature_planes, limits)?;
+    scene.motion.check_sources(scene.feature_planes.features(), &scene.gaussians)
 }

@@ -2,7 +2,7 @@
 
 use super::{check, container::Container, scene_frame};
 use crate::{
-    CodecError, GaussianArrays, HexPlaneArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
+    CodecError, FeaturePlaneArrays, GaussianArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
     attributes,
     budget::{Budget, Demand},
     bytes::{Section, sections::Kind},
@@ -94,13 +94,13 @@ impl<'a> OpenStream<'a> {
     ///
     /// # Errors
     /// As [`crate::decode`].
-    pub fn hexplanes(&self) -> Result<HexPlaneArrays, CodecError> {
-        self.hexplanes_within(&self.budget())
+    pub fn feature_planes(&self) -> Result<FeaturePlaneArrays, CodecError> {
+        self.feature_planes_within(&self.budget())
     }
 
-    fn hexplanes_within(&self, budget: &Budget) -> Result<HexPlaneArrays, CodecError> {
-        let (kind, _, payload) = self.container.section(Section::HexPlanes)?;
-        if kind == Kind::HexPlanesExplicit {
+    fn feature_planes_within(&self, budget: &Budget) -> Result<FeaturePlaneArrays, CodecError> {
+        let (kind, _, payload) = self.container.section(Section::FeaturePlanes)?;
+        if kind == Kind::FeaturePlanesExplicit {
             return planes::explicit::read(payload, budget);
         }
         let (_, encoding, model) = self.container.section(Section::ContextModel)?;
@@ -112,13 +112,13 @@ impl<'a> OpenStream<'a> {
     ///
     /// # Errors
     /// As [`crate::decode`].
-    pub fn sh_needs_hexplanes(&self) -> Result<bool, CodecError> {
+    pub fn sh_needs_feature_planes(&self) -> Result<bool, CodecError> {
         let (kind, _, payload) = self.container.section(Section::Sh)?;
-        sh::section::reads_hexplanes(payload, kind, &self.limits)
+        sh::section::reads_feature_planes(payload, kind, &self.limits)
     }
 
     /// `gaussians`, which come from this stream, with their `sh_degree` and `sh_rest`. The planes may be empty unless
-    /// [`OpenStream::sh_needs_hexplanes`].
+    /// [`OpenStream::sh_needs_feature_planes`].
     ///
     /// # Errors
     /// As [`crate::decode`].
@@ -126,20 +126,20 @@ impl<'a> OpenStream<'a> {
         &self,
         gaussians: GaussianArrays,
         frame: &SceneFrameArrays,
-        hexplane: &HexPlaneArrays,
+        feature_planes: &FeaturePlaneArrays,
     ) -> Result<GaussianArrays, CodecError> {
-        self.sh_within(gaussians, frame, hexplane, &self.budget())
+        self.sh_within(gaussians, frame, feature_planes, &self.budget())
     }
 
     fn sh_within(
         &self,
         gaussians: GaussianArrays,
         frame: &SceneFrameArrays,
-        hexplane: &HexPlaneArrays,
+        feature_planes: &FeaturePlaneArrays,
         budget: &Budget,
     ) -> Result<GaussianArrays, CodecError> {
         let (kind, encoding, payload) = self.container.section(Section::Sh)?;
-        let conditions = Conditions { gaussians: &gaussians, frame, hexplane };
+        let conditions = Conditions { gaussians: &gaussians, frame, feature_planes };
         let (head, sh_rest) = sh::section::read(payload, (kind, encoding), conditions, budget)?;
         Ok(GaussianArrays { sh_degree: head.degree, sh_rest, ..gaussians })
     }
@@ -157,30 +157,30 @@ impl<'a> OpenStream<'a> {
         let budget = self.budget();
         self.check_sections()?;
         let frame = self.frame()?;
-        let coupled = self.sh_needs_hexplanes()?;
-        let (gaussians, hexplane) = parallel::join(
+        let coupled = self.sh_needs_feature_planes()?;
+        let (gaussians, feature_planes) = parallel::join(
             || {
                 let gaussians = self.gaussians_within(&budget)?;
                 if coupled {
                     return Ok(gaussians);
                 }
-                self.sh_within(gaussians, &frame, &HexPlaneArrays::default(), &budget)
+                self.sh_within(gaussians, &frame, &FeaturePlaneArrays::default(), &budget)
             },
-            || self.hexplanes_within(&budget),
+            || self.feature_planes_within(&budget),
         );
-        let (mut gaussians, hexplane) = (gaussians?, hexplane?);
+        let (mut gaussians, feature_planes) = (gaussians?, feature_planes?);
         if coupled {
-            gaussians = self.sh_within(gaussians, &frame, &hexplane, &budget)?;
+            gaussians = self.sh_within(gaussians, &frame, &feature_planes, &budget)?;
         }
         let motion = self.motion_within(&budget)?;
-        let scene = SceneData { meta: self.container.meta.clone(), gaussians, frame, hexplane, motion };
+        let scene = SceneData { meta: self.container.meta.clone(), gaussians, frame, feature_planes, motion };
         check(&scene, &self.limits)?;
         Ok((scene, budget.demand()))
     }
 
     /// Refuses a context model without coded planes, and the other way round.
     fn check_sections(&self) -> Result<(), CodecError> {
-        let coded = self.container.section(Section::HexPlanes)?.0 == Kind::HexPlanesContextCoded;
+        let coded = self.container.section(Section::FeaturePlanes)?.0 == Kind::FeaturePlanesContextCoded;
         if self.container.has(Section::ContextModel) && !coded {
             let section = Section::ContextModel.name();
             return Err(CodecError::invalid(section, "section", "there", "none, since no plane is coded with it"));
@@ -213,12 +213,12 @@ mod tests {
                 Ok((scene, demand)) => {
                     let (asked, mib) = (demand.nanoseconds as f64 / 1e6, demand.memory_bytes >> 20);
                     println!(
-                        "{:5.2} asked {asked:7.1} ms took {took:7.1} ms, {mib} MiB, {} bytes, {} Gaussians, {} x {:?}: {}",
+                        "{:5.2} asked {asked:7.1} ms took {took:7.1} ms, {mib} MiB, {} bytes, {} Gaussians, {} channels of {} planes: {}",
                         asked / took,
                         bytes.len(),
                         scene.gaussians.len(),
-                        scene.hexplane.channels,
-                        scene.hexplane.resolution,
+                        scene.feature_planes.channels,
+                        scene.feature_planes.planes.len(),
                         path.display()
                     );
                 }

@@ -3,7 +3,7 @@
 //! Decoding by parts is [`crate::OpenStream`]'s; the other attributes are in [`crate::attributes`].
 
 use crate::{
-    CodecError, Distributions, GaussianArrays, HexPlaneArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding,
+    CodecError, Distributions, FeaturePlaneArrays, GaussianArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding,
     attributes,
     bytes::{Section, Writer},
     planes,
@@ -14,15 +14,15 @@ use crate::{
 ///
 /// # Errors
 /// As [`crate::encode_compressed`].
-pub fn encode_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<Vec<u8>, CodecError> {
-    check_planes(hexplane, coding)?;
+pub fn encode_planes(feature_planes: &FeaturePlaneArrays, coding: &PlaneCoding) -> Result<Vec<u8>, CodecError> {
+    check_planes(feature_planes, coding)?;
     let mut writer = Writer::default();
     let PlaneCoding { model, steps, latent_symbols } = coding;
-    planes::section::write(hexplane, model, steps, latent_symbols, &Limits::large(), &mut writer)?;
+    planes::section::write(feature_planes, model, steps, latent_symbols, &Limits::large(), &mut writer)?;
     Ok(writer.bytes)
 }
 
-/// The bytes of coded spherical harmonics, with float32 weights. `frame` and `hexplane`, decoded, matter to priors
+/// The bytes of coded spherical harmonics, with float32 weights. `frame` and `feature_planes`, decoded, matter to priors
 /// that read them.
 ///
 /// # Errors
@@ -31,35 +31,35 @@ pub fn encode_sh(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
     frame: &SceneFrameArrays,
-    hexplane: &HexPlaneArrays,
+    feature_planes: &FeaturePlaneArrays,
 ) -> Result<Vec<u8>, CodecError> {
     let limits = Limits::large();
     attributes::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
-    planes::head::check(hexplane, &limits)?;
+    planes::head::check(feature_planes, &limits)?;
     let mut writer = Writer::default();
-    let conditions = Conditions { gaussians, frame, hexplane };
+    let conditions = Conditions { gaussians, frame, feature_planes };
     sh::section::write(gaussians, coding, None, conditions, &limits, &mut writer)?;
     Ok(writer.bytes)
 }
 
-/// What the exact executor gives for one plane of a decoded hexplane, `[M, height, width]`: the distributions that a
+/// What the exact executor gives for one of decoded planes, `[M, height, width]`: the distributions that a
 /// stream's intervals come from. The step is not asked for, since all networks see planes in their own units.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`]; a plane that is not there.
 pub fn plane_distributions(
-    hexplane: &HexPlaneArrays,
+    feature_planes: &FeaturePlaneArrays,
     coding: &PlaneCoding,
     plane: usize,
 ) -> Result<Distributions, CodecError> {
-    check_planes(hexplane, coding)?;
-    if plane >= hexplane.planes.len() {
-        let expected = format!("less than {}", hexplane.planes.len());
-        return Err(CodecError::invalid(Section::HexPlanes.name(), "plane", plane, expected));
+    check_planes(feature_planes, coding)?;
+    if plane >= feature_planes.planes.len() {
+        let expected = format!("less than {}", feature_planes.planes.len());
+        return Err(CodecError::invalid(Section::FeaturePlanes.name(), "plane", plane, expected));
     }
     let symbols = &coding.latent_symbols[plane];
-    let (scales, means) = planes::parameters(hexplane, &coding.model, symbols, plane, &Limits::large())?;
+    let (scales, means) = planes::parameters(feature_planes, &coding.model, symbols, plane, &Limits::large())?;
     Ok(Distributions { scales, means })
 }
 
@@ -71,17 +71,17 @@ pub fn sh_distributions(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
     frame: &SceneFrameArrays,
-    hexplane: &HexPlaneArrays,
+    feature_planes: &FeaturePlaneArrays,
 ) -> Result<Distributions, CodecError> {
     let limits = Limits::large();
     attributes::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
-    planes::head::check(hexplane, &limits)?;
-    sh::section::distributions(gaussians, coding, Conditions { gaussians, frame, hexplane }, &limits)
+    planes::head::check(feature_planes, &limits)?;
+    sh::section::distributions(gaussians, coding, Conditions { gaussians, frame, feature_planes }, &limits)
 }
 
-fn check_planes(hexplane: &HexPlaneArrays, coding: &PlaneCoding) -> Result<(), CodecError> {
+fn check_planes(feature_planes: &FeaturePlaneArrays, coding: &PlaneCoding) -> Result<(), CodecError> {
     let limits = Limits::large();
-    planes::head::check(hexplane, &limits)?;
-    planes::section::check(hexplane, coding, &limits)
+    planes::head::check(feature_planes, &limits)?;
+    planes::section::check(feature_planes, coding, &limits)
 }

@@ -1,11 +1,11 @@
 //! Context models, tables and networks of random numbers that follow from a seed.
 
 use light4gs_codec::{
-    CompressionInput, Condition, ContextModelArrays, FrequencyTable, HexPlaneArrays, LatentArrays, Network, PerGroup,
-    PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
+    CompressionInput, Condition, ContextModelArrays, FeaturePlaneArrays, FrequencyTable, LatentArrays, Network,
+    PerGroup, PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
     attributes::AttributeSteps,
     network::{Layer, LayerKind, Operation, Value},
-    plane_layout::SPACE_TIME_PLANES,
+    plane_layout::PlaneLayout,
     sh_rest_coefficients,
 };
 
@@ -140,8 +140,8 @@ pub fn distribution(random: &mut Random, channels: u32, [first, second]: [u32; 2
     network
 }
 
-/// A context model of random weights.
-pub fn model(shape: Shape, seed: u64) -> ContextModelArrays {
+/// A context model of random weights for planes.
+pub fn model(shape: Shape, planes: &FeaturePlaneArrays, seed: u64) -> ContextModelArrays {
     let Shape { channels: m, latent_channels, synthesis: [a, b], hidden, parts, centers, .. } = shape;
     let mut random = Random::new(seed);
     let mut networks = Vec::new();
@@ -194,13 +194,14 @@ pub fn model(shape: Shape, seed: u64) -> ContextModelArrays {
     let latent = |network: Option<u32>| network.and_then(|network| condition(network, &[PlaneSource::Latent]));
     let anchors = || checkerboard.and_then(|network| condition(network, &[PlaneSource::Anchors]));
     let lower = || inter_scale.and_then(|network| condition(network, &[PlaneSource::LowerScale]));
-    let prior = |position: usize, higher: bool| {
-        let over_time = [[Some(2), Some(4)], [Some(2), Some(5)], [None; 2], [Some(4), Some(5)], [None; 2], [None; 2]];
-        let conditions = match (over_time[position], inter_plane) {
+    let layout: PlaneLayout = planes.layout().unwrap();
+    let prior = |plane: usize| {
+        let higher = layout.one_scale_below(plane).is_some();
+        let conditions = match (layout.over_time(plane), inter_plane) {
             _ if higher && parts.high_scale_hyperprior => vec![latent(synthesis), lower()],
             _ if higher && parts.inter_scale => vec![lower(), None],
-            ([Some(first), Some(second)], Some(network)) => {
-                let sources = [PlaneSource::SameScale(first), PlaneSource::SameScale(second)];
+            (Some(over_time), Some(network)) => {
+                let sources = over_time.map(|plane| PlaneSource::SameScale(layout.planes()[plane].axes));
                 vec![condition(network, &sources), anchors()]
             }
             _ => vec![latent(synthesis), anchors()],
@@ -215,12 +216,12 @@ pub fn model(shape: Shape, seed: u64) -> ContextModelArrays {
         }
         place as u32
     };
-    let [lowest, higher] = [false, true].map(|higher| std::array::from_fn(|position| place(prior(position, higher))));
+    let plane_priors = (0..layout.len()).map(|plane| place(prior(plane))).collect();
     let latent = parts.hyperprior.then(|| LatentArrays {
         tables: (0..latent_channels).map(|_| laplace_table(0.5)).collect(),
         medians: random.normals(latent_channels as usize, 0.3),
     });
-    ContextModelArrays { channels: m, centers, latent, networks, priors, lowest, higher }
+    ContextModelArrays { channels: m, centers, latent, networks, priors, plane_priors }
 }
 
 /// The table of `p(k) ~ decay^|k|`.
@@ -237,10 +238,10 @@ pub fn laplace_symbol(random: &mut Random, decay: f64) -> i32 {
     if uniform < 0.0 { -magnitude } else { magnitude }
 }
 
-/// Coding of a hexplane with a model.
-pub fn plane_coding(hexplane: &HexPlaneArrays, model: ContextModelArrays, steps: Vec<PerGroup>) -> PlaneCoding {
+/// Coding of planes with a model.
+pub fn plane_coding(planes: &FeaturePlaneArrays, model: ContextModelArrays, steps: Vec<PerGroup>) -> PlaneCoding {
     let mut random = Random::new(77);
-    let sizes: Vec<_> = hexplane.planes.iter().map(|plane| [plane.height, plane.width]).collect();
+    let sizes: Vec<_> = planes.planes.iter().map(|plane| [plane.height, plane.width]).collect();
     let latent_symbols = PlaneCoding::latent_shapes(&model, &sizes)
         .into_iter()
         .map(|shape| {
@@ -328,13 +329,24 @@ pub fn scene(count: usize, sh_degree: u8, channels: u32, resolution: [u32; 4], m
         .map(|_| 0.02 * laplace_symbol(&mut random, 0.6) as f32 + 0.004 * random.uniform())
         .collect();
     gaussians.further = vec![further("age", 2, count), further("label", 1, count)];
-    scene.hexplane = hexplane(channels, resolution, multipliers);
-    scene.motion = match channels * multipliers.len() as u32 {
+    scene.feature_planes = hexplane(channels, resolution, multipliers);
+    fill(scene, random)
+}
+
+/// The scene over other planes.
+pub fn with_planes(mut scene: SceneData, planes: FeaturePlaneArrays) -> SceneData {
+    scene.feature_planes = planes;
+    fill(scene, Random::new(12))
+}
+
+/// Random planes, and a motion that reads them.
+fn fill(mut scene: SceneData, mut random: Random) -> SceneData {
+    scene.motion = match scene.feature_planes.features() as u32 {
         0 => Default::default(),
         features => super::motion(features),
     };
-    for (index, plane) in scene.hexplane.planes.iter_mut().enumerate() {
-        let center = if SPACE_TIME_PLANES.contains(&(index % 6)) { 1.0 } else { 0.0 };
+    for plane in &mut scene.feature_planes.planes {
+        let center = if plane.axes.is_space_time() { 1.0 } else { 0.0 };
         plane.values.fill_with(|| center + 0.1 * random.normal());
     }
     scene
@@ -344,7 +356,7 @@ pub fn scene(count: usize, sh_degree: u8, channels: u32, resolution: [u32; 4], m
 pub fn input(scene: &SceneData, profile: Profile, shape: Shape) -> CompressionInput {
     CompressionInput {
         profile,
-        planes: Some(plane_coding(&scene.hexplane, model(shape, 3), step(0.1))),
+        planes: Some(plane_coding(&scene.feature_planes, model(shape, &scene.feature_planes, 3), step(0.1))),
         sh: sh_tables(scene.gaussians.sh_degree),
         // The label has no step.
         attributes: AttributeSteps::default().with("age", 0.01),

@@ -5,9 +5,10 @@
 pub mod compression;
 
 use light4gs_codec::{
-    CoordinateMapping, FurtherAttribute, GaussianArrays, HexPlaneArrays, MotionArrays, MotionNetwork, MotionOutput,
-    MotionSource, NamedTensor, Network, Plane, SceneData, SceneFrameArrays, SceneMeta,
+    CoordinateMapping, FeaturePlaneArrays, FurtherAttribute, GaussianArrays, MotionArrays, MotionNetwork, MotionOutput,
+    MotionSource, NamedTensor, Network, SceneData, SceneFrameArrays, SceneMeta,
     network::{Layer, Operation},
+    plane_layout::{PlaneAxes, PlaneLayout},
     sh_rest_coefficients,
 };
 
@@ -40,17 +41,20 @@ pub fn further(name: &str, width: usize, count: usize) -> FurtherAttribute {
     FurtherAttribute { name: name.into(), width: width as u32, values: numbers(width * count), optional: true }
 }
 
-/// A hexplane whose time axis is not multiplied.
-pub fn hexplane(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> HexPlaneArrays {
-    let mut planes = Vec::new();
-    for multiplier in multipliers {
-        let [x, y, z] = [0, 1, 2].map(|axis| resolution[axis] * multiplier);
-        let t = resolution[3];
-        for (width, height) in [(x, y), (x, z), (x, t), (y, z), (y, t), (z, t)] {
-            planes.push(Plane { height, width, values: numbers((channels * height * width) as usize) });
-        }
+/// Planes over these axes whose time axis is not multiplied.
+pub fn planes(axes: &[PlaneAxes], channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> FeaturePlaneArrays {
+    let multipliers: Vec<usize> = multipliers.iter().map(|&multiplier| multiplier as usize).collect();
+    let layout = PlaneLayout::multiscale(axes, resolution.map(|cells| cells as usize), &multipliers);
+    let mut planes = FeaturePlaneArrays::without_values(channels, &layout);
+    for plane in &mut planes.planes {
+        plane.values = numbers((channels * plane.height * plane.width) as usize);
     }
-    HexPlaneArrays { channels, resolution, multipliers: multipliers.to_vec(), planes }
+    planes
+}
+
+/// A hexplane whose time axis is not multiplied.
+pub fn hexplane(channels: u32, resolution: [u32; 4], multipliers: &[u32]) -> FeaturePlaneArrays {
+    planes(&PlaneAxes::ALL, channels, resolution, multipliers)
 }
 
 /// A layer from `inputs` to `outputs` channels.
@@ -95,7 +99,7 @@ pub fn sample() -> SceneData {
             std: [1.0, 2.0, 0.5],
             mapping: CoordinateMapping::default(),
         },
-        hexplane: hexplane(1, [2, 1, 1, 3], &[1, 2]),
+        feature_planes: hexplane(1, [2, 1, 1, 3], &[1, 2]),
         motion: motion(2),
     }
 }

@@ -12,6 +12,7 @@ use light4gs_codec::{
     encode_planes, info,
     network::{LayerKind, Operation, Value},
     plane_distributions,
+    plane_layout::PlaneAxes,
 };
 use proptest::prelude::*;
 
@@ -25,7 +26,7 @@ fn round_trip(scene: &SceneData, input: &CompressionInput) -> Encoded {
     assert_eq!((info.version, info.profile), (1, Some(input.profile)));
     assert_eq!(info.plane_bytes, encoded.report.planes);
     assert_eq!(info.gaussian_count as usize, scene.gaussians.len());
-    assert_eq!(info.plane_count, scene.hexplane.planes.len());
+    assert_eq!(info.planes, scene.feature_planes.layout().unwrap());
     encoded
 }
 
@@ -40,7 +41,7 @@ fn errors_are_at_most_half_a_step() {
     for profile in [Profile::Compact, Profile::Paper] {
         for shape in [compact_shape(4, ALL_PARTS), reference_shape(4, ALL_PARTS)] {
             let encoded = round_trip(&scene, &input(&scene, profile, shape));
-            for (given, decoded) in scene.hexplane.planes.iter().zip(&encoded.decoded.hexplane.planes) {
+            for (given, decoded) in scene.feature_planes.planes.iter().zip(&encoded.decoded.feature_planes.planes) {
                 assert!(largest_error(&given.values, &decoded.values) <= 0.0501);
             }
             if profile == Profile::Paper {
@@ -78,7 +79,7 @@ fn every_combination_of_parts() {
 fn a_description_is_short() {
     let scene = scene(0, 0, 16, [4, 4, 4, 4], &[1, 2]);
     let encoded = round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(16, ALL_PARTS)));
-    let model = model(compact_shape(16, ALL_PARTS), 3);
+    let model = model(compact_shape(16, ALL_PARTS), &scene.feature_planes, 3);
     let stored = |network: &Network| -> u64 {
         let layers = network.layers().map(|layer| match layer.kind {
             LayerKind::Checkerboard => layer.weights() / 25 * 12 + u64::from(layer.outputs),
@@ -134,14 +135,14 @@ fn a_composition_of_ones_own() {
     networks.push(network);
     networks.push(distribution(&mut random, M, [7, 9]));
 
-    let other = |position| condition(0, &[PlaneSource::SameScale(position)]);
+    let other = |axes| condition(0, &[PlaneSource::SameScale(axes)]);
     let anchors = || condition(1, &[PlaneSource::Anchors, PlaneSource::Anchors]);
     let prior = |first, second| PlanePrior { conditions: vec![first, second], distribution: 3 };
     let priors = vec![
         prior(None, anchors()),
-        prior(other(0), None),
-        prior(other(1), anchors()),
-        prior(other(5), other(2)),
+        prior(other(PlaneAxes::Xy), None),
+        prior(other(PlaneAxes::Xz), anchors()),
+        prior(other(PlaneAxes::Zt), other(PlaneAxes::Xt)),
         prior(condition(0, &[PlaneSource::LowerScale]), condition(2, &[PlaneSource::Latent])),
         prior(condition(2, &[PlaneSource::Latent]), anchors()),
     ];
@@ -155,14 +156,13 @@ fn a_composition_of_ones_own() {
         networks,
         priors,
         // xy, then xz from it, then xt from that, then yz and yt and zt from what stands after them.
-        lowest: [0, 1, 2, 3, 0, 2],
-        higher: [4, 5, 4, 5, 4, 0],
+        plane_priors: vec![0, 1, 2, 3, 0, 2, 4, 5, 4, 5, 4, 0],
     };
     for profile in [Profile::Compact, Profile::Paper] {
-        let planes = Some(plane_coding(&scene.hexplane, model.clone(), step(0.1)));
+        let planes = Some(plane_coding(&scene.feature_planes, model.clone(), step(0.1)));
         let input = CompressionInput { planes, ..input(&scene, profile, compact_shape(M, ALL_PARTS)) };
         let encoded = round_trip(&scene, &input);
-        for (given, decoded) in scene.hexplane.planes.iter().zip(&encoded.decoded.hexplane.planes) {
+        for (given, decoded) in scene.feature_planes.planes.iter().zip(&encoded.decoded.feature_planes.planes) {
             assert!(largest_error(&given.values, &decoded.values) <= 0.0501);
         }
         let has_latent: Vec<_> = encoded.report.planes.iter().map(|plane| plane.latent > 0).collect();
@@ -171,22 +171,25 @@ fn a_composition_of_ones_own() {
     }
 
     // Planes that wait for each other, and for what is not there.
+    let sound = self::model(compact_shape(M, ALL_PARTS), &scene.feature_planes, 1);
     let refused = |spoil: &dyn Fn(&mut ContextModelArrays)| {
         let mut model = model.clone();
         spoil(&mut model);
-        let coding = PlaneCoding {
-            model,
-            ..plane_coding(&scene.hexplane, self::model(compact_shape(M, ALL_PARTS), 1), step(0.1))
-        };
-        encode_planes(&scene.hexplane, &coding).unwrap_err().to_string()
+        let coding = PlaneCoding { model, ..plane_coding(&scene.feature_planes, sound.clone(), step(0.1)) };
+        encode_planes(&scene.feature_planes, &coding).unwrap_err().to_string()
     };
-    assert!(refused(&|model| model.lowest = [2; 6]).contains("planes that wait for this one"));
-    assert!(refused(&|model| model.priors[2].conditions[0] = other(2)).contains("planes that wait for this one"));
-    assert!(refused(&|model| model.priors[2].conditions[0] = other(6)).contains("less than 6"));
-    assert!(refused(&|model| model.lowest[0] = 4).contains("the scale below"));
-    assert!(refused(&|model| model.lowest[0] = 9).contains("less than 6"));
+    assert!(refused(&|model| model.plane_priors[..6].fill(2)).contains("planes that wait for this one"));
+    assert!(
+        refused(&|model| model.priors[2].conditions[0] = other(PlaneAxes::Xt))
+            .contains("planes that wait for this one")
+    );
+    assert!(refused(&|model| model.plane_priors[0] = 4).contains("a source of plane 0.xy is the scale below"));
+    assert!(refused(&|model| model.plane_priors[0] = 9).contains("prior of planes[0] is 9, expected less than 6"));
+    assert!(refused(&|model| model.plane_priors.truncate(11)).contains("number of planes with a prior is 11"));
+    assert!(refused(&|model| model.plane_priors.push(0)).contains("number of planes with a prior is 13"));
+    assert!(refused(&|model| model.plane_priors = vec![0; 97]).contains("number of planes is 97, at most 96"));
     assert!(refused(&|model| model.priors[0].distribution = 0).contains("looks at one place only"));
-    assert!(refused(&|model| model.priors[0].conditions[1] = other(0)).contains(""));
+    assert!(refused(&|model| model.priors[0].conditions[1] = other(PlaneAxes::Xy)).contains(""));
     assert!(refused(&|model| model.latent = None).contains("those of its source Latent"));
     assert!(refused(&|model| model.networks[1].outputs = vec![Value(0)]).contains("an output is anchors"));
     let sources = [PlaneSource::Anchors, PlaneSource::LowerScale];
@@ -225,7 +228,7 @@ fn empty_sets_and_other_numbers_of_scales() {
             planes: None,
             ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS))
         };
-        assert_eq!(round_trip(&scene, &plain).decoded.hexplane, scene.hexplane);
+        assert_eq!(round_trip(&scene, &plain).decoded.feature_planes, scene.feature_planes);
     }
     let empty = SceneData::default();
     let plain = CompressionInput {
@@ -238,12 +241,11 @@ fn empty_sets_and_other_numbers_of_scales() {
 #[test]
 fn time_may_be_multiplied() {
     let mut scene = scene(2, 0, 4, [4, 8, 4, 4], &[1, 2]);
-    let multiplied = common::hexplane(4, [8, 16, 8, 8], &[1]);
-    scene.hexplane.planes.splice(6.., multiplied.planes);
+    for plane in scene.feature_planes.planes.iter_mut().filter(|plane| plane.scale == 1 && plane.axes.is_space_time()) {
+        plane.height *= 2;
+        plane.values.resize(2 * plane.values.len(), 1.0);
+    }
     round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS)));
-    scene.hexplane.planes[8] = common::hexplane(4, [8, 16, 8, 4], &[1]).planes.swap_remove(2);
-    let error = encode_compressed(&scene, &input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS))).unwrap_err();
-    assert!(error.to_string().contains("time axis"), "{error}");
 }
 
 #[test]
@@ -252,14 +254,17 @@ fn steps_of_each_scale_and_group() {
     let steps = [(0.2, 0.01), (0.05, 0.4)].map(|(space_only, space_time)| PerGroup { space_only, space_time }).to_vec();
     let input = CompressionInput {
         profile: Profile::Paper,
-        planes: Some(plane_coding(&scene.hexplane, model(compact_shape(4, ALL_PARTS), 9), steps.clone())),
+        planes: Some(plane_coding(
+            &scene.feature_planes,
+            model(compact_shape(4, ALL_PARTS), &scene.feature_planes, 9),
+            steps.clone(),
+        )),
         ..input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS))
     };
     let encoded = round_trip(&scene, &input);
-    for (index, plane) in scene.hexplane.planes.iter().enumerate() {
-        let PerGroup { space_only, space_time } = steps[index / 6];
-        let step = if [2, 4, 5].contains(&(index % 6)) { space_time } else { space_only };
-        let error = largest_error(&plane.values, &encoded.decoded.hexplane.planes[index].values);
+    for (index, plane) in scene.feature_planes.planes.iter().enumerate() {
+        let step = steps[plane.scale as usize].of(plane.axes);
+        let error = largest_error(&plane.values, &encoded.decoded.feature_planes.planes[index].values);
         assert!(error <= 0.501 * step && error > 0.4 * step, "plane {index}: {error}");
     }
 }
@@ -292,7 +297,7 @@ fn harmonics_need_no_planes_unless_coupled() {
             &CompressionInput { sh, ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS)) },
         );
         let stream = OpenStream::new(&encoded.bytes).unwrap();
-        assert!(!stream.sh_needs_hexplanes().unwrap());
+        assert!(!stream.sh_needs_feature_planes().unwrap());
         let gaussians = stream.gaussians().unwrap();
         let gaussians = stream.sh(gaussians, &stream.frame().unwrap(), &Default::default()).unwrap();
         assert_eq!(gaussians, encoded.decoded.gaussians);
@@ -306,10 +311,11 @@ fn the_coded_bits_are_those_of_the_distributions() {
     let input = input(&scene, Profile::Paper, compact_shape(16, ALL_PARTS));
     let encoded = round_trip(&scene, &input);
     let planes = input.planes.as_ref().unwrap();
-    let bytes = encode_planes(&scene.hexplane, planes).unwrap();
+    let bytes = encode_planes(&scene.feature_planes, planes).unwrap();
     assert_eq!(bytes.len() as u64, encoded.report.sections[4].3);
-    for (index, plane) in encoded.decoded.hexplane.planes.iter().enumerate() {
-        let Distributions { scales, means } = plane_distributions(&encoded.decoded.hexplane, planes, index).unwrap();
+    for (index, plane) in encoded.decoded.feature_planes.planes.iter().enumerate() {
+        let Distributions { scales, means } =
+            plane_distributions(&encoded.decoded.feature_planes, planes, index).unwrap();
         let center = if [2, 4, 5].contains(&(index % 6)) { 1.0 } else { 0.0 };
         let mut ideal = 0.0;
         for ((&value, &scale), &mean) in plane.values.iter().zip(&scales).zip(&means) {
@@ -362,6 +368,7 @@ fn extreme_weights_do_no_harm() {
 fn contradictions_are_refused() {
     let scene = scene(4, 1, 4, [4, 4, 4, 4], &[1, 2]);
     let good = input(&scene, Profile::Paper, compact_shape(4, ALL_PARTS));
+    let hexplane = &scene.feature_planes;
     let message = |spoil: &dyn Fn(&mut CompressionInput)| {
         let mut input = good.clone();
         spoil(&mut input);
@@ -374,9 +381,9 @@ fn contradictions_are_refused() {
     assert!(planes(&|planes| planes.steps = step(0.0)).contains("step is 0"));
     assert!(planes(&|planes| planes.steps = step(f32::NAN)).contains("step is NaN"));
     assert!(planes(&|planes| planes.steps = step(1e-12)).contains("make the step larger"));
-    assert!(planes(&|planes| planes.latent_symbols[2][0] = i32::MIN).contains("latent of planes[2]"));
-    assert!(planes(&|planes| planes.latent_symbols[2].clear()).contains("latent symbols of planes[2] is 0"));
-    assert!(planes(&|planes| planes.latent_symbols[0].push(0)).contains("latent symbols of planes[0] is 1"));
+    assert!(planes(&|planes| planes.latent_symbols[2][0] = i32::MIN).contains("latent of plane 0.xt"));
+    assert!(planes(&|planes| planes.latent_symbols[2].clear()).contains("latent symbols of plane 0.xt is 0"));
+    assert!(planes(&|planes| planes.latent_symbols[0].push(0)).contains("latent symbols of plane 0.xy is 1"));
     assert!(planes(&|planes| drop(planes.latent_symbols.pop())).contains("one list a plane"));
     assert!(planes(&|planes| drop(planes.model.networks.pop())).contains("network of priors[0] is 4"));
     fn layer(planes: &mut PlaneCoding) -> &mut light4gs_codec::network::Layer {
@@ -402,7 +409,8 @@ fn contradictions_are_refused() {
     assert!(planes(&|planes| drop(planes.model.latent.as_mut().unwrap().tables.pop())).contains("0 tables, 1 medians"));
     assert!(planes(&|planes| planes.model.latent.as_mut().unwrap().medians[0] = f32::NAN).contains("latent is NaN"));
     assert!(
-        planes(&|planes| planes.model = model(compact_shape(8, ALL_PARTS), 1)).contains("channels is 4, expected 8")
+        planes(&|planes| planes.model = model(compact_shape(8, ALL_PARTS), hexplane, 1))
+            .contains("channels is 4, expected 8")
     );
     assert!(message(&|input| input.sh = sh_tables(2)).contains("number of tables is 24, expected 9"));
     assert!(message(&|input| input.sh = sh_networks(ShKind::HexPlaneCoupled, 1, 5)).contains("SpaceFeatures"));
@@ -419,7 +427,7 @@ fn contradictions_are_refused() {
     );
     let odd = common::compression::scene(1, 0, 4, [4, 6, 4, 4], &[1]);
     let error = encode_compressed(&odd, &input(&odd, Profile::Paper, compact_shape(4, ALL_PARTS))).unwrap_err();
-    assert!(matches!(error, CodecError::Invalid { section: "hexplanes", .. }), "{error}");
+    assert!(matches!(error, CodecError::Invalid { section: "feature_planes", .. }), "{error}");
     assert!(error.to_string().contains("a multiple of 4"), "{error}");
 }
 
@@ -441,7 +449,7 @@ prop_compose! {
         let scene = scene(counts.0, counts.1, channels, resolution.map(|r| 4 * r), &multipliers);
         let shape = if reference { reference_shape(channels, parts) } else { compact_shape(channels, parts) };
         let steps = common::compression::step(step);
-        let planes = Some(plane_coding(&scene.hexplane, model(shape, seed), steps));
+        let planes = Some(plane_coding(&scene.feature_planes, model(shape, &scene.feature_planes, seed), steps));
         let features = channels as usize * multipliers.len();
         let sh = match seed % 3 {
             0 => sh_tables(counts.1),

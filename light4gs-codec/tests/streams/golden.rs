@@ -46,7 +46,7 @@ fn every_build_writes_the_same_bytes() {
         let (scene, input) = tiny(profile);
         crc32c::crc32c(&encode_compressed(&scene, &input).unwrap().bytes)
     });
-    assert_eq!(checksums, [0xd0ca_c19e, 0xeeb9_4be1], "{checksums:#x?}");
+    assert_eq!(checksums, [0xdf79_7e8a, 0x3768_1c72], "{checksums:#x?}");
 }
 
 #[test]
@@ -121,6 +121,6 @@ fn the_bytes_lie_where_the_document_says() {
     let layer = scene.motion.network.as_ref().unwrap().network.layers().next().unwrap();
     assert_eq!((f32_at(weights), f32_at(weights + 4 * 9)), (layer.weight[0], layer.bias[0]));
     let planes = starts[4];
-    assert_eq!(&bytes[planes..planes + 9], [1, 2, 1, 1, 3, 2, 1, 2, 0]);
-    assert_eq!(f32_at(planes + 9), scene.hexplane.planes[0].values[0]);
+    assert_eq!(&bytes[planes..planes + 12], [1, 2, 0b11_1111, 2, 1, 1, 3, 0b11_1111, 4, 2, 2, 3]);
+    assert_eq!(f32_at(planes + 12), scene.feature_planes.planes[0].values[0]);
 }

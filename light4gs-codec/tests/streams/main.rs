@@ -12,6 +12,7 @@ mod motion;
 mod network_weights;
 mod operations;
 mod paper_size;
+mod planes;
 mod random_networks;
 mod refusals;
 mod round_trip;

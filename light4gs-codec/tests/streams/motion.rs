@@ -14,8 +14,8 @@ fn scene() -> SceneData {
     let mut scene = SceneData { gaussians: common::gaussians(1, 0), ..sample() };
     scene.gaussians.means = vec![[0.5, 0.0, 0.0]];
     scene.frame = SceneFrameArrays::default();
-    scene.hexplane = hexplane(1, [2, 2, 2, 3], &[1]);
-    for (index, plane) in scene.hexplane.planes.iter_mut().enumerate() {
+    scene.feature_planes = hexplane(1, [2, 2, 2, 3], &[1]);
+    for (index, plane) in scene.feature_planes.planes.iter_mut().enumerate() {
         plane.values.fill(1.0);
         if index == 2 {
             plane.values = vec![0.0, 0.0, 1.0, 1.0, 2.0, 2.0];
@@ -46,7 +46,7 @@ fn features_move_positions() {
 /// A field that this crate has never heard of: circles around a point, without planes, of a kind of its own.
 #[test]
 fn any_network_of_known_sources_moves() {
-    let mut scene = SceneData { hexplane: Default::default(), ..scene() };
+    let mut scene = SceneData { feature_planes: Default::default(), ..scene() };
     scene.gaussians = common::gaussians(20, 0);
     let (mut network, [point, time]) = Network::new([3, 1]);
     let spread = network.layer(time, Layer::linear(vec![1.0, 2.0, 3.0], vec![0.0; 3]));
@@ -91,7 +91,7 @@ fn a_network_that_does_not_fit_is_refused() {
     }
     assert!(message(|scene| drop(network(scene).nodes.pop())).contains("an output is 5, expected less than 5"));
     assert!(message(|scene| network(scene).inputs = vec![2]).contains("inputs of node 0 is 1, expected 2"));
-    assert!(message(|scene| scene.hexplane.channels = 2).contains("planes[0].values"));
+    assert!(message(|scene| scene.feature_planes.channels = 2).contains("values of plane 0.xy"));
     assert!(message(|scene| network(scene).outputs.clear()).contains("number of named outputs is 1, expected 0"));
 }
 

@@ -75,7 +75,8 @@ fn operations_that_do_not_fit_are_refused() {
 
 /// A scene without planes, whose Gaussians fade and turn: everything new in one network.
 fn scene() -> SceneData {
-    let mut scene = SceneData { hexplane: Default::default(), gaussians: common::gaussians(11, 1), ..common::sample() };
+    let mut scene =
+        SceneData { feature_planes: Default::default(), gaussians: common::gaussians(11, 1), ..common::sample() };
     let (mut network, [time, means, quats, logits, dc]) = Network::new([1, 3, 4, 1, 3]);
     // Of the time alone: a turn about z as a quaternion, and a center.
     let turn = network.layer(time, Layer::linear(vec![0.0, 0.0, 0.0, 1.0], vec![1.0, 0.0, 0.0, 0.0]));

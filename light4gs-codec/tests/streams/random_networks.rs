@@ -14,6 +14,7 @@ use light4gs_codec::{
     CodecError, CompressionInput, Condition, ContextModelArrays, LatentArrays, Limits, Network, PlanePrior,
     PlaneSource, Profile, decode, decode_with_limits, encode_compressed, encode_compressed_with_limits, info,
     network::{Layer, LayerKind, Node, Operation, Value},
+    plane_layout::PlaneAxes,
 };
 use proptest::prelude::*;
 
@@ -100,8 +101,7 @@ fn model(graph: Network, sources: Vec<PlaneSource>, random: &mut Random) -> Cont
         latent: Some(latent),
         networks: vec![graph, distribution(random, M, [3, 3])],
         priors,
-        lowest: [0; 6],
-        higher: [0, 1, 1, 1, 1, 1],
+        plane_priors: vec![0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 1],
         ..ContextModelArrays::default()
     }
 }
@@ -114,18 +114,18 @@ proptest! {
         seed in any::<u64>(),
     ) {
         let mut random = Random::new(seed);
-        let sources = vec![PlaneSource::LowerScale, PlaneSource::Latent, PlaneSource::SameScale(0)];
+        let sources = vec![PlaneSource::LowerScale, PlaneSource::Latent, PlaneSource::SameScale(PlaneAxes::Xy)];
         let network = graph(&[M, 1, M], &choices, &mut random);
         let scene = scene(2, 0, M, [4, 8, 4, 4], &[1, 2]);
         let model = model(network, sources, &mut random);
         let others = input(&scene, Profile::Paper, compact_shape(M, ALL_PARTS));
         // Whether there is a latent is said by sources alone, so the coding can be made before the model is checked.
-        let planes = Some(plane_coding(&scene.hexplane, model, step(0.1)));
+        let planes = Some(plane_coding(&scene.feature_planes, model, step(0.1)));
         match encode_compressed(&scene, &CompressionInput { planes, ..others }) {
             Ok(encoded) => {
                 let decoded = decode(&encoded.bytes).unwrap();
                 prop_assert_eq!(&decoded, &encoded.decoded);
-                for (given, decoded) in scene.hexplane.planes.iter().zip(&decoded.hexplane.planes) {
+                for (given, decoded) in scene.feature_planes.planes.iter().zip(&decoded.feature_planes.planes) {
                     let near = given.values.iter().zip(&decoded.values).all(|(a, b)| (a - b).abs() < 0.0501);
                     prop_assert!(near);
                 }
@@ -167,7 +167,7 @@ fn refusal(network: Network, sources: &[PlaneSource]) -> CodecError {
     let scene = scene(0, 0, M, [64, 64, 64, 64], &[1, 2]);
     let model = model(network, sources.to_vec(), &mut random);
     let others = input(&scene, Profile::Paper, compact_shape(M, ALL_PARTS));
-    let planes = Some(plane_coding(&scene.hexplane, model, step(0.1)));
+    let planes = Some(plane_coding(&scene.feature_planes, model, step(0.1)));
     match encode_compressed_with_limits(&scene, &CompressionInput { planes, ..others }, &Limits::default()) {
         Ok(_) => panic!("the network is within the limits"),
         Err(error) => error,

@@ -4,8 +4,11 @@ use crate::common;
 
 use common::sample;
 use light4gs_codec::{
-    CodecError, MotionNetwork, MotionOutput, PerGroup, SceneData, attributes::AttributeSteps, checks, encode,
+    CodecError, MotionNetwork, MotionOutput, PerGroup, SceneData,
+    attributes::AttributeSteps,
+    checks, encode,
     network::Layer,
+    plane_layout::{PlaneAxes, PlaneLayout},
 };
 
 fn network(scene: &mut SceneData) -> &mut MotionNetwork {
@@ -35,8 +38,7 @@ fn arrays_of_other_lengths() {
     assert!(message(|scene| scene.gaussians.log_scales.clear()).contains("length of log_scales is 0"));
     assert!(message(|scene| scene.gaussians.sh_rest.push(0.0)).contains("expected 18"));
     assert!(message(|scene| scene.gaussians.sh_degree = 4).contains("degree is 4, expected 0, 1, 2 or 3"));
-    assert!(message(|scene| drop(scene.hexplane.planes.pop())).contains("length of planes is 11, expected 12"));
-    assert!(message(|scene| scene.hexplane.planes[7].values.push(0.0)).contains("planes[7].values"));
+    assert!(message(|scene| scene.feature_planes.planes[7].values.push(0.0)).contains("values of plane 1.xz"));
     assert!(message(|scene| layer(scene).weight.clear()).contains("length of the network, node 1, weight"));
     assert!(message(|scene| layer(scene).bias.push(0.0)).contains("length of the network, node 1, bias"));
     assert!(message(|scene| scene.motion.tensors[0].values.push(0.0)).contains("length of nodes is 7"));
@@ -44,10 +46,17 @@ fn arrays_of_other_lengths() {
 
 #[test]
 fn shapes_that_contradict_each_other() {
-    assert!(message(|scene| scene.hexplane.resolution[0] = 5).contains("resolution 5 along x times multiplier 1"));
-    assert!(message(|scene| scene.hexplane.resolution[3] = 5).contains("or 5"));
-    assert!(message(|scene| scene.hexplane.multipliers[1] = 0).contains("more than 0"));
-    assert!(message(|scene| scene.hexplane.channels = 0).contains("channels is 0"));
+    assert!(message(|scene| scene.feature_planes.planes[0].width = 3).contains("values of plane 0.xy"));
+    assert!(message(|scene| scene.feature_planes.planes[4].height = 0).contains("height of plane 0.yt is 0"));
+    // A plane twice, one out of order, a scale without planes.
+    let order = "planes stand scale by scale";
+    assert!(message(|scene| scene.feature_planes.planes[1].axes = PlaneAxes::Xy).contains("plane 1 is 0.xy"));
+    assert!(message(|scene| scene.feature_planes.planes.swap(2, 3)).contains(order));
+    assert!(message(|scene| scene.feature_planes.planes[0].scale = 1).contains(order));
+    assert!(message(|scene| scene.feature_planes.planes[11].scale = 2).contains("Features is 2, expected 3"));
+    assert!(message(|scene| scene.feature_planes.planes[11].scale = 3).contains("plane 11 is 3.zt"));
+    assert!(message(|scene| scene.feature_planes.planes[11].scale = u32::MAX).contains(order));
+    assert!(message(|scene| scene.feature_planes.channels = 0).contains("channels is 0"));
     assert!(message(|scene| scene.motion.tensors.push(scene.motion.tensors[0].clone())).contains("each name once"));
     assert!(message(|scene| layer(scene).inputs = 0).contains("node 1, inputs is 0"));
     assert!(message(|scene| layer(scene).inputs = 4).contains("inputs of node 1 is 4, expected 3"));
@@ -57,7 +66,7 @@ fn shapes_that_contradict_each_other() {
     assert!(message(|scene| network(scene).outputs[1] = MotionOutput::Position).contains("Position"));
     assert!(message(|scene| network(scene).sources.truncate(1)).contains("number of sources is 1"));
     assert!(
-        message(|scene| scene.hexplane = common::hexplane(3, [2, 1, 1, 3], &[1, 2]))
+        message(|scene| scene.feature_planes = common::hexplane(3, [2, 1, 1, 3], &[1, 2]))
             .contains("Features is 2, expected 6")
     );
     assert!(message(|scene| scene.meta.bounds.reverse()).contains("bounds"));
@@ -70,7 +79,7 @@ fn numbers_that_are_not_finite() {
         assert!(message(|scene| scene.gaussians.means[1][2] = bad).starts_with("gaussians: value 5 of means is"));
         assert!(message(|scene| scene.gaussians.sh_rest[3] = bad).starts_with("sh: value 3 of sh_rest is"));
         assert!(message(|scene| scene.frame.axes[0][1] = bad).starts_with("scene_frame: value 1 of axes is"));
-        assert!(message(|scene| scene.hexplane.planes[3].values[0] = bad).contains("planes[3].values"));
+        assert!(message(|scene| scene.feature_planes.planes[3].values[0] = bad).contains("values of plane 0.yz"));
         assert!(message(|scene| layer(scene).bias[0] = bad).contains("layers[0].bias"));
         assert!(message(|scene| scene.motion.tensors[0].values[1] = bad).contains("value 1 of nodes"));
         assert!(message(|scene| scene.meta.background[0] = bad).starts_with("meta: value 0 of background is"));
@@ -86,8 +95,8 @@ fn numbers_beyond_the_limits() {
     };
     over(|scene| scene.meta.name = "n".repeat(70_000));
     over(|scene| scene.meta.extra = (0..20).map(|i| (i.to_string(), "v".repeat(65_000))).collect());
-    over(|scene| scene.hexplane.channels = u32::MAX);
-    over(|scene| scene.hexplane.resolution[2] = u32::MAX);
+    over(|scene| scene.feature_planes.channels = u32::MAX);
+    over(|scene| scene.feature_planes.planes[2].height = u32::MAX);
     over(|scene| scene.motion.tensors[0].shape = vec![u32::MAX; 5]);
     over(|scene| layer(scene).outputs = u32::MAX);
 }
@@ -95,13 +104,16 @@ fn numbers_beyond_the_limits() {
 /// What a configuration may ask before anything is trained; the encoder asks the same.
 #[test]
 fn what_is_refused_before_training() {
-    let hexplane = |multipliers: &[u32]| checks::hexplane(32, [64, 64, 64, 24], multipliers);
+    let planes = |channels: u32, resolution: [usize; 4], multipliers: &[usize]| {
+        checks::feature_planes(channels, &PlaneLayout::multiscale(&PlaneAxes::ALL, resolution, multipliers))
+    };
+    let hexplane = |multipliers: &[usize]| planes(32, [64, 64, 64, 24], multipliers);
     assert!(hexplane(&[1, 2, 4]).is_ok());
     assert!(hexplane(&[1; 16]).is_ok());
     assert!(hexplane(&[1; 17]).unwrap_err().to_string().contains("number of scales is 17, at most 16"));
-    assert!(hexplane(&[1, 2000]).unwrap_err().to_string().contains("width is 128000, at most 65536"));
-    assert!(checks::hexplane(5000, [64; 4], &[1]).unwrap_err().to_string().contains("channels is 5000"));
-    assert!(checks::hexplane(8, [64, 64, 63, 24], &[1]).unwrap_err().to_string().contains("63 along z"));
+    assert!(hexplane(&[1, 2000]).unwrap_err().to_string().contains("of plane 1.xy is 128000, at most 65536"));
+    assert!(planes(5000, [64; 4], &[1]).unwrap_err().to_string().contains("channels is 5000"));
+    assert!(planes(8, [64, 64, 63, 24], &[1]).unwrap_err().to_string().contains("63 along z"));
 
     for step in [1e-45, 0.0, -0.1, 0.99e-5, 2e30, f32::NAN, f32::INFINITY] {
         assert!(checks::plane_step(step).is_err(), "{step}");

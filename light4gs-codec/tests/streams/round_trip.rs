@@ -3,7 +3,7 @@
 use crate::common;
 
 use common::{gaussians, hexplane, motion, sample};
-use light4gs_codec::{CoordinateMapping, MotionArrays, SceneData, SceneMeta, decode, encode, info};
+use light4gs_codec::{CoordinateMapping, MotionArrays, Plane, SceneData, SceneMeta, decode, encode, info};
 use proptest::{collection::btree_map, prelude::*};
 
 #[test]
@@ -26,8 +26,8 @@ fn the_sign_of_zero_and_the_smallest_numbers_survive() {
 #[test]
 fn time_may_be_multiplied() {
     let mut scene = sample();
-    let multiplied = hexplane(1, [4, 2, 2, 6], &[1]);
-    scene.hexplane.planes.splice(6.., multiplied.planes);
+    let multiplied = hexplane(1, [4, 2, 2, 6], &[1]).planes.into_iter().map(|plane| Plane { scale: 1, ..plane });
+    scene.feature_planes.planes.splice(6.., multiplied);
     assert_eq!(decode(&encode(&scene).unwrap()).unwrap(), scene);
 }
 
@@ -39,14 +39,14 @@ fn info_tells_what_is_inside() {
     assert_eq!(info.meta, scene.meta);
     assert_eq!((info.version, info.flags, info.bytes), (1, 0, bytes.len() as u64));
     assert_eq!((info.gaussian_count, info.sh_degree), (2, 1));
-    assert_eq!((info.hexplane_channels, info.hexplane_resolution), (1, [2, 1, 1, 3]));
-    assert_eq!((info.hexplane_multipliers, info.plane_count), (vec![1, 2], 12));
+    assert_eq!((info.plane_channels, &info.planes), (1, &scene.feature_planes.layout().unwrap()));
+    assert_eq!((info.planes.len(), info.planes.planes()[11].name()), (12, "1.zt".to_owned()));
     let network = info.motion.network.unwrap();
     assert!(network.network.has_structure_of(&scene.motion.network.unwrap().network));
     assert_eq!((&info.motion.kind[..], &info.motion.tensors[0].shape[..]), ("test-field", &[2, 3][..]));
     assert_eq!(info.profile, None);
     let names: Vec<_> = info.sections.iter().map(|section| section.name).collect();
-    assert_eq!(names, ["gaussians", "sh", "scene_frame", "motion", "hexplanes"]);
+    assert_eq!(names, ["gaussians", "sh", "scene_frame", "motion", "feature_planes"]);
     assert!(info.sections.iter().all(|section| section.encoding.name() == "float32"));
     let kinds: Vec<_> = info.sections.iter().map(|section| section.kind.name()).collect();
     assert_eq!(kinds, ["explicit", "explicit", "principal axes", "description", "explicit"]);
@@ -96,13 +96,13 @@ prop_compose! {
             meta,
             gaussians: gaussians(count, sh_degree),
             frame: sample().frame,
-            hexplane: hexplane(channels, resolution, &multipliers),
+            feature_planes: hexplane(channels, resolution, &multipliers),
             motion: if moves && features > 0 { motion(features) } else { MotionArrays::default() },
         };
         // Any finite bit pattern may stand anywhere.
         let mut random = values.iter().cycle();
         let arrays = [scene.gaussians.means.as_flattened_mut(), scene.gaussians.sh_rest.as_mut_slice()];
-        let planes = scene.hexplane.planes.iter_mut().map(|plane| plane.values.as_mut_slice());
+        let planes = scene.feature_planes.planes.iter_mut().map(|plane| plane.values.as_mut_slice());
         let network = scene.motion.network.iter_mut().flat_map(|motion| motion.network.layers_mut());
         let weights = network.map(|layer| layer.weight.as_mut_slice());
         for array in arrays.into_iter().chain(planes).chain(weights) {
@@ -120,7 +120,7 @@ proptest! {
         prop_assert_eq!(&decoded, &scene);
         // The same bits, not only equal numbers: the bytes are the same.
         prop_assert_eq!(encode(&decoded).unwrap(), bytes.clone());
-        prop_assert_eq!(info(&bytes).unwrap().plane_count, scene.hexplane.planes.len());
+        prop_assert_eq!(info(&bytes).unwrap().planes, scene.feature_planes.layout().unwrap());
     }
 
     #[test]

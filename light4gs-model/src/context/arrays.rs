@@ -1,6 +1,6 @@
 //! The context model and the quantization steps as the codec's plain arrays.
 
-use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
+use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 use light4gs_codec::{CodecError, Condition, ContextModelArrays, FrequencyTable, LatentArrays, PerGroup, PlanePrior};
 
 use super::ContextModel;
@@ -8,13 +8,21 @@ use super::prior::{DescribedCondition, DescribedPrior, Passes, PriorPart};
 use crate::entropy::quantization_steps::PlaneSteps;
 
 impl PlaneSteps {
-    /// A pair of steps for each scale, or one for all where they are the same.
-    pub fn to_groups(&self) -> Vec<PerGroup> {
+    /// A pair of steps for each scale of a layout, or one for all where they are the same. The planes without time have one
+    /// step in a scale, and those with time; where a scale has only one of the two, that step stands for both.
+    pub fn to_groups(&self, layout: &PlaneLayout) -> Vec<PerGroup> {
         let steps = self.values();
-        let mut groups: Vec<PerGroup> = steps
-            .chunks_exact(PLANES_PER_SCALE)
-            .map(|scale| PerGroup { space_only: scale[SPACE_ONLY_PLANES[0]], space_time: scale[SPACE_TIME_PLANES[0]] })
-            .collect();
+        let pair = |scale: usize| {
+            let of = |space_time: bool| {
+                let mut planes = layout.scale(scale);
+                planes
+                    .find(|plane| layout.planes()[*plane].axes.is_space_time() == space_time)
+                    .map(|plane| steps[plane])
+            };
+            let any = steps[layout.scale(scale).start];
+            PerGroup { space_only: of(false).unwrap_or(any), space_time: of(true).unwrap_or(any) }
+        };
+        let mut groups: Vec<PerGroup> = (0..layout.scales()).map(pair).collect();
         if groups.iter().all(|group| *group == groups[0]) {
             groups.truncate(1);
         }
@@ -23,23 +31,29 @@ impl PlaneSteps {
 }
 
 impl ContextModel {
-    /// What a decoder needs of a composition of parts. Call [`Self::update_quantiles`] first: the hyperprior's tables go
+    /// What a decoder needs of a composition of parts, for planes of a layout. Call [`Self::update_quantiles`] first: the hyperprior's tables go
     /// as far as its quantiles.
     ///
     /// # Errors
     /// A density that gives no frequency table; the message names what is wrong with it.
-    pub fn to_arrays_with(&self, parts: &[Box<dyn PriorPart + '_>]) -> Result<ContextModelArrays, CodecError> {
+    pub fn to_arrays_with(
+        &self,
+        parts: &[Box<dyn PriorPart + '_>],
+        layout: &PlaneLayout,
+    ) -> Result<ContextModelArrays, CodecError> {
         let mut arrays = ContextModelArrays {
             channels: self.entropy_parameters.channels() as u32,
             centers: PerGroup {
-                space_only: self.center_of(SPACE_ONLY_PLANES[0]) as f32,
-                space_time: self.center_of(SPACE_TIME_PLANES[0]) as f32,
+                space_only: self.center_of(PlaneAxes::Xy) as f32,
+                space_time: self.center_of(PlaneAxes::Xt) as f32,
             },
             ..ContextModelArrays::default()
         };
-        let described =
-            |plane: usize| parts.iter().find_map(|part| part.describe(plane)).unwrap_or_else(DescribedPrior::constant);
-        for plane in 0..2 * PLANES_PER_SCALE {
+        let described = |plane: usize| {
+            let mut described = parts.iter().filter_map(|part| part.describe(layout, plane));
+            described.next().unwrap_or_else(DescribedPrior::constant)
+        };
+        for plane in 0..layout.len() {
             let DescribedPrior { parameters, mut context, passes } = described(plane);
             if let (Some(checkerboard), Passes::AnchorsFirst) = (&self.checkerboard, passes) {
                 context = Some(checkerboard.describe());
@@ -50,8 +64,7 @@ impl ContextModel {
             });
             let distribution = place(&mut arrays.networks, self.entropy_parameters.network());
             let prior = place(&mut arrays.priors, PlanePrior { conditions: conditions.to_vec(), distribution });
-            let priors = if plane < PLANES_PER_SCALE { &mut arrays.lowest } else { &mut arrays.higher };
-            priors[plane % PLANES_PER_SCALE] = prior;
+            arrays.plane_priors.push(prior);
         }
         if let Some(hyperprior) = &self.hyperprior {
             let bottleneck = &hyperprior.bottleneck;

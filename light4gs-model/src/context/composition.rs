@@ -2,6 +2,7 @@
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::Tensor;
+use light4gs_codec::plane_layout::PlaneLayout;
 use light4gs_codec::{CodecError, ContextModelArrays};
 
 use super::ContextModel;
@@ -10,6 +11,7 @@ use super::rate::{PlaneRate, QuantizedPlane};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::gaussian_conditional::NormalParameters;
 use crate::entropy::quantization_steps::PlaneSteps;
+use crate::planes::PlaneTensors;
 
 /// An entropy model of feature planes as a composition of parts (paper III-C).
 ///
@@ -28,13 +30,19 @@ pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
 
     /// Bits of the selected planes. The values are taken as they are: noisy in training, quantized in an evaluation.
     /// Differentiable in planes, steps and weights.
-    fn rate(&self, planes: &[Tensor<3>], steps: &PlaneSteps, selection: &[usize], latent: Latent) -> Vec<PlaneRate> {
+    fn rate(&self, planes: &PlaneTensors, steps: &PlaneSteps, selection: &[usize], latent: Latent) -> Vec<PlaneRate> {
         let (planes, parts) = (self.base().centered(planes, steps), self.parts());
         selection.iter().map(|plane| self.base().rate_with(&parts, &planes, *plane, latent)).collect()
     }
 
     /// `[H, W]` for each selected plane: the bits of its values, summed over channels.
-    fn bit_map(&self, planes: &[Tensor<3>], steps: &PlaneSteps, selection: &[usize], latent: Latent) -> Vec<Tensor<2>> {
+    fn bit_map(
+        &self,
+        planes: &PlaneTensors,
+        steps: &PlaneSteps,
+        selection: &[usize],
+        latent: Latent,
+    ) -> Vec<Tensor<2>> {
         let (planes, parts) = (self.base().centered(planes, steps), self.parts());
         selection.iter().map(|plane| self.base().bit_map_with(&parts, &planes, *plane, latent)).collect()
     }
@@ -42,7 +50,7 @@ pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
     /// Means and scales of the selected planes' values, in units of their steps, relative to the center.
     fn plane_parameters(
         &self,
-        planes: &[Tensor<3>],
+        planes: &PlaneTensors,
         steps: &PlaneSteps,
         selection: &[usize],
         latent: Latent,
@@ -53,22 +61,22 @@ pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
 
     /// Quantizes all planes in coding order, each with the parameters that the decoder will have: what the codec does,
     /// with a back end's floats in place of its exact executor. Without gradients.
-    fn quantize(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<QuantizedPlane> {
+    fn quantize(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> Vec<QuantizedPlane> {
         self.base().quantize_with(&self.parts(), planes, steps)
     }
 
     /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one. Call
     /// [`update_quantiles`](ContextModel::update_quantiles) first, since they count from the medians.
-    fn latent_symbols(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
+    fn latent_symbols(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
         self.base().latent_symbols_with(&self.parts(), planes, steps)
     }
 
-    /// What a decoder needs of the model. Call [`update_quantiles`](ContextModel::update_quantiles) first: the hyperprior's
+    /// What a decoder needs of the model for planes of a layout. Call [`update_quantiles`](ContextModel::update_quantiles) first: the hyperprior's
     /// tables go as far as its quantiles.
     ///
     /// # Errors
     /// A density that gives no frequency table; the message names what is wrong with it.
-    fn to_arrays(&self) -> Result<ContextModelArrays, CodecError> {
-        self.base().to_arrays_with(&self.parts())
+    fn to_arrays(&self, layout: &PlaneLayout) -> Result<ContextModelArrays, CodecError> {
+        self.base().to_arrays_with(&self.parts(), layout)
     }
 }

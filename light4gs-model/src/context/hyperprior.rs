@@ -4,6 +4,7 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
+use light4gs_codec::plane_layout::PlaneLayout;
 use light4gs_codec::{Network, PlaneSource};
 
 use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
@@ -100,7 +101,7 @@ impl PriorPart for Hyperprior {
         })
     }
 
-    fn describe(&self, _: usize) -> Option<DescribedPrior> {
+    fn describe(&self, _: &PlaneLayout, _: usize) -> Option<DescribedPrior> {
         let parameters = DescribedCondition { network: self.synthesis_network(), sources: vec![PlaneSource::Latent] };
         Some(DescribedPrior { parameters: Some(parameters), context: None, passes: Passes::AnchorsFirst })
     }

@@ -4,7 +4,7 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network::Operation;
-use light4gs_codec::plane_layout::position_of;
+use light4gs_codec::plane_layout::PlaneLayout;
 use light4gs_codec::{Network, PlaneSource};
 
 use super::prior::{CenteredPlanes, DescribedCondition, DescribedPrior, Passes, Prior, PriorPart};
@@ -43,19 +43,6 @@ pub struct InterPlane {
 }
 
 impl InterPlane {
-    /// Positions of the space-time planes over the two axes of the plane at `position`; none if that holds time itself.
-    pub fn sources(position: usize) -> Option<[usize; 2]> {
-        const XT: usize = 2;
-        const YT: usize = 4;
-        const ZT: usize = 5;
-        match position {
-            0 => Some([XT, YT]),
-            1 => Some([XT, ZT]),
-            3 => Some([YT, ZT]),
-            _ => None,
-        }
-    }
-
     /// The context `[2 M, B, A]` of the plane over (a, b) from `over_a [M, T, A]` and `over_b [M, T, B]`.
     ///
     /// ```
@@ -96,16 +83,17 @@ impl InterPlane {
 }
 
 impl PriorPart for InterPlane {
-    /// Applies to space-only planes.
+    /// Applies to planes without time, where the planes over their axes and time are there
+    /// ([`PlaneLayout::over_time`]).
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
-        let [over_a, over_b] = Self::sources(position_of(plane))?.map(|position| planes.in_same_scale(plane, position));
+        let [over_a, over_b] = planes.layout().over_time(plane)?.map(|source| planes.planes[source].clone());
         let parameters = Some(self.forward(over_a, over_b));
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
     }
 
-    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
         let sources =
-            Self::sources(position_of(plane))?.map(|position| PlaneSource::SameScale(position as u8)).to_vec();
+            layout.over_time(plane)?.map(|source| PlaneSource::SameScale(layout.planes()[source].axes)).to_vec();
         let parameters = Some(DescribedCondition { network: self.network(), sources });
         Some(DescribedPrior { parameters, context: None, passes: Passes::AnchorsFirst })
     }

@@ -4,7 +4,7 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network::Operation;
-use light4gs_codec::plane_layout::scale_of;
+use light4gs_codec::plane_layout::PlaneLayout;
 use light4gs_codec::{Network, PlaneSource};
 
 use super::hyperprior::Hyperprior;
@@ -56,9 +56,9 @@ impl InterScale {
         network
     }
 
-    fn described_contribution(&self, plane: usize) -> Option<DescribedCondition> {
-        let network = self.network();
-        (scale_of(plane) > 0).then(|| DescribedCondition { network, sources: vec![PlaneSource::LowerScale] })
+    fn described_contribution(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedCondition> {
+        layout.one_scale_below(plane)?;
+        Some(DescribedCondition { network: self.network(), sources: vec![PlaneSource::LowerScale] })
     }
 
     fn contribution(&self, planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
@@ -69,14 +69,14 @@ impl InterScale {
 }
 
 impl PriorPart for InterScale {
-    /// Applies above the lowest scale: no latent, one pass.
+    /// Applies where there is a plane below: no latent, one pass.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let parameters = Some(self.contribution(planes, plane)?);
         Some(Prior { parameters, context: None, passes: Passes::One, hyper_bits: None })
     }
 
-    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
-        let parameters = Some(self.described_contribution(plane)?);
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
+        let parameters = Some(self.described_contribution(layout, plane)?);
         Some(DescribedPrior { parameters, context: None, passes: Passes::One })
     }
 }
@@ -97,9 +97,9 @@ impl PriorPart for HighScaleHyperprior<'_> {
         Some(Prior { context: Some(context), passes: Passes::One, ..hyperprior })
     }
 
-    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
-        let context = self.inter_scale.described_contribution(plane)?;
-        let hyperprior = self.hyperprior.describe(plane)?;
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
+        let context = self.inter_scale.described_contribution(layout, plane)?;
+        let hyperprior = self.hyperprior.describe(layout, plane)?;
         Some(DescribedPrior { context: Some(context), passes: Passes::One, ..hyperprior })
     }
 }

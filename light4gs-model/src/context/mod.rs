@@ -9,8 +9,8 @@
 //! | lowest scale, space-only | [`InterPlane`], from the decoded space-time planes | [`Checkerboard`] |
 //! | higher scales | [`InterScale`], from the decoded plane one scale below | all at once |
 //!
-//! Where a part is switched off, the next one that applies takes its place: inter-scale, inter-plane, hyperprior,
-//! then a constant. [`EntropyParameters`] turns what the parts know into the distribution.
+//! Where a part is switched off, or the planes that it reads are not there, the next one that applies takes its place:
+//! inter-scale, inter-plane, hyperprior, then a constant. [`EntropyParameters`] turns what the parts know into the distribution.
 //!
 //! Which parts the paper's model has is said in this file and nowhere else. A new one is a file of its own with a
 //! [`PriorPart`], which computes its prior with Burn and describes the same network for the codec, and an entry in
@@ -156,8 +156,8 @@ impl ContextModelConfig {
 
 /// The context model. See the [module's documentation](self) for what it consists of.
 ///
-/// Planes are `[M, H, W]`, scale-major, six a scale in the order of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES), H and W multiples
-/// of 4, in original units. For training they carry uniform noise of their steps' width
+/// Planes are `[M, H, W]`, H and W multiples of 4, in original units; which there are says their
+/// [`PlaneLayout`](light4gs_codec::plane_layout::PlaneLayout). For training they carry uniform noise of their steps' width
 /// ([`PlaneSteps::add_noise`](crate::PlaneSteps::add_noise)), and the parameters of a plane depend only on the noisy values of others, so a random
 /// subset of planes gives an unbiased estimate of the rate.
 ///
@@ -169,8 +169,7 @@ impl ContextModelConfig {
 /// let hexplane = HexPlaneConfig::new().with_channels(8).with_resolution([8, 8, 8, 4]).init(&device);
 /// let model = ContextModelConfig::compact(8).init(&device);
 /// let steps = PlaneSteps::fixed(&[0.1; 12], &device);
-/// let planes: Vec<_> = hexplane.planes.iter().map(|plane| plane.val()).collect();
-/// let rates = model.rate(&steps.add_noise(&planes), &steps, &[2, 6], Latent::Noise);
+/// let rates = model.rate(&steps.add_noise(&hexplane.tensors()), &steps, &[2, 6], Latent::Noise);
 /// // A space-time plane of the lowest scale has a hyperprior, a plane above has none.
 /// assert!(rates[0].hyper_bits.is_some() && rates[1].hyper_bits.is_none());
 /// ```

@@ -1,20 +1,21 @@
 //! What a part of the context model contributes to a plane, and what it may look at.
 
 use burn::tensor::Tensor;
-use light4gs_codec::plane_layout::{PLANES_PER_SCALE, scale_of};
+use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 use light4gs_codec::{Network, PlaneSource};
 
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::quantization_steps::PlaneSteps;
+use crate::planes::PlaneTensors;
 
-/// All planes `[M, H, W]` of a hexplane, scale-major, minus their groups' centers, with their steps.
+/// All planes `[M, H, W]` of a field minus their groups' centers, with their steps.
 ///
 /// For the planes that are coded before, these are the decoded ones, or the noisy ones that stand for them in training. Only a
 /// hyperprior looks at the plane that is being coded: it is transmitted.
 #[derive(Clone, Debug)]
 pub struct CenteredPlanes {
     /// `[M, H, W]`, original units minus the center.
-    pub planes: Vec<Tensor<3>>,
+    pub planes: PlaneTensors,
     /// One for each plane.
     pub steps: PlaneSteps,
 }
@@ -25,14 +26,19 @@ impl CenteredPlanes {
         self.planes[plane].clone() / self.steps.broadcast(plane)
     }
 
-    /// The plane over the same axes one scale below; none for the lowest scale.
-    pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
-        Some(self.planes[plane.checked_sub(PLANES_PER_SCALE)?].clone())
+    /// Which planes there are.
+    pub fn layout(&self) -> &PlaneLayout {
+        self.planes.layout()
     }
 
-    /// The plane at a position of [`PLANE_NAMES`](light4gs_codec::plane_layout::PLANE_NAMES) in the same scale as `plane`.
-    pub fn in_same_scale(&self, plane: usize, position: usize) -> Tensor<3> {
-        self.planes[scale_of(plane) * PLANES_PER_SCALE + position].clone()
+    /// The plane over the same axes one scale below; none where there is none.
+    pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
+        Some(self.planes[self.layout().one_scale_below(plane)?].clone())
+    }
+
+    /// The plane over other axes in the same scale as `plane`; none where there is none.
+    pub fn in_same_scale(&self, plane: usize, axes: PlaneAxes) -> Option<Tensor<3>> {
+        Some(self.planes[self.layout().in_same_scale(plane, axes)?].clone())
     }
 }
 
@@ -73,9 +79,9 @@ pub trait PriorPart {
     /// The prior of a plane, or nothing where this part does not apply.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior>;
 
-    /// The same for the codec's exact executor, with the same weights: what [`PriorPart::prior`] computes, in the same
-    /// order. `plane` is one of two scales, which stand for the lowest and all higher ones.
-    fn describe(&self, plane: usize) -> Option<DescribedPrior>;
+    /// The same for the codec's exact executor, with the same weights: what [`PriorPart::prior`] computes for a plane of such
+    /// a layout, in the same order. Both apply to the same planes.
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior>;
 }
 
 /// A [`Prior`] as networks. Absent ones count as zeros.
@@ -110,7 +116,7 @@ impl<P: PriorPart> PriorPart for &P {
         (**self).prior(planes, plane, latent)
     }
 
-    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
-        (**self).describe(plane)
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
+        (**self).describe(layout, plane)
     }
 }

@@ -1,7 +1,7 @@
 //! What planes cost under a context model, and planes as the codec leaves them.
 
 use burn::tensor::Tensor;
-use light4gs_codec::plane_layout::{coding_order, is_space_time};
+use light4gs_codec::plane_layout::PlaneAxes;
 
 use super::ContextModel;
 use super::checkerboard::anchor_mask;
@@ -9,11 +9,12 @@ use super::prior::{CenteredPlanes, Passes, Prior, PriorPart};
 use crate::entropy::bottleneck::Latent;
 use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
 use crate::entropy::quantization_steps::PlaneSteps;
+use crate::planes::PlaneTensors;
 
 /// Bits of a plane.
 #[derive(Clone, Debug)]
 pub struct PlaneRate {
-    /// Its place among all planes, scale-major.
+    /// Its place among all planes.
     pub plane: usize,
     /// `[1]`: of its values.
     pub values_bits: Tensor<1>,
@@ -43,14 +44,14 @@ pub struct QuantizedPlane {
 }
 
 impl ContextModel {
-    /// What is subtracted from a plane before anything else.
-    pub fn center_of(&self, plane: usize) -> f64 {
-        if is_space_time(plane) { self.space_time_center } else { self.space_only_center }
+    /// What is subtracted from planes over these axes before anything else.
+    pub fn center_of(&self, axes: PlaneAxes) -> f64 {
+        if axes.is_space_time() { self.space_time_center } else { self.space_only_center }
     }
 
     /// Planes in original units as the parts see them.
-    pub fn centered(&self, planes: &[Tensor<3>], steps: &PlaneSteps) -> CenteredPlanes {
-        let planes = planes.iter().enumerate().map(|(i, plane)| plane.clone() - self.center_of(i)).collect();
+    pub fn centered(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> CenteredPlanes {
+        let planes = planes.map(|place, plane| plane - self.center_of(planes.layout().planes()[place].axes));
         CenteredPlanes { planes, steps: steps.clone() }
     }
 
@@ -96,7 +97,7 @@ impl ContextModel {
     pub fn latent_symbols_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
-        planes: &[Tensor<3>],
+        planes: &PlaneTensors,
         steps: &PlaneSteps,
     ) -> Vec<Option<Tensor<3>>> {
         let planes = self.centered(planes, steps);
@@ -113,15 +114,13 @@ impl ContextModel {
     pub fn quantize_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
-        planes: &[Tensor<3>],
+        planes: &PlaneTensors,
         steps: &PlaneSteps,
     ) -> Vec<QuantizedPlane> {
         let mut known = self.centered(planes, steps);
-        for plane in &mut known.planes {
-            *plane = plane.clone().detach();
-        }
+        known.planes = known.planes.map(|_, plane| plane.detach());
         let mut quantized: Vec<Option<QuantizedPlane>> = vec![None; planes.len()];
-        for plane in coding_order(planes.len()) {
+        for plane in planes.layout().coding_order() {
             let step = steps.broadcast(plane).detach();
             let prior = prior_of(parts, &known, plane, Latent::Rounded);
             let hyper_bits = prior.hyper_bits.clone();
@@ -133,15 +132,15 @@ impl ContextModel {
                 let anchors = Prior { passes: Passes::One, ..prior.clone() };
                 let anchors = round(self.gaussians(anchors, &values).means);
                 let mask = anchor_mask([height, width], &values.device());
-                known.planes[plane] = anchors * mask;
+                known.planes.set(plane, anchors * mask);
             }
             let gaussians = self.gaussians(prior, &known.planes[plane]);
             let symbols = (values - gaussians.means.clone()).round();
             let received = symbols.clone() + gaussians.means.clone();
             let decoded = received.clone() * step;
             let rate = PlaneRate { plane, values_bits: value_bits(received, gaussians).sum(), hyper_bits };
-            known.planes[plane] = decoded.clone();
-            let decoded = decoded + self.center_of(plane);
+            known.planes.set(plane, decoded.clone());
+            let decoded = decoded + self.center_of(planes.layout().planes()[plane].axes);
             quantized[plane] = Some(QuantizedPlane { decoded, symbols, rate });
         }
         quantized.into_iter().map(|plane| plane.expect("the coding order visits every plane")).collect()
@@ -150,7 +149,7 @@ impl ContextModel {
     /// Starts the network at the statistics of these planes: each channel's mean and standard deviation over all
     /// planes, in steps, as the biases of the last layer. To be called when the rate enters a training that has begun
     /// without it; otherwise the values may lie so far in the Gaussians' tails that no gradient comes back.
-    pub fn start_from(&mut self, planes: &[Tensor<3>], steps: &PlaneSteps) {
+    pub fn start_from(&mut self, planes: &PlaneTensors, steps: &PlaneSteps) {
         let centered = self.centered(planes, steps);
         let channels = planes[0].dims()[0];
         let (mut sums, mut squares, mut count) = (vec![0.0f64; channels], vec![0.0f64; channels], 0usize);

@@ -2,8 +2,8 @@
 
 pub(crate) mod adam;
 pub(crate) mod blend;
-pub(crate) mod hexplane;
 pub(crate) mod lanes;
+pub(crate) mod planes;
 pub(crate) mod project;
 pub(crate) mod rasterize;
 pub(crate) mod rasterize_backward;

@@ -3,15 +3,13 @@
 use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::plane_layout::{PLANES_PER_SCALE, is_space_time, scale_of};
+use light4gs_codec::plane_layout::{PlaneLayout, PlaneShape};
 
 use super::quantization_steps::PlaneSteps;
 
 /// Configuration of an [`AdaptiveQuantization`].
 #[derive(Config, Debug)]
 pub struct AdaptiveQuantizationConfig {
-    /// Scales of the hexplane.
-    pub scales: usize,
     /// Initial step of the space-only planes.
     #[config(default = 0.05)]
     pub space_only: f64,
@@ -24,19 +22,20 @@ pub struct AdaptiveQuantizationConfig {
 }
 
 impl AdaptiveQuantizationConfig {
-    /// Steps at their initial values.
+    /// Steps of some planes at their initial values.
     ///
     /// # Panics
     /// If a step is not positive and finite.
-    pub fn init(&self, device: &Device) -> AdaptiveQuantization {
-        AdaptiveQuantization { log_steps: Param::from_tensor(self.log_steps(device)), scales: self.scales }
+    pub fn init(&self, layout: &PlaneLayout, device: &Device) -> AdaptiveQuantization {
+        let log_steps = Param::from_tensor(self.log_steps(layout.scales(), device));
+        AdaptiveQuantization { log_steps, layout: layout.clone() }
     }
 
     /// Logarithms of the initial steps, in the order of [`AdaptiveQuantization::log_steps`].
-    fn log_steps(&self, device: &Device) -> Tensor<1> {
+    fn log_steps(&self, scales: usize, device: &Device) -> Tensor<1> {
         let pair = [self.space_only, self.space_time];
         assert!(pair.iter().all(|step| *step > 0.0 && step.is_finite()), "steps must be positive, not {pair:?}");
-        let groups = if self.per_scale { self.scales } else { 1 };
+        let groups = if self.per_scale { scales } else { 1 };
         Tensor::<1>::from_floats(pair.map(|step| step.ln() as f32), device).repeat_dim(0, groups)
     }
 }
@@ -48,9 +47,11 @@ impl AdaptiveQuantizationConfig {
 ///
 /// ```
 /// use burn::tensor::Device;
+/// use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 /// use light4gs_model::AdaptiveQuantizationConfig;
 ///
-/// let quantization = AdaptiveQuantizationConfig::new(2).with_space_time(0.1).init(&Device::flex());
+/// let planes = PlaneLayout::multiscale(&PlaneAxes::ALL, [8, 8, 8, 4], &[1, 2]);
+/// let quantization = AdaptiveQuantizationConfig::new().with_space_time(0.1).init(&planes, &Device::flex());
 /// let steps = quantization.steps().values();
 /// assert_eq!(steps.len(), 12);
 /// assert!((steps[0] - 0.05).abs() < 1e-6 && (steps[2] - 0.1).abs() < 1e-6);
@@ -59,7 +60,8 @@ impl AdaptiveQuantizationConfig {
 pub struct AdaptiveQuantization {
     /// `[2]` or `[2 · scales]`: space-only, space-time.
     pub log_steps: Param<Tensor<1>>,
-    scales: usize,
+    #[module(skip)]
+    layout: PlaneLayout,
 }
 
 impl AdaptiveQuantization {
@@ -80,7 +82,7 @@ impl AdaptiveQuantization {
     /// If `config` is not the one that this was made with.
     pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
         let log_steps = self.log_steps.val().inner();
-        let initial = config.log_steps(&log_steps.device());
+        let initial = config.log_steps(self.layout.scales(), &log_steps.device());
         let value = Tensor::from_inner(log_steps.max_pair(initial));
         let learns = self.log_steps.is_require_grad();
         self.log_steps = Param::initialized(self.log_steps.id, value.set_require_grad(learns));
@@ -89,10 +91,10 @@ impl AdaptiveQuantization {
     fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {
         let steps = log_steps.exp();
         let groups = steps.dims()[0] / 2;
-        let of_plane = |plane: usize| {
-            let group = 2 * (scale_of(plane) % groups) + usize::from(is_space_time(plane));
+        let of_plane = |plane: &PlaneShape| {
+            let group = 2 * (plane.scale % groups) + usize::from(plane.axes.is_space_time());
             steps.clone().narrow(0, group, 1)
         };
-        PlaneSteps::new((0..self.scales * PLANES_PER_SCALE).map(of_plane).collect())
+        PlaneSteps::new(self.layout.planes().iter().map(of_plane).collect())
     }
 }

@@ -2,7 +2,9 @@
 
 use burn::tensor::{Device, Distribution, Tensor};
 
-/// A step for each plane, scale-major; they carry a gradient where they are learned.
+use crate::planes::PlaneTensors;
+
+/// A step for each plane, in the order of the planes; they carry a gradient where they are learned.
 #[derive(Clone, Debug)]
 pub struct PlaneSteps(Vec<Tensor<1>>);
 
@@ -39,11 +41,10 @@ impl PlaneSteps {
 
     /// Planes with uniform noise as wide as their steps, which stands in for rounding during training. The steps'
     /// gradient passes through the noise.
-    pub fn add_noise(&self, planes: &[Tensor<3>]) -> Vec<Tensor<3>> {
-        let noisy = planes.iter().enumerate().map(|(i, plane)| {
+    pub fn add_noise(&self, planes: &PlaneTensors) -> PlaneTensors {
+        planes.map(|place, plane| {
             let noise = Tensor::random(plane.dims(), Distribution::Uniform(-0.5, 0.5), &plane.device());
-            plane.clone() + noise * self.broadcast(i)
-        });
-        noisy.collect()
+            plane + noise * self.broadcast(place)
+        })
     }
 }

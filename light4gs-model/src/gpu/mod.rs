@@ -3,8 +3,8 @@
 mod adam;
 mod context;
 mod elementwise;
-mod hexplane;
 mod kernel;
+mod planes;
 mod significance;
 mod sort;
 mod splat;

@@ -1,5 +1,5 @@
 //! What the kernels of every back end take and give: the seam between the operations of [`ops`](crate::ops) and `cpu/`, `gpu/`.
 
 pub(crate) mod adam;
-pub(crate) mod hexplane_query;
+pub(crate) mod plane_query;
 pub(crate) mod splat;

@@ -11,10 +11,10 @@
 pub mod adam;
 #[cfg(feature = "wgpu")]
 mod fusion;
-pub mod hexplane_query;
 mod host;
 pub mod lower_bound;
 pub mod normal_cdf;
+pub mod plane_query;
 pub mod significance;
 pub mod splat;
 

@@ -4,9 +4,8 @@ use std::sync::Arc;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS, position_of, scale_of};
 use light4gs_codec::{
-    FurtherAttribute, GaussianArrays, HexPlaneArrays, MotionArrays, Plane, SceneData, SceneFrameArrays, SceneMeta,
+    FeaturePlaneArrays, FurtherAttribute, GaussianArrays, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
 };
 
 use super::attributes::Attribute;
@@ -15,7 +14,7 @@ use super::dynamic_scene::DynamicScene;
 use super::field::DeformationField;
 use super::further::FurtherTensor;
 use super::gaussians::{GaussianTensors, Gaussians};
-use super::hexplane::HexPlane;
+use crate::planes::{FeaturePlanes, PlaneTensors};
 
 /// Plain arrays that do not make a model.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -46,8 +45,8 @@ pub enum ModelError {
     /// The Gaussians have an attribute that the scene does not look right without, and nobody knows what it does.
     #[error("{0}")]
     UnknownAttribute(String),
-    /// The planes are not six a scale in the shapes that the resolution gives.
-    #[error("hexplanes: {0}")]
+    /// The planes contradict themselves, or are not those that the field needs.
+    #[error("feature planes: {0}")]
     Planes(String),
 }
 
@@ -133,49 +132,36 @@ impl SceneCoordinates {
     }
 }
 
-impl HexPlane {
-    /// Copies to plain arrays. Resolutions are read off the planes.
-    pub fn to_arrays(&self) -> HexPlaneArrays {
-        let dims = |scale: usize, plane: usize| self.planes[PLANES_PER_SCALE * scale + plane].dims();
-        let [channels, res_y, res_x] = dims(0, 0);
-        let [_, res_t, res_z] = dims(0, 5);
-        let planes = self.planes.iter().map(|plane| {
-            let [_, height, width] = plane.dims();
-            Plane { height: height as u32, width: width as u32, values: values(plane.val()) }
-        });
-        HexPlaneArrays {
-            channels: channels as u32,
-            resolution: [res_x, res_y, res_z, res_t].map(|r| r as u32),
-            multipliers: (0..self.scales()).map(|scale| (dims(scale, 0)[2] / res_x) as u32).collect(),
-            planes: planes.collect(),
+impl FeaturePlanes {
+    /// Copies to plain arrays.
+    pub fn to_arrays(&self) -> FeaturePlaneArrays {
+        let mut arrays = FeaturePlaneArrays::without_values(self.channels() as u32, self.layout());
+        for (plane, parameter) in arrays.planes.iter_mut().zip(&self.planes) {
+            plane.values = values(parameter.val());
         }
+        arrays
     }
 
     /// From plain arrays.
-    pub fn from_arrays(arrays: &HexPlaneArrays, device: &Device) -> Result<Self, ModelError> {
-        let channels = arrays.channels as usize;
-        if arrays.planes.is_empty() || arrays.planes.len() != PLANES_PER_SCALE * arrays.multipliers.len() {
-            let (planes, scales) = (arrays.planes.len(), arrays.multipliers.len());
-            return Err(ModelError::Planes(format!("{planes} planes for {scales} scales, expected six a scale")));
+    ///
+    /// # Errors
+    /// Planes that make no layout, or are not as long as their sizes say.
+    pub fn from_arrays(arrays: &FeaturePlaneArrays, device: &Device) -> Result<Self, ModelError> {
+        let wrong = |problem: String| Err(ModelError::Planes(problem));
+        if arrays.planes.is_empty() {
+            return wrong("there are none".into());
         }
+        let layout = arrays.layout().map_err(|error| ModelError::Planes(error.to_string()))?;
         let mut tensors = Vec::with_capacity(arrays.planes.len());
-        for (i, plane) in arrays.planes.iter().enumerate() {
-            let resolution = |axis: usize| {
-                arrays.resolution[axis] * if axis == TIME_AXIS { 1 } else { arrays.multipliers[scale_of(i)] }
-            };
-            let [across, down] = PLANE_AXES[position_of(i)];
-            let expected = (resolution(down), resolution(across));
-            if (plane.height, plane.width) != expected {
-                let found = (plane.height, plane.width);
-                return Err(ModelError::Planes(format!("plane {i} is {found:?} cells, expected {expected:?}")));
+        for (plane, shape) in arrays.planes.iter().zip(layout.planes()) {
+            let [height, width] = shape.size;
+            let dims = [arrays.channels as usize, height, width];
+            if plane.values.len() != dims.iter().product::<usize>() {
+                return wrong(format!("plane {} has {} values for {dims:?}", shape.name(), plane.values.len()));
             }
-            let shape = [channels, plane.height as usize, plane.width as usize];
-            if plane.values.len() != shape.iter().product::<usize>() {
-                return Err(ModelError::Planes(format!("plane {i} has {} values for {shape:?}", plane.values.len())));
-            }
-            tensors.push(Tensor::from_data(TensorData::new(plane.values.clone(), shape), device));
+            tensors.push(Tensor::from_data(TensorData::new(plane.values.clone(), dims), device));
         }
-        Ok(Self::from_planes(tensors))
+        Ok(Self::from_tensors(PlaneTensors::new(layout, tensors)))
     }
 }
 
@@ -194,7 +180,7 @@ impl<F: DeformationField> DynamicScene<F> {
             meta,
             gaussians: self.gaussians.to_arrays(),
             frame: self.coordinates.to_arrays(),
-            hexplane: self.planes().map(HexPlane::to_arrays).unwrap_or_default(),
+            feature_planes: self.planes().map(FeaturePlanes::to_arrays).unwrap_or_default(),
             motion: MotionArrays::default(),
         }
     }
@@ -209,9 +195,9 @@ impl<F: DeformationField> DynamicScene<F> {
         if !F::KINDS.contains(&data.motion.kind.as_str()) {
             return Err(ModelError::kind(&data.motion.kind, F::KINDS));
         }
-        let planes = match data.hexplane.planes.is_empty() {
+        let planes = match data.feature_planes.planes.is_empty() {
             true => None,
-            false => Some(HexPlane::from_arrays(&data.hexplane, device)?),
+            false => Some(FeaturePlanes::from_arrays(&data.feature_planes, device)?),
         };
         let SceneFrameArrays { mean, axes, std, mapping } = data.frame;
         Ok(Self {

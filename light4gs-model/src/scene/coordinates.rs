@@ -125,7 +125,7 @@ pub struct SceneCoordinates {
     axes: Param<Tensor<2>>,
     /// `[1, 3]`
     std: Param<Tensor<2>>,
-    /// From standardized coordinates to the hexplane's.
+    /// From standardized coordinates to those of the planes.
     #[module(skip)]
     mapping: CoordinateMapping,
 }
@@ -152,7 +152,7 @@ impl SceneCoordinates {
         self
     }
 
-    /// From standardized coordinates to the hexplane's.
+    /// From standardized coordinates to those of the planes.
     pub fn mapping(&self) -> CoordinateMapping {
         self.mapping
     }

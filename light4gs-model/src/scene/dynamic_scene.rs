@@ -7,7 +7,7 @@ use light4gs_data::PointCloud;
 use super::coordinates::{CoordinatesConfig, SceneCoordinates};
 use super::field::{BuiltInField, DeformationField};
 use super::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
-use super::hexplane::HexPlane;
+use crate::planes::FeaturePlanes;
 
 /// Configuration of a [`DynamicScene`].
 #[derive(Clone, Debug)]
@@ -94,12 +94,12 @@ impl<F: DeformationField> DynamicScene<F> {
     }
 
     /// The field's planes, if it has some.
-    pub fn planes(&self) -> Option<&HexPlane> {
+    pub fn planes(&self) -> Option<&FeaturePlanes> {
         self.field.planes()
     }
 
     /// The field's planes, if it has some, to replace them.
-    pub fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+    pub fn planes_mut(&mut self) -> Option<&mut FeaturePlanes> {
         self.field.planes_mut()
     }
 }

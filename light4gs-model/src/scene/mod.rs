@@ -1,6 +1,6 @@
 //! The scene (paper III-A): Gaussians at rest, and the field that moves them.
 //!
-//! World points become the field's coordinates ([`SceneCoordinates`], [`contract`]); a multiscale [`HexPlane`] gives a
+//! World points become the field's coordinates ([`SceneCoordinates`], [`contract`]); [`FeaturePlanes`](crate::FeaturePlanes) give a
 //! feature for a point and a time; [`Deformation`] turns the feature into changes of the Gaussians' attributes;
 //! [`DynamicScene`] is all of it together. [`regularizer`] keeps the planes smooth.
 
@@ -12,7 +12,6 @@ pub(crate) mod dynamic_scene;
 pub(crate) mod field;
 mod further;
 pub(crate) mod gaussians;
-pub(crate) mod hexplane;
 pub mod regularizer;
 
 pub use arrays::ModelError;
@@ -26,4 +25,3 @@ pub use field::{
 };
 pub use further::{FurtherParameters, FurtherTensor};
 pub use gaussians::{ActivatedGaussians, AttributeMapper, GaussianTensors, Gaussians, GaussiansConfig};
-pub use hexplane::{HexPlane, HexPlaneConfig, query_planes};

@@ -1,9 +1,8 @@
 //! Regularizers of the planes (4DGS: `compute_regulation`).
 
 use burn::tensor::{Tensor, s};
-use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_ONLY_PLANES, SPACE_TIME_PLANES};
 
-use super::hexplane::HexPlane;
+use crate::planes::FeaturePlanes;
 
 /// Mean square of the second difference along the height of a plane `[C, H, W]`: `[1]`. Zero below three rows.
 pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {
@@ -17,25 +16,28 @@ pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {
     (above + below - middle * 2.0).powi_scalar(2).mean()
 }
 
-fn sum_over(hexplane: &HexPlane, members: [usize; 3], term: impl Fn(Tensor<3>) -> Tensor<1>) -> Tensor<1> {
-    let scales = hexplane.planes.chunks_exact(PLANES_PER_SCALE);
-    let terms: Vec<_> = scales.flat_map(|scale| members.map(|plane| term(scale[plane].val()))).collect();
-    terms.into_iter().reduce(|sum, term| sum + term).expect("a hexplane has at least one scale")
+/// The sum of a term over the planes with time, or over those without; 0 where there are none.
+fn sum_over(planes: &FeaturePlanes, space_time: bool, term: impl Fn(Tensor<3>) -> Tensor<1>) -> Tensor<1> {
+    let shapes = planes.layout().planes().iter().zip(&planes.planes);
+    let terms =
+        shapes.filter(|(shape, _)| shape.axes.is_space_time() == space_time).map(|(_, plane)| term(plane.val()));
+    let sum = terms.reduce(|sum, term| sum + term);
+    sum.unwrap_or_else(|| Tensor::zeros([1], &planes.planes[0].device()))
 }
 
 /// Smoothness of the space-only planes, `[1]`: second differences along their height, summed over planes and scales.
-pub fn plane_smoothness(hexplane: &HexPlane) -> Tensor<1> {
-    sum_over(hexplane, SPACE_ONLY_PLANES, second_difference)
+pub fn plane_smoothness(planes: &FeaturePlanes) -> Tensor<1> {
+    sum_over(planes, false, second_difference)
 }
 
 /// Smoothness in time of the space-time planes, `[1]`: second differences along time, summed over planes and scales.
-pub fn time_smoothness(hexplane: &HexPlane) -> Tensor<1> {
-    sum_over(hexplane, SPACE_TIME_PLANES, second_difference)
+pub fn time_smoothness(planes: &FeaturePlanes) -> Tensor<1> {
+    sum_over(planes, true, second_difference)
 }
 
 /// Departure of the space-time planes from 1, `[1]`: mean absolute difference, summed over planes and scales.
-pub fn time_l1(hexplane: &HexPlane) -> Tensor<1> {
-    sum_over(hexplane, SPACE_TIME_PLANES, |plane| (plane - 1.0).abs().mean())
+pub fn time_l1(planes: &FeaturePlanes) -> Tensor<1> {
+    sum_over(planes, true, |plane| (plane - 1.0).abs().mean())
 }
 
 /// Weights of the three terms.
@@ -51,16 +53,16 @@ pub struct PlaneRegularizer {
 
 impl PlaneRegularizer {
     /// The weighted sum of the terms, `[1]`; terms of weight 0 are not computed.
-    pub fn loss(&self, hexplane: &HexPlane) -> Tensor<1> {
-        let mut sum = Tensor::zeros([1], &hexplane.planes[0].device());
+    pub fn loss(&self, planes: &FeaturePlanes) -> Tensor<1> {
+        let mut sum = Tensor::zeros([1], &planes.planes[0].device());
         if self.plane_smoothness != 0.0 {
-            sum = sum + plane_smoothness(hexplane) * self.plane_smoothness;
+            sum = sum + plane_smoothness(planes) * self.plane_smoothness;
         }
         if self.time_smoothness != 0.0 {
-            sum = sum + time_smoothness(hexplane) * self.time_smoothness;
+            sum = sum + time_smoothness(planes) * self.time_smoothness;
         }
         if self.time_l1 != 0.0 {
-            sum = sum + time_l1(hexplane) * self.time_l1;
+            sum = sum + time_l1(planes) * self.time_l1;
         }
         sum
     }

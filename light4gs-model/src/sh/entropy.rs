@@ -8,6 +8,7 @@ use light4gs_codec::{CodecError, ShCoding, ShPrior};
 use super::tables::table_coding;
 
 use crate::entropy::gaussian_conditional::{NormalParameters, bits, gaussian_likelihood};
+use crate::planes::PlaneTensors;
 
 /// Channels of the higher spherical harmonics.
 pub const SH_CHANNELS: usize = 45;
@@ -19,14 +20,18 @@ pub struct ShKnown {
     pub sh_dc: Tensor<3>,
     /// Positions in the scene's frame, `[N, 3]` in [-1, 1].
     pub positions: Tensor<2>,
-    /// All planes of the hexplane `[M, H, W]`, scale-major.
-    pub planes: Vec<Tensor<3>>,
+    /// All feature planes; empty where there are none.
+    pub planes: PlaneTensors,
 }
 
 impl ShKnown {
     /// For models whose densities depend on nothing (see [`ShTables`]): no Gaussian, no plane.
     pub fn nothing(device: &Device) -> Self {
-        Self { sh_dc: Tensor::zeros([0, 1, 3], device), positions: Tensor::zeros([0, 3], device), planes: Vec::new() }
+        Self {
+            sh_dc: Tensor::zeros([0, 1, 3], device),
+            positions: Tensor::zeros([0, 3], device),
+            planes: PlaneTensors::default(),
+        }
     }
 }
 

@@ -1,19 +1,17 @@
-//! Entropy model of the spherical harmonics that asks the hexplanes (paper III-D, an alternative).
+//! Entropy model of the spherical harmonics that asks the feature planes (paper III-D, an alternative).
 
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::plane_layout::PLANES_PER_SCALE;
 use light4gs_codec::{Network, ShPrior, ShSource};
 
 use super::entropy::{SH_CHANNELS, ShEntropy, ShKnown, channels_first, channels_last, gaussian_bits, round_around};
 use super::network::ShNetwork;
-use crate::scene::hexplane::query_planes;
 
 /// Configuration of a [`ShHexPlaneCoupled`].
 #[derive(Config, Debug)]
 pub struct ShHexPlaneCoupledConfig {
-    /// Channels of a plane times scales: the length of a hexplane's feature.
+    /// Channels of a plane times scales: the length of a feature.
     pub feature_size: usize,
     /// Distance between the values of neighboring symbols.
     #[config(default = 0.02)]
@@ -45,24 +43,8 @@ pub struct ShHexPlaneCoupled {
 impl ShHexPlaneCoupled {
     /// Scales and means `[90, 1, N]`.
     fn output(&self, known: &ShKnown) -> Tensor<3> {
-        self.network.forward(space_feature(&known.planes, known.positions.clone()).transpose().unsqueeze_dim(1))
+        self.network.forward(known.planes.query_space(known.positions.clone()).transpose().unsqueeze_dim(1))
     }
-}
-
-/// `[N, M · scales]` at positions `[N, 3]`: the product of the three space-only planes' bilinear samples, the scales side
-/// by side. The hexplane's query, with ones for the planes that hold time.
-pub fn space_feature(planes: &[Tensor<3>], positions: Tensor<2>) -> Tensor<2> {
-    const MOMENTS: usize = 2;
-    let device = positions.device();
-    let [count, _] = positions.dims();
-    let points = Tensor::cat(vec![positions, Tensor::zeros([count, 1], &device)], 1);
-    let planes = planes.chunks_exact(PLANES_PER_SCALE).flat_map(|scale| {
-        let [xy, xz, _, yz, ..] = scale else { unreachable!("chunks of six") };
-        let ([channels, y, x], [_, z, _]) = (xy.dims(), xz.dims());
-        let [xt, yt, zt] = [x, y, z].map(|length| Tensor::ones([channels, MOMENTS, length], &device));
-        [xy.clone(), xz.clone(), xt, yz.clone(), yt, zt]
-    });
-    query_planes(points, planes.collect())
 }
 
 impl ShEntropy for ShHexPlaneCoupled {

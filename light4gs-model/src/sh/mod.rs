@@ -24,7 +24,7 @@ pub use bottleneck::{ShBottleneck, ShBottleneckConfig};
 pub use entropy::{
     SH_CHANNELS, ShEntropy, ShKnown, ShTables, channels_first, channels_last, gaussian_bits, round_around,
 };
-pub use hexplane_coupled::{ShHexPlaneCoupled, ShHexPlaneCoupledConfig, space_feature};
+pub use hexplane_coupled::{ShHexPlaneCoupled, ShHexPlaneCoupledConfig};
 pub use mixture::{ShMixture, ShMixtureConfig};
 pub use network::ShNetwork;
 pub use tables::counted_sh_coding;
@@ -120,14 +120,14 @@ impl ShEntropyConfig {
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::{ShBottleneckConfig, ShEntropy, ShEntropyConfig, ShKnown};
+/// use light4gs_model::{PlaneTensors, ShBottleneckConfig, ShEntropy, ShEntropyConfig, ShKnown};
 ///
 /// let device = Device::flex();
 /// let model = ShEntropyConfig::Factorized(ShBottleneckConfig::new()).init(&device);
 /// let known = ShKnown {
 ///     sh_dc: Tensor::zeros([7, 1, 3], &device),
 ///     positions: Tensor::zeros([7, 3], &device),
-///     planes: Vec::new(),
+///     planes: PlaneTensors::default(),
 /// };
 /// let noisy = model.add_noise(Tensor::zeros([7, 15, 3], &device));
 /// assert_eq!(model.bits(noisy, &known).dims(), [7, 15, 3]);

@@ -5,7 +5,7 @@ use std::time::Instant;
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::{
-    CompressionInput, HexPlaneArrays, OpenStream, Profile, SceneMeta, attributes, encode_compressed, encode_planes,
+    CompressionInput, FeaturePlaneArrays, OpenStream, Profile, SceneMeta, attributes, encode_compressed, encode_planes,
     encode_sh,
 };
 use light4gs_data::PointCloud;
@@ -73,9 +73,9 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let encoded = encode_compressed(&data, &input)?;
     let stream = OpenStream::new(&encoded.bytes)?;
     let (frame, gaussians) = (stream.frame()?, stream.gaussians()?);
-    let no_planes = HexPlaneArrays::default();
+    let no_planes = FeaturePlaneArrays::default();
 
-    let plane_symbols = data.hexplane.planes.iter().map(|plane| plane.values.len()).sum();
+    let plane_symbols = data.feature_planes.planes.iter().map(|plane| plane.values.len()).sum();
     let sh_symbols = data.gaussians.sh_rest.len();
     let attribute_symbols = GAUSSIANS * 14;
     let all = plane_symbols + sh_symbols + attribute_symbols;
@@ -97,8 +97,8 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
         times.push(CoderTime { part, symbols, milliseconds, milliseconds_one_thread });
     };
     // Everything was coded once above without an error, and coding is deterministic.
-    add("encode planes", plane_symbols, &|| drop(encode_planes(&data.hexplane, planes).unwrap()));
-    add("decode planes", plane_symbols, &|| drop(stream.hexplanes().unwrap()));
+    add("encode planes", plane_symbols, &|| drop(encode_planes(&data.feature_planes, planes).unwrap()));
+    add("decode planes", plane_symbols, &|| drop(stream.feature_planes().unwrap()));
     add("encode spherical harmonics", sh_symbols, &|| {
         drop(encode_sh(&data.gaussians, &input.sh, &frame, &no_planes).unwrap());
     });

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use light4gs_codec::attributes::AttributeInfo;
-use light4gs_codec::plane_layout::plane_name;
+use light4gs_codec::plane_layout::PlaneShape;
 use light4gs_codec::{Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
 use light4gs_model::DeformationField;
@@ -163,12 +163,14 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
             "gaussians": info.gaussian_count, "sh_degree": info.sh_degree,
             "attributes": info.attributes.iter().map(|a| json!({"name": a.name, "width": a.width, "coder": a.coder.name(),
                 "optional": a.optional, "bytes": a.bytes})).collect::<Vec<_>>(),
-            "hexplane": {"channels": info.hexplane_channels, "resolution": info.hexplane_resolution,
-                "multipliers": info.hexplane_multipliers},
+            "feature_planes": {"channels": info.plane_channels, "planes": info.planes.planes().iter().map(|plane| {
+                let [height, width] = plane.size;
+                json!({"name": plane.name(), "width": width, "height": height})
+            }).collect::<Vec<_>>()},
             "motion": {"kind": info.motion.kind, "layers": motion_layers(info)},
             "profile": info.profile.map(|profile| profile.name()),
             "plane_steps": info.plane_steps.iter().map(|s| [s.space_only, s.space_time]).collect::<Vec<_>>(),
-            "plane_bytes": info.plane_bytes.iter().map(|p| json!({"plane": plane_name(p.plane),
+            "plane_bytes": info.plane_bytes.iter().map(|p| json!({"plane": info.planes.planes()[p.plane].name(),
                 "latent": p.latent, "anchors": p.anchors, "others": p.others})).collect::<Vec<_>>(),
         }));
     }
@@ -180,14 +182,15 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
         let optional = if *optional { ", optional" } else { "" };
         say(format_args!("their attribute {name}: {width} numbers each, {}, {bytes} bytes{optional}", coder.name()))?;
     }
-    say(format_args!(
-        "hexplanes: {} channels, {:?} cells times {:?}; motion: {}, {} layers",
-        info.hexplane_channels,
-        info.hexplane_resolution,
-        info.hexplane_multipliers,
-        info.motion.kind,
-        motion_layers(info)
-    ))?;
+    for scale in 0..info.planes.scales() {
+        let planes = info.planes.planes()[info.planes.scale(scale)].iter().map(|plane| {
+            let PlaneShape { axes, size: [height, width], .. } = plane;
+            format!("{} {width}×{height}", axes.name())
+        });
+        let planes = planes.collect::<Vec<_>>().join(", ");
+        say(format_args!("feature planes of scale {scale}: {planes}; {} channels", info.plane_channels))?;
+    }
+    say(format_args!("motion: {}, {} layers", info.motion.kind, motion_layers(info)))?;
     if let Some(profile) = info.profile {
         let steps: Vec<String> = info
             .plane_steps
@@ -249,9 +252,9 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
     add("frame.mean".into(), vec![3], &data.frame.mean);
     add("frame.axes".into(), vec![3, 3], data.frame.axes.as_flattened());
     add("frame.std".into(), vec![3], &data.frame.std);
-    for (i, plane) in data.hexplane.planes.iter().enumerate() {
-        let shape = vec![data.hexplane.channels as usize, plane.height as usize, plane.width as usize];
-        add(format!("hexplane.{}", plane_name(i)), shape, &plane.values);
+    for plane in &data.feature_planes.planes {
+        let shape = vec![data.feature_planes.channels as usize, plane.height as usize, plane.width as usize];
+        add(format!("feature_planes.{}", plane.shape().name()), shape, &plane.values);
     }
     let layers = data.motion.network.iter().flat_map(|motion| motion.network.layers());
     for (i, layer) in layers.enumerate() {

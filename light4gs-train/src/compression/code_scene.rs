@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
@@ -69,7 +68,7 @@ impl CodingRecord {
     pub fn parts(&self) -> [CodedPart; 2] {
         let (expected, coded) = (self.estimated_bits, self.coded_bits);
         [
-            CodedPart { name: "hexplanes", expected: expected.hexplanes, coded: coded.hexplanes },
+            CodedPart { name: "feature planes", expected: expected.planes, coded: coded.planes },
             CodedPart { name: "spherical harmonics", expected: expected.sh, coded: coded.sh },
         ]
     }
@@ -163,14 +162,14 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     let begin = Instant::now();
     let encoded = encode(scene, &compression, meta, settings, profile, images, device)?;
     let sizes = &encoded.coded.report;
-    let hexplane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
+    let plane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
     let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
     let record = CodingRecord {
         profile: settings.profile,
         fit_seconds,
         encode_seconds: begin.elapsed().as_secs_f64(),
         estimated_bits: encoded.coded.estimate,
-        coded_bits: BitEstimate { hexplanes: 8.0 * hexplane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
+        coded_bits: BitEstimate { planes: 8.0 * plane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
         planes: plane_records(&encoded, &compression),
     };
     Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
@@ -185,12 +184,15 @@ fn searches(settings: &CompressionConfig, fits: bool) -> bool {
 fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Compression<C, S>) -> Vec<PlaneRecord> {
     let Some(models) = &compression.planes else { return Vec::new() };
     let steps = models.quantization.steps_without_gradient().values();
-    let record = |bytes: &PlaneBytes| PlaneRecord {
-        name: plane_name(bytes.plane),
-        step: steps[bytes.plane],
-        symbols: encoded.decoded.hexplane.planes[bytes.plane].values.len(),
-        latent_bytes: bytes.latent,
-        value_bytes: bytes.anchors + bytes.others,
+    let record = |bytes: &PlaneBytes| {
+        let plane = &encoded.decoded.feature_planes.planes[bytes.plane];
+        PlaneRecord {
+            name: plane.shape().name(),
+            step: steps[bytes.plane],
+            symbols: plane.values.len(),
+            latent_bytes: bytes.latent,
+            value_bytes: bytes.anchors + bytes.others,
+        }
     };
     encoded.coded.report.planes.iter().map(record).collect()
 }

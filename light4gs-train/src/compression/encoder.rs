@@ -3,12 +3,11 @@
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network_weights::WeightPrecision;
-use light4gs_codec::plane_layout::plane_name;
 use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
 };
-use light4gs_model::{DeformationField, DynamicScene, HexPlane, Latent, PlaneEntropy, counted_sh_coding};
+use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
@@ -67,8 +66,8 @@ impl BitMap {
 /// Bits that the training's models give for a decoded scene, model weights and tables aside.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BitEstimate {
-    /// Of the hexplanes' values and latents.
-    pub hexplanes: f64,
+    /// Of the feature planes' values and latents.
+    pub planes: f64,
     /// Of the spherical harmonics beyond degree 0.
     pub sh: f64,
 }
@@ -133,7 +132,7 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     compression: &Compression<C, S>,
     config: &CompressionConfig,
     device: &Device,
-) -> Result<Option<HexPlane>, TrainError> {
+) -> Result<Option<FeaturePlanes>, TrainError> {
     let mut scene = scene.valid();
     let compression = &mut compression.valid();
     if scene.planes().is_none() || compression.planes.is_none() {
@@ -144,18 +143,18 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let mut first = None;
     for _ in 0..FREEZING_ROUNDS {
         let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
-        let decoded = encode_compressed(&data, &input)?.decoded.hexplane;
-        if decoded == data.hexplane {
+        let decoded = encode_compressed(&data, &input)?.decoded.feature_planes;
+        if decoded == data.feature_planes {
             first = None;
             break;
         }
         if let Some(planes) = scene.planes_mut() {
-            *planes = HexPlane::from_arrays(&decoded, &device.clone().inner())?;
+            *planes = FeaturePlanes::from_arrays(&decoded, &device.clone().inner())?;
         }
         first.get_or_insert_with(|| decoded.clone());
-        data.hexplane = decoded;
+        data.feature_planes = decoded;
     }
-    Ok(Some(HexPlane::from_arrays(&first.unwrap_or(data.hexplane), device)?))
+    Ok(Some(FeaturePlanes::from_arrays(&first.unwrap_or(data.feature_planes), device)?))
 }
 
 /// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
@@ -186,13 +185,13 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// What the codec needs to code the planes.
     fn plane_coding<F: DeformationField>(&self, scene: &DynamicScene<F>) -> Result<Option<PlaneCoding>, TrainError> {
-        let (Some(models), Some(hexplane)) = (&self.planes, scene.planes()) else { return Ok(None) };
+        let (Some(models), Some(planes)) = (&self.planes, scene.planes()) else { return Ok(None) };
         let steps = models.quantization.steps_without_gradient();
-        let symbols = models.context.latent_symbols(&hexplane.tensors(), &steps);
+        let symbols = models.context.latent_symbols(&planes.tensors(), &steps);
         let integers = |symbols: Tensor<3>| symbols.into_data().iter::<f32>().map(|v| v as i32).collect();
         Ok(Some(PlaneCoding {
-            model: models.context.to_arrays()?,
-            steps: steps.to_groups().into_iter().map(checks::nearest_plane_steps).collect(),
+            model: models.context.to_arrays(planes.layout())?,
+            steps: steps.to_groups(planes.layout()).into_iter().map(checks::nearest_plane_steps).collect(),
             latent_symbols: symbols.into_iter().map(|plane| plane.map_or_else(Vec::new, integers)).collect(),
         }))
     }
@@ -214,7 +213,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let scene = DynamicScene::<F>::from_arrays(decoded, device)?;
         let planes = plane_tensors(&scene);
         let all: Vec<usize> = (0..planes.len()).collect();
-        let hexplanes = self.planes.as_ref().map_or(0.0, |models| {
+        let plane_bits = self.planes.as_ref().map_or(0.0, |models| {
             let steps = models.quantization.steps_without_gradient();
             let rates = models.context.rate(&planes, &steps, &all, Latent::Rounded);
             rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum()
@@ -225,19 +224,24 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             }
             _ => counted_bits(&decoded.gaussians, coding),
         };
-        Ok(BitEstimate { hexplanes, sh })
+        Ok(BitEstimate { planes: plane_bits, sh })
     }
 
     /// Where the bits of a decoded scene's planes are.
     fn bit_maps(&self, decoded: &SceneData, device: &Device) -> Result<Vec<BitMap>, TrainError> {
         let Some(models) = &self.planes else { return Ok(Vec::new()) };
-        let planes = HexPlane::from_arrays(&decoded.hexplane, device)?.tensors();
+        let planes = FeaturePlanes::from_arrays(&decoded.feature_planes, device)?.tensors();
         let all: Vec<usize> = (0..planes.len()).collect();
         let steps = models.quantization.steps_without_gradient();
         let maps = models.context.bit_map(&planes, &steps, &all, Latent::Rounded);
         let map = |(plane, map): (usize, Tensor<2>)| {
             let [height, width] = map.dims().map(|length| length as u32);
-            BitMap { name: plane_name(plane), width, height, bits: map.into_data().iter().collect() }
+            BitMap {
+                name: planes.layout().planes()[plane].name(),
+                width,
+                height,
+                bits: map.into_data().iter().collect(),
+            }
         };
         Ok(maps.into_iter().enumerate().map(map).collect())
     }

@@ -28,7 +28,7 @@ pub use rate::{NoisyScene, Rate};
 use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_model::{
-    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, HexPlane, PlaneEntropy, ShEntropyModel,
+    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, FeaturePlanes, PlaneEntropy, ShEntropyModel,
 };
 
 use crate::config::{CompressionConfig, Config};
@@ -64,7 +64,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     pub fn of_run<E: EntropyModels<Planes = C, Sh = S>>(
         models: &E,
         config: &Config,
-        planes: Option<&HexPlane>,
+        planes: Option<&FeaturePlanes>,
         device: &Device,
     ) -> Result<Option<Self>, TrainError> {
         let trains = config.compression.rate.lambda > 0.0;
@@ -79,15 +79,15 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     pub fn new<E: EntropyModels<Planes = C, Sh = S>>(
         models: &E,
         config: &Config,
-        planes: Option<&HexPlane>,
+        planes: Option<&FeaturePlanes>,
         device: &Device,
     ) -> Result<Self, TrainError> {
         let CompressionConfig { context, sh, .. } = &config.compression;
-        let feature_size = planes.map_or(0, HexPlane::feature_size);
-        let plane_models = |planes: &HexPlane| -> Result<_, TrainError> {
+        let feature_size = planes.map_or(0, FeaturePlanes::feature_size);
+        let plane_models = |planes: &FeaturePlanes| -> Result<_, TrainError> {
             Ok(PlaneModels {
-                context: models.planes(context, planes.feature_size() / planes.scales(), device)?,
-                quantization: quantization_config(config, planes.scales()).init(device),
+                context: models.planes(context, planes.channels(), device)?,
+                quantization: quantization_config(config).init(planes.layout(), device),
             })
         };
         let planes = planes.map(plane_models).transpose()?;
@@ -96,25 +96,25 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 
     /// Lets the context model begin with the statistics of planes.
-    pub fn start_from(&mut self, planes: Option<&HexPlane>) {
+    pub fn start_from(&mut self, planes: Option<&FeaturePlanes>) {
         if let (Some(models), Some(planes)) = (&mut self.planes, planes) {
             models.context.base_mut().start_from(&planes.tensors(), &models.quantization.steps_without_gradient());
         }
     }
 
-    /// Keeps learned steps in the range that a configuration allows, for planes at so many scales.
-    pub fn bound_steps(&mut self, config: &Config, scales: usize) {
+    /// Keeps learned steps in the range that a configuration allows.
+    pub fn bound_steps(&mut self, config: &Config) {
         if let Some(models) = &mut self.planes
             && !config.compression.steps.refine
         {
-            models.quantization.no_finer_than(&quantization_config(config, scales));
+            models.quantization.no_finer_than(&quantization_config(config));
         }
     }
 }
 
-fn quantization_config(config: &Config, scales: usize) -> AdaptiveQuantizationConfig {
+fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
     let steps = &config.compression.steps;
-    AdaptiveQuantizationConfig::new(scales)
+    AdaptiveQuantizationConfig::new()
         .with_space_only(steps.space_only)
         .with_space_time(steps.space_time)
         .with_per_scale(steps.per_scale)

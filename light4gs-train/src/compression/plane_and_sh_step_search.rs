@@ -4,7 +4,6 @@
 //! the error grows with the square of the step, so the error of one step says nearly which to take.
 
 use light4gs_codec::SceneData;
-use light4gs_codec::plane_layout::{PLANES_PER_SCALE, SPACE_TIME_PLANES};
 
 use super::SearchImages;
 use crate::config::CompressionConfig;
@@ -28,13 +27,12 @@ pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images
         let sum: f64 = rendered.iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         sum / exact.len().max(1) as f64
     };
-    if settings.steps.search_tolerance > 0.0 && !scene.hexplane.planes.is_empty() {
+    if settings.steps.search_tolerance > 0.0 && !scene.feature_planes.planes.is_empty() {
         let (space, time) = (settings.steps.space_only, settings.steps.space_time);
         let factor = factor(budget(settings.steps.search_tolerance), |factor| {
             let mut rounded = scene.clone();
-            for (index, plane) in rounded.hexplane.planes.iter_mut().enumerate() {
-                let is_time = SPACE_TIME_PLANES.contains(&(index % PLANES_PER_SCALE));
-                round(&mut plane.values, factor * if is_time { time } else { space });
+            for plane in &mut rounded.feature_planes.planes {
+                round(&mut plane.values, factor * if plane.axes.is_space_time() { time } else { space });
             }
             distortion(&rounded)
         });
@@ -75,23 +73,24 @@ fn round(values: &mut [f32], step: f64) {
 
 #[cfg(test)]
 mod tests {
-    use light4gs_codec::{GaussianArrays, HexPlaneArrays, Plane};
+    use light4gs_codec::plane_layout::PlaneAxes;
+    use light4gs_codec::{FeaturePlaneArrays, GaussianArrays, Plane};
 
     use super::*;
 
     fn scene() -> SceneData {
         let random = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
-        let plane = Plane { height: 8, width: 8, values: (0..64).map(random).collect() };
+        let plane = |axes| Plane { scale: 0, axes, height: 8, width: 8, values: (0..64).map(random).collect() };
         SceneData {
             gaussians: GaussianArrays { sh_rest: (0..450).map(random).collect(), ..GaussianArrays::default() },
-            hexplane: HexPlaneArrays { planes: vec![plane; 6], ..HexPlaneArrays::default() },
+            feature_planes: FeaturePlaneArrays { channels: 1, planes: PlaneAxes::ALL.map(plane).to_vec() },
             ..SceneData::default()
         }
     }
 
     /// "Images" that are ten times as sensitive to planes as to harmonics.
     fn render(scene: &SceneData) -> Vec<f32> {
-        let planes = scene.hexplane.planes.iter().flat_map(|plane| plane.values.iter().map(|value| 10.0 * value));
+        let planes = scene.feature_planes.planes.iter().flat_map(|plane| plane.values.iter().map(|value| 10.0 * value));
         planes.chain(scene.gaussians.sh_rest.iter().copied()).collect()
     }
 
@@ -109,7 +108,7 @@ mod tests {
         let exact = render(&scene());
         let mut rounded = scene();
         let step = settings.steps.space_only;
-        rounded.hexplane.planes.iter_mut().for_each(|plane| round(&mut plane.values, step));
+        rounded.feature_planes.planes.iter_mut().for_each(|plane| round(&mut plane.values, step));
         let squares: f64 = render(&rounded).iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         let budget = error * (10f64.powf(tolerance / 10.0) - 1.0);
         let distortion = squares / exact.len() as f64;

@@ -3,7 +3,8 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::{
-    BuiltInField, DeformationField, DynamicScene, HexPlane, Latent, PlaneEntropy, PlaneSteps, ShKnown,
+    BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps, PlaneTensors,
+    ShKnown,
 };
 use rand::Rng;
 use rand::seq::index;
@@ -65,11 +66,10 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     ) -> NoisyScene<F> {
         let mut noisy = scene.clone();
         let steps = match (&self.planes, noisy.planes_mut()) {
-            (Some(models), Some(hexplane)) => {
+            (Some(models), Some(planes)) => {
                 let steps = models.quantization.steps_without_gradient();
-                let planes: Vec<_> =
-                    hexplane.tensors().into_iter().map(|plane| plane.set_require_grad(false)).collect();
-                for (parameter, plane) in hexplane.planes.iter_mut().zip(steps.add_noise(&planes)) {
+                let noisy = steps.add_noise(&planes.tensors().map(|_, plane| plane.set_require_grad(false)));
+                for (parameter, plane) in planes.planes.iter_mut().zip(noisy.into_tensors()) {
                     replace(parameter, plane);
                 }
                 Some(steps.leaves(learn_steps))
@@ -86,7 +86,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         with_sh: bool,
     ) -> NoisyScene<F> {
         let mut scene = scene.clone();
-        for plane in scene.planes_mut().into_iter().flat_map(|hexplane| &mut hexplane.planes) {
+        for plane in scene.planes_mut().into_iter().flat_map(|planes| &mut planes.planes) {
             *plane = plane.clone().set_require_grad(false);
         }
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
@@ -148,7 +148,7 @@ impl<F: DeformationField> NoisyScene<F> {
     pub fn with_detached(&self, planes: bool, sh: bool) -> Self {
         let mut apart = self.clone();
         if planes {
-            for plane in apart.scene.planes_mut().into_iter().flat_map(|hexplane| &mut hexplane.planes) {
+            for plane in apart.scene.planes_mut().into_iter().flat_map(|planes| &mut planes.planes) {
                 detach(plane);
             }
             apart.steps = apart.steps.map(|steps| steps.leaves(false));
@@ -170,7 +170,7 @@ impl<F: DeformationField> NoisyScene<F> {
     /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
     /// That is without the part they play through the noise.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
-        let planes = 0..self.scene.planes().map_or(0, |hexplane| hexplane.planes.len());
+        let planes = 0..self.scene.planes().map_or(0, |planes| planes.planes.len());
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
     }
 }
@@ -186,14 +186,14 @@ fn detach<const D: usize>(parameter: &mut Param<Tensor<D>>) {
 }
 
 /// The planes of a scene; none if its field has none.
-pub(super) fn plane_tensors<F: DeformationField>(scene: &DynamicScene<F>) -> Vec<Tensor<3>> {
-    scene.planes().map(HexPlane::tensors).unwrap_or_default()
+pub(super) fn plane_tensors<F: DeformationField>(scene: &DynamicScene<F>) -> PlaneTensors {
+    scene.planes().map(FeaturePlanes::tensors).unwrap_or_default()
 }
 
 /// What a decoder knows of the Gaussians, or of some rows of them, before it comes to their spherical harmonics.
 pub(super) fn known<F: DeformationField>(
     scene: &DynamicScene<F>,
-    planes: &[Tensor<3>],
+    planes: &PlaneTensors,
     rows: Option<Tensor<1, Int>>,
 ) -> ShKnown {
     let (mut sh_dc, mut means) = (scene.gaussians.sh_dc.val(), scene.gaussians.means.val());
@@ -201,7 +201,7 @@ pub(super) fn known<F: DeformationField>(
         sh_dc = sh_dc.select(0, rows.clone());
         means = means.select(0, rows);
     }
-    ShKnown { sh_dc, positions: scene.coordinates.normalize(means), planes: planes.to_vec() }
+    ShKnown { sh_dc, positions: scene.coordinates.normalize(means), planes: planes.clone() }
 }
 
 /// A random share of `0..count` without repetition, at least one, in rising order.

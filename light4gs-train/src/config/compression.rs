@@ -24,9 +24,9 @@ keys! {
             "ours; paper", "or \"paper\" (other attributes and weights as float32), \"float32\"";
         /// The rate in the loss.
         rate: RateConfig;
-        /// The context model of the hexplanes (MHCM).
+        /// The context model of the feature planes (MHCM).
         context: ContextConfig;
-        /// Quantization steps of the hexplanes.
+        /// Quantization steps of the feature planes.
         steps: StepsConfig;
         /// The entropy model of the spherical harmonics.
         sh: ShConfig;
@@ -261,7 +261,7 @@ keys! {
 
 /// Where the steps' defaults come from.
 fn quantization() -> AdaptiveQuantizationConfig {
-    AdaptiveQuantizationConfig::new(1)
+    AdaptiveQuantizationConfig::new()
 }
 
 /// The configuration knows bits only.

@@ -86,10 +86,10 @@ keys! {
         deformation_init: f64 = 1.6e-4; RATE, "reference";
         /// Deformation network, end of the schedule.
         deformation_final: f64 = 1.6e-5; RATE, "reference";
-        /// Hexplanes, first step.
-        grid_init: f64 = 1.6e-3; RATE, "reference";
-        /// Hexplanes, end of the schedule.
-        grid_final: f64 = 1.6e-4; RATE, "reference";
+        /// Feature planes, first step.
+        planes_init: f64 = 1.6e-3; RATE, "reference";
+        /// Feature planes, end of the schedule.
+        planes_final: f64 = 1.6e-4; RATE, "reference";
         /// Constant color.
         sh_dc: f64 = 2.5e-3; RATE, "3DGS";
         /// View-dependent color: `sh_dc` divided by this.
@@ -107,7 +107,7 @@ keys! {
         /// Length of the decay in iterations. 0 takes the stage's length.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000", "0 = the stage's length";
-        /// Rates of positions, deformation and hexplanes are multiplied by the scene's extent.
+        /// Rates of positions, deformation and feature planes are multiplied by the scene's extent.
         scale_by_extent: bool = true; Flag, "reference";
     }
 }
@@ -116,7 +116,7 @@ keys! {
     /// Weights of the space-time regularizers, fine stage only.
     pub struct RegularizerConfig {
         /// Squared second difference of the space-only planes.
-        plane_tv: f32 = 1e-4; WEIGHT, "reference";
+        plane_smoothness: f32 = 1e-4; WEIGHT, "reference";
         /// Squared second difference over time of the space-time planes.
         time_smoothness: f32 = 1e-2; WEIGHT, "reference";
         /// Distance of the space-time planes from 1, which means "no motion".
@@ -127,7 +127,7 @@ keys! {
 impl RegularizerConfig {
     /// The regularizer that this stands for.
     pub fn build(&self) -> PlaneRegularizer {
-        let Self { plane_tv, time_smoothness, time_l1 } = *self;
-        PlaneRegularizer { plane_smoothness: plane_tv, time_smoothness, time_l1 }
+        let Self { plane_smoothness, time_smoothness, time_l1 } = *self;
+        PlaneRegularizer { plane_smoothness, time_smoothness, time_l1 }
     }
 }

@@ -1,6 +1,6 @@
 //! What keys may not hold together. What each may hold by itself is said where it is declared.
 
-use light4gs_codec::plane_layout::check_resolution;
+use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, check_resolution};
 use light4gs_codec::{CodecError, checks};
 use serde_json::Value;
 
@@ -50,8 +50,8 @@ fn hexplane(check: &mut Check, planes: &HexPlaneTable) {
     });
     if legal {
         let narrow = |size: usize| u32::try_from(size).unwrap_or(u32::MAX);
-        let multipliers: Vec<u32> = multipliers.iter().copied().map(narrow).collect();
-        let answer = checks::hexplane(narrow(planes.channels), planes.resolution.map(narrow), &multipliers);
+        let layout = PlaneLayout::multiscale(&PlaneAxes::ALL, planes.resolution, multipliers);
+        let answer = checks::feature_planes(narrow(planes.channels), &layout);
         check.encodable("model.hexplane.multipliers", answer);
     }
 }

@@ -14,7 +14,7 @@ mod views;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use light4gs_model::{DynamicScene, HexPlaneField};
+use light4gs_model::{DynamicScene, HexPlaneConfig, HexPlaneField};
 
 pub use views::scene_around;
 
@@ -42,13 +42,12 @@ impl ImportedScene {
     /// Sizes that a run cannot have, such as planes whose resolution is no multiple of 4.
     pub fn config(&self, base: &Config) -> Result<Config, TrainError> {
         let mut config = base.clone();
-        let planes = &self.scene.field.hexplane;
-        let arrays = planes.to_arrays();
+        let planes = HexPlaneConfig::of(&self.scene.field.hexplane).expect("what is imported has a hexplane");
         let deformation = &self.scene.field.deformation;
         config.model.sh_degree = self.scene.gaussians.sh_degree() as u8;
-        config.model.hexplane.channels = planes.feature_size() / planes.scales();
-        config.model.hexplane.resolution = arrays.resolution.map(|side| side as usize);
-        config.model.hexplane.multipliers = arrays.multipliers.iter().map(|multiplier| *multiplier as usize).collect();
+        config.model.hexplane.channels = planes.channels;
+        config.model.hexplane.resolution = planes.resolution;
+        config.model.hexplane.multipliers = planes.multipliers;
         let network = &mut config.model.deformation;
         network.width = deformation.trunk[0].weight.dims()[1];
         network.depth = deformation.trunk.len();

@@ -12,11 +12,12 @@ use std::path::{Path, PathBuf};
 use burn::module::{Module, Param};
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_codec::plane_layout::{PLANE_AXES, PLANES_PER_SCALE, TIME_AXIS};
+use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, PlaneShape, TIME_AXIS};
 use light4gs_codec::{CoordinateMapping, GaussianArrays};
 use light4gs_data::{DataError, PlainTensor, read_pytorch};
 use light4gs_model::{
-    Deformation, DeformationHead, DynamicScene, Gaussians, HexPlane, HexPlaneField, Pca, SceneCoordinates,
+    Deformation, DeformationHead, DynamicScene, FeaturePlanes, Gaussians, HexPlaneField, Pca, PlaneTensors,
+    SceneCoordinates,
 };
 
 use super::ImportedScene;
@@ -161,12 +162,13 @@ fn scene(
     let (mut planes, channels) = planes(weights)?;
     let (pca, mut mapping) = coordinates(weights)?;
     crop_and_pad_times(&mut planes, &mut mapping);
-    let tensors = planes.into_iter().map(|PlainTensor { shape, values }| {
-        let shape: [usize; 3] = [shape[0], shape[1], shape[2]];
-        Tensor::from_data(TensorData::new(values, shape), weights.device)
-    });
-    let hexplane = HexPlane::from_planes(tensors.collect());
-    debug_assert_eq!(hexplane.feature_size(), channels * hexplane.scales());
+    let layout = PlaneLayout::new(planes.iter().map(|plane| plane.shape).collect());
+    let layout = layout.expect("planes are read in the order of a layout");
+    let tensors =
+        planes.into_iter().map(|StoredPlane { shape: PlaneShape { size: [height, width], .. }, values, .. }| {
+            Tensor::from_data(TensorData::new(values, [channels, height, width]), weights.device)
+        });
+    let hexplane = FeaturePlanes::from_tensors(PlaneTensors::new(layout, tensors.collect()));
     let deformation = deformation(weights, hexplane.feature_size(), settings)?;
     let device = weights.device;
     Ok(DynamicScene {
@@ -178,23 +180,31 @@ fn scene(
     .no_grad())
 }
 
-/// The planes `[C, H, W]`, scale-major, and their channels.
-fn planes(weights: &mut Weights) -> Result<(Vec<PlainTensor>, usize), TrainError> {
+/// A plane of a checkpoint, `[C, H, W]`.
+struct StoredPlane {
+    shape: PlaneShape,
+    channels: usize,
+    values: Vec<f32>,
+}
+
+/// The planes of all scales, a hexplane, and their channels.
+fn planes(weights: &mut Weights) -> Result<(Vec<StoredPlane>, usize), TrainError> {
     let name = |scale: usize, plane: usize| format!("deformation_net.grid.grids.{scale}.{plane}");
-    let mut planes: Vec<PlainTensor> = Vec::new();
+    let mut planes: Vec<StoredPlane> = Vec::new();
     let mut base: Option<[usize; 5]> = None;
     for scale in 0.. {
         if scale > 0 && !weights.has(&name(scale, 0)) {
             break;
         }
         let mut sides = [None; 4];
-        for (plane, [across, down]) in PLANE_AXES.into_iter().enumerate() {
-            let key = name(scale, plane);
+        for axes in PlaneAxes::ALL {
+            let key = name(scale, axes as usize);
             let tensor = weights.take(&key)?;
             let [1, channels, height, width] = tensor.shape[..] else {
                 return Err(weights.wrong(&key, format!("shape {:?}, expected [1, C, H, W]", tensor.shape)));
             };
             let known = *base.get_or_insert([channels, 0, 0, 0, 0]);
+            let [across, down] = axes.axes();
             let agree = [(across, width), (down, height)]
                 .into_iter()
                 .all(|(axis, side)| side > 1 && *sides[axis].get_or_insert(side) == side);
@@ -202,7 +212,8 @@ fn planes(weights: &mut Weights) -> Result<(Vec<PlainTensor>, usize), TrainError
                 let problem = format!("shape {:?} does not fit the planes before it", tensor.shape);
                 return Err(weights.wrong(&key, problem));
             }
-            planes.push(PlainTensor { shape: vec![channels, height, width], values: tensor.values });
+            let shape = PlaneShape { scale, axes, size: [height, width] };
+            planes.push(StoredPlane { shape, channels, values: tensor.values });
         }
         let sides = sides.map(|side| side.unwrap_or(0));
         let base = base.get_or_insert([0; 5]);
@@ -264,24 +275,23 @@ fn coordinates(weights: &mut Weights) -> Result<(Pca, CoordinateMapping), TrainE
 
 /// Leaves out rows of the space-time planes before the first time, and repeats the last one up to a multiple of 4. The
 /// mapping of time follows, so that what is looked up stays the same.
-fn crop_and_pad_times(planes: &mut [PlainTensor], mapping: &mut CoordinateMapping) {
-    let is_time = |plane: usize| PLANE_AXES[plane % PLANES_PER_SCALE][1] == TIME_AXIS;
-    let times = planes[PLANE_AXES.iter().position(|axes| axes[1] == TIME_AXIS).unwrap_or(2)].shape[1];
+fn crop_and_pad_times(planes: &mut [StoredPlane], mapping: &mut CoordinateMapping) {
+    let Some(times) = planes.iter().find_map(|plane| plane.shape.cells_along(TIME_AXIS)) else { return };
     let last = (times - 1) as f32;
     let (slope, first) = (mapping.time_scale * last, mapping.time_offset * last);
     let skipped = (first.max(0.0) as usize).min(times - 2);
     let padded = (times - skipped).next_multiple_of(TIME_MULTIPLE);
     mapping.time_scale = slope / (padded - 1) as f32;
     mapping.time_offset = (first - skipped as f32) / (padded - 1) as f32;
-    for (_, plane) in planes.iter_mut().enumerate().filter(|(index, _)| is_time(*index)) {
-        let [channels, _, width] = plane.shape[..] else { continue };
+    for plane in planes.iter_mut().filter(|plane| plane.shape.axes.is_space_time()) {
+        let [_, width] = plane.shape.size;
         let row = |channel: usize, row: usize| {
             let begin = (channel * times + (row + skipped).min(times - 1)) * width;
             &plane.values[begin..begin + width]
         };
-        let values = (0..channels).flat_map(|channel| (0..padded).flat_map(move |k| row(channel, k).to_vec()));
-        let values = values.collect();
-        *plane = PlainTensor { shape: vec![channels, padded, width], values };
+        let values = (0..plane.channels).flat_map(|channel| (0..padded).flat_map(move |k| row(channel, k).to_vec()));
+        plane.values = values.collect();
+        plane.shape.size = [padded, width];
     }
 }
 

@@ -11,7 +11,7 @@ pub enum ParameterGroup {
     /// What every Gaussian has; each attribute has a rate of its own.
     Attribute,
     /// Feature planes of the deformation field.
-    Grid,
+    Planes,
     /// Everything else of the deformation field.
     Deformation,
     /// The entropy model of the planes.
@@ -27,7 +27,7 @@ pub enum ParameterGroup {
 const GROUPS: [(&str, &str, ParameterGroup); 6] = [
     ("gaussians", "", ParameterGroup::Attribute),
     // The planes of any field: `field.hexplane.planes.3` for the built-in one.
-    ("field", "planes", ParameterGroup::Grid),
+    ("field", "planes", ParameterGroup::Planes),
     ("field", "", ParameterGroup::Deformation),
     ("compression.planes.context", "", ParameterGroup::Context),
     ("compression.planes.quantization", "", ParameterGroup::Steps),
@@ -88,13 +88,13 @@ mod tests {
         for attribute in scene.gaussians.attributes() {
             assert!(groups.0.iter().any(|(path, _)| *path == attribute.path()), "{attribute:?}");
         }
-        let grid = groups.0.iter().filter(|(_, group)| *group == Some(ParameterGroup::Grid)).count();
-        assert_eq!(grid, 12);
+        let planes = groups.0.iter().filter(|(_, group)| *group == Some(ParameterGroup::Planes)).count();
+        assert_eq!(planes, 12);
         for (path, _) in models.0 {
             let path = format!("{COMPRESSION}.{path}");
             assert!(ParameterGroup::of(&path).is_some(), "{path}");
         }
-        assert_eq!(ParameterGroup::of("field.motion.planes.0"), Some(ParameterGroup::Grid));
+        assert_eq!(ParameterGroup::of("field.motion.planes.0"), Some(ParameterGroup::Planes));
         assert_eq!(ParameterGroup::of("fields"), None);
     }
 }

@@ -66,8 +66,8 @@ fn coding_record() -> CodingRecord {
         profile: crate::config::FileProfile::Compact,
         fit_seconds: None,
         encode_seconds: 0.5,
-        estimated_bits: BitEstimate { hexplanes: 530.0, sh: 1010.0 },
-        coded_bits: BitEstimate { hexplanes: 536.0, sh: 1000.0 },
+        estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0 },
+        coded_bits: BitEstimate { planes: 536.0, sh: 1000.0 },
         planes: vec![plane],
     }
 }
@@ -75,7 +75,7 @@ fn coding_record() -> CodingRecord {
 #[test]
 fn expected_bits_stand_beside_real_ones() {
     let html = page(Path::new("report.html"), &sample()).unwrap();
-    assert!(html.contains("530") && html.contains("536") && html.contains("-1.12"), "bits of the hexplanes");
+    assert!(html.contains("530") && html.contains("536") && html.contains("-1.12"), "bits of the planes");
     assert!(html.contains("Bits of plane 0.xy"), "the bit map");
 }
 

@@ -22,8 +22,8 @@ choice! {
         GaussianBytes = "gaussian_bytes",
         /// Size of the spherical harmonics beyond degree 0, with their model.
         ShBytes = "sh_bytes",
-        /// Size of what the hexplanes take: values and context model.
-        HexplaneBytes = "hexplane_bytes",
+        /// Size of what the feature planes take: values and context model.
+        PlaneBytes = "plane_bytes",
         /// Size of the context model alone.
         ContextBytes = "context_bytes",
         /// Size of the motion network.
@@ -64,7 +64,7 @@ impl Measure {
         Self::Bytes,
         Self::GaussianBytes,
         Self::ShBytes,
-        Self::HexplaneBytes,
+        Self::PlaneBytes,
         Self::ContextBytes,
         Self::MotionBytes,
         Self::Gaussians,
@@ -90,7 +90,7 @@ impl Measure {
             Self::Bytes => "file, bytes",
             Self::GaussianBytes => "Gaussians, bytes",
             Self::ShBytes => "SH, bytes",
-            Self::HexplaneBytes => "hexplanes, bytes",
+            Self::PlaneBytes => "feature planes, bytes",
             Self::ContextBytes => "context model, bytes",
             Self::MotionBytes => "network, bytes",
             Self::Gaussians => "Gaussians",
@@ -116,7 +116,7 @@ impl Measure {
     /// Digits after the point.
     pub fn digits(self) -> usize {
         match self {
-            Self::Bytes | Self::GaussianBytes | Self::ShBytes | Self::HexplaneBytes | Self::ContextBytes => 0,
+            Self::Bytes | Self::GaussianBytes | Self::ShBytes | Self::PlaneBytes | Self::ContextBytes => 0,
             Self::MotionBytes | Self::Gaussians => 0,
             Self::Minutes | Self::FitSeconds | Self::Fps => 1,
             Self::Psnr | Self::ValPsnr | Self::EncodeSeconds | Self::DecodeSeconds | Self::RenderMilliseconds => 2,
@@ -156,7 +156,7 @@ impl Measure {
             Self::Bytes => Some(run.bytes as f64),
             Self::GaussianBytes => section(&["gaussians", "sh"]),
             Self::ShBytes => section(&["sh"]),
-            Self::HexplaneBytes => section(&["hexplanes", "context_model"]),
+            Self::PlaneBytes => section(&["feature_planes", "context_model"]),
             Self::ContextBytes => section(&["context_model"]),
             Self::MotionBytes => section(&["motion"]),
             Self::Gaussians => Some(run.gaussians as f64),

@@ -14,7 +14,7 @@ use crate::stage::Stage;
 pub(super) struct GroupRates {
     /// By the path of their parameters.
     attributes: BTreeMap<String, f64>,
-    grid: f64,
+    planes: f64,
     deformation: LearningRate,
     context: f64,
     sh_model: f64,
@@ -51,7 +51,7 @@ impl GroupRates {
             |first: f64, last: f64| ExponentialDecay::new(first, last, train.fine_iterations).at(iteration as f64);
         Self {
             attributes: attributes.filter_map(attribute).collect(),
-            grid: decay(rates.grid_init, rates.grid_final),
+            planes: decay(rates.planes_init, rates.planes_final),
             deformation: LearningRate {
                 initial: rates.deformation_init * scale,
                 last: rates.deformation_final * scale,
@@ -81,7 +81,7 @@ impl GroupRates {
     pub(super) fn of(&self, group: ParameterGroup, path: &str) -> Option<f64> {
         match group {
             ParameterGroup::Attribute => self.attributes.get(path).copied(),
-            ParameterGroup::Grid => Some(self.grid),
+            ParameterGroup::Planes => Some(self.planes),
             ParameterGroup::Deformation => Some(self.at(self.deformation)),
             ParameterGroup::Context => Some(self.context),
             ParameterGroup::ShModel => Some(self.sh_model),

@@ -162,15 +162,12 @@ mod tests {
         apart.add_module(&compression, &mut term.backward());
 
         let steps = quantization.steps();
-        let pairs =
-            scene.planes().unwrap().tensors().into_iter().zip(noisy.scene.planes().unwrap().tensors()).enumerate();
-        let planes: Vec<_> = pairs
-            .map(|(i, (plane, noisy))| {
-                let step = steps.broadcast(i);
-                let noise = (noisy.inner() - plane.clone().inner()) / step.clone().inner();
-                plane + Tensor::from_inner(noise) * step
-            })
-            .collect();
+        let noisy = noisy.scene.planes().unwrap().tensors();
+        let planes = scene.planes().unwrap().tensors().map(|i, plane| {
+            let step = steps.broadcast(i);
+            let noise = (noisy[i].clone().inner() - plane.clone().inner()) / step.clone().inner();
+            plane + Tensor::from_inner(noise) * step
+        });
         let mut together = GradientSums::default();
         together.add_module(&compression, &mut loss(&planes, &|i| steps.of(i)).backward());
 

@@ -2,7 +2,7 @@
 
 use burn::tensor::Tensor;
 use light4gs_data::Frame;
-use light4gs_model::{DeformationField, HexPlane};
+use light4gs_model::DeformationField;
 
 use super::Trainer;
 use super::learning_rates::GroupRates;
@@ -77,8 +77,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if let Some(compression) = &mut self.state.compression {
             self.state.adam.step_module(COMPRESSION, compression, &mut gradients, rate);
             if noisy.is_some_and(|noisy| noisy.learns_steps()) {
-                let scales = self.state.scene.planes().map_or(0, HexPlane::scales);
-                compression.bound_steps(&self.config, scales);
+                compression.bound_steps(&self.config);
             }
         }
         self.profile.lap("Adam");

@@ -6,13 +6,13 @@
 
 use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::network::Operation;
-use light4gs_codec::plane_layout::coding_order;
+use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 use light4gs_codec::{Network, PlaneSource};
 use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
     CenteredPlanes, ContextModel, ContextModelConfig, DescribedCondition, DescribedPrior, InterPlane, InterScale,
-    KernelShape, Latent, Passes, PlaneEntropy, PlaneSteps, Prior, PriorPart, anchor_mask, checkerboard_kernel,
-    upsample,
+    KernelShape, Latent, Passes, PlaneEntropy, PlaneSteps, PlaneTensors, Prior, PriorPart, anchor_mask,
+    checkerboard_kernel, upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::named::{compare_gradients, load};
@@ -64,8 +64,9 @@ fn file_key(plane: usize) -> String {
     format!("scale{}.{}", plane / 6, plane % 6)
 }
 
-fn planes_of(golden: &Golden, device: &Device) -> Vec<Tensor<3>> {
-    (0..6 * scales_of(golden)).map(|i| golden.tensor(&format!("plane.{}", file_key(i)), device)).collect()
+fn planes_of(golden: &Golden, device: &Device) -> PlaneTensors {
+    let planes = (0..6 * scales_of(golden)).map(|i| golden.tensor(&format!("plane.{}", file_key(i)), device));
+    PlaneTensors::at_scales(&PlaneAxes::ALL, planes.collect())
 }
 
 fn steps_of(golden: &Golden, device: &Device) -> PlaneSteps {
@@ -89,8 +90,8 @@ impl ReferenceInterPlane<'_> {
 
     fn context(planes: &CenteredPlanes, plane: usize) -> Option<Tensor<3>> {
         let [_, height, width] = planes.planes[plane].dims();
-        let maps = InterPlane::sources(plane % 6)?
-            .map(|position| Self::spread(planes.in_same_scale(plane, position), [height, width]));
+        let sources = planes.layout().over_time(plane)?;
+        let maps = sources.map(|source| Self::spread(planes.planes[source].clone(), [height, width]));
         let [first, second] = maps;
         Some((first + second) / 2.0)
     }
@@ -103,8 +104,8 @@ impl PriorPart for ReferenceInterPlane<'_> {
     }
 
     /// Where moments are stretched over the rows.
-    fn describe(&self, plane: usize) -> Option<DescribedPrior> {
-        let sources = InterPlane::sources(plane % 6)?.map(|position| PlaneSource::SameScale(position as u8));
+    fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
+        let sources = layout.over_time(plane)?.map(|source| PlaneSource::SameScale(layout.planes()[source].axes));
         let mut layer = self.0.conv.to_layer();
         layer.weight.iter_mut().for_each(|weight| *weight *= 0.5);
         let (mut network, planes) = Network::new([layer.inputs; 2]);
@@ -223,7 +224,7 @@ fn pieces() {
 
         let planes = model.centered(&planes_of(&golden, &device), &steps_of(&golden, &device));
         for plane in [0, 1, 3] {
-            let [a, b] = InterPlane::sources(plane).unwrap().map(|source| planes.in_same_scale(plane, source));
+            let [a, b] = planes.layout().over_time(plane).unwrap().map(|source| planes.planes[source].clone());
             check(&format!("interplane_paper.{plane}"), &InterPlane::context(a, b));
             let reference = ReferenceInterPlane::context(&planes, plane).unwrap();
             check(&format!("interplane_ref.{plane}"), &reference);
@@ -270,7 +271,7 @@ fn identity() {
     for (name, device) in devices() {
         let device = device.autodiff();
         let model = model_of(&golden, &device);
-        let leaves: Vec<_> = planes_of(&golden, &device).into_iter().map(Tensor::require_grad).collect();
+        let leaves = planes_of(&golden, &device).map(|_, plane| plane.require_grad());
         let planes = model.centered(&leaves, &steps_of(&golden, &device));
         let parts = parts(&model);
         let mut total = Tensor::<1>::zeros([1], &device);
@@ -335,7 +336,7 @@ fn stream() {
         let model = model_of(&golden, &device);
         let planes = planes_of(&golden, &device);
         let quantized = model.quantize_with(&parts(&model), &planes, &steps_of(&golden, &device));
-        for plane in coding_order(planes.len()) {
+        for plane in planes.layout().coding_order() {
             let decoded = values_of(&quantized[plane].decoded);
             let key = format!("stream.decoded.{}", file_key(plane));
             assert_close(&format!("{name} {key}"), &decoded, &golden.values(&key), 1e-4);

@@ -4,7 +4,7 @@ use burn::tensor::{Device, Distribution, Gradients, Tensor};
 use light4gs_model::gaussian_conditional::{LIKELIHOOD_BOUND, NormalParameters, bits, gaussian_likelihood};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::{
-    EntropyBottleneck, EntropyBottleneckConfig, FactorizedDensity, Latent, PlainDensity, ShBottleneck,
+    EntropyBottleneck, EntropyBottleneckConfig, FactorizedDensity, Latent, PlainDensity, PlaneTensors, ShBottleneck,
     ShBottleneckConfig, ShEntropy, ShKnown, ShTables,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
@@ -219,7 +219,7 @@ fn nothing_known(values: &Tensor<3>) -> ShKnown {
     ShKnown {
         sh_dc: Tensor::zeros([count, 1, 3], &device),
         positions: Tensor::zeros([count, 3], &device),
-        planes: Vec::new(),
+        planes: PlaneTensors::default(),
     }
 }
 

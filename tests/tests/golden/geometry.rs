@@ -3,9 +3,10 @@
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, s};
+use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_model::{
-    Deformation, DeformationConfig, DeformationHead, DynamicScene, GaussianTensors, Gaussians, HexPlane, HexPlaneField,
-    Pca, SceneCoordinates, contract,
+    Deformation, DeformationConfig, DeformationHead, DynamicScene, FeaturePlanes, GaussianTensors, Gaussians,
+    HexPlaneField, Pca, PlaneTensors, SceneCoordinates, contract,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 
@@ -73,10 +74,11 @@ fn scales_of(golden: &Golden, prefix: &str) -> usize {
     (0..).find(|s| !golden.has(&format!("{prefix}scale{s}.plane0"))).unwrap()
 }
 
-fn hexplane_of(golden: &Golden, prefix: &str, device: &Device) -> HexPlane {
+fn hexplane_of(golden: &Golden, prefix: &str, device: &Device) -> FeaturePlanes {
     let scales = scales_of(golden, prefix);
     let names = (0..scales).flat_map(|s| (0..6).map(move |p| format!("{prefix}scale{s}.plane{p}")));
-    HexPlane::from_planes(names.map(|name| golden.tensor::<3>(&name, device)).collect())
+    let planes = names.map(|name| golden.tensor::<3>(&name, device)).collect();
+    FeaturePlanes::from_tensors(PlaneTensors::at_scales(&PlaneAxes::ALL, planes))
 }
 
 #[test]

@@ -2,8 +2,9 @@
 
 use burn::module::Param;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
+use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_data::PointCloud;
-use light4gs_model::{GaussianTensors, Gaussians, GaussiansConfig, HexPlane, regularizer};
+use light4gs_model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, PlaneTensors, regularizer};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_train::density::clone_and_split::{
     DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors,
@@ -95,7 +96,8 @@ fn plane_regularizers() {
     for (name, device) in devices() {
         let device = device.autodiff();
         let keys = (0..scales).flat_map(|s| (0..6).map(move |p| format!("reg.plane.scale{s}.{p}")));
-        let hexplane = HexPlane::from_planes(keys.map(|key| golden.tensor::<3>(&key, &device)).collect());
+        let planes = keys.map(|key| golden.tensor::<3>(&key, &device)).collect();
+        let hexplane = FeaturePlanes::from_tensors(PlaneTensors::at_scales(&PlaneAxes::ALL, planes));
         let check = |term: &str, loss: Tensor<1>| {
             let value = golden.values(&format!("reg.{term}.value"));
             assert_close(&format!("{name} {term}.value"), &values_of(&loss), &value, 1e-5);

@@ -5,9 +5,11 @@ use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::{PlaneCoding, Profile, SceneMeta, decode, plane_distributions};
 use light4gs_data::PointCloud;
 use light4gs_model::{
-    ContextModel, ContextModelConfig, ContextParts, DynamicScene, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps,
+    ContextModel, ContextModelConfig, ContextParts, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps,
+    PlaneTensors,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
+use light4gs_tests::planes::plane_sets;
 use light4gs_train::compression::{Compression, ConfiguredModels, encode, freeze_planes};
 use light4gs_train::config::Config;
 use rand::{Rng, SeedableRng};
@@ -37,7 +39,7 @@ fn compositions() -> Vec<ContextModelConfig> {
 }
 
 /// Weights far from their start, so that every path through the networks counts.
-fn shaken(mut model: ContextModel, planes: &[Tensor<3>], steps: &PlaneSteps) -> ContextModel {
+fn shaken(mut model: ContextModel, planes: &PlaneTensors, steps: &PlaneSteps) -> ContextModel {
     model.start_from(planes, steps);
     let [.., last] = &mut model.entropy_parameters.layers;
     let weight = last.weight.val();
@@ -52,30 +54,37 @@ fn shaken(mut model: ContextModel, planes: &[Tensor<3>], steps: &PlaneSteps) -> 
 fn modules_and_exact_executor_agree() {
     for (name, device) in devices() {
         device.seed(3);
-        let hexplane = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([8, 12, 4, 8]).init(&device);
-        let planes: Vec<Tensor<3>> = hexplane
-            .tensors()
-            .into_iter()
-            .map(|plane| plane.clone() + Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.3), &device))
-            .collect();
-        let steps = PlaneSteps::fixed(&[0.1; 12], &device);
-        for (which, config) in compositions().into_iter().enumerate() {
+        let sets = plane_sets();
+        // The hexplane with each composition, every other set of planes with the whole model.
+        let cases = sets.iter().enumerate().flat_map(|(place, set)| {
+            let count = if place == 0 { usize::MAX } else { 1 };
+            compositions().into_iter().enumerate().take(count).map(move |config| (set, config))
+        });
+        for ((set, layout), (which, config)) in cases {
+            let planes = FeaturePlanes::init(layout, CHANNELS, &device)
+                .tensors()
+                .map(|_, plane| plane.clone() + Tensor::random(plane.dims(), Distribution::Normal(0.0, 0.3), &device));
+            let steps = PlaneSteps::fixed(&vec![0.1; layout.len()], &device);
             let model = shaken(config.init(&device), &planes, &steps);
-            let decoded: Vec<Tensor<3>> =
-                model.quantize(&planes, &steps).into_iter().map(|plane| plane.decoded).collect();
+            let quantized = model.quantize(&planes, &steps);
+            let decoded = planes.map(|plane, _| quantized[plane].decoded.clone());
             let latent_symbols = model
                 .latent_symbols(&decoded, &steps)
                 .into_iter()
                 .map(|plane| plane.map_or_else(Vec::new, |plane| values_of(&plane).iter().map(|v| *v as i32).collect()))
                 .collect();
-            let coding = PlaneCoding { model: model.to_arrays().unwrap(), steps: steps.to_groups(), latent_symbols };
-            let arrays = light4gs_model::HexPlane::from_planes(decoded.clone()).to_arrays();
-            let all: Vec<usize> = (0..12).collect();
+            let coding = PlaneCoding {
+                model: model.to_arrays(planes.layout()).unwrap(),
+                steps: steps.to_groups(planes.layout()),
+                latent_symbols,
+            };
+            let arrays = FeaturePlanes::from_tensors(decoded.clone()).to_arrays();
+            let all: Vec<usize> = (0..layout.len()).collect();
             for (plane, gaussians) in
                 model.plane_parameters(&decoded, &steps, &all, Latent::Rounded).into_iter().enumerate()
             {
                 let exact = plane_distributions(&arrays, &coding, plane).unwrap();
-                let what = |part: &str| format!("{name}, composition {which}, plane {plane}: {part}");
+                let what = |part: &str| format!("{name}, {set}, composition {which}, plane {plane}: {part}");
                 assert_close_relative(&what("means"), &values_of(&gaussians.means), &exact.means, 1e-4);
                 assert_close_relative(&what("scales"), &values_of(&gaussians.scales), &exact.scales, 1e-4);
             }
@@ -164,7 +173,7 @@ fn every_configuration_makes_a_file_that_decodes() {
         assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
         let coded = encoded.coded;
         let bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
-        let (expected, found) = (coded.estimate.hexplanes, 8.0 * bytes as f64);
+        let (expected, found) = (coded.estimate.planes, 8.0 * bytes as f64);
         // What the sub-streams of a plane spend on whole words at their ends, and quantized weights.
         let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
@@ -199,7 +208,7 @@ fn frozen_planes_are_those_of_the_file() {
         let file =
             encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
                 .unwrap();
-        assert_eq!(file.decoded.hexplane, frozen, "{name}");
+        assert_eq!(file.decoded.feature_planes, frozen, "{name}");
     }
 }
 

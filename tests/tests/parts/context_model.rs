@@ -4,22 +4,28 @@
 use burn::module::Param;
 use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::{Device, Distribution, Tensor};
-use light4gs_codec::plane_layout::coding_order;
+use light4gs_codec::plane_layout::{PlaneLayout, PlaneShape};
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 use light4gs_model::{
     AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlaneConfig, Latent, PlaneEntropy,
-    PlaneSteps,
+    PlaneSteps, PlaneTensors,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
+use light4gs_tests::planes::plane_sets;
 
 const CHANNELS: usize = 4;
 const PLANES: usize = 12;
 
 /// Random planes of two scales; sizes differ between the axes.
-fn random_planes(device: &Device) -> Vec<Tensor<3>> {
+fn random_planes(device: &Device) -> PlaneTensors {
     let config = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([8, 12, 4, 8]);
-    let shapes = (0..PLANES).map(|i| config.plane_shape(i / 6, i % 6));
-    shapes.map(|shape| Tensor::random(shape, Distribution::Normal(0.5, 0.4), device)).collect()
+    random_values(&config.layout(), device)
+}
+
+fn random_values(layout: &PlaneLayout, device: &Device) -> PlaneTensors {
+    let shapes = layout.planes().iter().map(|PlaneShape { size: [height, width], .. }| [CHANNELS, *height, *width]);
+    let planes = shapes.map(|shape| Tensor::random(shape, Distribution::Normal(0.5, 0.4), device));
+    PlaneTensors::new(layout.clone(), planes.collect())
 }
 
 /// The whole model, and without one or more of its parts.
@@ -42,17 +48,25 @@ fn compositions() -> Vec<(&'static str, ContextModelConfig)> {
     ]
 }
 
-fn steps(device: &Device) -> PlaneSteps {
-    PlaneSteps::fixed(&[0.1; PLANES], device)
+fn steps(planes: &PlaneTensors) -> PlaneSteps {
+    PlaneSteps::fixed(&vec![0.1; planes.len()], &planes[0].device())
 }
 
 fn all_planes() -> Vec<usize> {
     (0..PLANES).collect()
 }
 
+/// The hexplane with each composition, every other set of planes with the whole model.
+fn cases() -> impl Iterator<Item = (String, PlaneLayout, ContextModelConfig)> {
+    plane_sets().into_iter().enumerate().flat_map(|(place, (set, layout))| {
+        let compositions = compositions().into_iter().take(if place == 0 { usize::MAX } else { 1 });
+        compositions.map(move |(name, config)| (format!("{set}, {name}"), layout.clone(), config))
+    })
+}
+
 /// Means and scales of a plane, side by side.
-fn parameters(model: &ContextModel, planes: &[Tensor<3>], plane: usize) -> Vec<f32> {
-    let found = model.plane_parameters(planes, &steps(&planes[0].device()), &[plane], Latent::Rounded);
+fn parameters(model: &ContextModel, planes: &PlaneTensors, plane: usize) -> Vec<f32> {
+    let found = model.plane_parameters(planes, &steps(planes), &[plane], Latent::Rounded);
     [values_of(&found[0].means), values_of(&found[0].scales)].concat()
 }
 
@@ -61,11 +75,11 @@ fn parameters(model: &ContextModel, planes: &[Tensor<3>], plane: usize) -> Vec<f
 #[test]
 fn parameters_depend_only_on_what_is_decoded() {
     let device = Device::flex();
-    let planes = random_planes(&device);
-    let order = coding_order(PLANES);
-    for (name, config) in compositions() {
+    for (name, layout, config) in cases() {
+        let planes = random_values(&layout, &device);
+        let order = layout.coding_order();
         let model = config.init(&device);
-        let rates = model.rate(&planes, &steps(&device), &all_planes(), Latent::Rounded);
+        let rates = model.rate(&planes, &steps(&planes), &(0..layout.len()).collect::<Vec<_>>(), Latent::Rounded);
         for (place, plane) in order.iter().copied().enumerate() {
             if rates[plane].hyper_bits.is_some() {
                 continue;
@@ -79,7 +93,7 @@ fn parameters_depend_only_on_what_is_decoded() {
                     .map(|i| if *later != plane || (i / width % height + i % width) % 2 == 0 { 1.0 } else { 0.0 })
                     .collect();
                 let mask = Tensor::<1>::from_floats(mask.as_slice(), &device).reshape([channels, height, width]);
-                changed[*later] = changed[*later].clone() + mask * 0.7;
+                changed.set(*later, changed[*later].clone() + mask * 0.7);
                 let after = parameters(&model, &changed, plane);
                 assert_eq!(before, after, "{name}: plane {plane} sees plane {later}, which is coded later");
             }
@@ -91,15 +105,15 @@ fn parameters_depend_only_on_what_is_decoded() {
 #[test]
 fn rate_of_the_quantized_planes() {
     for (name, device) in devices() {
-        let planes = random_planes(&device);
-        let steps = steps(&device);
-        for (composition, config) in compositions() {
+        for (composition, layout, config) in cases() {
+            let planes = random_values(&layout, &device);
+            let (steps, all) = (steps(&planes), (0..planes.len()).collect::<Vec<_>>());
             let model = config.init(&device);
             let quantized = model.quantize(&planes, &steps);
-            let decoded: Vec<_> = quantized.iter().map(|plane| plane.decoded.clone()).collect();
-            let rates = model.rate(&decoded, &steps, &all_planes(), Latent::Rounded);
-            let maps = model.bit_map(&decoded, &steps, &all_planes(), Latent::Rounded);
-            for plane in 0..PLANES {
+            let decoded = planes.map(|plane, _| quantized[plane].decoded.clone());
+            let rates = model.rate(&decoded, &steps, &all, Latent::Rounded);
+            let maps = model.bit_map(&decoded, &steps, &all, Latent::Rounded);
+            for plane in all {
                 let what = format!("{name} {composition} plane {plane}");
                 let error = values_of(&(decoded[plane].clone() - planes[plane].clone()).abs().max())[0];
                 assert!(error <= 0.1 / 2.0 + 1e-5, "{what}: decoded {error} away");
@@ -117,12 +131,13 @@ fn rate_of_the_quantized_planes() {
 #[test]
 fn latent_symbols_are_integers_where_there_is_a_hyperprior() {
     let device = Device::flex();
-    let planes = random_planes(&device);
-    for (name, config) in compositions() {
+    for (name, layout, config) in cases() {
+        let planes = random_values(&layout, &device);
+        let (steps, all) = (steps(&planes), (0..planes.len()).collect::<Vec<_>>());
         let model = config.init(&device);
-        let rates = model.rate(&planes, &steps(&device), &all_planes(), Latent::Rounded);
-        let symbols = model.latent_symbols(&planes, &steps(&device));
-        for plane in 0..PLANES {
+        let rates = model.rate(&planes, &steps, &all, Latent::Rounded);
+        let symbols = model.latent_symbols(&planes, &steps);
+        for plane in all {
             assert_eq!(symbols[plane].is_some(), rates[plane].hyper_bits.is_some(), "{name} plane {plane}");
             let Some(symbols) = &symbols[plane] else { continue };
             let [_, height, width] = planes[plane].dims();
@@ -181,7 +196,7 @@ fn learned_steps_have_a_gradient() {
     for (name, device) in devices() {
         let device = device.autodiff();
         let planes = random_planes(&device);
-        let quantization = AdaptiveQuantizationConfig::new(2).with_per_scale(true).init(&device);
+        let quantization = AdaptiveQuantizationConfig::new().with_per_scale(true).init(planes.layout(), &device);
         let mut model = ContextModelConfig::compact(CHANNELS).init(&device);
         model.start_from(&planes, &quantization.steps());
         let steps = quantization.steps();
@@ -205,8 +220,9 @@ fn learned_steps_have_a_gradient() {
 fn steps_no_finer_than_they_began() {
     for (name, device) in devices() {
         let device = device.autodiff();
-        let config = AdaptiveQuantizationConfig::new(2).with_space_only(0.05).with_space_time(0.2).with_per_scale(true);
-        let mut quantization = config.init(&device);
+        let layout = HexPlaneConfig::new().layout();
+        let config = AdaptiveQuantizationConfig::new().with_space_only(0.05).with_space_time(0.2).with_per_scale(true);
+        let mut quantization = config.init(&layout, &device);
         let began = values_of(&quantization.log_steps.val());
         let learned = Tensor::from_floats([0.04f32, 0.3, 0.06, 0.1], &device).log().require_grad();
         quantization.log_steps = Param::initialized(quantization.log_steps.id, learned.clone());
@@ -224,9 +240,9 @@ fn steps_no_finer_than_they_began() {
 fn training_lowers_the_rate() {
     let device = Device::flex().autodiff();
     let config = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([16, 16, 16, 8]);
-    let planes: Vec<_> = (0..PLANES)
+    let planes = (0..PLANES)
         .map(|i| {
-            let [channels, height, width] = config.plane_shape(i / 6, i % 6);
+            let ([height, width], channels) = (config.layout().planes()[i].size, CHANNELS);
             let value = |c: usize, row: usize, column: usize| {
                 let [v, u] = [(row, height), (column, width)].map(|(i, n)| i as f32 / (n - 1) as f32);
                 (4.0 * u + c as f32).sin() * (3.0 * v + (i % 6) as f32).cos()
@@ -237,6 +253,7 @@ fn training_lowers_the_rate() {
             Tensor::<1>::from_floats(values.as_slice(), &device).reshape([channels, height, width])
         })
         .collect();
+    let planes = PlaneTensors::new(config.layout(), planes);
     let steps = PlaneSteps::fixed(&[0.05; PLANES], &device);
     let mut model = ContextModelConfig::compact(CHANNELS).init(&device);
     model.start_from(&planes, &steps);

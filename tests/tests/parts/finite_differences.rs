@@ -12,10 +12,11 @@
 //!   almost never crossed, and the twin tells when one is, so the scenes are ordinary ones where everything happens.
 
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_data::Camera;
-use light4gs_model::HexPlane;
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
+use light4gs_model::{FeaturePlanes, PlaneTensors};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
 use light4gs_tests::splat_scene::{ATTRIBUTES, MEANS, Ranges, SH_DC, SplatScene, image_of, random_camera};
@@ -206,7 +207,7 @@ impl Query {
     }
 
     /// Features and leaves, with the operation.
-    fn run(&self, device: &Device) -> (Tensor<2>, Tensor<2>, HexPlane) {
+    fn run(&self, device: &Device) -> (Tensor<2>, Tensor<2>, FeaturePlanes) {
         let data = |k: usize, shape: Vec<usize>| {
             TensorData::new(self.inputs[k].iter().map(|v| *v as f32).collect::<Vec<_>>(), shape)
         };
@@ -214,7 +215,7 @@ impl Query {
             let shape = vec![self.channels, self.resolution[down], self.resolution[across]];
             Tensor::<3>::from_data(data(plane + 1, shape), device)
         });
-        let hexplane = HexPlane::from_planes(planes.collect());
+        let hexplane = FeaturePlanes::from_tensors(PlaneTensors::at_scales(&PlaneAxes::ALL, planes.collect()));
         let points = Tensor::<2>::from_data(data(0, vec![self.inputs[0].len() / 4, 4]), device).require_grad();
         (hexplane.query(points.clone()), points, hexplane)
     }

@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_data::{Frame, GaussianPly, SplitFrames};
-use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, Splatter, StillField, query_planes};
+use light4gs_model::{DeformationField, DynamicScene, HexPlaneField, PlaneTensors, Splatter, StillField};
 use light4gs_tests::golden::{Golden, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::pytorch::{StateDict, save_state_dict};
 use light4gs_tests::random::Random;
@@ -185,7 +186,7 @@ fn expected_features(state: &StateDict, points: &[[f32; 3]], time: f32, device: 
         let (shape, values) = &state[&format!("{GRID}.grids.{}.{}", index / 6, index % 6)];
         Tensor::<3>::from_data(TensorData::new(values.clone(), [shape[1], shape[2], shape[3]]), device)
     };
-    query_planes(points, (0..12).map(plane).collect())
+    PlaneTensors::at_scales(&PlaneAxes::ALL, (0..12).map(plane).collect()).query(points)
 }
 
 #[test]
@@ -196,7 +197,7 @@ fn the_coordinates_of_4dgaussians_are_kept_for_every_number_of_times() {
             let state = four_d_gaussians(folder.path(), &one_gaussian(), times, 3, 0.1);
             let imported = reference::read(folder.path(), &device).unwrap();
             assert_eq!(imported.background, [0.0; 3]);
-            let rows = imported.scene.field.hexplane.to_arrays().resolution[3];
+            let rows = imported.scene.field.hexplane.layout().planes()[2].size[0];
             assert!(rows.is_multiple_of(4) && rows as usize <= (times / 2 + 2).next_multiple_of(4), "{times}: {rows}");
             let mut random = Random::new(5);
             // Some outside the box, where the border counts.
@@ -410,7 +411,7 @@ fn a_ply_becomes_a_file_that_renders_alike() {
     };
     let coded = code_scene(&trained, &mut |_, _| Ok(())).unwrap();
     let decoded = light4gs_codec::decode(&coded.bytes).unwrap();
-    assert!(decoded.motion.kind.is_empty() && decoded.hexplane.planes.is_empty());
+    assert!(decoded.motion.kind.is_empty() && decoded.feature_planes.planes.is_empty());
     let again = DynamicScene::<StillField>::from_arrays(&decoded, &device.clone().inner()).unwrap();
     let frames = other_views(&scene.gaussians.to_arrays(), folder.path());
     let cost = cost_in_db(&|frame| pixels(&scene, [0.0; 3], frame), &|frame| pixels(&again, [0.0; 3], frame), &frames);

@@ -10,6 +10,7 @@ mod finite_differences;
 mod gpu_kernels;
 mod import;
 mod plane_convolutions;
+mod plane_query;
 mod poisoned_scenes;
 mod rooms;
 mod sh_entropy;

@@ -3,7 +3,7 @@
 use burn::tensor::{Device, Distribution, Tensor, s};
 use light4gs_model::{
     HexPlaneConfig, ShAutoregressiveConfig, ShBottleneckConfig, ShEntropy, ShEntropyConfig, ShEntropyModel,
-    ShHexPlaneCoupledConfig, ShKnown, ShMixtureConfig, space_feature,
+    ShHexPlaneCoupledConfig, ShKnown, ShMixtureConfig,
 };
 use light4gs_tests::golden::{assert_close, devices, values_of};
 
@@ -28,7 +28,7 @@ fn known(device: &Device) -> ShKnown {
     ShKnown {
         sh_dc: random([COUNT, 1, 3], device),
         positions: Tensor::random([COUNT, 3], Distribution::Uniform(-1.0, 1.0), device),
-        planes: hexplane.planes.iter().map(|plane| plane.val()).collect(),
+        planes: hexplane.tensors(),
     }
 }
 
@@ -98,7 +98,7 @@ fn space_feature_at_corners() {
     for (name, device) in devices() {
         let known = known(&device);
         let corners = Tensor::<2>::from_floats([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0], [1.0, -1.0, 1.0]], &device);
-        let found = values_of(&space_feature(&known.planes, corners));
+        let found = values_of(&known.planes.query_space(corners));
         let cell = |plane: &Tensor<3>, channel: usize, across: bool, down: bool| {
             let [_, height, width] = plane.dims();
             let (row, column) = (if down { height - 1 } else { 0 }, if across { width - 1 } else { 0 });

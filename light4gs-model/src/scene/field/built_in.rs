@@ -9,7 +9,8 @@ use light4gs_codec::MotionArrays;
 use super::hexplane::HexPlaneField;
 use super::still::StillField;
 use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
-use crate::scene::{Attribute, GaussianTensors, HexPlane, ModelError};
+use crate::planes::FeaturePlanes;
+use crate::scene::{Attribute, GaussianTensors, ModelError};
 
 /// Makes one field of several: whatever is asked of it is asked of the one that it is.
 macro_rules! built_in_fields {
@@ -63,7 +64,7 @@ macro_rules! built_in_fields {
                 }
             }
 
-            fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+            fn from_arrays(arrays: &MotionArrays, planes: Option<FeaturePlanes>, device: &Device) -> Result<Self, ModelError> {
                 $(if $field::KINDS.contains(&arrays.kind.as_str()) {
                     return $field::from_arrays(arrays, planes, device).map(Self::$variant);
                 })+
@@ -98,11 +99,11 @@ macro_rules! built_in_fields {
                 each!(self, field => field.resize(shapes))
             }
 
-            fn planes(&self) -> Option<&HexPlane> {
+            fn planes(&self) -> Option<&FeaturePlanes> {
                 each!(self, field => field.planes())
             }
 
-            fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+            fn planes_mut(&mut self) -> Option<&mut FeaturePlanes> {
                 each!(self, field => field.planes_mut())
             }
 

@@ -7,7 +7,8 @@ use light4gs_codec::MotionArrays;
 
 use super::deformation::{Deformation, DeformationConfig};
 use super::{DeformationField, Offsets};
-use crate::scene::{GaussianTensors, HexPlane, HexPlaneConfig, ModelError};
+use crate::planes::{FeaturePlanes, HexPlaneConfig};
+use crate::scene::{GaussianTensors, ModelError};
 
 /// Configuration of a [`HexPlaneField`].
 #[derive(Config, Debug)]
@@ -34,7 +35,7 @@ pub struct HexPlaneFieldConfig {
 #[derive(Module, Debug)]
 pub struct HexPlaneField {
     /// Features over space and time.
-    pub hexplane: HexPlane,
+    pub hexplane: FeaturePlanes,
     /// From features to changes.
     pub deformation: Deformation,
 }
@@ -68,11 +69,11 @@ impl DeformationField for HexPlaneField {
         rest.offset_by(self.offsets(points, time))
     }
 
-    fn planes(&self) -> Option<&HexPlane> {
+    fn planes(&self) -> Option<&FeaturePlanes> {
         Some(&self.hexplane)
     }
 
-    fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+    fn planes_mut(&mut self) -> Option<&mut FeaturePlanes> {
         Some(&mut self.hexplane)
     }
 
@@ -81,7 +82,7 @@ impl DeformationField for HexPlaneField {
         Ok(MotionArrays { kind: self.kind().to_owned(), network, tensors: Vec::new() })
     }
 
-    fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(arrays: &MotionArrays, planes: Option<FeaturePlanes>, device: &Device) -> Result<Self, ModelError> {
         let hexplane = planes.ok_or_else(|| ModelError::Planes("none, but a hexplane field needs some".into()))?;
         let motion = arrays.network.as_ref().ok_or_else(|| ModelError::Motion("no network".into()))?;
         let deformation = Deformation::from_motion(motion, hexplane.feature_size(), device)?;

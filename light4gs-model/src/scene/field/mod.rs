@@ -26,7 +26,7 @@ use super::arrays::ModelError;
 use super::attributes::Attribute;
 use super::coordinates::SceneCoordinates;
 use super::gaussians::{GaussianTensors, Gaussians};
-use super::hexplane::HexPlane;
+use crate::planes::FeaturePlanes;
 
 /// A field of motion over the scene and time (paper III-A).
 ///
@@ -107,12 +107,12 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
 
     /// The feature planes, if the field has some. They are what the context model codes, what carries quantization noise in
     /// training and what the regularizers smooth. A field without planes has no plane rate and no context model.
-    fn planes(&self) -> Option<&HexPlane> {
+    fn planes(&self) -> Option<&FeaturePlanes> {
         None
     }
 
     /// [`Self::planes`], to replace them.
-    fn planes_mut(&mut self) -> Option<&mut HexPlane> {
+    fn planes_mut(&mut self) -> Option<&mut FeaturePlanes> {
         None
     }
 
@@ -130,7 +130,7 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     /// # Errors
     /// A layer or plane that is missing, or of another shape than the others ask for; [`ModelError::NoStreamForm`] where this
     /// is not implemented.
-    fn from_arrays(arrays: &MotionArrays, planes: Option<HexPlane>, device: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(arrays: &MotionArrays, planes: Option<FeaturePlanes>, device: &Device) -> Result<Self, ModelError> {
         let _ = (arrays, planes, device);
         Err(ModelError::NoStreamForm { kind: Self::KINDS[0], action: "read from", method: "from_arrays" })
     }

@@ -5,7 +5,8 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
 
 use super::DeformationField;
-use crate::scene::{GaussianTensors, HexPlane, ModelError};
+use crate::planes::FeaturePlanes;
+use crate::scene::{GaussianTensors, ModelError};
 
 /// A field that moves nothing.
 ///
@@ -39,7 +40,7 @@ impl DeformationField for StillField {
         Ok(MotionArrays::default())
     }
 
-    fn from_arrays(_: &MotionArrays, _: Option<HexPlane>, _: &Device) -> Result<Self, ModelError> {
+    fn from_arrays(_: &MotionArrays, _: Option<FeaturePlanes>, _: &Device) -> Result<Self, ModelError> {
         Ok(Self)
     }
 }

@@ -1,4 +1,4 @@
-//! Of the hexplanes: how their values are distributed, and where their bits are.
+//! Of the feature planes: how their values are distributed, and where their bits are.
 
 use light4gs_data::RgbImage8;
 
@@ -34,7 +34,7 @@ pub(super) fn values(
             &folder.path(&run.run).join("scene.l4gs"),
             &light4gs_codec::Limits::large(),
         )?;
-        let values: Vec<f32> = data.hexplane.planes.into_iter().flat_map(|plane| plane.values).collect();
+        let values: Vec<f32> = data.feature_planes.planes.into_iter().flat_map(|plane| plane.values).collect();
         all.push((label.clone(), values));
     }
     let mut together: Vec<f32> = all.iter().flat_map(|(_, values)| values).copied().collect();

@@ -189,13 +189,17 @@ fn planes(parts: &mut Parts, random: &mut Random) {
     let widest = random.pick(&[4, 64, 4096]);
     let channels = random.scale(widest);
     let most = random.pick(&[1 << 4, 1 << 6, 1 << 8, 1 << 13]);
-    let side = |random: &mut Random| 4 * random.scale(most);
+    let sides: [u64; 4] = std::array::from_fn(|_| 4 * random.scale(most));
     let scales = 1 + random.below(3) as u64;
     let mut payload = varint(channels);
-    (0..4).for_each(|_| payload.extend(varint(side(random))));
     payload.extend(varint(scales));
-    (0..scales).for_each(|_| payload.extend(varint(random.scale(4))));
-    payload.extend([0, 1]);
+    for _ in 0..scales {
+        let multiplier = random.scale(4);
+        payload.push(0b11_1111);
+        sides[..3].iter().for_each(|side| payload.extend(varint(side * multiplier)));
+        payload.extend(varint(sides[3]));
+    }
+    payload.push(1);
     let step = random.pick(&[0.1f32, 0.1, 0.1, 1e-17, 1e-17, 1e-38]);
     [step, 0.1].iter().for_each(|step| payload.extend(step.to_le_bytes()));
 
@@ -231,7 +235,8 @@ fn planes(parts: &mut Parts, random: &mut Random) {
     model.extend([0, conditions as u8 + 1]);
     (0..conditions).for_each(|condition| model.extend([condition as u8 + 2, 0]));
     model.extend([conditions as u8 + 2, if anchors { 6 } else { 0 }]);
-    model.extend([0, 1, 1, 1, 1, 1].repeat(2));
+    model.extend(varint(6 * scales));
+    model.extend([0, 1, 1, 1, 1, 1].repeat(scales as usize));
     let lengths: Vec<u64> = networks.iter().flat_map(|network| network.lengths.iter().copied()).collect();
     model.extend(weights(&lengths, random));
     parts.set(6, 1, 1, model);

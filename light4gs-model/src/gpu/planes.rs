@@ -1,27 +1,30 @@
-//! The hexplane query on a GPU.
+//! The query of feature planes on a GPU.
 
 use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
+use cubecl::client::Client;
 use cubecl::server::Handle;
-use light4gs_shaders::{HEXPLANE_GATHER, HEXPLANE_PACK, HEXPLANE_QUERY, HEXPLANE_QUERY_BACKWARD};
+use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
+use light4gs_shaders::{PLANE_GATHER, PLANE_PACK, PLANE_QUERY, PLANE_QUERY_BACKWARD, Shader};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Launch;
 use super::sort::{bits_for, ranges, sort};
 use crate::gpu_error::GpuError;
-use crate::kernels::hexplane_query::{HexPlaneKernels, QueryGradients, QueryInputs};
+use crate::kernels::plane_query::{PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
 
-const PLANES: usize = 6;
+/// Planes that a scale may have.
+const MOST_PLANES: usize = PlaneAxes::ALL.len();
 
 /// Shapes of one query.
 #[derive(Clone, Debug)]
 struct Layout {
     points: usize,
     channels: usize,
-    /// `[C, H, W]` of each plane.
-    planes: [Shape; PLANES],
+    /// The planes that there are, with their shapes `[C, H, W]`.
+    planes: Vec<(PlaneAxes, Shape)>,
 }
 
 impl Layout {
@@ -31,7 +34,7 @@ impl Layout {
     }
 
     fn cells_of(&self, plane: usize) -> usize {
-        self.planes[plane][1] * self.planes[plane][2]
+        self.planes.get(plane).map_or(0, |(_, shape)| shape[1] * shape[2])
     }
 
     fn first_cell(&self, plane: usize) -> usize {
@@ -39,17 +42,27 @@ impl Layout {
     }
 
     fn cells(&self) -> usize {
-        self.first_cell(PLANES)
+        self.first_cell(self.planes.len())
     }
 
-    /// `Planes` of `shaders/include/hexplane.wgsl`.
+    /// `Planes` of `shaders/include/planes.wgsl`.
     fn uniform(&self) -> Vec<u32> {
-        let [xy, .., zt] = &self.planes;
-        let resolution = [xy[2], xy[1], zt[2], zt[1]];
-        let first_cells = (0..=PLANES).map(|plane| self.first_cell(plane));
+        let mut resolution = [1; AXIS_NAMES.len()];
+        for (axes, shape) in &self.planes {
+            let [across, down] = axes.axes();
+            (resolution[across], resolution[down]) = (shape[2], shape[1]);
+        }
+        let first_cells = (0..=MOST_PLANES).map(|plane| self.first_cell(plane));
         let sizes = [self.points, self.channels, self.quads(), 0, 0];
         resolution.into_iter().chain(first_cells).chain(sizes).map(|value| value as u32).collect()
     }
+}
+
+/// A launch of a shader that includes `shaders/include/planes.wgsl`.
+fn launch<'a>(client: &'a Client, shader: Shader, layout: &Layout) -> Launch<'a> {
+    let planes = layout.planes.iter().enumerate();
+    let pairs = planes.fold(0, |pairs, (place, (axes, _))| pairs | (*axes as u32) << (3 * place));
+    Launch::new(client, shader).constant("PLANES", layout.planes.len() as u32).constant("AXIS_PAIRS", pairs)
 }
 
 /// State between forward and backward.
@@ -60,23 +73,26 @@ pub struct GpuQuerySaved {
     packed: Handle,
 }
 
-fn forward(inputs: QueryInputs<CubeBackend>) -> Result<(CubeTensor, GpuQuerySaved), GpuError> {
+fn forward(inputs: PlaneQueryInputs<CubeBackend>, set: PlaneSet) -> Result<(CubeTensor, GpuQuerySaved), GpuError> {
     let gpu = Gpu::of(&inputs.points)?;
     let [points, planes @ ..] = inputs.into_array();
-    let shapes = planes.each_ref().map(|plane| plane.shape());
-    let layout = Layout { points: points.shape()[0], channels: shapes[0][0], planes: shapes };
+    let present = PlaneAxes::ALL.into_iter().zip(planes).zip(set.0).filter(|(_, present)| *present);
+    let planes: Vec<(PlaneAxes, CubeTensor)> = present.map(|(plane, _)| plane).collect();
+    let shapes: Vec<_> = planes.iter().map(|(axes, plane)| (*axes, plane.shape())).collect();
+    let channels = shapes.first().map_or(0, |(_, shape)| shape[0]);
+    let layout = Layout { points: points.shape()[0], channels, planes: shapes };
     let points = buffer_of(points);
     let packed = gpu.allocate("packed planes", 4 * layout.quads() * layout.cells())?;
-    for (k, plane) in planes.into_iter().enumerate() {
+    for (k, (_, plane)) in planes.into_iter().enumerate() {
         let sizes = [layout.cells_of(k), layout.channels, layout.quads(), layout.first_cell(k)];
-        Launch::new(&gpu.client, HEXPLANE_PACK)
+        Launch::new(&gpu.client, PLANE_PACK)
             .reads(&buffer_of(plane))
             .writes(&packed)
             .uniform(&sizes.map(|size| size as u32))
             .invocations(layout.cells_of(k))?;
     }
     let features = gpu.allocate("features", layout.points * layout.channels)?;
-    Launch::new(&gpu.client, HEXPLANE_QUERY)
+    launch(&gpu.client, PLANE_QUERY, &layout)
         .reads(&points)
         .reads(&packed)
         .writes(&features)
@@ -91,17 +107,17 @@ fn backward(
     saved: GpuQuerySaved,
     upstream: CubeTensor,
     with_points: bool,
-) -> Result<QueryGradients<CubeBackend>, GpuError> {
+) -> Result<PlaneQueryGradients<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
     let upstream = buffer_of(upstream);
     let GpuQuerySaved { layout, points, packed } = saved;
-    let samples = PLANES * layout.points;
+    let samples = layout.planes.len() * layout.points;
     let handed = gpu.allocate("gradients of samples", 4 * layout.quads() * samples)?;
     let cells = gpu.allocate("cells of samples", samples)?;
     let fractions = gpu.allocate("fractions of samples", 2 * samples)?;
     let of_points = Places::new(&[4 * layout.points]);
     let point_gradients = gpu.allocate("gradients of points", of_points.total)?;
-    Launch::new(&gpu.client, HEXPLANE_QUERY_BACKWARD)
+    launch(&gpu.client, PLANE_QUERY_BACKWARD, &layout)
         .reads(&points)
         .reads(&packed)
         .reads(&upstream)
@@ -114,14 +130,16 @@ fn backward(
 
     let sorted = sort(&gpu, &cells, samples, bits_for(layout.cells()))?;
     let starts = ranges(&gpu, &sorted.keys, samples, layout.cells())?;
-    let places = Places::new(&layout.planes.each_ref().map(|shape| shape.num_elements()));
+    let places = Places::new(&layout.planes.iter().map(|(_, shape)| shape.num_elements()).collect::<Vec<_>>());
+    let mut firsts = places.starts.clone();
+    firsts.resize(MOST_PLANES, places.total);
     let gradients = gpu.allocate("gradients of planes", places.total)?;
     // No cell has more samples than there are points, and each takes a round of a loop a vector.
     let at_most = (gpu.longest_loop() / layout.quads()).clamp(1, layout.points.max(1));
     for begin in (0..layout.points.max(1)).step_by(at_most) {
         let mut uniform = layout.uniform();
-        uniform.extend(places.starts.iter().chain(&[begin, at_most]).map(|value| *value as u32));
-        Launch::new(&gpu.client, HEXPLANE_GATHER)
+        uniform.extend(firsts.iter().chain(&[begin, at_most]).map(|value| *value as u32));
+        launch(&gpu.client, PLANE_GATHER, &layout)
             .reads(&starts)
             .reads(&sorted.order)
             .reads(&fractions)
@@ -133,22 +151,21 @@ fn backward(
     gpu.check("the gradients of the planes", &[&gradients])?;
 
     let points = with_points.then(|| gpu.tensor(of_points.of(&point_gradients, 0), Shape::from([layout.points, 4])));
-    let mut k = 0;
-    let planes = layout.planes.map(|shape| {
-        k += 1;
-        gpu.tensor(places.of(&gradients, k - 1), shape)
-    });
-    Ok(QueryGradients { points, planes })
+    let mut planes = [const { None }; MOST_PLANES];
+    for (k, (axes, shape)) in layout.planes.into_iter().enumerate() {
+        planes[axes as usize] = Some(gpu.tensor(places.of(&gradients, k), shape));
+    }
+    Ok(PlaneQueryGradients { points, planes })
 }
 
-impl HexPlaneKernels for CubeBackend {
+impl PlaneQueryKernels for CubeBackend {
     type Saved = GpuQuerySaved;
 
-    fn query_forward(inputs: QueryInputs<Self>) -> (CubeTensor, GpuQuerySaved) {
-        forward(inputs).unwrap_or_else(|error| error.raise())
+    fn query_forward(inputs: PlaneQueryInputs<Self>, planes: PlaneSet) -> (CubeTensor, GpuQuerySaved) {
+        forward(inputs, planes).unwrap_or_else(|error| error.raise())
     }
 
-    fn query_backward(saved: GpuQuerySaved, gradient: CubeTensor, with_points: bool) -> QueryGradients<Self> {
+    fn query_backward(saved: GpuQuerySaved, gradient: CubeTensor, with_points: bool) -> PlaneQueryGradients<Self> {
         backward(saved, gradient, with_points).unwrap_or_else(|error| error.raise())
     }
 }
@@ -157,7 +174,7 @@ impl HexPlaneKernels for CubeBackend {
 mod tests {
     use burn::tensor::{Device, Tensor};
 
-    use crate::scene::hexplane::HexPlaneConfig;
+    use crate::planes::{HexPlaneConfig, PlaneTensors};
 
     /// Far more points in one cell than a loop of Mesa's software driver takes.
     #[test]
@@ -173,7 +190,7 @@ mod tests {
                 .map(|plane| Tensor::from_data(plane.val().into_data(), &device).require_grad());
             let planes: Vec<Tensor<3>> = planes.collect();
             let points = Tensor::<2>::full([POINTS, 4], 0.1, &device);
-            let features = crate::scene::hexplane::query_planes(points, planes.clone());
+            let features = PlaneTensors::new(config.layout(), planes.clone()).query(points);
             let gradients = features.sum().backward();
             let all = planes.iter().map(|plane| plane.grad(&gradients).expect("planes have gradients"));
             let sums = all.map(|gradient| gradient.sum().into_scalar::<f32>());

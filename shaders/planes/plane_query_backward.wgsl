@@ -1,4 +1,4 @@
-// First half of the query's derivative: what every point hands to each of its six samples, and the points' own gradients.
+// First half of the query's derivative: what every point hands to each of its samples, and the points' own gradients.
 //
 // One invocation owns one point. Reads points, packed planes and `upstream` [N, C]. Writes for plane p, at place p · N + n:
 // the derivative by the sample (QUADS vectors of `handed`), the low cell that the sample begins in (`cells`), and the
@@ -26,7 +26,7 @@ fn main(
     }
     let point = vec4<f32>(points[4u * n], points[4u * n + 1u], points[4u * n + 2u], points[4u * n + 3u]);
     let axes = axis_samples(point, planes.resolution);
-    for (var plane = 0u; plane < 6u; plane++) {
+    for (var plane = 0u; plane < PLANES; plane++) {
         let along = plane_axes(plane);
         let low_row = first_cell(planes, plane) + axes.low[along.y] * planes.resolution[along.x];
         cells[plane * count + n] = low_row + axes.low[along.x];
@@ -43,10 +43,10 @@ fn main(
                 above[k] = upstream[n * channels + 4u * quad + k];
             }
         }
-        var samples: array<vec4<f32>, 6>;
-        var by_across: array<vec4<f32>, 6>;
-        var by_down: array<vec4<f32>, 6>;
-        for (var plane = 0u; plane < 6u; plane++) {
+        var samples: array<vec4<f32>, PLANES>;
+        var by_across: array<vec4<f32>, PLANES>;
+        var by_down: array<vec4<f32>, PLANES>;
+        for (var plane = 0u; plane < PLANES; plane++) {
             let along = plane_axes(plane);
             let width = planes.resolution[along.x];
             let first = first_cell(planes, plane);
@@ -66,14 +66,14 @@ fn main(
             by_down[plane] = first_column + ((c3 - c1) - first_column) * x;
         }
         // Product of the others without dividing: upstream · those before · those after.
-        var before: array<vec4<f32>, 6>;
+        var before: array<vec4<f32>, PLANES>;
         before[0] = above;
-        for (var plane = 1u; plane < 6u; plane++) {
+        for (var plane = 1u; plane < PLANES; plane++) {
             before[plane] = before[plane - 1u] * samples[plane - 1u];
         }
         var after = vec4<f32>(1.0);
-        for (var back = 0u; back < 6u; back++) {
-            let plane = 5u - back;
+        for (var back = 0u; back < PLANES; back++) {
+            let plane = PLANES - 1u - back;
             let gradient = before[plane] * after;
             after *= samples[plane];
             handed[(plane * count + n) * quads + quad] = gradient;

@@ -1,12 +1,13 @@
-// Bilinear samples of the six planes of a scale, over xy, xz, xt, yz, yt, zt.
+// Bilinear samples of the planes of a scale: PLANES of those over xy, xz, xt, yz, yt, zt, in this order. AXIS_PAIRS has the
+// place of each in that list, three bits a plane from the lowest on.
 //
 // The planes lie one after the other in `packed`, cell by cell, a cell's channels in QUADS vectors of four. `first_cell`
 // says where each plane begins; the last entry is the end.
 
 struct Planes {
-    // Cells along x, y, z, t.
+    // Cells along x, y, z, t; 1 along an axis that no plane spans.
     resolution: vec4<u32>,
-    // First cells of the planes xy, xz, xt, yz; then of yt and zt, the end, and the number of points.
+    // First cells of six planes, the end for those that are not there, and the end; then the number of points.
     first_cells_a: vec4<u32>,
     first_cells_b: vec4<u32>,
     // Channels, vectors of four channels a cell, then free.
@@ -15,7 +16,7 @@ struct Planes {
 
 // The axes of the planes: along the width, along the height.
 fn plane_axes(plane: u32) -> vec2<u32> {
-    switch plane {
+    switch (AXIS_PAIRS >> (3u * plane)) & 7u {
         case 0u: { return vec2<u32>(0u, 1u); }
         case 1u: { return vec2<u32>(0u, 2u); }
         case 2u: { return vec2<u32>(0u, 3u); }

@@ -7,9 +7,9 @@
 // samples of a cell that no loop gets too long, and later launches add the rest.
 
 struct Places {
-    // Where the gradients of xy, xz, xt, yz begin.
+    // Where the gradients of the first four planes begin.
     a: vec4<u32>,
-    // Those of yt and zt; the first sample of every cell that this launch takes, and how many.
+    // Those of two more; the first sample of every cell that this launch takes, and how many.
     b: vec4<u32>,
 }
 
@@ -37,7 +37,7 @@ fn main(
         return;
     }
     var plane = 0u;
-    for (var k = 1u; k < 6u; k++) {
+    for (var k = 1u; k < PLANES; k++) {
         plane += select(0u, 1u, own >= first_cell(planes, k));
     }
     let width = planes.resolution[plane_axes(plane).x];
@@ -60,7 +60,7 @@ fn main(
         return;
     }
 
-    let cells = select(planes.first_cells_b.z, first_cell(planes, min(plane + 1u, 5u)), plane < 5u)
+    let cells = select(planes.first_cells_b.z, first_cell(planes, min(plane + 1u, 5u)), plane + 1u < PLANES)
         - first_cell(planes, plane);
     var first = parameters.places.a[plane % 4u];
     if (plane >= 4u) {

@@ -1,10 +1,10 @@
-//! Bilinear queries of six planes and the product of the samples, forward and backward.
+//! Bilinear queries of the planes of a scale and the product of the samples, forward and backward.
 //!
 //! Planes arrive as `[C, H, W]`. They are repacked to blocks of eight channels, `[C / 8][H · W][8]`, so that a sample is
 //! four vector loads; C is padded with zeros. The backward pass gives each block of channels to one task, which alone
 //! writes that block's gradients: no atomics, and the same sums whatever the number of threads.
 
-use light4gs_codec::plane_layout::PLANE_AXES;
+use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
 use rayon::prelude::*;
 
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
@@ -12,24 +12,56 @@ use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 /// Points a forward task handles.
 const CHUNK: usize = 1024;
 
+/// Planes that a scale may have.
+const PLANES: usize = PlaneAxes::ALL.len();
+const PLANE_AXES: [[usize; 2]; PLANES] = {
+    let mut axes = [[0; 2]; PLANES];
+    let mut plane = 0;
+    while plane < PLANES {
+        axes[plane] = PlaneAxes::ALL[plane].axes();
+        plane += 1;
+    }
+    axes
+};
+
 type Block = [f32; LANES];
 
-/// Six planes of one scale, repacked.
+/// The planes of one scale, repacked.
 #[derive(Debug)]
 pub(crate) struct PackedPlanes {
     channels: usize,
-    /// Cells along x, y, z, t.
-    resolution: [usize; 4],
-    /// For each plane, `[blocks][H · W]`.
-    planes: [Vec<Block>; 6],
+    /// Cells along x, y, z, t; 1 along an axis that no plane spans.
+    resolution: [usize; AXIS_NAMES.len()],
+    /// Which planes there are.
+    present: [bool; PLANES],
+    /// For each plane, `[blocks][H · W]`; nothing where there is no plane.
+    planes: [Vec<Block>; PLANES],
 }
 
 impl PackedPlanes {
-    /// Repacks planes `[C, res[second], res[first]]` in the order xy, xz, xt, yz, yt, zt.
-    pub(crate) fn new(planes: [&[f32]; 6], channels: usize, resolution: [usize; 4]) -> Self {
-        let packed: Vec<Vec<Block>> = planes.into_par_iter().map(|plane| pack(plane, channels)).collect();
-        let planes = packed.try_into().expect("six planes in, six planes out");
-        Self { channels, resolution, planes }
+    /// Repacks planes over the axes of [`PlaneAxes::ALL`], none where there is no plane, of these shapes `[C, H, W]`.
+    pub(crate) fn new(planes: [Option<&[f32]>; PLANES], shapes: &[Option<[usize; 3]>; PLANES]) -> Self {
+        let mut resolution = [1; AXIS_NAMES.len()];
+        let mut channels = 0;
+        for ([across, down], shape) in PLANE_AXES.into_iter().zip(shapes) {
+            if let Some(shape) = shape {
+                [channels, resolution[down], resolution[across]] = *shape;
+            }
+        }
+        let packed = planes.into_par_iter().map(|plane| plane.map_or_else(Vec::new, |plane| pack(plane, channels)));
+        let packed: Vec<Vec<Block>> = packed.collect();
+        let present = planes.map(|plane| plane.is_some());
+        let planes = packed.try_into().expect("as many planes out as in");
+        Self { channels, resolution, present, planes }
+    }
+
+    /// Channels of each plane.
+    pub(crate) fn channels(&self) -> usize {
+        self.channels
+    }
+
+    fn is_full(&self) -> bool {
+        self.present == [true; PLANES]
     }
 
     fn blocks(&self) -> usize {
@@ -37,7 +69,7 @@ impl PackedPlanes {
     }
 
     fn cells(&self, plane: usize) -> usize {
-        PLANE_AXES[plane].iter().map(|&axis| self.resolution[axis]).product()
+        self.planes[plane].len() / self.blocks()
     }
 
     fn block(&self, plane: usize, block: usize) -> &[Block] {
@@ -188,40 +220,45 @@ fn padded(channels: &[f32]) -> Block {
 }
 
 #[inline(always)]
-fn samples(point: &[f32], resolution: [usize; 4]) -> [AxisSample; 4] {
+fn samples(point: &[f32], resolution: [usize; AXIS_NAMES.len()]) -> [AxisSample; 4] {
     std::array::from_fn(|axis| AxisSample::new(point[axis], resolution[axis]))
 }
 
 #[inline(always)]
-fn corners(axes: &[AxisSample; 4], resolution: [usize; 4]) -> [Corners; 6] {
+fn corners(axes: &[AxisSample; 4], resolution: [usize; AXIS_NAMES.len()]) -> [Corners; PLANES] {
     // A loop, not `array::map`: its closure is not inlined.
-    let mut corners = [Corners::default(); 6];
+    let mut corners = [Corners::default(); PLANES];
     for (corners, [across, down]) in corners.iter_mut().zip(PLANE_AXES) {
         *corners = Corners::new(&axes[across], &axes[down], resolution[across]);
     }
     corners
 }
 
-struct Forward<'a> {
+/// Where all planes are there (`FULL`) this is known when the kernel is compiled, and no plane is asked for.
+struct Forward<'a, const FULL: bool> {
     points: &'a [f32],
     planes: &'a PackedPlanes,
     out: &'a mut [f32],
 }
 
-impl LaneKernel for Forward<'_> {
+impl<const FULL: bool> LaneKernel for Forward<'_, FULL> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let planes = self.planes;
         let channels = planes.channels;
-        let blocks: Vec<[&[Block]; 6]> =
+        let first = if FULL { 0 } else { planes.present.iter().position(|present| *present).unwrap_or(0) };
+        let blocks: Vec<[&[Block]; PLANES]> =
             (0..planes.blocks()).map(|b| std::array::from_fn(|plane| planes.block(plane, b))).collect();
         for (point, out) in self.points.chunks_exact(4).zip(self.out.chunks_exact_mut(channels)) {
             let corners = corners(&samples(point, planes.resolution), planes.resolution);
             for (cells, out) in blocks.iter().zip(out.chunks_mut(LANES)) {
-                let mut product = corners[0].sample::<L>(cells[0]);
-                for plane in 1..6 {
+                let mut product = corners[first].sample::<L>(cells[first]);
+                for plane in first + 1..PLANES {
+                    if !FULL && !planes.present[plane] {
+                        continue;
+                    }
                     product = product.mul(corners[plane].sample::<L>(cells[plane]));
                 }
                 if let Some(block) = out.first_chunk_mut() {
@@ -239,9 +276,12 @@ impl LaneKernel for Forward<'_> {
 /// Features `[N, C]` at points `[N, 4]` in [-1, 1].
 pub(crate) fn query(points: &[f32], planes: &PackedPlanes) -> Vec<f32> {
     let mut out = vec![0.0; points.len() / 4 * planes.channels];
-    out.par_chunks_mut(CHUNK * planes.channels)
-        .zip(points.par_chunks(4 * CHUNK))
-        .for_each(|(out, points)| dispatch(Forward { points, planes, out }));
+    out.par_chunks_mut(CHUNK * planes.channels).zip(points.par_chunks(4 * CHUNK)).for_each(
+        |(out, points)| match planes.is_full() {
+            true => dispatch(Forward::<true> { points, planes, out }),
+            false => dispatch(Forward::<false> { points, planes, out }),
+        },
+    );
     out
 }
 
@@ -249,8 +289,8 @@ pub(crate) fn query(points: &[f32], planes: &PackedPlanes) -> Vec<f32> {
 pub(crate) struct QueryGradients {
     /// `[N, 4]`, absent if not asked for.
     pub(crate) points: Option<Vec<f32>>,
-    /// Each `[C, H, W]`.
-    pub(crate) planes: [Vec<f32>; 6],
+    /// Each `[C, H, W]`; nothing where there is no plane.
+    pub(crate) planes: [Vec<f32>; PLANES],
 }
 
 /// Points and their upstream gradients in the order of [`spatial_order`], so that the tasks read them from end to end.
@@ -289,7 +329,8 @@ impl Sorted {
     }
 }
 
-struct Backward<'a> {
+/// `FULL` as in [`Forward`].
+struct Backward<'a, const FULL: bool> {
     sorted: &'a Sorted,
     planes: &'a PackedPlanes,
     block: usize,
@@ -298,20 +339,20 @@ struct Backward<'a> {
 
 /// What one block of channels adds to the gradients.
 struct BlockGradients {
-    planes: [Vec<Block>; 6],
+    planes: [Vec<Block>; PLANES],
     /// In the order of [`Sorted`]; empty if not asked for.
     points: Vec<[f32; 4]>,
 }
 
-impl LaneKernel for Backward<'_> {
+impl<const FULL: bool> LaneKernel for Backward<'_, FULL> {
     type Output = BlockGradients;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let planes = self.planes;
         let sorted = self.sorted;
-        let cells: [&[Block]; 6] = std::array::from_fn(|plane| planes.block(plane, self.block));
-        let mut gradients: [Vec<Block>; 6] = std::array::from_fn(|plane| vec![[0.0; LANES]; cells[plane].len()]);
+        let cells: [&[Block]; PLANES] = std::array::from_fn(|plane| planes.block(plane, self.block));
+        let mut gradients: [Vec<Block>; PLANES] = std::array::from_fn(|plane| vec![[0.0; LANES]; cells[plane].len()]);
         let mut point_gradients = Vec::with_capacity(if self.with_points { sorted.points.len() } else { 0 });
         let upstream = sorted.upstream.iter().skip(self.block).step_by(planes.blocks());
         for (point, upstream) in sorted.points.iter().zip(upstream) {
@@ -323,21 +364,27 @@ impl LaneKernel for Backward<'_> {
                 fractions[axis] = L::splat(axes[axis].fraction);
             }
             // Loops, not `array::from_fn`: a call that is not inlined leaves the vector registers.
-            let mut values = [upstream; 6];
-            let mut slopes = [[upstream; 2]; 6];
-            for plane in 0..6 {
+            let mut values = [L::splat(1.0); PLANES];
+            let mut slopes = [[L::splat(0.0); 2]; PLANES];
+            for plane in 0..PLANES {
+                if !FULL && !planes.present[plane] {
+                    continue;
+                }
                 let [across, down] = PLANE_AXES[plane];
                 (values[plane], slopes[plane]) =
                     corners[plane].sample_with_slopes(cells[plane], fractions[across], fractions[down]);
             }
 
             // Product of the others without dividing: upstream · prefix · suffix.
-            let mut prefix = [upstream; 6];
-            for plane in 1..6 {
+            let mut prefix = [upstream; PLANES];
+            for plane in 1..PLANES {
                 prefix[plane] = prefix[plane - 1].mul(values[plane - 1]);
             }
             let mut suffix = L::splat(1.0);
-            for plane in (0..6).rev() {
+            for plane in (0..PLANES).rev() {
+                if !FULL && !planes.present[plane] {
+                    continue;
+                }
                 let gradient = prefix[plane].mul(suffix);
                 suffix = suffix.mul(values[plane]);
                 let Corners { index, weight } = &corners[plane];
@@ -376,11 +423,17 @@ pub(crate) fn query_backward(
     let sorted = Sorted::new(points, upstream, planes.channels);
     let blocks: Vec<BlockGradients> = (0..planes.blocks())
         .into_par_iter()
-        .map(|block| dispatch(Backward { sorted: &sorted, planes, block, with_points }))
+        .map(|block| match planes.is_full() {
+            true => dispatch(Backward::<true> { sorted: &sorted, planes, block, with_points }),
+            false => dispatch(Backward::<false> { sorted: &sorted, planes, block, with_points }),
+        })
         .collect();
-    let unpacked: Vec<Vec<f32>> = (0..6)
+    let unpacked: Vec<Vec<f32>> = (0..PLANES)
         .into_par_iter()
         .map(|plane| {
+            if !planes.present[plane] {
+                return Vec::new();
+            }
             let parts: Vec<&[Block]> = blocks.iter().map(|block| block.planes[plane].as_slice()).collect();
             unpack(&parts, planes.channels)
         })
@@ -394,5 +447,5 @@ pub(crate) fn query_backward(
         }
         sum
     });
-    QueryGradients { points, planes: unpacked.try_into().expect("six planes in, six planes out") }
+    QueryGradients { points, planes: unpacked.try_into().expect("as many planes out as in") }
 }

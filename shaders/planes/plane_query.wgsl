@@ -1,4 +1,4 @@
-// Features at points: the product over six planes of their bilinear samples.
+// Features at points: the product over the planes of a scale of their bilinear samples.
 //
 // One invocation owns one vector of four channels of one point. Reads points [N, 4] in [-1, 1] and the packed planes;
 // writes features [N, C].
@@ -24,7 +24,7 @@ fn main(
     let point = vec4<f32>(points[4u * n], points[4u * n + 1u], points[4u * n + 2u], points[4u * n + 3u]);
     let axes = axis_samples(point, planes.resolution);
     var product = vec4<f32>(1.0);
-    for (var plane = 0u; plane < 6u; plane++) {
+    for (var plane = 0u; plane < PLANES; plane++) {
         let along = plane_axes(plane);
         let width = planes.resolution[along.x];
         let first = first_cell(planes, plane);

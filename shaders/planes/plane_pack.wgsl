@@ -1,4 +1,4 @@
-// Brings one plane from [C, H · W] to the layout of `include/hexplane.wgsl`.
+// Brings one plane from [C, H · W] to the layout of `include/planes.wgsl`.
 //
 // One invocation owns one cell with all its channels; channels that are missing to the last four become zero.
 
