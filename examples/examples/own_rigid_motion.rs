@@ -3,7 +3,8 @@
 //!
 //! What this field asks for beyond the paper's: whole Gaussians and world positions (`deform`), nodes that are made from the
 //! cloud when motion begins (`begin_motion`, `resize`), a bound on what a step has made (`begin_step`), a loss of its own
-//! (`regularizer`) and learning rates of its own (`learning_rate`). For the file, skinning is a list of operations that the
+//! (`regularizer`) and learning rates of its own (`learning_rate`). The trainer takes a sampler that shows it the middle of the
+//! scene's time first. For the file, skinning is a list of operations that the
 //! codec runs; what depends on the time alone, the nodes' poses, it computes once a frame.
 
 use std::collections::BTreeMap;
@@ -19,9 +20,12 @@ use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
 use light4gs_model::{
     DeformationField, DynamicScene, FeaturePlanes, FinePosition, GaussianTensors, LearningRate, ModelError, SceneAtRest,
 };
+use light4gs_train::Stage;
 use light4gs_train::dataset::load_options;
 use light4gs_train::run::RunFolder;
+use light4gs_train::sampling::BatchRequest;
 use light4gs_train::trainer::Trainer;
+use rand::Rng;
 
 /// Configuration of [`RigidNodes`].
 #[derive(Config, Debug)]
@@ -360,6 +364,19 @@ impl DeformationField for RigidNodes {
     }
 }
 
+/// Frames of the times around the middle first, and then of more and more: a trajectory grows from where it is known.
+fn widening_window(request: &BatchRequest) -> Vec<usize> {
+    let times = &request.candidates.times;
+    let share = match request.stage {
+        Stage::Coarse => 0.25,
+        Stage::Fine => (0.25 + 2.0 * request.iteration as f64 / request.iterations as f64).min(1.0),
+    };
+    let count = ((share * times.len() as f64).ceil() as usize).clamp(1, times.len());
+    let seen = times[(times.len() - count) / 2..][..count].concat();
+    let mut random = request.generator(request.iteration);
+    (0..request.batch_size).map(|_| seen[random.random_range(0..seen.len())]).collect()
+}
+
 fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
@@ -371,7 +388,7 @@ fn main() -> Outcome {
     let builder = || -> Outcome<_> {
         let data = Scene::open(&root, &load_options(&config))?;
         let builder = Trainer::<RigidNodes>::builder_with_field(config.clone(), data, RigidNodesConfig::new());
-        Ok(builder.run_folder(run.clone()))
+        Ok(builder.sampler(widening_window).run_folder(run.clone()))
     };
 
     // Trained into the fine stage, where the nodes are made, and dropped there as a crash would.

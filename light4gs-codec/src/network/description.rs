@@ -291,3 +291,34 @@ fn whole_weight(layer: &Layer, stored: Vec<f32>) -> Vec<f32> {
     }
     weight
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few bytes may ask for many channels, and then for as many again.
+    #[test]
+    fn selections_are_bounded_before_they_are_made() {
+        let limits = Limits::default();
+        let most = limits.layer_width / 2 + 1;
+        let mut writer = Writer::default();
+        writer.varint(1);
+        writer.varint(most.into());
+        writer.varint(200);
+        for _ in 0..200 {
+            writer.u8(SELECT);
+            writer.varint(0);
+            write_selection(&(0..most).collect::<Vec<_>>(), &mut writer);
+        }
+        let read = |bytes: &[u8]| Network::read(&mut Reader::new("motion", bytes), "motion", "the network", &limits);
+        let error = read(&writer.bytes).unwrap_err().to_string();
+        assert!(error.contains("the network, selected channels"), "{error}");
+        // A run beyond the limit by itself.
+        let mut writer = Writer::default();
+        [1, 1, 1].into_iter().for_each(|number| writer.varint(number));
+        writer.u8(SELECT);
+        [0, 2, 0, limits.layer_width.into(), 0, 1].into_iter().for_each(|number| writer.varint(number));
+        let error = read(&writer.bytes).unwrap_err().to_string();
+        assert!(error.contains("length of a run of selected channels"), "{error}");
+    }
+}
