@@ -26,6 +26,31 @@ fn every_preset_loads_and_survives_a_round_trip() {
     }
 }
 
+#[test]
+fn a_layout_without_a_preset_is_named() {
+    use light4gs_data::{DataError, DatasetLayout, LoadOptions, Scene};
+    struct Own;
+    impl DatasetLayout for Own {
+        fn name(&self) -> &'static str {
+            "own"
+        }
+
+        fn signature(&self) -> &'static str {
+            "own.txt"
+        }
+
+        fn detect(&self, _: &Path) -> bool {
+            false
+        }
+
+        fn open(&self, root: &Path, _: &LoadOptions) -> Result<Scene, DataError> {
+            Err(DataError::field(root, "own", "found", "nothing"))
+        }
+    }
+    let text = Config::preset_of(&Own).unwrap_err().to_string();
+    assert!(text.contains("layout `own`") && text.contains("dnerf-cpu"), "{text}");
+}
+
 /// Set, the test of what follows from the declarations of keys writes it instead of comparing it.
 const WRITE: &str = "LIGHT4GS_WRITE_KEYS";
 
