@@ -94,7 +94,7 @@ fn main() -> Outcome {
     println!("times up to {latest:.2} from the center; loss {first:.3} at first, {last:.3} at last");
     assert!(latest > 0.4 && last < 0.7 * first);
 
-    // Interrupted, and gone on with from the last checkpoint: the same frames and the same losses, to the last bit.
+    // Interrupted, and continued from the last checkpoint: the same frames and the same losses, to the last bit.
     let begun = run("interrupted")?;
     train(&mut trainer(&config, &data, begun.clone(), &window)?, 75)?;
     let rest = train(&mut trainer(&config, &data, begun, &window)?, usize::MAX)?;

@@ -41,7 +41,7 @@ pub enum TrainError {
         /// Who holds it, as far as is known.
         holder: String,
     },
-    /// A checkpoint that cannot be gone on from.
+    /// A checkpoint from which a run cannot continue.
     #[error(
         "checkpoint {}: {problem}. Remove the file, and `light4gs resume` goes on from the checkpoint before it",
         path.display()
@@ -52,7 +52,7 @@ pub enum TrainError {
         /// What was found and expected, with the tensor.
         problem: String,
     },
-    /// The user asked a run or a study to stop; it can be gone on with.
+    /// The user asked a run or a study to stop; it can be continued.
     #[error("{0}")]
     Stopped(String),
     /// Numbers of the training are no longer finite.

@@ -39,7 +39,7 @@ pub(super) struct Import {
     /// views around the scene.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// A preset or a TOML file: how the scene will be coded. What the model is like follows from the source.
+    /// A preset or a TOML file: how the scene will be coded. The model itself follows from the source.
     #[arg(long, default_value = "imported", value_name = "PRESET|FILE")]
     config: String,
     /// Changes one key of the configuration; may be given more than once.

@@ -62,7 +62,7 @@ enum Command {
     /// Show a file or a run in the browser, and follow a run that is still training.
     #[command(after_help = "Example:\n  light4gs view runs/bouncing --open")]
     View(view::View),
-    /// Take over a scene that another program has trained: a checkpoint of 4DGaussians, or a PLY file of 3DGS.
+    /// Import a scene that another program has trained: a checkpoint of 4DGaussians, or a PLY file of 3DGS.
     #[command(
         after_help = "Examples:\n  light4gs import output/bouncing --from 4dgaussians --out runs/bouncing\n  light4gs import scene.ply --from ply --out scene.l4gs"
     )]

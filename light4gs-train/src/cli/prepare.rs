@@ -14,7 +14,7 @@ pub(super) struct Prepare {
     /// One video of a moving camera, or the videos of several cameras that were started together.
     #[arg(required = true, value_name = "VIDEO")]
     videos: Vec<PathBuf>,
-    /// Folder to make; a folder that was begun with the same videos and options is gone on with.
+    /// Folder to make; a folder that was begun with the same videos and options is continued.
     #[arg(long)]
     out: PathBuf,
     /// Frames to take of each video, spread evenly over it.

@@ -33,7 +33,7 @@ pub(super) struct RunOutput {
     /// No progress bars.
     #[arg(long)]
     pub(super) quiet: bool,
-    /// Print the time of every stage of a training step. The run itself gets slower, since each stage is waited for.
+    /// Print the time of every part of a training step. The run gets slower, since it waits for the device after each part.
     #[arg(long)]
     pub(super) profile: bool,
 }
@@ -161,7 +161,7 @@ fn trainer(
     Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars).stop_flag(stop_flag()))
 }
 
-/// Trains to the end, and prints what the stages took if that is asked for.
+/// Trains to the end, and prints what the parts took if that is asked for.
 fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
     if output.profile {
         trainer.measure_stages();
@@ -195,7 +195,7 @@ pub(super) struct Resume {
     /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Go on although the dataset is not what it was when the run began.
+    /// Continue although the dataset has changed since the run began.
     #[arg(long)]
     accept_changed_dataset: bool,
     #[command(flatten)]
