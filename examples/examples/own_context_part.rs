@@ -54,7 +54,7 @@ impl PriorPart for ProfileAlongX {
         // xy is [M, y, x]. Its mean over the rows is spread over the rows of xz, [M, z, x].
         let profile = planes.in_same_scale(plane, PlaneAxes::Xy)?.mean_dim(1).expand([channels, height, width]);
         let parameters = Some(self.conv.forward(profile));
-        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, latent_bits: None })
     }
 
     fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {

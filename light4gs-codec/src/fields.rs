@@ -13,7 +13,7 @@ struct Field<'a> {
 
 /// All numbers of `scene`, in the order of the stream.
 fn fields(scene: &SceneData) -> Vec<Field<'_>> {
-    let SceneData { meta, gaussians, frame, feature_planes, motion } = scene;
+    let SceneData { meta, gaussians, coordinates, feature_planes, motion } = scene;
     let mut fields = Vec::new();
     let mut add = |section, name: String, values| fields.push(Field { section, name, values });
 
@@ -27,14 +27,14 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
         add(section.name(), attribute.name.to_owned(), attribute.values);
     }
 
-    let section = Section::SceneFrame.name();
-    add(section, "mean".into(), &frame.mean);
-    add(section, "axes".into(), frame.axes.as_flattened());
-    add(section, "std".into(), &frame.std);
-    add(section, "scale".into(), &frame.mapping.scale);
-    add(section, "offset".into(), &frame.mapping.offset);
-    add(section, "time_scale".into(), from_ref(&frame.mapping.time_scale));
-    add(section, "time_offset".into(), from_ref(&frame.mapping.time_offset));
+    let section = Section::SceneCoordinates.name();
+    add(section, "mean".into(), &coordinates.mean);
+    add(section, "axes".into(), coordinates.axes.as_flattened());
+    add(section, "std".into(), &coordinates.std);
+    add(section, "scale".into(), &coordinates.mapping.scale);
+    add(section, "offset".into(), &coordinates.mapping.offset);
+    add(section, "time_scale".into(), from_ref(&coordinates.mapping.time_scale));
+    add(section, "time_offset".into(), from_ref(&coordinates.mapping.time_offset));
 
     let section = Section::Motion.name();
     let layers = motion.network.iter().flat_map(|motion| motion.network.layers());

@@ -1,12 +1,12 @@
 //! The `.l4gs` stream: plain arrays in, bytes out.
 //!
-//! A dynamic scene is a set of Gaussians, a frame that normalizes their positions, multiscale feature planes and a
+//! A dynamic scene is a set of Gaussians, scene coordinates that normalize their positions, multiscale feature planes and a
 //! small deformation network. [`SceneData`] holds all of it as plain arrays, [`encode`] turns it into one byte
 //! stream and [`decode`] turns the stream back, bit for bit, on every machine. `docs/format.md` describes the
 //! stream byte by byte.
 //!
 //! ```
-//! use light4gs_codec::{GaussianArrays, SceneData, SceneFrameArrays, SceneMeta, decode, encode, info};
+//! use light4gs_codec::{GaussianArrays, SceneCoordinateArrays, SceneData, SceneMeta, decode, encode, info};
 //!
 //! let scene = SceneData {
 //!     meta: SceneMeta { name: "one gray ball".into(), frame_count: 1, fps: 30.0, ..Default::default() },
@@ -20,7 +20,7 @@
 //!         sh_rest: vec![0.0; 9],
 //!         further: Vec::new(),
 //!     },
-//!     frame: SceneFrameArrays::default(), // no normalization
+//!     coordinates: SceneCoordinateArrays::default(), // no normalization
 //!     ..Default::default()                // no planes, no network: a scene that does not move
 //! };
 //!
@@ -108,8 +108,8 @@ pub use planes::{
 };
 pub use scene::{
     AttributeValues, Coder, CoordinateMapping, FeaturePlaneArrays, FurtherAttribute, GaussianArrays,
-    LONGEST_ATTRIBUTE_NAME, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Plane, SceneData,
-    SceneFrameArrays, SceneMeta, legal_attribute_name, sh_rest_coefficients,
+    LONGEST_ATTRIBUTE_NAME, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Plane,
+    SceneCoordinateArrays, SceneData, SceneMeta, legal_attribute_name, sh_rest_coefficients,
 };
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use steps::PerGroup;

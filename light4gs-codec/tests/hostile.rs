@@ -105,7 +105,7 @@ fn a_table_that_lies() {
     let lied = |section, value: u64| forged_entry(section, 8, &value.to_le_bytes());
     // Too long: the last one is cut short. Too short: something is left at the end, or the bytes are others'.
     assert!(matches!(lied(0, length(0) + 1), CodecError::Truncated { section: "feature_planes", .. }));
-    assert!(matches!(lied(2, u64::MAX), CodecError::Truncated { section: "scene_frame", .. }));
+    assert!(matches!(lied(2, u64::MAX), CodecError::Truncated { section: "scene_coordinates", .. }));
     assert!(matches!(lied(4, length(4) + 1), CodecError::Truncated { section: "feature_planes", .. }));
     assert!(matches!(lied(4, length(4) - 1), CodecError::TrailingBytes { section: "stream", bytes: 1 }));
     assert!(matches!(lied(1, length(1) - 1), CodecError::TrailingBytes { section: "stream", bytes: 1 }));

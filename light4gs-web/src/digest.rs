@@ -6,16 +6,16 @@ use light4gs_codec::SceneData;
 /// test. Native code and WebAssembly must agree.
 pub fn digest(scene: &SceneData) -> u64 {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
-    let SceneData { gaussians, frame, feature_planes, motion, .. } = scene;
+    let SceneData { gaussians, coordinates, feature_planes, motion, .. } = scene;
     hash.bytes(&[gaussians.sh_degree]);
     gaussians.attributes().for_each(|attribute| hash.floats(attribute.values));
     for attribute in &gaussians.further {
         hash.bytes(attribute.name.as_bytes());
         hash.integers(&[attribute.width]);
     }
-    hash.floats(&frame.mean);
-    hash.floats(frame.axes.as_flattened());
-    hash.floats(&frame.std);
+    hash.floats(&coordinates.mean);
+    hash.floats(coordinates.axes.as_flattened());
+    hash.floats(&coordinates.std);
     for plane in &feature_planes.planes {
         hash.integers(&[plane.height, plane.width]);
         hash.floats(&plane.values);

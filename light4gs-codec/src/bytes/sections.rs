@@ -7,7 +7,7 @@ use crate::CodecError;
 pub(crate) enum Section {
     Gaussians,
     Sh,
-    SceneFrame,
+    SceneCoordinates,
     Motion,
     FeaturePlanes,
     ContextModel,
@@ -16,14 +16,14 @@ pub(crate) enum Section {
 impl Section {
     /// Every section, in the order of their numbers.
     pub(crate) const ALL: [Self; 6] =
-        [Self::Gaussians, Self::Sh, Self::SceneFrame, Self::Motion, Self::FeaturePlanes, Self::ContextModel];
+        [Self::Gaussians, Self::Sh, Self::SceneCoordinates, Self::Motion, Self::FeaturePlanes, Self::ContextModel];
 
     /// The number that stands in the table.
     pub(crate) const fn id(self) -> u16 {
         match self {
             Self::Gaussians => 1,
             Self::Sh => 2,
-            Self::SceneFrame => 3,
+            Self::SceneCoordinates => 3,
             Self::Motion => 4,
             Self::FeaturePlanes => 5,
             Self::ContextModel => 6,
@@ -40,7 +40,7 @@ impl Section {
         match self {
             Self::Gaussians => "gaussians",
             Self::Sh => "sh",
-            Self::SceneFrame => "scene_frame",
+            Self::SceneCoordinates => "scene_coordinates",
             Self::Motion => "motion",
             Self::FeaturePlanes => "feature_planes",
             Self::ContextModel => "context_model",
@@ -61,9 +61,9 @@ pub enum Kind {
     /// Spherical harmonics under distributions that networks give.
     ShNetworks,
     /// Mean, principal axes and deviations of a cloud.
-    SceneFramePrincipalAxes,
+    SceneCoordinatesPrincipalAxes,
     /// The same, with a mapping of their coordinates other than the paper's.
-    SceneFrameMapped,
+    SceneCoordinatesMapped,
     /// A description of what moves the Gaussians; it says itself what it is.
     MotionDescription,
     /// Planes as they are.
@@ -80,8 +80,8 @@ impl Kind {
         Self::ShExplicit,
         Self::ShTables,
         Self::ShNetworks,
-        Self::SceneFramePrincipalAxes,
-        Self::SceneFrameMapped,
+        Self::SceneCoordinatesPrincipalAxes,
+        Self::SceneCoordinatesMapped,
         Self::MotionDescription,
         Self::FeaturePlanesExplicit,
         Self::FeaturePlanesContextCoded,
@@ -95,8 +95,8 @@ impl Kind {
             Self::ShExplicit => (Section::Sh, 1),
             Self::ShTables => (Section::Sh, 2),
             Self::ShNetworks => (Section::Sh, 3),
-            Self::SceneFramePrincipalAxes => (Section::SceneFrame, 1),
-            Self::SceneFrameMapped => (Section::SceneFrame, 2),
+            Self::SceneCoordinatesPrincipalAxes => (Section::SceneCoordinates, 1),
+            Self::SceneCoordinatesMapped => (Section::SceneCoordinates, 2),
             Self::MotionDescription => (Section::Motion, 1),
             Self::FeaturePlanesExplicit => (Section::FeaturePlanes, 1),
             Self::FeaturePlanesContextCoded => (Section::FeaturePlanes, 2),
@@ -113,9 +113,10 @@ impl Kind {
     /// The encodings that it may have.
     fn encodings(self) -> &'static [Encoding] {
         match self {
-            Self::ShExplicit | Self::SceneFramePrincipalAxes | Self::SceneFrameMapped | Self::FeaturePlanesExplicit => {
-                &[Encoding::Float32]
-            }
+            Self::ShExplicit
+            | Self::SceneCoordinatesPrincipalAxes
+            | Self::SceneCoordinatesMapped
+            | Self::FeaturePlanesExplicit => &[Encoding::Float32],
             Self::ShTables | Self::FeaturePlanesContextCoded => &[Encoding::Quantized],
             _ => &[Encoding::Float32, Encoding::Quantized],
         }
@@ -127,8 +128,8 @@ impl Kind {
             Self::GaussiansExplicit | Self::ShExplicit | Self::FeaturePlanesExplicit => "explicit",
             Self::ShTables => "tables",
             Self::ShNetworks | Self::ContextModelNetworks => "networks",
-            Self::SceneFramePrincipalAxes => "principal axes",
-            Self::SceneFrameMapped => "mapped principal axes",
+            Self::SceneCoordinatesPrincipalAxes => "principal axes",
+            Self::SceneCoordinatesMapped => "mapped principal axes",
             Self::MotionDescription => "description",
             Self::FeaturePlanesContextCoded => "context coded",
         }

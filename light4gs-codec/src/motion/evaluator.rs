@@ -76,7 +76,7 @@ impl MotionEvaluator {
             program: Program::pointwise_with_uniform(network, &uniform),
             sources: sources.clone(),
             outputs: outputs.clone(),
-            mapping: scene.frame.mapping,
+            mapping: scene.coordinates.mapping,
             channels,
             features,
             points: Vec::with_capacity(scene.gaussians.len().div_ceil(LANES)),
@@ -86,7 +86,7 @@ impl MotionEvaluator {
         for means in scene.gaussians.means.chunks(LANES) {
             let mut points = [[0.0; LANES]; 3];
             for (lane, &mean) in means.iter().enumerate() {
-                let point = normalized(&scene.frame, mean);
+                let point = normalized(&scene.coordinates, mean);
                 points.iter_mut().zip(point).for_each(|(lanes, coordinate)| lanes[lane] = coordinate);
             }
             motion.points.push(points);

@@ -3,17 +3,17 @@
 //! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
 //! hexplane-coupled harmonics are coded by these numbers.
 
-use crate::{CoordinateMapping, Plane, SceneFrameArrays, network::kernels::kept};
+use crate::{CoordinateMapping, Plane, SceneCoordinateArrays, network::kernels::kept};
 
 /// Coordinates in [-1, 1]: standardized along the principal axes, and by default contracted into the ball of radius 2 and
 /// halved (paper III-A).
-pub(crate) fn normalized(frame: &SceneFrameArrays, point: [f32; 3]) -> [f32; 3] {
-    let offset: [f32; 3] = std::array::from_fn(|i| point[i] - frame.mean[i]);
+pub(crate) fn normalized(coordinates: &SceneCoordinateArrays, point: [f32; 3]) -> [f32; 3] {
+    let offset: [f32; 3] = std::array::from_fn(|i| point[i] - coordinates.mean[i]);
     let [x, y, z] = std::array::from_fn(|j| {
-        let axis = frame.axes[j];
-        (offset[0] * axis[0] + offset[1] * axis[1] + offset[2] * axis[2]) / frame.std[j]
+        let axis = coordinates.axes[j];
+        (offset[0] * axis[0] + offset[1] * axis[1] + offset[2] * axis[2]) / coordinates.std[j]
     });
-    let CoordinateMapping { contracts, scale, offset, .. } = frame.mapping;
+    let CoordinateMapping { contracts, scale, offset, .. } = coordinates.mapping;
     let square = x * x + y * y + z * z;
     let inverse = if contracts && square > 1.0 { 1.0 / square.sqrt() } else { 1.0 };
     let factor = (2.0 - inverse) * inverse;

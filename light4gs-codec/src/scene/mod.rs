@@ -25,8 +25,8 @@ pub struct SceneData {
     pub meta: SceneMeta,
     /// The canonical Gaussians.
     pub gaussians: GaussianArrays,
-    /// The frame that normalizes positions before the planes are queried.
-    pub frame: SceneFrameArrays,
+    /// The scene coordinates that normalize positions before the planes are queried.
+    pub coordinates: SceneCoordinateArrays,
     /// The feature planes; none where nothing reads any.
     pub feature_planes: FeaturePlaneArrays,
     /// How the Gaussians move.
@@ -60,7 +60,7 @@ pub struct SceneMeta {
 
 /// Mean, principal axes and per-axis standard deviation of the initial cloud.
 #[derive(Clone, Debug, PartialEq)]
-pub struct SceneFrameArrays {
+pub struct SceneCoordinateArrays {
     /// Mean of the cloud, in world units.
     pub mean: [f32; 3],
     /// `axes[j]` is principal axis `j`, of unit length.
@@ -71,8 +71,8 @@ pub struct SceneFrameArrays {
     pub mapping: CoordinateMapping,
 }
 
-impl Default for SceneFrameArrays {
-    /// The frame of the world itself: mean 0, the world's axes, deviations 1.
+impl Default for SceneCoordinateArrays {
+    /// Those of the world itself: mean 0, the world's axes, deviations 1.
     fn default() -> Self {
         Self {
             mean: [0.0; 3],

@@ -1,8 +1,8 @@
 //! How spherical harmonics are coded, as data.
 
 use crate::{
-    CodecError, FeaturePlaneArrays, FrequencyTable, GaussianArrays, Limits, Network, SceneFrameArrays, bytes::Section,
-    limits::at_most, sh_rest_coefficients, steps::LEAST_STEP_IN_STREAM,
+    CodecError, FeaturePlaneArrays, FrequencyTable, GaussianArrays, Limits, Network, SceneCoordinateArrays,
+    bytes::Section, limits::at_most, sh_rest_coefficients, steps::LEAST_STEP_IN_STREAM,
 };
 
 pub(super) const SECTION: &str = Section::Sh.name();
@@ -87,11 +87,11 @@ impl ShSource {
     }
 }
 
-/// What distributions may depend on: decoded Gaussians without `sh_rest`, the frame, decoded planes.
+/// What distributions may depend on: decoded Gaussians without `sh_rest`, the scene coordinates, decoded planes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Conditions<'a> {
     pub(crate) gaussians: &'a GaussianArrays,
-    pub(crate) frame: &'a SceneFrameArrays,
+    pub(crate) coordinates: &'a SceneCoordinateArrays,
     pub(crate) feature_planes: &'a FeaturePlaneArrays,
 }
 

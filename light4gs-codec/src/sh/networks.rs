@@ -68,13 +68,13 @@ impl<'a> Networks<'a> {
         if !self.reads_features {
             return;
         }
-        let Conditions { gaussians, frame, feature_planes } = self.conditions;
+        let Conditions { gaussians, coordinates, feature_planes } = self.conditions;
         let channels = feature_planes.channels as usize;
         self.features.clear();
         self.features.resize(channels * feature_planes.scales(), [0.0; LANES]);
         let mut product = vec![1.0; channels];
         for (lane, &mean) in gaussians.means[first..].iter().take(LANES).enumerate() {
-            let coordinates = normalized(frame, mean);
+            let coordinates = normalized(coordinates, mean);
             for (planes, features) in scales(&feature_planes.planes).zip(self.features.chunks_exact_mut(channels)) {
                 product.fill(1.0);
                 multiply_by_space_samples(planes, coordinates, &mut product);
@@ -92,7 +92,7 @@ impl<'a> Networks<'a> {
         values: &[f32],
         channels: usize,
     ) -> (usize, &[Lanes], &[Lanes]) {
-        let Self { priors, conditions: Conditions { gaussians, frame, .. }, features, .. } = self;
+        let Self { priors, conditions: Conditions { gaussians, coordinates, .. }, features, .. } = self;
         let ExactPrior { sources, program, workspace, channels: (start, count) } = &mut priors[prior];
         let lanes = LANES.min(gaussians.len() - first);
         for (input, source) in sources.iter().enumerate() {
@@ -108,7 +108,7 @@ impl<'a> Networks<'a> {
                 match source {
                     ShSource::Dc => set(&gaussians.sh_dc[gaussian]),
                     ShSource::Decoded => set(&values[gaussian * channels..gaussian * channels + *start]),
-                    ShSource::Position => set(&normalized(frame, gaussians.means[gaussian])),
+                    ShSource::Position => set(&normalized(coordinates, gaussians.means[gaussian])),
                     ShSource::LogScale => set(&gaussians.log_scales[gaussian]),
                     ShSource::Quaternion => set(&gaussians.quats[gaussian]),
                     ShSource::OpacityLogit => set(&[gaussians.opacity_logits[gaussian]]),

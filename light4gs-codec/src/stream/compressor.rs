@@ -4,7 +4,7 @@ use super::{
     OpenStream,
     container::{self, NewSection},
     input::{CompressionInput, Profile},
-    scene_frame,
+    scene_coordinates,
 };
 use crate::{
     CodecError, Demand, FeaturePlaneArrays, GaussianArrays, Limits, PlaneBytes, PlaneCoding, SceneData, ShBytes,
@@ -75,13 +75,14 @@ pub fn encode_compressed_with_limits(
     let motion = motion::section::write(&scene.motion, compact(input.weights.motion), &mut writer)?;
     push(&mut sections, Kind::MotionDescription, encoding_of(compact(input.weights.motion)), writer);
     let mut writer = Writer::default();
-    scene_frame::write(&scene.frame, &mut writer);
-    push(&mut sections, scene_frame::kind(&scene.frame), Encoding::Float32, writer);
+    scene_coordinates::write(&scene.coordinates, &mut writer);
+    push(&mut sections, scene_coordinates::kind(&scene.coordinates), Encoding::Float32, writer);
     let precision = compact(input.weights.context_model);
     let (feature_planes, planes) =
         write_planes(&scene.feature_planes, input.planes.as_ref(), precision, limits, &mut sections)?;
 
-    let conditions = Conditions { gaussians: &attributes, frame: &scene.frame, feature_planes: &feature_planes };
+    let conditions =
+        Conditions { gaussians: &attributes, coordinates: &scene.coordinates, feature_planes: &feature_planes };
     let rest = reordered(&scene.gaussians, &order);
     let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
     let mut writer = Writer::default();
@@ -95,7 +96,7 @@ pub fn encode_compressed_with_limits(
     let expected = SceneData {
         meta: scene.meta.clone(),
         gaussians: GaussianArrays { sh_rest, ..with_rest },
-        frame: scene.frame.clone(),
+        coordinates: scene.coordinates.clone(),
         feature_planes,
         motion,
     };

@@ -3,7 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `container.rs` | header and table |
-//! | `meta.rs`, `scene_frame.rs` | the simple parts; the others have rooms of their own |
+//! | `meta.rs`, `scene_coordinates.rs` | the simple parts; the others have rooms of their own |
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and doing it |
 //! | `open.rs`, `info.rs` | decoding section by section, and looking without decoding |
 
@@ -14,7 +14,7 @@ mod input;
 mod meta;
 mod open;
 mod parts;
-mod scene_frame;
+mod scene_coordinates;
 
 pub use compressor::{CompressionReport, Encoded, encode_compressed, encode_compressed_with_limits};
 pub use info::{SectionInfo, StreamInfo, info, info_with_limits};
@@ -53,7 +53,9 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
     let sections = [
         section(Kind::GaussiansExplicit, &|writer| attributes::write_float32(&scene.gaussians, writer)),
         section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
-        section(scene_frame::kind(&scene.frame), &|writer| scene_frame::write(&scene.frame, writer)),
+        section(scene_coordinates::kind(&scene.coordinates), &|writer| {
+            scene_coordinates::write(&scene.coordinates, writer)
+        }),
         section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
         section(Kind::FeaturePlanesExplicit, &|writer| planes::explicit::write(&scene.feature_planes, writer)),
     ];

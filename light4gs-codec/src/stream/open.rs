@@ -1,8 +1,8 @@
 //! A stream whose sections are decoded one at a time.
 
-use super::{check, container::Container, scene_frame};
+use super::{check, container::Container, scene_coordinates};
 use crate::{
-    CodecError, FeaturePlaneArrays, GaussianArrays, Limits, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
+    CodecError, FeaturePlaneArrays, GaussianArrays, Limits, MotionArrays, SceneCoordinateArrays, SceneData, SceneMeta,
     attributes,
     budget::{Budget, Demand},
     bytes::{Section, sections::Kind},
@@ -68,13 +68,13 @@ impl<'a> OpenStream<'a> {
         attributes::decode_within(payload, encoding, budget)
     }
 
-    /// The frame.
+    /// The scene coordinates.
     ///
     /// # Errors
     /// As [`crate::decode`].
-    pub fn frame(&self) -> Result<SceneFrameArrays, CodecError> {
-        let (kind, _, payload) = self.container.section(Section::SceneFrame)?;
-        scene_frame::read(payload, kind)
+    pub fn coordinates(&self) -> Result<SceneCoordinateArrays, CodecError> {
+        let (kind, _, payload) = self.container.section(Section::SceneCoordinates)?;
+        scene_coordinates::read(payload, kind)
     }
 
     /// How the Gaussians move.
@@ -125,21 +125,21 @@ impl<'a> OpenStream<'a> {
     pub fn sh(
         &self,
         gaussians: GaussianArrays,
-        frame: &SceneFrameArrays,
+        coordinates: &SceneCoordinateArrays,
         feature_planes: &FeaturePlaneArrays,
     ) -> Result<GaussianArrays, CodecError> {
-        self.sh_within(gaussians, frame, feature_planes, &self.budget())
+        self.sh_within(gaussians, coordinates, feature_planes, &self.budget())
     }
 
     fn sh_within(
         &self,
         gaussians: GaussianArrays,
-        frame: &SceneFrameArrays,
+        coordinates: &SceneCoordinateArrays,
         feature_planes: &FeaturePlaneArrays,
         budget: &Budget,
     ) -> Result<GaussianArrays, CodecError> {
         let (kind, encoding, payload) = self.container.section(Section::Sh)?;
-        let conditions = Conditions { gaussians: &gaussians, frame, feature_planes };
+        let conditions = Conditions { gaussians: &gaussians, coordinates, feature_planes };
         let (head, sh_rest) = sh::section::read(payload, (kind, encoding), conditions, budget)?;
         Ok(GaussianArrays { sh_degree: head.degree, sh_rest, ..gaussians })
     }
@@ -156,7 +156,7 @@ impl<'a> OpenStream<'a> {
     pub(crate) fn scene_and_demand(&self) -> Result<(SceneData, Demand), CodecError> {
         let budget = self.budget();
         self.check_sections()?;
-        let frame = self.frame()?;
+        let coordinates = self.coordinates()?;
         let coupled = self.sh_needs_feature_planes()?;
         let (gaussians, feature_planes) = parallel::join(
             || {
@@ -164,16 +164,16 @@ impl<'a> OpenStream<'a> {
                 if coupled {
                     return Ok(gaussians);
                 }
-                self.sh_within(gaussians, &frame, &FeaturePlaneArrays::default(), &budget)
+                self.sh_within(gaussians, &coordinates, &FeaturePlaneArrays::default(), &budget)
             },
             || self.feature_planes_within(&budget),
         );
         let (mut gaussians, feature_planes) = (gaussians?, feature_planes?);
         if coupled {
-            gaussians = self.sh_within(gaussians, &frame, &feature_planes, &budget)?;
+            gaussians = self.sh_within(gaussians, &coordinates, &feature_planes, &budget)?;
         }
         let motion = self.motion_within(&budget)?;
-        let scene = SceneData { meta: self.container.meta.clone(), gaussians, frame, feature_planes, motion };
+        let scene = SceneData { meta: self.container.meta.clone(), gaussians, coordinates, feature_planes, motion };
         check(&scene, &self.limits)?;
         Ok((scene, budget.demand()))
     }

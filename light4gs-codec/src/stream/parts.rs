@@ -3,8 +3,8 @@
 //! Decoding by parts is [`crate::OpenStream`]'s; the other attributes are in [`crate::attributes`].
 
 use crate::{
-    CodecError, Distributions, FeaturePlaneArrays, GaussianArrays, Limits, PlaneCoding, SceneFrameArrays, ShCoding,
-    attributes,
+    CodecError, Distributions, FeaturePlaneArrays, GaussianArrays, Limits, PlaneCoding, SceneCoordinateArrays,
+    ShCoding, attributes,
     bytes::{Section, Writer},
     planes,
     sh::{self, coding::Conditions},
@@ -22,7 +22,7 @@ pub fn encode_planes(feature_planes: &FeaturePlaneArrays, coding: &PlaneCoding) 
     Ok(writer.bytes)
 }
 
-/// The bytes of coded spherical harmonics, with float32 weights. `frame` and `feature_planes`, decoded, matter to priors
+/// The bytes of coded spherical harmonics, with float32 weights. `coordinates` and `feature_planes`, decoded, matter to priors
 /// that read them.
 ///
 /// # Errors
@@ -30,7 +30,7 @@ pub fn encode_planes(feature_planes: &FeaturePlaneArrays, coding: &PlaneCoding) 
 pub fn encode_sh(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
-    frame: &SceneFrameArrays,
+    coordinates: &SceneCoordinateArrays,
     feature_planes: &FeaturePlaneArrays,
 ) -> Result<Vec<u8>, CodecError> {
     let limits = Limits::large();
@@ -38,7 +38,7 @@ pub fn encode_sh(
     sh::section::check(gaussians)?;
     planes::head::check(feature_planes, &limits)?;
     let mut writer = Writer::default();
-    let conditions = Conditions { gaussians, frame, feature_planes };
+    let conditions = Conditions { gaussians, coordinates, feature_planes };
     sh::section::write(gaussians, coding, None, conditions, &limits, &mut writer)?;
     Ok(writer.bytes)
 }
@@ -70,14 +70,14 @@ pub fn plane_distributions(
 pub fn sh_distributions(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
-    frame: &SceneFrameArrays,
+    coordinates: &SceneCoordinateArrays,
     feature_planes: &FeaturePlaneArrays,
 ) -> Result<Distributions, CodecError> {
     let limits = Limits::large();
     attributes::check(gaussians, &limits)?;
     sh::section::check(gaussians)?;
     planes::head::check(feature_planes, &limits)?;
-    sh::section::distributions(gaussians, coding, Conditions { gaussians, frame, feature_planes }, &limits)
+    sh::section::distributions(gaussians, coding, Conditions { gaussians, coordinates, feature_planes }, &limits)
 }
 
 fn check_planes(feature_planes: &FeaturePlaneArrays, coding: &PlaneCoding) -> Result<(), CodecError> {

@@ -6,7 +6,7 @@ pub mod compression;
 
 use light4gs_codec::{
     CoordinateMapping, FeaturePlaneArrays, FurtherAttribute, GaussianArrays, MotionArrays, MotionNetwork, MotionOutput,
-    MotionSource, NamedTensor, Network, SceneData, SceneFrameArrays, SceneMeta,
+    MotionSource, NamedTensor, Network, SceneCoordinateArrays, SceneData, SceneMeta,
     network::{Layer, Operation},
     plane_layout::{PlaneAxes, PlaneLayout},
     sh_rest_coefficients,
@@ -93,7 +93,7 @@ pub fn sample() -> SceneData {
             extra: [("author".to_owned(), "a test".to_owned()), ("writer".to_owned(), String::new())].into(),
         },
         gaussians: GaussianArrays { further: vec![further("age", 2, 2)], ..gaussians(2, 1) },
-        frame: SceneFrameArrays {
+        coordinates: SceneCoordinateArrays {
             mean: [0.5, -0.25, 0.125],
             axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
             std: [1.0, 2.0, 0.5],

@@ -299,7 +299,7 @@ fn harmonics_need_no_planes_unless_coupled() {
         let stream = OpenStream::new(&encoded.bytes).unwrap();
         assert!(!stream.sh_needs_feature_planes().unwrap());
         let gaussians = stream.gaussians().unwrap();
-        let gaussians = stream.sh(gaussians, &stream.frame().unwrap(), &Default::default()).unwrap();
+        let gaussians = stream.sh(gaussians, &stream.coordinates().unwrap(), &Default::default()).unwrap();
         assert_eq!(gaussians, encoded.decoded.gaussians);
     }
 }

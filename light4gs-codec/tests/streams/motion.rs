@@ -5,7 +5,7 @@ use crate::common;
 use common::{hexplane, sample};
 use light4gs_codec::{
     CodecError, FurtherAttribute, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource, Network,
-    SceneData, SceneFrameArrays, decode, encode, info,
+    SceneCoordinateArrays, SceneData, decode, encode, info,
     network::{Layer, Operation},
 };
 
@@ -13,7 +13,7 @@ use light4gs_codec::{
 fn scene() -> SceneData {
     let mut scene = SceneData { gaussians: common::gaussians(1, 0), ..sample() };
     scene.gaussians.means = vec![[0.5, 0.0, 0.0]];
-    scene.frame = SceneFrameArrays::default();
+    scene.coordinates = SceneCoordinateArrays::default();
     scene.feature_planes = hexplane(1, [2, 2, 2, 3], &[1]);
     for (index, plane) in scene.feature_planes.planes.iter_mut().enumerate() {
         plane.values.fill(1.0);

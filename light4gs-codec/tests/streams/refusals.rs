@@ -78,7 +78,9 @@ fn numbers_that_are_not_finite() {
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         assert!(message(|scene| scene.gaussians.means[1][2] = bad).starts_with("gaussians: value 5 of means is"));
         assert!(message(|scene| scene.gaussians.sh_rest[3] = bad).starts_with("sh: value 3 of sh_rest is"));
-        assert!(message(|scene| scene.frame.axes[0][1] = bad).starts_with("scene_frame: value 1 of axes is"));
+        assert!(
+            message(|scene| scene.coordinates.axes[0][1] = bad).starts_with("scene_coordinates: value 1 of axes is")
+        );
         assert!(message(|scene| scene.feature_planes.planes[3].values[0] = bad).contains("values of plane 0.yz"));
         assert!(message(|scene| layer(scene).bias[0] = bad).contains("layers[0].bias"));
         assert!(message(|scene| scene.motion.tensors[0].values[1] = bad).contains("value 1 of nodes"));

@@ -46,7 +46,7 @@ fn info_tells_what_is_inside() {
     assert_eq!((&info.motion.kind[..], &info.motion.tensors[0].shape[..]), ("test-field", &[2, 3][..]));
     assert_eq!(info.profile, None);
     let names: Vec<_> = info.sections.iter().map(|section| section.name).collect();
-    assert_eq!(names, ["gaussians", "sh", "scene_frame", "motion", "feature_planes"]);
+    assert_eq!(names, ["gaussians", "sh", "scene_coordinates", "motion", "feature_planes"]);
     assert!(info.sections.iter().all(|section| section.encoding.name() == "float32"));
     let kinds: Vec<_> = info.sections.iter().map(|section| section.kind.name()).collect();
     assert_eq!(kinds, ["explicit", "explicit", "principal axes", "description", "explicit"]);
@@ -95,7 +95,7 @@ prop_compose! {
         let mut scene = SceneData {
             meta,
             gaussians: gaussians(count, sh_degree),
-            frame: sample().frame,
+            coordinates: sample().coordinates,
             feature_planes: hexplane(channels, resolution, &multipliers),
             motion: if moves && features > 0 { motion(features) } else { MotionArrays::default() },
         };
@@ -137,7 +137,7 @@ proptest! {
 #[test]
 fn a_mapping_of_coordinates_is_kept_and_used() {
     let mut scene = sample();
-    scene.frame.mapping = CoordinateMapping {
+    scene.coordinates.mapping = CoordinateMapping {
         contracts: false,
         scale: [-0.5, 0.25, 1.5],
         offset: [0.1, -0.2, 0.3],
@@ -150,11 +150,11 @@ fn a_mapping_of_coordinates_is_kept_and_used() {
     assert!(kinds.contains(&"mapped principal axes"), "{kinds:?}");
     // The contraction's flag stands 60 bytes into the section; a section that is cut short is refused too.
     let mut paper = scene.clone();
-    paper.frame.mapping = CoordinateMapping::default();
+    paper.coordinates.mapping = CoordinateMapping::default();
     assert_eq!(encode(&paper).unwrap().len() + 33, bytes.len());
     // Half the time from the middle on: the beginning of the one is the middle of the other.
     let mut late = scene.clone();
-    late.frame.mapping = CoordinateMapping { time_scale: 1.0, time_offset: 0.0, ..scene.frame.mapping };
+    late.coordinates.mapping = CoordinateMapping { time_scale: 1.0, time_offset: 0.0, ..scene.coordinates.mapping };
     assert_eq!(scene.positions_at(0.0).unwrap(), late.positions_at(0.5).unwrap());
     assert_eq!(scene.positions_at(1.0).unwrap(), late.positions_at(1.0).unwrap());
 }

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!     . # . #      # anchors: row + column odd. Coded first, all at once, without this context.
-//!     # . # .      . the others: coded second, all at once, each in sight of the decoded anchors around it.
+//!     # . # .      . the others: coded second, all at once, with the decoded anchors around them as context.
 //!     . # . #
 //! ```
 

@@ -65,7 +65,7 @@ pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
         self.base().quantize_with(&self.parts(), planes, steps)
     }
 
-    /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one. Call
+    /// For each plane the symbols `[N, H / 4, W / 4]` of its latent, where it has one. Call
     /// [`update_quantiles`](ContextModel::update_quantiles) first, since they count from the medians.
     fn latent_symbols(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
         self.base().latent_symbols_with(&self.parts(), planes, steps)

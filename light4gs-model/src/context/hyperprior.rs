@@ -1,4 +1,4 @@
-//! The hyperprior: a small latent that is transmitted and describes a plane (Ballé et al. 2018; docs/design.md).
+//! The hyperprior: it describes a plane by a small latent, which is coded first (Ballé et al. 2018; docs/design.md).
 
 use burn::config::Config;
 use burn::module::Module;
@@ -18,7 +18,7 @@ pub struct HyperpriorConfig {
     /// Channels of a plane, M.
     pub channels: usize,
     /// Channels of the latent, N.
-    pub hyper_channels: usize,
+    pub latent_channels: usize,
     /// Channels between the layers of the synthesis, A and B.
     pub synthesis_channels: [usize; 2],
 }
@@ -26,7 +26,7 @@ pub struct HyperpriorConfig {
 impl HyperpriorConfig {
     /// PyTorch's default initialization; the bottleneck as CompressAI.
     pub fn init(&self, device: &Device) -> Hyperprior {
-        let Self { channels, hyper_channels: hyper, synthesis_channels: [first, second] } = *self;
+        let Self { channels, latent_channels: hyper, synthesis_channels: [first, second] } = *self;
         Hyperprior {
             analysis: [
                 PlaneConvConfig::new(channels, hyper, 3).init(device),
@@ -97,7 +97,7 @@ impl PriorPart for Hyperprior {
             parameters: Some(self.synthesize(received)),
             context: None,
             passes: Passes::AnchorsFirst,
-            hyper_bits: Some(bits(likelihood).sum()),
+            latent_bits: Some(bits(likelihood).sum()),
         })
     }
 

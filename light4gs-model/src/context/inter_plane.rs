@@ -88,7 +88,7 @@ impl PriorPart for InterPlane {
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let [over_a, over_b] = planes.layout().over_time(plane)?.map(|source| planes.planes[source].clone());
         let parameters = Some(self.forward(over_a, over_b));
-        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, latent_bits: None })
     }
 
     fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {

@@ -72,7 +72,7 @@ impl PriorPart for InterScale {
     /// Applies where there is a plane below: no latent, one pass.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let parameters = Some(self.contribution(planes, plane)?);
-        Some(Prior { parameters, context: None, passes: Passes::One, hyper_bits: None })
+        Some(Prior { parameters, context: None, passes: Passes::One, latent_bits: None })
     }
 
     fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {

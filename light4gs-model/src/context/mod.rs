@@ -1,7 +1,7 @@
 //! The multiscale hexplane context model, MHCM (paper III-C): a normal distribution for every value of every plane, and so
 //! what it costs in the file.
 //!
-//! One set of weights for all planes, from the lowest scale up. Which part speaks for a plane:
+//! One set of weights for all planes, from the lowest scale up. Which part applies to a plane:
 //!
 //! | plane | parameters | then |
 //! |---|---|---|
@@ -45,7 +45,7 @@ pub struct ContextParts {
     /// A transmitted latent for planes that nothing else describes.
     #[config(default = true)]
     pub hyperprior: bool,
-    /// Anchors first, the others in sight of them.
+    /// Anchors first, then the others with them as context.
     #[config(default = true)]
     pub checkerboard: bool,
     /// Space-only planes from space-time planes.
@@ -74,7 +74,7 @@ pub struct ContextModelConfig {
     /// Channels of a plane, M.
     pub channels: usize,
     /// Channels of the hyperprior's latent, N.
-    pub hyper_channels: usize,
+    pub latent_channels: usize,
     /// Channels between the layers of the hyperprior's synthesis, A and B.
     pub synthesis_channels: [usize; 2],
     /// Widths of the hidden layers of [`EntropyParameters`], C and D.
@@ -133,7 +133,7 @@ impl ContextModelConfig {
         let channels = self.channels;
         ContextModel {
             hyperprior: hyperprior
-                .then(|| HyperpriorConfig::new(channels, self.hyper_channels, self.synthesis_channels).init(device)),
+                .then(|| HyperpriorConfig::new(channels, self.latent_channels, self.synthesis_channels).init(device)),
             checkerboard: checkerboard
                 .then(|| CheckerboardConfig::new(channels).with_groups(self.context_groups).init(device)),
             inter_plane: inter_plane.then(|| {
@@ -171,7 +171,7 @@ impl ContextModelConfig {
 /// let steps = PlaneSteps::fixed(&[0.1; 12], &device);
 /// let rates = model.rate(&steps.add_noise(&hexplane.tensors()), &steps, &[2, 6], Latent::Noise);
 /// // A space-time plane of the lowest scale has a hyperprior, a plane above has none.
-/// assert!(rates[0].hyper_bits.is_some() && rates[1].hyper_bits.is_none());
+/// assert!(rates[0].latent_bits.is_some() && rates[1].latent_bits.is_none());
 /// ```
 #[derive(Module, Debug)]
 pub struct ContextModel {

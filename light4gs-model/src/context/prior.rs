@@ -47,7 +47,7 @@ impl CenteredPlanes {
 pub enum Passes {
     /// All at once.
     One,
-    /// The checkerboard's anchors, then the others in sight of them, if the model has a checkerboard.
+    /// The checkerboard's anchors, then the others with them as context, if the model has a checkerboard.
     AnchorsFirst,
 }
 
@@ -61,13 +61,13 @@ pub struct Prior {
     /// How the values are coded.
     pub passes: Passes,
     /// `[1]`: what is transmitted beside the values.
-    pub hyper_bits: Option<Tensor<1>>,
+    pub latent_bits: Option<Tensor<1>>,
 }
 
 impl Prior {
     /// Nothing is known but the network's biases.
     pub fn constant() -> Self {
-        Self { parameters: None, context: None, passes: Passes::AnchorsFirst, hyper_bits: None }
+        Self { parameters: None, context: None, passes: Passes::AnchorsFirst, latent_bits: None }
     }
 }
 

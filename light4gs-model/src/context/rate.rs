@@ -18,14 +18,14 @@ pub struct PlaneRate {
     pub plane: usize,
     /// `[1]`: of its values.
     pub values_bits: Tensor<1>,
-    /// `[1]`: of its hyperprior, where it has one.
-    pub hyper_bits: Option<Tensor<1>>,
+    /// `[1]`: of its latent, where it has one.
+    pub latent_bits: Option<Tensor<1>>,
 }
 
 impl PlaneRate {
-    /// `[1]`: values and hyperprior.
+    /// `[1]`: values and latent.
     pub fn total(self) -> Tensor<1> {
-        match self.hyper_bits {
+        match self.latent_bits {
             Some(hyper) => self.values_bits + hyper,
             None => self.values_bits,
         }
@@ -63,12 +63,12 @@ impl ContextModel {
         plane: usize,
         latent: Latent,
     ) -> PlaneRate {
-        let (gaussians, hyper_bits) = self.parameters_with(parts, planes, plane, latent);
-        PlaneRate { plane, values_bits: value_bits(planes.in_steps(plane), gaussians).sum(), hyper_bits }
+        let (gaussians, latent_bits) = self.parameters_with(parts, planes, plane, latent);
+        PlaneRate { plane, values_bits: value_bits(planes.in_steps(plane), gaussians).sum(), latent_bits }
     }
 
     /// Means and scales of a plane's values under a composition of parts, in units of the plane's step and relative to its
-    /// center, and its hyperprior's bits.
+    /// center, and the bits of its latent.
     pub fn parameters_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
@@ -77,8 +77,8 @@ impl ContextModel {
         latent: Latent,
     ) -> (NormalParameters<3>, Option<Tensor<1>>) {
         let prior = prior_of(parts, planes, plane, latent);
-        let hyper_bits = prior.hyper_bits.clone();
-        (self.gaussians(prior, &planes.planes[plane]), hyper_bits)
+        let latent_bits = prior.latent_bits.clone();
+        (self.gaussians(prior, &planes.planes[plane]), latent_bits)
     }
 
     /// `[H, W]`: the bits of a plane's values under a composition of parts, summed over channels.
@@ -93,7 +93,7 @@ impl ContextModel {
         value_bits(planes.in_steps(plane), gaussians).sum_dim(0).squeeze_dim(0)
     }
 
-    /// For each plane the symbols `[N, H / 4, W / 4]` of its hyperprior, where it has one under a composition of parts.
+    /// For each plane the symbols `[N, H / 4, W / 4]` of its latent, where it has one under a composition of parts.
     pub fn latent_symbols_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
@@ -102,7 +102,7 @@ impl ContextModel {
     ) -> Vec<Option<Tensor<3>>> {
         let planes = self.centered(planes, steps);
         let symbols = (0..planes.planes.len()).map(|plane| {
-            let has_latent = prior_of(parts, &planes, plane, Latent::Rounded).hyper_bits.is_some();
+            let has_latent = prior_of(parts, &planes, plane, Latent::Rounded).latent_bits.is_some();
             let hyperprior = self.hyperprior.as_ref().filter(|_| has_latent)?;
             Some(hyperprior.symbols(planes.in_steps(plane)))
         });
@@ -123,7 +123,7 @@ impl ContextModel {
         for plane in planes.layout().coding_order() {
             let step = steps.broadcast(plane).detach();
             let prior = prior_of(parts, &known, plane, Latent::Rounded);
-            let hyper_bits = prior.hyper_bits.clone();
+            let latent_bits = prior.latent_bits.clone();
             let values = known.in_steps(plane);
             let round = |means: Tensor<3>| ((values.clone() - means.clone()).round() + means) * step.clone();
             if let (Some(_), Passes::AnchorsFirst) = (&self.checkerboard, prior.passes) {
@@ -138,7 +138,7 @@ impl ContextModel {
             let symbols = (values - gaussians.means.clone()).round();
             let received = symbols.clone() + gaussians.means.clone();
             let decoded = received.clone() * step;
-            let rate = PlaneRate { plane, values_bits: value_bits(received, gaussians).sum(), hyper_bits };
+            let rate = PlaneRate { plane, values_bits: value_bits(received, gaussians).sum(), latent_bits };
             known.planes.set(plane, decoded.clone());
             let decoded = decoded + self.center_of(planes.layout().planes()[plane].axes);
             quantized[plane] = Some(QuantizedPlane { decoded, symbols, rate });

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::{
-    FeaturePlaneArrays, FurtherAttribute, GaussianArrays, MotionArrays, SceneData, SceneFrameArrays, SceneMeta,
+    FeaturePlaneArrays, FurtherAttribute, GaussianArrays, MotionArrays, SceneCoordinateArrays, SceneData, SceneMeta,
 };
 
 use super::attributes::Attribute;
@@ -126,9 +126,9 @@ impl GaussianTensors {
 }
 
 impl SceneCoordinates {
-    fn to_arrays(&self) -> SceneFrameArrays {
+    fn to_arrays(&self) -> SceneCoordinateArrays {
         let Pca { mean, axes, std } = self.pca();
-        SceneFrameArrays { mean, axes, std, mapping: self.mapping() }
+        SceneCoordinateArrays { mean, axes, std, mapping: self.mapping() }
     }
 }
 
@@ -179,7 +179,7 @@ impl<F: DeformationField> DynamicScene<F> {
         SceneData {
             meta,
             gaussians: self.gaussians.to_arrays(),
-            frame: self.coordinates.to_arrays(),
+            coordinates: self.coordinates.to_arrays(),
             feature_planes: self.planes().map(FeaturePlanes::to_arrays).unwrap_or_default(),
             motion: MotionArrays::default(),
         }
@@ -199,7 +199,7 @@ impl<F: DeformationField> DynamicScene<F> {
             true => None,
             false => Some(FeaturePlanes::from_arrays(&data.feature_planes, device)?),
         };
-        let SceneFrameArrays { mean, axes, std, mapping } = data.frame;
+        let SceneCoordinateArrays { mean, axes, std, mapping } = data.coordinates;
         Ok(Self {
             gaussians: Gaussians::from_arrays(&data.gaussians, device),
             coordinates: SceneCoordinates::new(&Pca { mean, axes, std }, device).with_mapping(mapping),

@@ -72,7 +72,7 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let planes = input.planes.as_ref().expect("the compact profile codes planes");
     let encoded = encode_compressed(&data, &input)?;
     let stream = OpenStream::new(&encoded.bytes)?;
-    let (frame, gaussians) = (stream.frame()?, stream.gaussians()?);
+    let (coordinates, gaussians) = (stream.coordinates()?, stream.gaussians()?);
     let no_planes = FeaturePlaneArrays::default();
 
     let plane_symbols = data.feature_planes.planes.iter().map(|plane| plane.values.len()).sum();
@@ -100,10 +100,10 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     add("encode planes", plane_symbols, &|| drop(encode_planes(&data.feature_planes, planes).unwrap()));
     add("decode planes", plane_symbols, &|| drop(stream.feature_planes().unwrap()));
     add("encode spherical harmonics", sh_symbols, &|| {
-        drop(encode_sh(&data.gaussians, &input.sh, &frame, &no_planes).unwrap());
+        drop(encode_sh(&data.gaussians, &input.sh, &coordinates, &no_planes).unwrap());
     });
     add("decode spherical harmonics", sh_symbols, &|| {
-        drop(stream.sh(gaussians.clone(), &frame, &no_planes).unwrap());
+        drop(stream.sh(gaussians.clone(), &coordinates, &no_planes).unwrap());
     });
     add("encode attributes", attribute_symbols, &|| {
         drop(attributes::encode(&data.gaussians, &input.attributes).unwrap());

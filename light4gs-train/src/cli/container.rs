@@ -249,9 +249,9 @@ fn plain_tensors(data: &SceneData) -> BTreeMap<String, (Vec<usize>, Vec<u8>)> {
         };
         add(format!("gaussians.{}", attribute.name), shape, attribute.values);
     }
-    add("frame.mean".into(), vec![3], &data.frame.mean);
-    add("frame.axes".into(), vec![3, 3], data.frame.axes.as_flattened());
-    add("frame.std".into(), vec![3], &data.frame.std);
+    add("coordinates.mean".into(), vec![3], &data.coordinates.mean);
+    add("coordinates.axes".into(), vec![3, 3], data.coordinates.axes.as_flattened());
+    add("coordinates.std".into(), vec![3], &data.coordinates.std);
     for plane in &data.feature_planes.planes {
         let shape = vec![data.feature_planes.channels as usize, plane.height as usize, plane.width as usize];
         add(format!("feature_planes.{}", plane.shape().name()), shape, &plane.values);

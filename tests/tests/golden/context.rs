@@ -41,9 +41,9 @@ fn name_in_file(path: &str) -> String {
 /// The reference's model with the file's sizes and weights. The file's only bottleneck is that of the hyperprior.
 fn model_of(golden: &Golden, device: &Device) -> ContextModel {
     let [channels, ..] = plane_shape(golden);
-    let hyper_channels = golden.shape("param.h_a.0.weight")[0];
+    let latent_channels = golden.shape("param.h_a.0.weight")[0];
     let mut config = ContextModelConfig::reference(channels);
-    config.hyper_channels = hyper_channels;
+    config.latent_channels = latent_channels;
     config.inter_scale = KernelShape::new(golden.shape("param.context_to_params.weight")[2], 1);
     // The reference's inter-plane part is in this file.
     config.parts.inter_plane = false;
@@ -100,7 +100,7 @@ impl ReferenceInterPlane<'_> {
 impl PriorPart for ReferenceInterPlane<'_> {
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let parameters = Some(self.0.conv.forward(Self::context(planes, plane)?));
-        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, hyper_bits: None })
+        Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, latent_bits: None })
     }
 
     /// Where moments are stretched over the rows.
@@ -279,7 +279,7 @@ fn identity() {
             let rate = model.rate_with(&parts, &planes, plane, Latent::Exact);
             let what = format!("{name} identity {}", file_key(plane));
             assert_close_relative(&format!("{what} y"), &values_of(&rate.values_bits), &bits_y[plane..=plane], 1e-4);
-            let hyper = rate.hyper_bits.as_ref().map_or(0.0, |bits| values_of(bits)[0]);
+            let hyper = rate.latent_bits.as_ref().map_or(0.0, |bits| values_of(bits)[0]);
             assert_close_relative(&format!("{what} z"), &[hyper], &bits_z[plane..=plane], 1e-4);
             total = total + rate.total();
         }

@@ -49,7 +49,7 @@ fn principal_axes() {
 }
 
 #[test]
-fn scene_frame() {
+fn scene_coordinates() {
     let golden = Golden::open("c01_contract_pca");
     for (name, device) in devices() {
         let device = device.autodiff();

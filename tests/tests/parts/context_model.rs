@@ -81,7 +81,7 @@ fn parameters_depend_only_on_what_is_decoded() {
         let model = config.init(&device);
         let rates = model.rate(&planes, &steps(&planes), &(0..layout.len()).collect::<Vec<_>>(), Latent::Rounded);
         for (place, plane) in order.iter().copied().enumerate() {
-            if rates[plane].hyper_bits.is_some() {
+            if rates[plane].latent_bits.is_some() {
                 continue;
             }
             let before = parameters(&model, &planes, plane);
@@ -120,7 +120,7 @@ fn rate_of_the_quantized_planes() {
                 let [rate, map] = [&rates[plane].values_bits, &maps[plane].clone().sum()].map(values_of);
                 assert_close_relative(&what, &map, &rate, 1e-5);
                 // Where there is a hyperprior, that of the decoded plane is another one.
-                if rates[plane].hyper_bits.is_none() {
+                if rates[plane].latent_bits.is_none() {
                     assert_close_relative(&what, &rate, &values_of(&quantized[plane].rate.values_bits), 1e-3);
                 }
             }
@@ -138,7 +138,7 @@ fn latent_symbols_are_integers_where_there_is_a_hyperprior() {
         let rates = model.rate(&planes, &steps, &all, Latent::Rounded);
         let symbols = model.latent_symbols(&planes, &steps);
         for plane in all {
-            assert_eq!(symbols[plane].is_some(), rates[plane].hyper_bits.is_some(), "{name} plane {plane}");
+            assert_eq!(symbols[plane].is_some(), rates[plane].latent_bits.is_some(), "{name} plane {plane}");
             let Some(symbols) = &symbols[plane] else { continue };
             let [_, height, width] = planes[plane].dims();
             assert_eq!(symbols.dims()[1..], [height / 4, width / 4]);

@@ -78,7 +78,7 @@ fn spherical_harmonics_cost_what_the_model_says() {
             let coding = model.to_coding(&sh_rest).unwrap();
             let gaussians = GaussianArrays { sh_rest, ..data.gaussians.clone() };
             let Distributions { scales, means } =
-                sh_distributions(&gaussians, &coding, &data.frame, &data.feature_planes).unwrap();
+                sh_distributions(&gaussians, &coding, &data.coordinates, &data.feature_planes).unwrap();
             let tensor = |values: Vec<f32>| Tensor::<3>::from_data(TensorData::new(values, [COUNT, 15, 3]), &device);
             let parameters = NormalParameters { means: tensor(means), scales: tensor(scales) };
             let exact = bits(gaussian_likelihood(values.clone() / model.step(), parameters));
