@@ -169,39 +169,3 @@ impl PlaneQueryKernels for CubeBackend {
         backward(saved, gradient, with_points).unwrap_or_else(|error| error.raise())
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use burn::tensor::{Device, Tensor};
-
-    use crate::planes::{HexPlaneConfig, PlaneTensors};
-
-    /// Far more points in one cell than a loop of Mesa's software driver takes.
-    #[test]
-    fn a_crowded_cell() {
-        const POINTS: usize = 20_000;
-        let config = HexPlaneConfig::new().with_channels(18).with_resolution([4, 4, 4, 4]).with_multipliers(vec![1]);
-        let gradients = |device: Device| {
-            let device = device.autodiff();
-            let planes = config
-                .init(&Device::flex())
-                .planes
-                .into_iter()
-                .map(|plane| Tensor::from_data(plane.val().into_data(), &device).require_grad());
-            let planes: Vec<Tensor<3>> = planes.collect();
-            let points = Tensor::<2>::full([POINTS, 4], 0.1, &device);
-            let features = PlaneTensors::new(config.layout(), planes.clone()).query(points);
-            let gradients = features.sum().backward();
-            let all = planes.iter().map(|plane| plane.grad(&gradients).expect("planes have gradients"));
-            let sums = all.map(|gradient| gradient.sum().into_scalar::<f32>());
-            sums.collect::<Vec<_>>()
-        };
-        Device::flex().seed(1);
-        let expected = gradients(Device::flex());
-        Device::flex().seed(1);
-        let found = gradients(Device::wgpu(Default::default()));
-        for (found, expected) in found.iter().zip(&expected) {
-            assert!((found - expected).abs() <= 1e-3 * expected.abs(), "{found} against {expected}");
-        }
-    }
-}

@@ -76,3 +76,57 @@ pub fn context_model(settings: &ContextConfig, channels: usize) -> ContextModelC
         .with_high_scale_hyperprior(settings.high_scale_hyperprior);
     sizes.with_parts(parts)
 }
+
+#[cfg(test)]
+mod tests {
+    use burn::module::Param;
+    use burn::tensor::{Device, Tensor};
+    use light4gs_data::PointCloud;
+    use light4gs_model::attributes::attribute_of_path;
+    use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
+
+    use super::ConfiguredModels;
+    use crate::compression::Compression;
+    use crate::config::Config;
+    use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
+
+    #[derive(Default)]
+    struct Groups(Vec<(String, Option<ParameterGroup>)>);
+
+    impl ParameterVisitor for Groups {
+        fn visit<const D: usize>(&mut self, path: &str, _: &Param<Tensor<D>>) {
+            self.0.push((path.to_owned(), ParameterGroup::of(path)));
+        }
+    }
+
+    /// Whatever is trained has a group, whatever has none is a constant.
+    #[test]
+    fn every_parameter_has_its_group() {
+        let mut config = Config::default();
+        config.model.hexplane.channels = 2;
+        config.model.hexplane.resolution = [8, 8, 8, 4];
+        let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
+        let device = Device::flex();
+        let scene = config.model.build().init(&cloud, &device);
+        let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
+        let (mut groups, mut models) = (Groups::default(), Groups::default());
+        visit_parameters(&scene, &mut groups);
+        visit_parameters(&compression, &mut models);
+        for (path, group) in &groups.0 {
+            assert_eq!(group.is_none(), path.starts_with("coordinates."), "{path}");
+            let part = path.split('.').next().unwrap();
+            assert_eq!(part == "gaussians", attribute_of_path(path).is_some(), "{path}");
+        }
+        for attribute in scene.gaussians.attributes() {
+            assert!(groups.0.iter().any(|(path, _)| *path == attribute.path()), "{attribute:?}");
+        }
+        let planes = groups.0.iter().filter(|(_, group)| *group == Some(ParameterGroup::Planes)).count();
+        assert_eq!(planes, 12);
+        for (path, _) in models.0 {
+            let path = format!("{COMPRESSION}.{path}");
+            assert!(ParameterGroup::of(&path).is_some(), "{path}");
+        }
+        assert_eq!(ParameterGroup::of("field.motion.planes.0"), Some(ParameterGroup::Planes));
+        assert_eq!(ParameterGroup::of("fields"), None);
+    }
+}

@@ -106,7 +106,7 @@ fn hexplane_query() {
 
 /// Our mapping to the planes: `paper.*` of c02.
 #[test]
-fn hexplane_query_in_the_scene_frame() {
+fn hexplane_query_in_scene_coordinates() {
     let golden = Golden::open("c02_hexplane");
     let rotation = golden.values("ref.rotation");
     let pca = Pca {

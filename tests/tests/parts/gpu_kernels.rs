@@ -6,7 +6,7 @@ use glam::Vec3;
 use light4gs_data::Camera;
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::{GaussianTensors, PixelContribution, Significance, Splatter};
+use light4gs_model::{GaussianTensors, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 
 /// Values and gradient of a function, at places far into the tails and on both sides of the bound.
 fn run(function: fn(Tensor<1>) -> Tensor<1>, device: Device, count: usize) -> [Vec<f32>; 2] {
@@ -95,5 +95,34 @@ fn scores_are_those_of_the_cpu() {
                 );
             }
         }
+    }
+}
+
+/// Far more points in one cell than a loop of Mesa's software driver takes.
+#[test]
+fn a_crowded_cell() {
+    const POINTS: usize = 20_000;
+    let config = HexPlaneConfig::new().with_channels(18).with_resolution([4, 4, 4, 4]).with_multipliers(vec![1]);
+    let gradients = |device: Device| {
+        let device = device.autodiff();
+        let planes = config
+            .init(&Device::flex())
+            .planes
+            .into_iter()
+            .map(|plane| Tensor::from_data(plane.val().into_data(), &device).require_grad());
+        let planes: Vec<Tensor<3>> = planes.collect();
+        let points = Tensor::<2>::full([POINTS, 4], 0.1, &device);
+        let features = PlaneTensors::new(config.layout(), planes.clone()).query(points);
+        let gradients = features.sum().backward();
+        let all = planes.iter().map(|plane| plane.grad(&gradients).expect("planes have gradients"));
+        let sums = all.map(|gradient| gradient.sum().into_scalar::<f32>());
+        sums.collect::<Vec<_>>()
+    };
+    Device::flex().seed(1);
+    let expected = gradients(Device::flex());
+    Device::flex().seed(1);
+    let found = gradients(Device::wgpu(Default::default()));
+    for (found, expected) in found.iter().zip(&expected) {
+        assert!((found - expected).abs() <= 1e-3 * expected.abs(), "{found} against {expected}");
     }
 }

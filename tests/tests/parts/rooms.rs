@@ -2,8 +2,8 @@
 //! form no circle, and no folder holds more files than one can take in at a glance.
 //!
 //! The paths that begin with `crate`, `super` or `self` are read from the sources as text; names that the crate's root
-//! exports again count for the room that they come from. `$crate` in a macro counts for the room of the macro. Unit tests are
-//! left out: a test of a room may use those above it.
+//! exports again count for the room that they come from. `$crate` in a macro counts for the room of the macro. Unit tests count
+//! as well: one that needs a room above its own stands in that room, or in `tests/`.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -102,7 +102,7 @@ fn a_circle_is_found() {
     write("lower.rs", "// crate::upper\nconst TEXT: &str = \"crate::upper\"; pub struct Low;");
     write("middle.rs", "use super::lower::Low;\nfn f(low: Low) { crate::Shown::new(low) }");
     write("upper/mod.rs", "pub mod inner;\npub struct Top;");
-    write("upper/inner.rs", "pub struct Deep;\n#[cfg(test)]\npub(super) mod tests { use crate::lower; }");
+    write("upper/inner.rs", "pub struct Deep;\nmod tests { use super::super::Top; }");
     assert_eq!(circles(&source), Vec::<String>::new());
     write("lower.rs", "use crate::{middle::{self, f}};\npub struct Low;");
     let found = circles(&source);
@@ -222,10 +222,6 @@ impl Source {
                     depth -= 1;
                     inline.retain(|(outside, _)| *outside < depth);
                 }
-                "mod" if self.word(at + 2) == "{" && self.is_test(at) => {
-                    at = self.closing(at + 2);
-                    continue;
-                }
                 "mod" if self.word(at + 2) == "{" => inline.push((depth, self.word(at + 1).to_string())),
                 "crate" | "super" | "self" if self.word(at + 1) == "::" && (at == 0 || self.word(at - 1) != "::") => {
                     let mut modules = self.modules.clone();
@@ -241,31 +237,6 @@ impl Source {
             at += 1;
         }
         found
-    }
-
-    /// Whether the item at `at` has `#[cfg(test)]` in front of it, with or without `pub`.
-    fn is_test(&self, at: usize) -> bool {
-        let attribute = ["#", "[", "cfg", "(", "test", ")", "]"];
-        (at.saturating_sub(5)..=at).any(|end| {
-            end >= attribute.len() && (0..attribute.len()).all(|i| self.word(end - attribute.len() + i) == attribute[i])
-        })
-    }
-
-    /// The place behind the brace that closes the one at `at`.
-    fn closing(&self, mut at: usize) -> usize {
-        let mut depth = 0;
-        while at < self.words.len() {
-            match self.word(at) {
-                "{" => depth += 1,
-                "}" => depth -= 1,
-                _ => {}
-            }
-            at += 1;
-            if depth == 0 {
-                break;
-            }
-        }
-        at
     }
 
     fn word(&self, at: usize) -> &str {
