@@ -66,13 +66,13 @@ impl DeformationField for SharedTrajectories {
         }
     }
 
-    fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
         let branch =
             |[first, second]: &[Linear; 2], input| second.forward(leaky_relu(first.forward(input), SLOPE.into()));
         let [count, _] = points.dims();
         let time = Tensor::full([count, 1], time, &points.device());
         let along = branch(&self.place, points) * branch(&self.pace, time);
-        GaussianTensors { means: rest.means.clone() + self.directions.forward(along), ..rest }
+        GaussianTensors { means: canonical.means.clone() + self.directions.forward(along), ..canonical }
     }
 
     fn to_arrays(&self) -> Result<MotionArrays, ModelError> {

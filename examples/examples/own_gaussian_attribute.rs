@@ -42,15 +42,15 @@ impl DeformationField for Lifetimes {
 
     /// With the opacity `1 / (1 + e)`, where `e = exp(-logit)`, and the bell curve `b`, the new logit is
     /// `log b - log(1 - b + e)`.
-    fn deform(&self, rest: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
-        let lifetime = rest.further(LIFETIME).expect("the field has asked for it").clone();
+    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+        let lifetime = canonical.further(LIFETIME).expect("the field has asked for it").clone();
         let center = lifetime.clone().slice(s![.., 0..1]);
         let width = lifetime.slice(s![.., 1..2]).exp();
         let distance = (center.neg() + time) / width;
         let log_bell = distance.powi_scalar(2) * -0.5;
-        let e = rest.opacity_logits.clone().neg().exp();
+        let e = canonical.opacity_logits.clone().neg().exp();
         let opacity_logits = log_bell.clone() - (log_bell.exp().neg() + 1.0 + e).log();
-        GaussianTensors { opacity_logits, ..rest }
+        GaussianTensors { opacity_logits, ..canonical }
     }
 
     /// The same as data: the codec calls attributes by their names.

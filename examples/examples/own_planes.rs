@@ -70,12 +70,12 @@ impl DeformationField for TriPlaneField {
         Self { planes, hidden, output }
     }
 
-    fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
         let [count, _] = points.dims();
         let time = Tensor::full([count, 1], time, &points.device());
         let known = Tensor::cat(vec![self.planes.tensors().query_space(points), time], 1);
         let offset = self.output.forward(leaky_relu(self.hidden.forward(known), SLOPE.into()));
-        GaussianTensors { means: rest.means.clone() + offset, ..rest }
+        GaussianTensors { means: canonical.means.clone() + offset, ..canonical }
     }
 
     fn planes(&self) -> Option<&FeaturePlanes> {

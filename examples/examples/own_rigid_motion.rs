@@ -250,13 +250,14 @@ impl DeformationField for RigidNodes {
         Self::zeros(1, config.knots, config.nodes, device)
     }
 
-    fn deform(&self, rest: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
-        let blended = self.weights(&rest.means).matmul(self.poses(time).transpose());
-        let means = products(blended.clone().slice(s![.., 0..9]), &rest.means) + blended.clone().slice(s![.., 9..12]);
+    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+        let blended = self.weights(&canonical.means).matmul(self.poses(time).transpose());
+        let means =
+            products(blended.clone().slice(s![.., 0..9]), &canonical.means) + blended.clone().slice(s![.., 9..12]);
         let turn = blended.slice(s![.., 12..16]).transpose();
         let product = rows(&Tensor::cat(vec![turn.clone(), -turn], 0), &PRODUCT).transpose();
         // Quaternions may have any length.
-        GaussianTensors { means, quats: products(product, &rest.quats), ..rest }
+        GaussianTensors { means, quats: products(product, &canonical.quats), ..canonical }
     }
 
     fn begin_motion(&mut self, scene: &SceneAtRest<'_>, _: &FinePosition) {

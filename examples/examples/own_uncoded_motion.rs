@@ -25,12 +25,12 @@ impl DeformationField for Turntable {
         Self { angle: Param::from_tensor(Tensor::zeros([1], device)) }
     }
 
-    fn deform(&self, rest: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
         let angle = (self.angle.val() * time).unsqueeze::<2>();
         let (cos, sin) = (angle.clone().cos(), angle.sin());
-        let [x, y, z] = [0, 1, 2].map(|axis| rest.means.clone().slice(s![.., axis..axis + 1]));
+        let [x, y, z] = [0, 1, 2].map(|axis| canonical.means.clone().slice(s![.., axis..axis + 1]));
         let means = vec![x.clone() * cos.clone() - y.clone() * sin.clone(), x * sin + y * cos, z];
-        GaussianTensors { means: Tensor::cat(means, 1), ..rest }
+        GaussianTensors { means: Tensor::cat(means, 1), ..canonical }
     }
 }
 

@@ -42,7 +42,7 @@ pub struct Attribute {
     pub learning_rate: Setting,
     /// How a file stores it.
     pub coding: Coding,
-    /// Whether it stays what it is at rest: [`DynamicScene::at`](crate::DynamicScene::at) then takes no other values from a field.
+    /// Whether it keeps its canonical value: [`DynamicScene::at`](crate::DynamicScene::at) then takes no other values from a field.
     pub constant: bool,
     /// Whether the scene looks right without it, so that a program that does not know it may show the scene.
     pub optional: bool,
@@ -262,7 +262,7 @@ impl Attribute {
         Self { activation, ..self }
     }
 
-    /// Staying what it is at rest at all times.
+    /// Keeping its canonical value at all times.
     pub fn constant(self) -> Self {
         Self { constant: true, ..self }
     }

@@ -68,7 +68,7 @@ impl<F: DeformationField> DynamicSceneConfig<F> {
 /// ```
 #[derive(Module, Debug)]
 pub struct DynamicScene<F: Module = BuiltInField> {
-    /// At rest.
+    /// The canonical ones.
     pub gaussians: Gaussians,
     /// From world coordinates to the field's.
     pub coordinates: SceneCoordinates,
@@ -81,16 +81,16 @@ pub struct DynamicScene<F: Module = BuiltInField> {
 impl<F: DeformationField> DynamicScene<F> {
     /// Raw attributes at a time in [0, 1].
     pub fn at(&self, time: f32) -> GaussianTensors {
-        let rest = self.gaussians.tensors();
+        let canonical = self.gaussians.tensors();
         if self.gaussians.is_empty() {
             // Dense layers of some back ends refuse a batch of none.
-            return rest;
+            return canonical;
         }
-        let means = rest.means.clone();
+        let means = canonical.means.clone();
         let means = if self.differentiate_points { means } else { means.detach() };
-        let at_rest = rest.further.clone();
+        let constants = canonical.further.clone();
         let (points, time) = (self.coordinates.normalize(means), self.coordinates.field_time(time));
-        self.field.deform(rest, points, time).with_constants_of(&at_rest)
+        self.field.deform(canonical, points, time).with_constants_of(&constants)
     }
 
     /// The field's planes, if it has some.

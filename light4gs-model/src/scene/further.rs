@@ -7,7 +7,7 @@ use burn::tensor::{Device, Tensor};
 
 use super::attributes::Attribute;
 
-/// A further attribute of N Gaussians: at rest or at a time.
+/// A further attribute of N Gaussians: canonical or at a time.
 #[derive(Clone, Debug)]
 pub struct FurtherTensor {
     /// What it is.

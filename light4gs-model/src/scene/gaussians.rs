@@ -80,7 +80,7 @@ impl GaussiansConfig {
     }
 }
 
-/// Raw attributes of N Gaussians as tensors: at rest or at a time.
+/// Raw attributes of N Gaussians as tensors: canonical or at a time.
 #[derive(Clone, Debug)]
 pub struct GaussianTensors {
     /// `[N, 3]`, world units.
@@ -132,7 +132,7 @@ impl GaussianTensors {
         self.further.iter().find(|tensor| tensor.attribute.name == name).map(|tensor| &tensor.values)
     }
 
-    /// Gives the attributes that are [constant](Attribute::constant) their values at rest back.
+    /// Gives the attributes that are [constant](Attribute::constant) their canonical values back.
     pub(super) fn with_constants_of(mut self, rest: &[FurtherTensor]) -> Self {
         for constant in rest.iter().filter(|tensor| tensor.attribute.constant) {
             let same = |tensor: &&mut FurtherTensor| tensor.attribute.name == constant.attribute.name;
@@ -230,7 +230,7 @@ impl Gaussians {
         }
     }
 
-    /// The attributes at rest, on the tape where autodiff is on.
+    /// The canonical attributes, on the tape where autodiff is on.
     pub fn tensors(&self) -> GaussianTensors {
         GaussianTensors {
             means: self.means.val(),

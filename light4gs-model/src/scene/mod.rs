@@ -1,4 +1,4 @@
-//! The scene (paper III-A): Gaussians at rest, and the field that moves them.
+//! The scene (paper III-A): canonical Gaussians, and the field that moves them.
 //!
 //! World points become the field's coordinates ([`SceneCoordinates`], [`contract`]); [`FeaturePlanes`](crate::FeaturePlanes) give a
 //! feature for a point and a time; [`Deformation`] turns the feature into changes of the Gaussians' attributes;

@@ -144,10 +144,10 @@ mod tests {
             }
         }
 
-        fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
-            assert_eq!(points.dims(), rest.means.dims());
+        fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+            assert_eq!(points.dims(), canonical.means.dims());
             let shift = self.shifts.val().mean_dim(0) + (self.fast.val() + self.slow.val()).unsqueeze::<2>();
-            GaussianTensors { means: rest.means.clone() + shift * time, ..rest }
+            GaussianTensors { means: canonical.means.clone() + shift * time, ..canonical }
         }
 
         fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {

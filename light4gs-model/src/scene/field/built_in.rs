@@ -71,8 +71,8 @@ macro_rules! built_in_fields {
                 Err(ModelError::kind(&arrays.kind, Self::KINDS))
             }
 
-            fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
-                each!(self, field => field.deform(rest, points, time))
+            fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+                each!(self, field => field.deform(canonical, points, time))
             }
 
             fn kind(&self) -> &'static str {

@@ -65,8 +65,8 @@ impl DeformationField for HexPlaneField {
         Self { hexplane, deformation: deformation.init(device) }
     }
 
-    fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
-        rest.offset_by(self.offsets(points, time))
+    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+        canonical.offset_by(self.offsets(points, time))
     }
 
     fn planes(&self) -> Option<&FeaturePlanes> {

@@ -55,11 +55,11 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     /// The field at the beginning of a training: it should move nothing much.
     fn init(config: &Self::Config, device: &Device) -> Self;
 
-    /// The Gaussians at a time in [0, 1]. `rest` are those at rest, N > 0 of them, with everything that they have, positions
+    /// The Gaussians at a time in [0, 1]. `canonical` are the canonical ones, N > 0 of them, with all their attributes, positions
     /// in world units among it; `points [N, 3]` are their positions in the scene's coordinates, each in [-1, 1].
     /// Differentiable in all of them and in the parameters. What is only added to the Gaussians is an [`Offsets`], see
     /// [`GaussianTensors::offset_by`].
-    fn deform(&self, rest: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors;
+    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors;
 
     /// Which of [`Self::KINDS`] this one is.
     fn kind(&self) -> &'static str {
@@ -139,7 +139,7 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
 /// What a field moves, on the tape where autodiff is on.
 #[derive(Clone, Copy, Debug)]
 pub struct SceneAtRest<'a> {
-    /// At rest.
+    /// The canonical ones.
     pub gaussians: &'a Gaussians,
     /// From world coordinates to those that [`DeformationField::deform`] gets.
     pub coordinates: &'a SceneCoordinates,

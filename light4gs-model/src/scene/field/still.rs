@@ -32,8 +32,8 @@ impl DeformationField for StillField {
         Self
     }
 
-    fn deform(&self, rest: GaussianTensors, _: Tensor<2>, _: f32) -> GaussianTensors {
-        rest
+    fn deform(&self, canonical: GaussianTensors, _: Tensor<2>, _: f32) -> GaussianTensors {
+        canonical
     }
 
     fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
