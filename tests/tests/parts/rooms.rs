@@ -291,7 +291,7 @@ impl Shown {
             let room = path[0].clone();
             if shown == "*" {
                 let inside = sources.iter().find(|file| file.modules == path);
-                for name in inside.into_iter().flat_map(|file| items(file)) {
+                for name in inside.into_iter().flat_map(items) {
                     rooms.entry(name).or_insert(room.clone());
                 }
             } else {
