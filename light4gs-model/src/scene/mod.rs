@@ -19,9 +19,6 @@ pub use attributes::Attribute;
 pub use contraction::contract;
 pub use coordinates::{CoordinatesConfig, Pca, SceneCoordinates};
 pub use dynamic_scene::{DynamicScene, DynamicSceneConfig};
-pub use field::{
-    BuiltInField, BuiltInFieldConfig, Deformation, DeformationConfig, DeformationField, DeformationHead, FinePosition,
-    HexPlaneField, HexPlaneFieldConfig, LearningRate, Offsets, SceneAtRest, StillField,
-};
+pub use field::*;
 pub use further::{FurtherParameters, FurtherTensor};
 pub use gaussians::{ActivatedGaussians, AttributeMapper, GaussianTensors, Gaussians, GaussiansConfig};
