@@ -1,10 +1,10 @@
-import { Camera } from "./camera.js";
-import { Controls } from "./controls.js";
-import { SplatRenderer } from "./splat_renderer.js";
-export type DatasetCamera = import("./camera.js").DatasetCamera;
-export type Vector = import("./camera.js").Vector;
-export type Scene = import("./scene.js").Scene;
-export type View = import("./splat_renderer.js").View;
+import { Camera } from "./views/camera.js";
+import { Controls } from "./views/controls.js";
+import { SplatRenderer } from "./drawing/splat_renderer.js";
+export type DatasetCamera = import("./views/camera.js").DatasetCamera;
+export type Vector = import("./views/camera.js").Vector;
+export type Scene = import("./scene/scene.js").Scene;
+export type View = import("./drawing/splat_renderer.js").View;
 export type PlayerOptions = {
     /**
      * begin to play; false
@@ -46,8 +46,8 @@ export type PlayerOptions = {
 export declare class Player extends EventTarget {
     #private;
     canvas: HTMLCanvasElement;
-    scene: import("./scene.js").Scene;
-    cameras: import("./camera.js").DatasetCamera[];
+    scene: import("./index.js").Scene;
+    cameras: import("./views/camera.js").DatasetCamera[];
     pixelRatio: number | undefined;
     loop: boolean;
     speed: number;
@@ -95,7 +95,7 @@ export declare class Player extends EventTarget {
     /** To be called after the camera was changed from outside. */
     cameraMoved(): void;
     /** The training cameras in the order of their times: the path that {@link following} takes. */
-    get path(): import("./camera.js").DatasetCamera[];
+    get path(): import("./views/camera.js").DatasetCamera[];
     /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
     get draftScale(): number;
     /** Images a second over the last second; 0 where nothing changes. */

@@ -75,7 +75,7 @@ export declare class SplatRenderer {
     constructor(canvas: HTMLCanvasElement | OffscreenCanvas);
     /** Makes everything again after the graphics card has lost it. */
     restore(): void;
-    /** @param {Float32Array} list  what is drawn, as {@link import("./scene.js").Scene.frame} gives it */
+    /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
     setList(list: Float32Array): void;
     /**
      * Draws what was set, over a background.

@@ -1,7 +1,7 @@
-export type Player = import("./player.js").Player;
+export type Player = import("../player.js").Player;
 export declare class Controls {
     #private;
-    player: import("./player.js").Player;
+    player: import("../player.js").Player;
     /** Whether a drag turns the view where it stands, in place of turning around the target. */
     flying: boolean;
     /** Whether the wheel zooms before the canvas was clicked: not in a page that scrolls. */

@@ -1,4 +1,4 @@
-export type View = import("./splat_renderer.js").View;
+export type View = import("../drawing/splat_renderer.js").View;
 export type Vector = [number, number, number];
 export type CameraFields = {
     /**
@@ -15,7 +15,7 @@ export type CameraFields = {
     time?: number;
 };
 export type DatasetCamera = View & CameraFields;
-/** @typedef {import("./splat_renderer.js").View} View */
+/** @typedef {import("../drawing/splat_renderer.js").View} View */
 /** @typedef {[number, number, number]} Vector */
 /**
  * @typedef {object} CameraFields

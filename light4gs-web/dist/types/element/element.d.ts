@@ -1,6 +1,6 @@
 import { Layers } from "./layers.js";
-import { Player } from "./player.js";
-export type DatasetCamera = import("./camera.js").DatasetCamera;
+import { Player } from "../player.js";
+export type DatasetCamera = import("../views/camera.js").DatasetCamera;
 declare const L4gsPlayer_base: {
     new (): HTMLElement;
     prototype: HTMLElement;
