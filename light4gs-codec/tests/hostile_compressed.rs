@@ -135,10 +135,12 @@ fn the_largest_planes_of_a_small_stream() {
 
     let bytes = &streams()[1];
     let payload = payload(bytes, 4);
-    assert_eq!(payload[..5], [4, 8, 4, 4, 4]); // channels, x, y, z, t
-    let x = 29_200u32;
-    let sizes = [4, x as u8 | 0x80, (x >> 7) as u8 | 0x80, (x >> 14) as u8, 8];
-    let error = decode(&with_payload(bytes, 4, &[&sizes, &payload[3..]].concat())).unwrap_err();
+    // Channels, scales; of each scale its planes and x, y, z, t.
+    assert_eq!(payload[..12], [4, 2, 63, 8, 4, 4, 4, 63, 16, 8, 8, 4]);
+    let varint = |x: u32| [x as u8 | 0x80, (x >> 7) as u8 | 0x80, (x >> 14) as u8];
+    let (x, finer) = (varint(29_200), varint(58_400));
+    let head = [&payload[..3], &x, &[8], &payload[5..8], &finer, &[16], &payload[10..]].concat();
+    let error = decode(&with_payload(bytes, 4, &head)).unwrap_err();
     assert!(matches!(error, CodecError::OverLimit { .. }), "{error}");
 }
 
