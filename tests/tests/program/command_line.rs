@@ -76,7 +76,7 @@ fn a_run_with_the_rate_in_its_loss() {
     assert_eq!(coding["fit_seconds"], serde_json::Value::Null, "the models were trained with the scene");
     let bits = |part: &str| ["estimated_bits", "coded_bits"].map(|kind| coding[kind][part].as_f64().unwrap());
     // So small a scene's sub-streams end with whole words; what remains is within two percent.
-    let [expected, coded] = bits("feature planes");
+    let [expected, coded] = bits("planes");
     assert!((expected - coded).abs() < 0.02 * coded + 600.0, "{expected} bits expected, {coded} coded");
     // In so few iterations most harmonics are still exactly zero, which costs less than an untrained model says.
     let [expected, coded] = bits("sh");
