@@ -77,7 +77,7 @@ impl VolumeWeight {
 /// let mut significance = Significance::new(2);
 /// significance.add(&Splatter::new([1.0; 3], 0), gaussians.tensors(), &camera);
 /// let sums = significance.sums(PixelContribution::BlendingWeight);
-/// assert!(scores[0] > scores[1]);
+/// assert!(sums[0] > sums[1]);
 /// ```
 #[derive(Clone, Debug)]
 pub struct Significance {
