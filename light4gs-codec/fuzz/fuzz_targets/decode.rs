@@ -27,6 +27,8 @@ const LIMITS: Limits = Limits {
     image_side: 1 << 12,
     image_pixels: 1 << 22,
     gaussians: 1 << 12,
+    attributes: 8,
+    attribute_width: 16,
     channels: 64,
     resolution: 1 << 8,
     scales: 4,
