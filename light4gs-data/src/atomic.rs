@@ -93,10 +93,16 @@ pub(crate) fn make_folder_atomically(
     fill: impl FnOnce(&Path) -> Result<(), DataError>,
 ) -> Result<(), DataError> {
     sweep_once(folder_of(path));
-    let part = sibling(path);
-    fs::create_dir_all(&part).map_err(DataError::io("create", &part))?;
-    // Where a folder cannot be opened and locked, it is not swept either.
-    let _locked = File::open(&part).map(|folder| claim(&part, &folder).then_some(folder));
+    let (part, _locked) = loop {
+        let part = sibling(path);
+        fs::create_dir_all(&part).map_err(DataError::io("create", &part))?;
+        match File::open(&part) {
+            Ok(folder) if !claim(&part, &folder) => {}
+            // Where a folder cannot be opened and locked, it is not swept either.
+            opened if part.is_dir() => break (part, opened),
+            _ => {}
+        }
+    };
     let made = fill(&part).and_then(|()| {
         if path.is_dir() {
             fs::remove_dir(path).map_err(DataError::io("replace", path))?;
@@ -141,7 +147,8 @@ pub fn write_atomically(
         Ok(created) => created,
         Err(source) => return Err(failed(source)),
     };
-    let written = fill_and_flush(file, fill).and_then(|()| fs::rename(&part, path));
+    // Locked until it has its name: a sweep between the two would remove it.
+    let written = fill_and_flush(file, fill).and_then(|_locked| fs::rename(&part, path));
     if let Err(source) = written {
         // The first error is the one to report; a leftover is all that could go wrong here.
         let _ = fs::remove_file(&part);
@@ -163,10 +170,12 @@ fn create_sibling(path: &Path) -> io::Result<(PathBuf, File)> {
     }
 }
 
-fn fill_and_flush(file: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+fn fill_and_flush(file: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<File> {
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;
-    writer.into_inner()?.sync_all()
+    let file = writer.into_inner()?;
+    file.sync_all()?;
+    Ok(file)
 }
 
 /// Flushes the entry of a file that has just been renamed. The file is there and complete, so a system that cannot
@@ -255,6 +264,27 @@ mod tests {
         .unwrap();
         assert_eq!(fs::read(folder.path().join("a.bin")).unwrap(), b"whole");
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+    }
+
+    /// Images of a new folder are written by all threads at once, and the first of them sweeps it.
+    #[test]
+    fn a_sweep_removes_nothing_that_is_being_written() {
+        let folder = tempfile::tempdir().unwrap();
+        std::thread::scope(|threads| {
+            let writer = threads.spawn(|| {
+                for count in 0..200 {
+                    let name = folder.path().join(format!("{count}.bin"));
+                    write_atomically(&name, |out| out.write_all(b"whole"))?;
+                    make_folder_atomically(&folder.path().join(count.to_string()), |_| Ok(()))?;
+                }
+                Ok::<(), DataError>(())
+            });
+            while !writer.is_finished() {
+                sweep_leftovers(folder.path());
+            }
+            writer.join().unwrap().unwrap();
+        });
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 400);
     }
 
     #[test]
