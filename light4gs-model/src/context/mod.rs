@@ -9,12 +9,13 @@
 //! | lowest scale, space-only | [`InterPlane`], from the decoded space-time planes | [`Checkerboard`] |
 //! | higher scales | [`InterScale`], from the decoded plane one scale below | all at once |
 //!
-//! Where a part is switched off, or the planes that it reads are not there, the next one that applies takes its place:
+//! Where a part is left out, or the planes that it reads are not there, the next one that applies takes its place:
 //! inter-scale, inter-plane, hyperprior, then a constant. [`EntropyParameters`] turns what the parts know into the distribution.
 //!
 //! Which parts the paper's model has is said in this file and nowhere else. A new one is a file of its own with a
 //! [`PriorPart`], which computes its prior with Burn and describes the same network for the codec, and an entry in
-//! [`PlaneEntropy::parts`]: of [`ContextModel`] here, or of a composition of one's own.
+//! [`PlaneEntropy::parts`]: of [`ContextModel`] here, where [`ContextPart`] gives it a name for configurations, or of a
+//! composition of one's own.
 
 mod arrays;
 pub(crate) mod checkerboard;
@@ -39,24 +40,53 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::Device;
 
-/// Parts of a [`ContextModel`], each of which an ablation may switch off.
-#[derive(Config, Debug, PartialEq)]
-pub struct ContextParts {
+/// A part of a [`ContextModel`] by name. An ablation leaves some out.
+#[derive(Config, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum ContextPart {
     /// A transmitted latent for planes that nothing else describes.
-    #[config(default = true)]
-    pub hyperprior: bool,
+    Hyperprior,
     /// Anchors first, then the others with them as context.
-    #[config(default = true)]
-    pub checkerboard: bool,
+    Checkerboard,
     /// Space-only planes from space-time planes.
-    #[config(default = true)]
-    pub inter_plane: bool,
+    InterPlane,
     /// Higher scales from the scale below.
-    #[config(default = true)]
-    pub inter_scale: bool,
+    InterScale,
     /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
-    #[config(default = false)]
-    pub high_scale_hyperprior: bool,
+    HighScaleHyperprior,
+}
+
+impl ContextPart {
+    /// All of them.
+    pub const ALL: [Self; 5] =
+        [Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale, Self::HighScaleHyperprior];
+    /// Their names, in the same order.
+    pub const NAMES: [&'static str; 5] =
+        ["hyperprior", "checkerboard", "inter_plane", "inter_scale", "high_scale_hyperprior"];
+    /// Those of the paper's model.
+    pub const PAPER: [Self; 4] = [Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale];
+
+    /// Its name in configurations.
+    pub fn name(self) -> &'static str {
+        Self::NAMES[self as usize]
+    }
+
+    /// The part of a name.
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|part| part.name() == name)
+    }
+
+    /// The parts that it consists of or builds on: it cannot be there without them.
+    pub fn needs(self) -> &'static [Self] {
+        match self {
+            Self::HighScaleHyperprior => &[Self::Hyperprior, Self::InterScale],
+            _ => &[],
+        }
+    }
+
+    /// The paper's parts without these.
+    pub fn paper_without(absent: &[Self]) -> Vec<Self> {
+        Self::PAPER.into_iter().filter(|part| !absent.contains(part)).collect()
+    }
 }
 
 /// Kernel and groups of a convolution.
@@ -86,8 +116,8 @@ pub struct ContextModelConfig {
     /// The inter-scale convolution.
     pub inter_scale: KernelShape,
     /// What is there.
-    #[config(default = "ContextParts::new()")]
-    pub parts: ContextParts,
+    #[config(default = "ContextPart::PAPER.to_vec()")]
+    pub parts: Vec<ContextPart>,
     /// Subtracted from the space-only planes before anything else.
     #[config(default = 0.0)]
     pub space_only_center: f64,
@@ -106,7 +136,7 @@ impl ContextModelConfig {
         let hidden = [10 * channels / 3, 8 * channels / 3];
         let synthesis = [channels, 3 * channels / 2];
         Self::new(channels, (channels / 8).max(1), synthesis, hidden, 1, kernel.clone(), kernel)
-            .with_parts(ContextParts::new().with_high_scale_hyperprior(true))
+            .with_parts(ContextPart::ALL.to_vec())
             .with_space_time_center(0.0)
             .with_start(Start::PyTorch)
     }
@@ -123,31 +153,31 @@ impl ContextModelConfig {
     /// Random weights; see [`Start`] for the last layer.
     ///
     /// # Panics
-    /// If the high-scale hyperprior is on without the two parts that it consists of, or groups do not divide channels.
+    /// If a part is there without those that it [needs](ContextPart::needs), or groups do not divide channels.
     pub fn init(&self, device: &Device) -> ContextModel {
-        let ContextParts { hyperprior, checkerboard, inter_plane, inter_scale, high_scale_hyperprior } = self.parts;
-        assert!(
-            !high_scale_hyperprior || (hyperprior && inter_scale),
-            "`high_scale_hyperprior` needs `hyperprior` and `inter_scale`"
-        );
+        let has = |part| self.parts.contains(&part);
+        for part in &self.parts {
+            let missing = part.needs().iter().find(|needed| !has(**needed));
+            assert!(missing.is_none(), "{part:?} needs {missing:?}");
+        }
         let channels = self.channels;
         ContextModel {
-            hyperprior: hyperprior
+            hyperprior: has(ContextPart::Hyperprior)
                 .then(|| HyperpriorConfig::new(channels, self.latent_channels, self.synthesis_channels).init(device)),
-            checkerboard: checkerboard
+            checkerboard: has(ContextPart::Checkerboard)
                 .then(|| CheckerboardConfig::new(channels).with_groups(self.context_groups).init(device)),
-            inter_plane: inter_plane.then(|| {
+            inter_plane: has(ContextPart::InterPlane).then(|| {
                 let KernelShape { kernel, groups } = self.inter_plane;
                 InterPlaneConfig::new(channels).with_kernel(kernel).with_groups(groups).init(device)
             }),
-            inter_scale: inter_scale.then(|| {
+            inter_scale: has(ContextPart::InterScale).then(|| {
                 let KernelShape { kernel, groups } = self.inter_scale;
                 InterScaleConfig::new(channels).with_kernel(kernel).with_groups(groups).init(device)
             }),
             entropy_parameters: EntropyParametersConfig::new(channels, self.parameter_channels)
                 .with_start(self.start.clone())
                 .init(device),
-            high_scale_hyperprior,
+            high_scale_hyperprior: has(ContextPart::HighScaleHyperprior),
             space_only_center: self.space_only_center,
             space_time_center: self.space_time_center,
         }

@@ -4,7 +4,7 @@ use std::fmt::Debug;
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::Device;
-use light4gs_model::{ContextModel, ContextModelConfig, ContextParts, PlaneEntropy, ShEntropy, ShEntropyModel};
+use light4gs_model::{ContextModel, ContextModelConfig, PlaneEntropy, ShEntropy, ShEntropyModel};
 
 use crate::config::{ContextArchitecture, ContextConfig, ShConfig};
 use crate::error::TrainError;
@@ -64,17 +64,11 @@ impl EntropyModels for ConfiguredModels {
 /// The context model that a configuration describes, for planes with so many channels.
 pub fn context_model(settings: &ContextConfig, channels: usize) -> ContextModelConfig {
     let sizes = match settings.architecture {
-        // The composition is what the switches say; the reference's centers and start belong to its sizes.
+        // The composition is what the list of parts says; the reference's centers and start belong to its sizes.
         ContextArchitecture::Reference => ContextModelConfig::reference(channels),
         ContextArchitecture::Compact => ContextModelConfig::compact(channels),
     };
-    let parts = ContextParts::new()
-        .with_hyperprior(settings.hyperprior)
-        .with_checkerboard(settings.checkerboard)
-        .with_inter_plane(settings.inter_plane)
-        .with_inter_scale(settings.inter_scale)
-        .with_high_scale_hyperprior(settings.high_scale_hyperprior);
-    sizes.with_parts(parts)
+    sizes.with_parts(settings.parts.iter().map(|part| part.0).collect())
 }
 
 #[cfg(test)]

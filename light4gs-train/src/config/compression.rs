@@ -1,17 +1,12 @@
 //! `[compression]`: how small, and how (paper III-C to III-E).
 
-use std::fmt;
-use std::str::FromStr;
-
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{Profile, WeightPrecisions};
-use light4gs_model::AdaptiveQuantizationConfig;
-use light4gs_model::ShKind;
-use serde::{Deserialize, Deserializer, Serialize, Serializer, de};
+use light4gs_model::{AdaptiveQuantizationConfig, ContextPart, ShKind};
 
-use crate::keys::Bounds::{self, Flag, Kind, Number, Whole, Word};
-use crate::keys::{ITERATION, RATE, STEP, TOLERANCE, UnknownChoice, WEIGHT, choice, keys};
+use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
+use crate::keys::{ITERATION, RATE, STEP, TOLERANCE, WEIGHT, choice, keys, named};
 
 keys! {
     /// What the file looks like, and what is trained for its sake (paper III-C to III-E,
@@ -101,6 +96,13 @@ choice! {
     }
 }
 
+named! {
+    /// A part of the context model: one of [`ContextPart::NAMES`] in TOML. Which there are is said in the model crate.
+    pub struct ContextPartName(pub ContextPart): "part";
+}
+
+const PART: Bounds = Kind { names: &ContextPart::NAMES, list: "light4gs-model/src/context/mod.rs" };
+
 keys! {
     /// Parts and sizes of the context model.
     pub struct ContextConfig {
@@ -108,16 +110,11 @@ keys! {
         /// (`"reference"`).
         architecture: ContextArchitecture = ContextArchitecture::Compact;
             Word(ContextArchitecture::NAMES), "ours; reference", "or \"reference\", the public code's sizes";
-        /// The lowest scale's space-time planes have a hyperprior.
-        hyperprior: bool = true; Flag, "paper";
-        /// Half of the lowest scale's positions are coded with the other half as context.
-        checkerboard: bool = true; Flag, "paper";
-        /// Space-only planes are predicted from the space-time planes over their axes.
-        inter_plane: bool = true; Flag, "paper";
-        /// Higher scales are predicted from the scale below.
-        inter_scale: bool = true; Flag, "paper";
-        /// Higher scales have a hyperprior as well. Needs `hyperprior` and `inter_scale`.
-        high_scale_hyperprior: bool = false; Flag, "reference", "the public code's";
+        /// What the context model consists of: the paper's four parts. The public code has
+        /// `"high_scale_hyperprior"` as well, which needs `"hyperprior"` and `"inter_scale"`. Without any, every channel
+        /// has one learned distribution.
+        parts: Vec<ContextPartName> = ContextPart::PAPER.map(ContextPartName).to_vec();
+            List { element: &PART, length: None }, "paper", "the public code also has \"high_scale_hyperprior\"";
         /// Learning rate of the context model at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// The same at the end of the fine stage.
@@ -181,34 +178,9 @@ keys! {
     }
 }
 
-/// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. Which there are is said in the model crate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ShModel(pub ShKind);
-
-impl fmt::Display for ShModel {
-    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.pad(self.0.name())
-    }
-}
-
-impl FromStr for ShModel {
-    type Err = UnknownChoice;
-
-    fn from_str(name: &str) -> Result<Self, UnknownChoice> {
-        ShKind::by_name(name).map(Self).ok_or_else(|| UnknownChoice::new("model", name, &ShKind::NAMES))
-    }
-}
-
-impl Serialize for ShModel {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(self.0.name())
-    }
-}
-
-impl<'de> Deserialize<'de> for ShModel {
-    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        String::deserialize(deserializer)?.parse().map_err(de::Error::custom)
-    }
+named! {
+    /// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. Which there are is said in the model crate.
+    pub struct ShModel(pub ShKind): "model";
 }
 
 keys! {

@@ -91,11 +91,15 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.that("compression.rate.planes_until", rate.planes_until == 0 || rate.planes_until > rate.from, || {
         format!("is {}; it must be 0 (never) or above compression.rate.from, {}", rate.planes_until, rate.from)
     });
-    check.that(
-        "compression.context.high_scale_hyperprior",
-        !context.high_scale_hyperprior || (context.hyperprior && context.inter_scale),
-        || "needs `compression.context.hyperprior` and `compression.context.inter_scale`".to_owned(),
-    );
+    for (i, part) in context.parts.iter().enumerate() {
+        check.that("compression.context.parts", !context.parts[..i].contains(part), || format!("has `{part}` twice"));
+        for needed in part.0.needs() {
+            let there = context.parts.iter().any(|other| other.0 == *needed);
+            check.that("compression.context.parts", there, || {
+                format!("has `{part}`, which needs `{}` beside it", needed.name())
+            });
+        }
+    }
     check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
     check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
     check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));

@@ -66,13 +66,47 @@ macro_rules! choice {
             }
         }
 
-        impl serde::Serialize for $choice {
-            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.name())
+        $crate::keys::serde_by_name!($choice);
+    };
+}
+
+/// Declares a configuration's view of an enum that another crate declares, with `NAMES`, `name` and `by_name`: `Display`,
+/// `FromStr` and serde as [`choice`] has them.
+macro_rules! named {
+    ($(#[$attribute:meta])* pub struct $named:ident(pub $kind:ty): $what:literal;) => {
+        $(#[$attribute])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub struct $named(pub $kind);
+
+        impl std::fmt::Display for $named {
+            fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                formatter.pad(self.0.name())
             }
         }
 
-        impl<'de> serde::Deserialize<'de> for $choice {
+        impl std::str::FromStr for $named {
+            type Err = $crate::keys::UnknownChoice;
+
+            fn from_str(name: &str) -> Result<Self, Self::Err> {
+                let known = <$kind>::by_name(name).map(Self);
+                known.ok_or_else(|| $crate::keys::UnknownChoice::new($what, name, &<$kind>::NAMES))
+            }
+        }
+
+        $crate::keys::serde_by_name!($named);
+    };
+}
+
+/// Serde by `Display` and `FromStr`.
+macro_rules! serde_by_name {
+    ($name:ident) => {
+        impl serde::Serialize for $name {
+            fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.collect_str(self)
+            }
+        }
+
+        impl<'de> serde::Deserialize<'de> for $name {
             fn deserialize<D: serde::Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
                 let name = <String as serde::Deserialize>::deserialize(deserializer)?;
                 name.parse().map_err(serde::de::Error::custom)
@@ -81,4 +115,4 @@ macro_rules! choice {
     };
 }
 
-pub(crate) use choice;
+pub(crate) use {choice, named, serde_by_name};

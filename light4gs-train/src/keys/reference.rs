@@ -105,7 +105,7 @@ fn toml_value(value: &toml::Value) -> String {
 /// Every key with its default, as a TOML file.
 pub(crate) fn toml_text<T: KeyTable + Default + Serialize>() -> String {
     /// Where notes begin.
-    const COLUMN: usize = 44;
+    const COLUMN: usize = 43;
     let mut text = String::new();
     for Section { path, keys, .. } in sections::<T>() {
         if !path.is_empty() {
@@ -114,7 +114,7 @@ pub(crate) fn toml_text<T: KeyTable + Default + Serialize>() -> String {
         for (name, default, key) in keys {
             let line = format!("{name} = {default}");
             match key {
-                Entry::Key { note: Some(note), .. } => text.push_str(&format!("{line:<COLUMN$}# {note}\n")),
+                Entry::Key { note: Some(note), .. } => text.push_str(&format!("{line:<COLUMN$} # {note}\n")),
                 _ => text.push_str(&format!("{line}\n")),
             }
         }
@@ -134,8 +134,10 @@ pub(crate) fn markdown<T: KeyTable + Default + Serialize>() -> String {
             let Entry::Key { bounds, meaning, source, .. } = key else { continue };
             let key = if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
             let meaning = joined(meaning);
+            let listed = |list: &str| format!("a name that [{list}](../{list}) lists");
             let bounds = match bounds {
-                Bounds::Kind { list, .. } => format!("a name that [{list}](../{list}) lists"),
+                Bounds::Kind { list, .. } => listed(list),
+                Bounds::List { element: Bounds::Kind { list, .. }, .. } => format!("each {}", listed(list)),
                 Bounds::LayoutOrNone { .. } => "empty, or the name of a layout".to_owned(),
                 _ => bounds.to_string(),
             };

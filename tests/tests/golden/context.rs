@@ -46,7 +46,7 @@ fn model_of(golden: &Golden, device: &Device) -> ContextModel {
     config.latent_channels = latent_channels;
     config.inter_scale = KernelShape::new(golden.shape("param.context_to_params.weight")[2], 1);
     // The reference's inter-plane part is in this file.
-    config.parts.inter_plane = false;
+    config.parts.retain(|part| *part != ContextPart::InterPlane);
     let mut model = config.init(device);
     load(&mut model, golden, |path| Some(format!("param.{}", name_in_file(path))));
     model

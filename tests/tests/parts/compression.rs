@@ -5,7 +5,7 @@ use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::{PlaneCoding, Profile, SceneMeta, decode, plane_distributions};
 use light4gs_data::PointCloud;
 use light4gs_model::{
-    ContextModel, ContextModelConfig, ContextParts, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps,
+    ContextModel, ContextModelConfig, ContextPart, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps,
     PlaneTensors,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
@@ -24,17 +24,9 @@ fn profile(config: &Config) -> Profile {
 
 /// The whole model, and each with a part less.
 fn compositions() -> Vec<ContextModelConfig> {
-    let all = ContextParts::new;
-    let parts = [
-        all(),
-        all().with_checkerboard(false),
-        all().with_inter_plane(false),
-        all().with_inter_scale(false),
-        all().with_hyperprior(false),
-        all().with_high_scale_hyperprior(true),
-        all().with_hyperprior(false).with_checkerboard(false).with_inter_plane(false).with_inter_scale(false),
-    ];
-    let compact = parts.into_iter().map(|parts| ContextModelConfig::compact(CHANNELS).with_parts(parts));
+    let parts = ContextPart::PAPER.map(|part| ContextPart::paper_without(&[part]));
+    let parts = parts.into_iter().chain([ContextPart::PAPER.to_vec(), ContextPart::ALL.to_vec(), Vec::new()]);
+    let compact = parts.map(|parts| ContextModelConfig::compact(CHANNELS).with_parts(parts));
     compact.chain([ContextModelConfig::reference(CHANNELS)]).collect()
 }
 
@@ -147,11 +139,12 @@ fn every_configuration_makes_a_file_that_decodes() {
         &[][..],
         &["compression.profile=paper"],
         &["compression.context.architecture=reference"],
-        &["compression.context.checkerboard=false"],
-        &["compression.context.inter_plane=false"],
-        &["compression.context.inter_scale=false"],
-        &["compression.context.hyperprior=false"],
-        &["compression.context.high_scale_hyperprior=true"],
+        &["compression.context.parts=['hyperprior', 'inter_plane', 'inter_scale']"],
+        &["compression.context.parts=['hyperprior', 'checkerboard', 'inter_scale']"],
+        &["compression.context.parts=['hyperprior', 'checkerboard', 'inter_plane']"],
+        &["compression.context.parts=['checkerboard', 'inter_plane', 'inter_scale']"],
+        &["compression.context.parts=['hyperprior', 'inter_scale', 'high_scale_hyperprior']"],
+        &["compression.context.parts=[]"],
         &["compression.sh.model=mixture_of_logistics"],
         &["compression.sh.model=channel_autoregressive"],
         &["compression.sh.model=hexplane_coupled"],

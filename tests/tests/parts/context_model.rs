@@ -7,7 +7,7 @@ use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::plane_layout::{PlaneLayout, PlaneShape};
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 use light4gs_model::{
-    AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextParts, HexPlaneConfig, Latent, PlaneEntropy,
+    AdaptiveQuantizationConfig, ContextModel, ContextModelConfig, ContextPart, HexPlaneConfig, Latent, PlaneEntropy,
     PlaneSteps, PlaneTensors,
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
@@ -30,21 +30,17 @@ fn random_values(layout: &PlaneLayout, device: &Device) -> PlaneTensors {
 
 /// The whole model, and without one or more of its parts.
 fn compositions() -> Vec<(&'static str, ContextModelConfig)> {
-    let all = ContextParts::new();
-    let compact = |parts: ContextParts| ContextModelConfig::compact(CHANNELS).with_parts(parts);
+    use ContextPart::{Checkerboard, Hyperprior, InterPlane, InterScale};
+    let without =
+        |parts: &[ContextPart]| ContextModelConfig::compact(CHANNELS).with_parts(ContextPart::paper_without(parts));
     vec![
-        ("compact", compact(all.clone())),
+        ("compact", without(&[])),
         ("reference", ContextModelConfig::reference(CHANNELS)),
-        ("no checkerboard", compact(all.clone().with_checkerboard(false))),
-        ("no inter-plane", compact(all.clone().with_inter_plane(false))),
-        ("no inter-scale", compact(all.clone().with_inter_scale(false))),
-        ("no hyperprior", compact(all.clone().with_hyperprior(false))),
-        (
-            "nothing",
-            compact(
-                all.with_hyperprior(false).with_checkerboard(false).with_inter_plane(false).with_inter_scale(false),
-            ),
-        ),
+        ("no checkerboard", without(&[Checkerboard])),
+        ("no inter-plane", without(&[InterPlane])),
+        ("no inter-scale", without(&[InterScale])),
+        ("no hyperprior", without(&[Hyperprior])),
+        ("nothing", without(&ContextPart::PAPER)),
     ]
 }
 

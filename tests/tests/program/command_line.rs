@@ -100,7 +100,7 @@ fn a_run_with_the_rate_in_its_loss() {
     let (plain, profile) = size("plain.l4gs", &["compression.profile=float32"]);
     assert_eq!(profile, serde_json::Value::Null);
     assert!(compact < paper && paper < plain, "{compact}, {paper}, {plain}");
-    size("fitted.l4gs", &["compression.context.checkerboard=false"]);
+    size("fitted.l4gs", &["compression.context.parts=[]"]);
     assert_success(&w.run(["eval", "fitted.l4gs", "--scene", "scene"]));
 
     let output = w.run(["encode", "run", "--out", "x.l4gs", "--set", "train.log_interval=7"]);

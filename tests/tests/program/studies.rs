@@ -175,7 +175,7 @@ fn what_is_wrong_is_said_before_anything_is_written() {
     refused("no.toml", &[], &["no.toml"]);
     refused("sizes", &["--set", "train.fine_iteration=1"], &["train.fine_iteration", "train.fine_iterations"]);
     refused("sizes", &["--slurm", "cluster.toml"], &["--launcher slurm"]);
-    refused("context-model", &["--set", "compression.context.inter_plane=false"], &["all", "no-inter-plane", "--set"]);
+    refused("context-model", &["--set", "compression.context.parts=[]"], &["all", "no-inter-plane", "--set"]);
     fs::write(w.path("broken.toml"), MINE.replace("psnr:difference", "psnr:diff")).unwrap();
     refused("broken.toml", &[], &["broken.toml:6", "psnr:diff", "`:percent`", "docs/studies.md"]);
     assert_refused(&w.run(["gather", "scene"]), &["scene", "not the folder of a study"]);
