@@ -10,8 +10,8 @@ use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 use light4gs_codec::{Network, PlaneSource};
 use light4gs_model::gaussian_conditional::{bits, gaussian_likelihood};
 use light4gs_model::{
-    CenteredPlanes, ContextModel, ContextModelConfig, DescribedCondition, DescribedPrior, InterPlane, InterScale,
-    KernelShape, Latent, Passes, PlaneEntropy, PlaneSteps, PlaneTensors, Prior, PriorPart, anchor_mask,
+    CenteredPlanes, ContextModel, ContextModelConfig, ContextPart, DescribedCondition, DescribedPrior, InterPlane,
+    InterScale, KernelShape, Latent, Passes, PlaneEntropy, PlaneSteps, PlaneTensors, Prior, PriorPart, anchor_mask,
     checkerboard_kernel, upsample,
 };
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
