@@ -2,7 +2,7 @@
 
 use light4gs_model::{BuiltInFieldConfig, DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig};
 
-use crate::keys::Bounds::{Flag, List, Whole, Word};
+use crate::keys::Bounds::{Flag, Kind, List, Whole};
 use crate::keys::{choice, keys};
 
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
@@ -15,7 +15,9 @@ keys! {
         sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";
         /// What moves the Gaussians: `"hexplane"`, of which `model.hexplane` and `model.deformation` are the keys, or
         /// `"still"`, nothing.
-        field: FieldKind = FieldKind::HexPlane; Word(FieldKind::NAMES), "paper", "or \"still\": nothing moves";
+        field: FieldKind = FieldKind::HexPlane;
+            Kind { names: FieldKind::NAMES, list: "light4gs-train/src/config/model.rs" },
+            "paper", "or \"still\": nothing moves";
         /// From world coordinates to those of the planes.
         coordinates: CoordinatesTable;
         /// The feature planes.
