@@ -1,4 +1,4 @@
-//! Entropy models of the higher spherical harmonics (paper III-D; docs/design.md): four of them, one interface.
+//! Entropy models of the higher spherical harmonics (paper III-D; docs/design.md): one interface, several of them.
 //!
 //! | model | a value's density comes from | travels as |
 //! |---|---|---|
@@ -7,7 +7,7 @@
 //! | [`ShAutoregressive`] | the color and the lower degrees of the same Gaussian | layers |
 //! | [`ShHexPlaneCoupled`] | the space-only planes at the Gaussian's position | layers |
 //!
-//! Which models there are is said in this file and nowhere else: a new one is a file of its own and a line in each list here.
+//! Which models there are is said in this file and nowhere else: a new one is a file of its own and a row in the list here.
 //!
 //! A channel is `coefficient * 3 + rgb` of `sh_rest [N, 15, 3]`; there are 45.
 
@@ -34,31 +34,99 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::ShPrior;
 
-/// The built-in models by name: what a configuration chooses from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ShKind {
-    /// One learned density for each channel: the paper's choice.
-    Factorized,
-    /// A mixture of logistics for each channel.
-    MixtureOfLogistics,
-    /// Every degree is predicted from those below it.
-    ChannelAutoregressive,
-    /// The parameters follow from the space-only planes at the Gaussian's position.
-    HexPlaneCoupled,
-}
-
 /// Width of the factorized densities before training, in the units of the values. The reference begins at 8, and in its log
 /// the rate needs hundreds of iterations to come down from there; our runs are shorter.
 const SH_INITIAL_SCALE: f64 = 0.3;
 
-impl ShKind {
-    /// All of them.
-    pub const ALL: [Self; 4] =
-        [Self::Factorized, Self::MixtureOfLogistics, Self::ChannelAutoregressive, Self::HexPlaneCoupled];
-    /// Their names, in the same order.
-    pub const NAMES: [&'static str; 4] =
-        ["factorized", "mixture_of_logistics", "channel_autoregressive", "hexplane_coupled"];
+/// Makes of a list of models their names, their configurations, and one type that is any of them.
+macro_rules! built_in_models {
+    ($($(#[$about:meta])* $variant:ident = $name:literal: $model:ident, $config:ident: |$step:pat_param, $features:pat_param| $usual:expr;)+) => {
+        /// The built-in models by name: what a configuration chooses from.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+        pub enum ShKind {
+            $($(#[$about])* $variant,)+
+        }
 
+        impl ShKind {
+            /// All of them.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+            /// Their names, in the same order.
+            pub const NAMES: &'static [&'static str] = &[$($name),+];
+
+            /// Its usual configuration, for planes with features of this length (0 without planes).
+            pub fn config(self, step: f32, feature_size: usize) -> ShEntropyConfig {
+                match self {
+                    $(Self::$variant => {
+                        let ($step, $features) = (step, feature_size);
+                        ShEntropyConfig::$variant($usual)
+                    })+
+                }
+            }
+        }
+
+        /// Which entropy model, with its configuration.
+        #[derive(Config, Debug)]
+        pub enum ShEntropyConfig {
+            $($(#[$about])* $variant($config),)+
+        }
+
+        impl ShEntropyConfig {
+            /// The configured model with its initial weights.
+            pub fn init(&self, device: &Device) -> ShEntropyModel {
+                match self {
+                    $(Self::$variant(config) => ShEntropyModel::$variant(config.init(device)),)+
+                }
+            }
+        }
+
+        /// One of the built-in models.
+        ///
+        /// ```
+        /// use burn::tensor::{Device, Tensor};
+        /// use light4gs_model::{PlaneTensors, ShBottleneckConfig, ShEntropy, ShEntropyConfig, ShKnown};
+        ///
+        /// let device = Device::flex();
+        /// let model = ShEntropyConfig::Factorized(ShBottleneckConfig::new()).init(&device);
+        /// let known = ShKnown {
+        ///     sh_dc: Tensor::zeros([7, 1, 3], &device),
+        ///     positions: Tensor::zeros([7, 3], &device),
+        ///     planes: PlaneTensors::default(),
+        /// };
+        /// let noisy = model.add_noise(Tensor::zeros([7, 15, 3], &device));
+        /// assert_eq!(model.bits(noisy, &known).dims(), [7, 15, 3]);
+        /// ```
+        // There is one of it in a scene, so its size does not matter.
+        #[allow(clippy::large_enum_variant)]
+        #[derive(Module, Debug)]
+        pub enum ShEntropyModel {
+            $($(#[$about])* $variant($model),)+
+        }
+
+        impl ShEntropyModel {
+            fn model(&self) -> &dyn ShEntropy {
+                match self {
+                    $(Self::$variant(model) => model,)+
+                }
+            }
+        }
+    };
+}
+
+built_in_models! {
+    /// One learned density for each channel: the paper's choice.
+    Factorized = "factorized": ShBottleneck, ShBottleneckConfig:
+        |step, _| ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE);
+    /// A mixture of logistics for each channel.
+    Mixture = "mixture_of_logistics": ShMixture, ShMixtureConfig: |step, _| ShMixtureConfig::new().with_step(step);
+    /// Every degree is predicted from those below it.
+    Autoregressive = "channel_autoregressive": ShAutoregressive, ShAutoregressiveConfig:
+        |step, _| ShAutoregressiveConfig::new().with_step(step);
+    /// The parameters follow from the space-only planes at the Gaussian's position.
+    HexPlaneCoupled = "hexplane_coupled": ShHexPlaneCoupled, ShHexPlaneCoupledConfig:
+        |step, feature_size| ShHexPlaneCoupledConfig::new(feature_size).with_step(step);
+}
+
+impl ShKind {
     /// Its name in configurations.
     pub fn name(self) -> &'static str {
         Self::NAMES[self as usize]
@@ -66,94 +134,12 @@ impl ShKind {
 
     /// The model of a name.
     pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|kind| kind.name() == name)
+        Self::ALL.iter().copied().find(|kind| kind.name() == name)
     }
 
     /// Whether it looks at the planes of the deformation field.
     pub fn needs_planes(self) -> bool {
         self == Self::HexPlaneCoupled
-    }
-
-    /// Its usual configuration, for planes with features of this length (0 without planes).
-    pub fn config(self, step: f32, feature_size: usize) -> ShEntropyConfig {
-        match self {
-            Self::Factorized => ShEntropyConfig::Factorized(
-                ShBottleneckConfig::new().with_step(step).with_initial_scale(SH_INITIAL_SCALE),
-            ),
-            Self::MixtureOfLogistics => ShEntropyConfig::Mixture(ShMixtureConfig::new().with_step(step)),
-            Self::ChannelAutoregressive => {
-                ShEntropyConfig::Autoregressive(ShAutoregressiveConfig::new().with_step(step))
-            }
-            Self::HexPlaneCoupled => {
-                ShEntropyConfig::HexPlaneCoupled(ShHexPlaneCoupledConfig::new(feature_size).with_step(step))
-            }
-        }
-    }
-}
-
-/// Which entropy model, with its configuration.
-#[derive(Config, Debug)]
-pub enum ShEntropyConfig {
-    /// The paper's choice.
-    Factorized(ShBottleneckConfig),
-    /// A mixture of logistics for each channel.
-    Mixture(ShMixtureConfig),
-    /// Degree by degree.
-    Autoregressive(ShAutoregressiveConfig),
-    /// From the space-only planes.
-    HexPlaneCoupled(ShHexPlaneCoupledConfig),
-}
-
-impl ShEntropyConfig {
-    /// The configured model with its initial weights.
-    pub fn init(&self, device: &Device) -> ShEntropyModel {
-        match self {
-            Self::Factorized(config) => ShEntropyModel::Factorized(config.init(device)),
-            Self::Mixture(config) => ShEntropyModel::Mixture(config.init(device)),
-            Self::Autoregressive(config) => ShEntropyModel::Autoregressive(config.init(device)),
-            Self::HexPlaneCoupled(config) => ShEntropyModel::HexPlaneCoupled(config.init(device)),
-        }
-    }
-}
-
-/// One of the four models.
-///
-/// ```
-/// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::{PlaneTensors, ShBottleneckConfig, ShEntropy, ShEntropyConfig, ShKnown};
-///
-/// let device = Device::flex();
-/// let model = ShEntropyConfig::Factorized(ShBottleneckConfig::new()).init(&device);
-/// let known = ShKnown {
-///     sh_dc: Tensor::zeros([7, 1, 3], &device),
-///     positions: Tensor::zeros([7, 3], &device),
-///     planes: PlaneTensors::default(),
-/// };
-/// let noisy = model.add_noise(Tensor::zeros([7, 15, 3], &device));
-/// assert_eq!(model.bits(noisy, &known).dims(), [7, 15, 3]);
-/// ```
-// There is one of it in a scene, so its size does not matter.
-#[allow(clippy::large_enum_variant)]
-#[derive(Module, Debug)]
-pub enum ShEntropyModel {
-    /// The paper's choice.
-    Factorized(ShBottleneck),
-    /// A mixture of logistics for each channel.
-    Mixture(ShMixture),
-    /// Degree by degree.
-    Autoregressive(ShAutoregressive),
-    /// From the space-only planes.
-    HexPlaneCoupled(ShHexPlaneCoupled),
-}
-
-impl ShEntropyModel {
-    fn model(&self) -> &dyn ShEntropy {
-        match self {
-            Self::Factorized(model) => model,
-            Self::Mixture(model) => model,
-            Self::Autoregressive(model) => model,
-            Self::HexPlaneCoupled(model) => model,
-        }
     }
 }
 

@@ -165,7 +165,7 @@ keys! {
         /// `"channel_autoregressive"` or `"hexplane_coupled"`. Trained for degree 3; lower degrees are coded with the
         /// frequencies of their symbols.
         model: ShModel = ShModel(ShKind::Factorized);
-            Kind { names: &ShKind::NAMES, list: "light4gs-model/src/sh/mod.rs" },
+            Kind { names: ShKind::NAMES, list: "light4gs-model/src/sh/mod.rs" },
             "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";
         /// Their quantization step.
         step: f64 = 0.02; STEP, "paper";
