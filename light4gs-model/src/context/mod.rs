@@ -57,11 +57,11 @@ pub enum ContextPart {
 
 impl ContextPart {
     /// All of them.
-    pub const ALL: [Self; 5] =
-        [Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale, Self::HighScaleHyperprior];
+    pub const ALL: &[Self] =
+        &[Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale, Self::HighScaleHyperprior];
     /// Their names, in the same order.
-    pub const NAMES: [&'static str; 5] =
-        ["hyperprior", "checkerboard", "inter_plane", "inter_scale", "high_scale_hyperprior"];
+    pub const NAMES: &[&'static str] =
+        &["hyperprior", "checkerboard", "inter_plane", "inter_scale", "high_scale_hyperprior"];
     /// Those of the paper's model.
     pub const PAPER: [Self; 4] = [Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale];
 
@@ -72,7 +72,7 @@ impl ContextPart {
 
     /// The part of a name.
     pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|part| part.name() == name)
+        Self::ALL.iter().copied().find(|part| part.name() == name)
     }
 
     /// The parts that it consists of or builds on: it cannot be there without them.
@@ -136,7 +136,7 @@ impl ContextModelConfig {
         let hidden = [10 * channels / 3, 8 * channels / 3];
         let synthesis = [channels, 3 * channels / 2];
         Self::new(channels, (channels / 8).max(1), synthesis, hidden, 1, kernel.clone(), kernel)
-            .with_parts(ContextPart::ALL.to_vec())
+            .with_parts([&ContextPart::PAPER[..], &[ContextPart::HighScaleHyperprior]].concat())
             .with_space_time_center(0.0)
             .with_start(Start::PyTorch)
     }

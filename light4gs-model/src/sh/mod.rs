@@ -40,7 +40,10 @@ const SH_INITIAL_SCALE: f64 = 0.3;
 
 /// Makes of a list of models their names, their configurations, and one type that is any of them.
 macro_rules! built_in_models {
-    ($($(#[$about:meta])* $variant:ident = $name:literal: $model:ident, $config:ident: |$step:pat_param, $features:pat_param| $usual:expr;)+) => {
+    ($(
+        $(#[$about:meta])*
+        $variant:ident = $name:literal: $model:ident, $config:ident: |$step:pat_param, $features:pat_param| $usual:expr;
+    )+) => {
         /// The built-in models by name: what a configuration chooses from.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ShKind {
@@ -49,9 +52,9 @@ macro_rules! built_in_models {
 
         impl ShKind {
             /// All of them.
-            pub const ALL: &'static [Self] = &[$(Self::$variant),+];
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
             /// Their names, in the same order.
-            pub const NAMES: &'static [&'static str] = &[$($name),+];
+            pub const NAMES: &[&'static str] = &[$($name),+];
 
             /// Its usual configuration, for planes with features of this length (0 without planes).
             pub fn config(self, step: f32, feature_size: usize) -> ShEntropyConfig {

@@ -101,7 +101,7 @@ named! {
     pub struct ContextPartName(pub ContextPart): "part";
 }
 
-const PART: Bounds = Kind { names: &ContextPart::NAMES, list: "light4gs-model/src/context/mod.rs" };
+const PART: Bounds = Kind { names: ContextPart::NAMES, list: "light4gs-model/src/context/mod.rs" };
 
 keys! {
     /// Parts and sizes of the context model.

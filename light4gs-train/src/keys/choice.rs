@@ -89,7 +89,7 @@ macro_rules! named {
 
             fn from_str(name: &str) -> Result<Self, Self::Err> {
                 let known = <$kind>::by_name(name).map(Self);
-                known.ok_or_else(|| $crate::keys::UnknownChoice::new($what, name, &<$kind>::NAMES))
+                known.ok_or_else(|| $crate::keys::UnknownChoice::new($what, name, <$kind>::NAMES))
             }
         }
 
