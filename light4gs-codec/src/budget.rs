@@ -1,16 +1,16 @@
-//! Memory and time that decoding takes, added up before it takes them.
+//! Memory and time that decoding takes: both are added up before they are taken.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::{CodecError, Limits, limits::at_most};
 
-/// What descriptions, tables, names and messages take at most, whose counts have limits of their own.
+/// Memory for descriptions, tables, names and messages together; limits of their own bound their counts.
 const SMALL_THINGS: u64 = 16 << 20;
-/// Nanoseconds that a byte of a stream may take besides what counts and sizes ask for: each can hold some decisions.
+/// Nanoseconds for each byte of a stream, besides those for counts and sizes: a byte may hold several decisions.
 const NANOSECONDS_A_BYTE: u64 = 60;
 
-/// What the parts of a stream have asked for so far. Nothing is given back: what is refused must not depend on which part
-/// comes first.
+/// What the parts of a stream have asked for so far. Nothing is given back: whether a stream is refused must not depend
+/// on the order of its parts.
 #[derive(Debug)]
 pub(crate) struct Budget {
     pub(crate) limits: Limits,
@@ -19,7 +19,7 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    /// A budget of which nothing but a fixed amount is spent.
+    /// A budget from which only the fixed amount is taken.
     pub(crate) fn new(limits: &Limits) -> Self {
         Self { limits: *limits, memory: AtomicU64::new(SMALL_THINGS), nanoseconds: AtomicU64::new(0) }
     }
@@ -36,7 +36,7 @@ impl Budget {
         at_most(section, field, spend(&self.nanoseconds, nanoseconds), self.limits.nanoseconds)
     }
 
-    /// Asks for the memory of `count` things of so many bytes, and the time to make them.
+    /// Asks for the memory of `count` things of a number of bytes each, and for the time to make them.
     pub(crate) fn things(
         &self,
         section: &'static str,
@@ -48,7 +48,7 @@ impl Budget {
         self.time(section, count.saturating_mul(nanoseconds))
     }
 
-    /// Asks for what the bytes of an entropy-coded stream take.
+    /// Asks for the memory and time of reading an entropy-coded stream.
     pub(crate) fn stream(&self, section: &'static str, bytes: usize) -> Result<(), CodecError> {
         self.things(section, bytes as u64, 1, NANOSECONDS_A_BYTE)
     }
@@ -65,7 +65,7 @@ impl Budget {
 pub struct Demand {
     /// Memory in bytes, added up beforehand.
     pub memory_bytes: u64,
-    /// Nanoseconds of one thread, likewise.
+    /// Nanoseconds on one thread, added up beforehand.
     pub nanoseconds: u64,
 }
 

@@ -1,9 +1,10 @@
-//! What the encoder refuses, for those who want to know before they train.
+//! The encoder's requirements, as functions that can be called before training.
 //!
-//! [`crate::encode`] and [`crate::encode_compressed`] ask the same functions. A configuration asks [`feature_planes`],
-//! [`plane_step`], [`sh_step`] and [`AttributeSteps::check`](crate::attributes::AttributeSteps::check) before there is a scene; a
-//! trainer asks [`scene`] and [`coding`] about the scene that it starts from, and [`positions`] about its points. What is
-//! left for the end are numbers that training makes: NaN, infinities, and values beyond 2^22 steps.
+//! [`crate::encode`] and [`crate::encode_compressed`] call the same functions. A configuration calls
+//! [`feature_planes`], [`plane_step`], [`sh_step`] and
+//! [`AttributeSteps::check`](crate::attributes::AttributeSteps::check) before there is a scene. A trainer calls
+//! [`scene`] and [`coding`] for the scene that it starts from, and [`positions`] for its points. Only numbers that come
+//! from training can still be refused at the end: NaN, infinities, and values beyond 2^22 steps.
 //!
 //! ```
 //! use light4gs_codec::checks;
@@ -26,7 +27,7 @@ use crate::{
 
 pub use crate::steps::{LEAST_STEP, attribute_step, nearest_plane_steps, plane_step, sh_step};
 
-/// Refuses feature planes that no stream can hold, or that cannot be coded: too many channels or scales, sizes.
+/// Refuses feature planes that no stream can hold, or that cannot be coded: too many channels or scales, illegal sizes.
 ///
 /// # Errors
 /// Names the number that is too large, or the plane and the axis.
@@ -37,13 +38,18 @@ pub fn feature_planes(channels: u32, layout: &PlaneLayout) -> Result<(), CodecEr
         let [height, width] = plane.size;
         [(a, width), (b, height)].into_iter().try_for_each(|(axis, size)| check_size(size, axis)).map_err(|illegal| {
             let field = format!("size of plane {}", plane.name());
-            CodecError::invalid(Section::FeaturePlanes.name(), field, illegal, "what a latent can have")
+            CodecError::invalid(
+                Section::FeaturePlanes.name(),
+                field,
+                illegal,
+                "a size that the hyperprior can halve twice",
+            )
         })
     })
 }
 
-/// Refuses the size of a network that no stream can hold: its weights, offsets included, and the channels of all its values,
-/// inputs included. `section` is for the message.
+/// Refuses a network that no stream can hold, by its size: the number of its weights, biases included, and of the
+/// channels of all its values, inputs included. `section` is for the message.
 ///
 /// # Errors
 /// Names the number that is too large.
@@ -53,7 +59,7 @@ pub fn network_size(section: &'static str, weights: u64, channels: u64) -> Resul
     at_most(section, "number of weights", weights, limits.layer_weights)
 }
 
-/// Refuses points where no Gaussian can be: beyond ±1e30 along an axis, and NaN.
+/// Refuses points at which no Gaussian can be: beyond ±1e30 along an axis, or NaN.
 ///
 /// # Errors
 /// Names the first one.

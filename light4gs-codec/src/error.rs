@@ -1,4 +1,4 @@
-//! What can be wrong with a scene or a stream.
+//! Errors of a scene or a stream.
 
 use std::path::PathBuf;
 
@@ -36,7 +36,7 @@ pub enum CodecError {
         /// Bytes that are there.
         available: u64,
     },
-    /// The bytes go on where they should end.
+    /// There are more bytes than there should be.
     #[error(
         "{section}: {bytes} bytes too many at the end; the stream is damaged or something was appended, get it again"
     )]
@@ -66,7 +66,7 @@ pub enum CodecError {
         /// The id that is not known.
         id: u16,
     },
-    /// The section holds something that this version does not know.
+    /// The section is of a kind that this version does not know.
     #[error("{section}: unknown kind {kind}; use a newer program")]
     UnknownKind {
         /// The section.
@@ -74,7 +74,7 @@ pub enum CodecError {
         /// The number that is not known.
         kind: u8,
     },
-    /// The numbers of a section are stored in a way that this version does not know for what it holds.
+    /// The numbers of a section are stored in an encoding that this version does not know for this kind.
     #[error("{section}: unknown encoding {encoding} of the kind \"{kind}\"; use a newer program")]
     UnknownEncoding {
         /// The section.
@@ -84,9 +84,9 @@ pub enum CodecError {
         /// The number that is not known.
         encoding: u8,
     },
-    /// Gaussians have an attribute that the scene does not look right without, and nobody knows what it does.
+    /// Gaussians have an attribute without which the scene looks wrong, and it is not known what the attribute does.
     #[error(
-        "gaussians: the attribute `{name}` has a part in what is seen, and neither this program nor the scene itself says which; \
+        "gaussians: the scene looks wrong without the attribute `{name}`, and neither this program nor the file knows what it does; \
          use the program that wrote the file, or a newer one"
     )]
     UnknownAttribute {
@@ -146,7 +146,7 @@ pub enum CodecError {
         /// What it should be.
         expected: String,
     },
-    /// What was written does not decode to what was given: a fault of this crate.
+    /// What was written does not decode to what was given: a bug of this crate.
     #[error(
         "{section}: {field} did not survive encoding; nothing was written. This is a fault of light4gs-codec, please report it"
     )]
@@ -177,12 +177,12 @@ pub enum CodecError {
 }
 
 impl CodecError {
-    /// Whether the fault is this crate's and not the input's.
+    /// Whether it is a bug of this crate, and not wrong input.
     pub fn is_internal(&self) -> bool {
         matches!(self, Self::SelfCheck { .. })
     }
 
-    /// An [`CodecError::Invalid`] from anything that prints.
+    /// An [`CodecError::Invalid`] from any value that can be printed.
     pub(crate) fn invalid(
         section: &'static str,
         field: impl Into<String>,

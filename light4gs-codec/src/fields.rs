@@ -63,7 +63,7 @@ pub(crate) fn check_finite(scene: &SceneData) -> Result<(), CodecError> {
     Ok(())
 }
 
-/// Refuses a `decoded` scene that is not `given` to the last bit.
+/// Refuses a `decoded` scene that differs from the `given` one in any bit.
 pub(crate) fn check_same_bits(given: &SceneData, decoded: &SceneData) -> Result<(), CodecError> {
     for (a, b) in fields(given).into_iter().zip(fields(decoded)) {
         let same =
@@ -72,7 +72,7 @@ pub(crate) fn check_same_bits(given: &SceneData, decoded: &SceneData) -> Result<
             return Err(CodecError::SelfCheck { section: a.section, field: a.name });
         }
     }
-    // Names, counts and shapes. Numbers are equal by now, but for arrays that one side lacks.
+    // Names, counts and shapes. Numbers have been found equal, except arrays that one side lacks.
     if given != decoded {
         return Err(CodecError::SelfCheck { section: "stream", field: "a name, a count or a shape".into() });
     }

@@ -35,7 +35,7 @@
 //! # Ok::<(), light4gs_codec::CodecError>(())
 //! ```
 //!
-//! Where are the Gaussians of a file half-way through?
+//! The positions of the Gaussians half-way through the time:
 //!
 //! ```no_run
 //! let scene = light4gs_codec::read_file("scene.l4gs".as_ref())?;
@@ -47,23 +47,23 @@
 //!
 //! # Compression
 //!
-//! [`encode_compressed`] quantizes a scene and spends bits by learned distributions: planes under a [context
+//! [`encode_compressed`] quantizes a scene and codes it under learned distributions: planes under a [context
 //! model](ContextModelArrays), spherical harmonics under [tables or small networks](ShCoding), other [`attributes`] and
-//! [network weights](network_weights) adaptively. Networks that choose a coding interval are evaluated by an executor
-//! of this crate in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
-//! They travel as [descriptions](network): what a network consists of is up to the model.
-//! The encoder decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`]
+//! [network weights](network_weights) adaptively. The networks that give coding intervals are evaluated by an executor
+//! of this crate, in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
+//! The stream holds them as [descriptions](network), so a model is free in what its networks consist of. The encoder
+//! decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`] reads one
 //! section by section, and [`info`] tells what is inside.
 //!
 //! # Hostile bytes, other platforms
 //!
 //! A reader trusts nothing: every length and every count is checked against the bytes that are there and against
-//! [`Limits`] before memory or time is taken, so hostile input gets a [`CodecError`], never a panic. `SECURITY.md` has the
-//! promises. What the encoder refuses can be asked before: see [`checks`].
+//! [`Limits`] before memory or time is taken, so hostile input gets a [`CodecError`], never a panic. `SECURITY.md` has
+//! the promises. The functions of [`checks`] say beforehand whether the encoder will refuse something.
 //!
-//! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`,
-//! where `read_file` and `read_info` are absent and work is done by one thread. Elsewhere
-//! planes are coded by the threads of rayon's current pool; the bytes do not depend on how many there are.
+//! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`.
+//! There, `read_file` and `read_info` are absent and all work is done by one thread. Elsewhere planes are coded by the
+//! threads of rayon's current pool; the bytes do not depend on their number.
 
 #![forbid(unsafe_code)]
 

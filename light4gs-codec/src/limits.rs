@@ -4,8 +4,9 @@ use crate::{CodecError, plane_layout::PlaneAxes};
 
 /// The most that a reader accepts, checked before memory and time are taken.
 ///
-/// The default is for files of strangers: a file takes [`Limits::memory_bytes`] and [`Limits::nanoseconds`] of one thread at
-/// most, or a small multiple of its own length if that is more. A program that knows its files may want less, or more:
+/// The default is for files of strangers: a file takes at most [`Limits::memory_bytes`], and [`Limits::nanoseconds`] on
+/// one thread, or a small multiple of its own length if that is more. A program that knows its files may set lower or
+/// higher limits:
 ///
 /// ```
 /// use light4gs_codec::{Limits, SceneData, decode_with_limits, encode};
@@ -28,7 +29,7 @@ pub struct Limits {
     pub string_bytes: u32,
     /// Bytes of a name: the scene's, a key's, a tensor's.
     pub name_bytes: u32,
-    /// Free notes in the scene meta.
+    /// Extra entries in the scene meta.
     pub extras: u32,
     /// Frames of the source.
     pub frames: u32,
@@ -56,11 +57,11 @@ pub struct Limits {
     pub layer_width: u32,
     /// Weights of all networks of a section.
     pub layer_weights: u64,
-    /// Memory that decoding takes, results included and the stream itself not. Added up from counts and sizes before
-    /// memory is taken. A stream of `b` bytes may take `4 b` whatever this says.
+    /// Memory that decoding takes, results included, but without the stream itself. Added up from counts and sizes
+    /// before memory is taken. A stream of `b` bytes may always take `4 b`.
     pub memory_bytes: u64,
-    /// Time that decoding takes on one thread of a server core of 2023. Added up from counts and sizes before any work is
-    /// done, so that it is the same on every machine. A stream of `b` bytes may take `400 b` whatever this says.
+    /// Time that decoding takes on one thread of a server core of 2023. Added up from counts and sizes before any work
+    /// is done, so that it is the same on every machine. A stream of `b` bytes may always take `400 b`.
     pub nanoseconds: u64,
 }
 
@@ -93,7 +94,8 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// For files that are trusted, such as one's own; what the encoder keeps to. A file may take 64 GiB and half an hour.
+    /// For files that are trusted, such as your own. A file may take 64 GiB and half an hour. What the encoder writes
+    /// is within these limits.
     pub fn large() -> Self {
         Self {
             image_pixels: 1 << 28,
@@ -111,13 +113,13 @@ impl Limits {
         self.scales.saturating_mul(PlaneAxes::ALL.len() as u32)
     }
 
-    /// These limits for a stream of some length, which raises what it may take.
+    /// These limits for a stream of a given length, which raises the limits of memory and time.
     pub(crate) fn for_stream(&self, bytes: usize) -> Self {
         let bytes = bytes as u64;
         Self { memory_bytes: self.memory_bytes.max(4 * bytes), nanoseconds: self.nanoseconds.max(400 * bytes), ..*self }
     }
 
-    /// Refuses the size of an image: what a file says of its camera, or what somebody wants to render.
+    /// Refuses the size of an image: that of a file's camera, or that of an image to be rendered.
     ///
     /// # Errors
     /// A side beyond [`Limits::image_side`], or more pixels than [`Limits::image_pixels`].

@@ -1,4 +1,4 @@
-//! Work on several threads where there are threads. The results do not depend on how many.
+//! Work on several threads, where there are any. The results do not depend on their number.
 
 /// `work(i)` for every `i` below `count`, in order.
 #[cfg(not(target_arch = "wasm32"))]

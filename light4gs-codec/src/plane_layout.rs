@@ -1,9 +1,9 @@
-//! Which feature planes a field has: at which scale, over which axes, of which size; what they are called, in which order
-//! they are coded, and which planes a plane may be predicted from.
+//! Which feature planes a field has, at which scale, over which axes and of which size; their names; the order in which
+//! they are coded; and from which planes a plane may be predicted.
 //!
-//! Model, codec and training all speak of the same planes; they take it from here. A hexplane has a plane over each pair of
-//! axes at each scale; a tri-plane has those over space alone; other fields have others. Nothing is said by a plane's place in
-//! the list but its order.
+//! Model, codec and training all use this description of the planes. A hexplane has a plane over each pair of axes at
+//! each scale; a tri-plane has those over space alone; other fields have others. A plane's place in the list gives only
+//! its order; scale and axes are stated.
 
 use std::error::Error;
 use std::fmt;
@@ -34,7 +34,7 @@ pub enum PlaneAxes {
 }
 
 impl PlaneAxes {
-    /// All of them, in the order that the planes of a scale have.
+    /// All of them, in the order of the planes of a scale.
     pub const ALL: [Self; 6] = [Self::Xy, Self::Xz, Self::Xt, Self::Yz, Self::Yt, Self::Zt];
     /// Those without time.
     pub const SPACE_ONLY: [Self; 3] = [Self::Xy, Self::Xz, Self::Yz];
@@ -70,7 +70,7 @@ impl PlaneAxes {
         self.axes()[1] == TIME_AXIS
     }
 
-    /// The pairs of each of two axes of space with time; none where one of them is time itself.
+    /// For two axes of space: each of them paired with time. `None` where one of the two is time itself.
     ///
     /// ```
     /// use light4gs_codec::plane_layout::PlaneAxes;
@@ -89,14 +89,14 @@ impl PlaneAxes {
 pub struct PlaneShape {
     /// From 0, the lowest.
     pub scale: usize,
-    /// What it spans.
+    /// The axes that it spans.
     pub axes: PlaneAxes,
     /// Cells along its second and its first axis: height, width.
     pub size: [usize; 2],
 }
 
 impl PlaneShape {
-    /// How the plane is called in records and messages: its scale and its axes.
+    /// The plane's name in records and messages: its scale and its axes.
     ///
     /// ```
     /// use light4gs_codec::plane_layout::{PlaneAxes, PlaneShape};
@@ -140,7 +140,8 @@ impl PlaneLayout {
     /// A layout of planes.
     ///
     /// # Errors
-    /// Planes that do not stand in a layout's order, a plane twice, a scale without a plane below others.
+    /// Planes that are not in the order of a layout, a plane that occurs twice, a scale without planes below another
+    /// one.
     pub fn new(planes: Vec<PlaneShape>) -> Result<Self, IllegalOrder> {
         for (place, plane) in planes.iter().enumerate() {
             let follows = match place.checked_sub(1).map(|before| planes[before]) {
@@ -155,8 +156,8 @@ impl PlaneLayout {
         Ok(Self { planes })
     }
 
-    /// The same planes at each scale: one over each of `axes`, as many cells as the resolution along x, y, z and t says. The
-    /// axes of space are multiplied, one multiplier a scale; time keeps its resolution.
+    /// The same planes at each scale: one over each of `axes`, with the given resolution along x, y, z and t. The
+    /// resolution in space is multiplied, by one multiplier for each scale; time keeps its resolution.
     pub fn multiscale(axes: &[PlaneAxes], resolution: [usize; 4], multipliers: &[usize]) -> Self {
         let mut axes = axes.to_vec();
         axes.sort_unstable();
@@ -214,8 +215,8 @@ impl PlaneLayout {
         self.find(scale.checked_sub(1)?, axes)
     }
 
-    /// The planes over the first axis and time, and over the second axis and time, in the scale of a plane over space. None
-    /// where one of them is missing, or has another number of cells along the shared axis.
+    /// The planes over the first axis and time, and over the second axis and time, in the scale of a plane over space.
+    /// `None` if one of them is missing, or if its size along the shared axis differs.
     pub fn over_time(&self, plane: usize) -> Option<[usize; 2]> {
         let own = &self.planes[plane];
         let [over_a, over_b] = own.axes.over_time()?.map(|axes| self.in_same_scale(plane, axes));
@@ -224,7 +225,7 @@ impl PlaneLayout {
         Some([over_a.filter(|place| fits(place, width))?, over_b.filter(|place| fits(place, height))?])
     }
 
-    /// The order in which a model in training takes planes for decoded: scale by scale, in each those with time first.
+    /// The order in which a model in training treats planes as decoded: scale by scale, in each those with time first.
     pub fn coding_order(&self) -> Vec<usize> {
         let mut order: Vec<usize> = (0..self.len()).collect();
         order.sort_by_key(|&plane| (self.planes[plane].scale, !self.planes[plane].axes.is_space_time()));
@@ -232,7 +233,7 @@ impl PlaneLayout {
     }
 }
 
-/// A list of planes that is none: [`PlaneLayout`] says what order they have.
+/// The planes are not in the order of a [`PlaneLayout`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct IllegalOrder {
     /// The first plane that is out of place.
@@ -254,12 +255,12 @@ impl fmt::Display for IllegalOrder {
 
 impl Error for IllegalOrder {}
 
-/// A number of cells that no plane can have along an axis.
+/// A size that no plane can have along an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct IllegalSize {
-    /// As asked for.
+    /// The size that was asked for.
     pub size: usize,
-    /// Along which of [`AXIS_NAMES`].
+    /// The axis, as a place in [`AXIS_NAMES`].
     pub axis: usize,
 }
 
@@ -285,8 +286,8 @@ impl fmt::Display for IllegalSize {
 
 impl Error for IllegalSize {}
 
-/// Whether planes can have this many cells along x, y, z and t. A whole multiple of a legal size is legal as well, so the
-/// lowest scale settles it for all.
+/// Whether planes can have these sizes along x, y, z and t. A multiple of a legal size is legal as well, so it is
+/// enough to check the lowest scale.
 ///
 /// # Errors
 /// The first axis whose size is no multiple of [`SIZE_MULTIPLE`], or 0.

@@ -1,23 +1,24 @@
-//! How Gaussians are drawn: the numbers that all renderers share, so that a scene looks everywhere as it was trained.
+//! How Gaussians are drawn: the numbers that all renderers share, so that a scene looks everywhere as it did in
+//! training.
 //!
-//! `docs/design.md` has the arithmetic around them, that of the original 3DGS (Kerbl et al. 2023). The kernels on the CPU and
-//! the player's decoder take them from here; the shaders of the wgpu back end begin with them as constants; the player's
-//! `constants.js` is written from them by a test.
+//! `docs/design.md` has the arithmetic in which they occur, that of the original 3DGS (Kerbl et al. 2023). The kernels
+//! on the CPU and the player's decoder use these constants; the shaders of the wgpu back end get them as their first
+//! lines; a test writes the player's `constants.js` from them.
 
-/// What lies nearer along the view axis is not drawn, world units.
+/// Gaussians nearer than this along the view axis are not drawn, world units.
 pub const NEAR: f32 = 0.2;
-/// Variance in square pixels that every projected Gaussian gets on top, so that none falls between pixels.
+/// Variance in square pixels that is added to every projected Gaussian, so that none falls between pixels.
 pub const DILATION: f32 = 0.3;
-/// The Jacobian of the projection is taken no further out than this many half fields of view.
+/// The Jacobian of the projection is evaluated at most this many half fields of view from the view axis.
 pub const FRUSTUM_MARGIN: f32 = 1.3;
 /// Side of a tile in pixels.
 pub const TILE: usize = 16;
 /// A contribution with less alpha is skipped.
 pub const MIN_ALPHA: f32 = 1.0 / 255.0;
-/// Alpha is clamped here, so that something shines through everything.
+/// Alpha is clamped to this, so that a little light passes through every Gaussian.
 pub const MAX_ALPHA: f32 = 0.99;
-/// A pixel takes no Gaussian that would leave it with less transmittance.
+/// A pixel stops before a Gaussian that would leave it with less transmittance.
 pub const MIN_TRANSMITTANCE: f32 = 1e-4;
-/// Logarithms (of scales, above all) are clamped here before the exponential: far beyond any scene, and the exponential stays finite, so
-/// that a backward pass has no 0 · infinity.
+/// Logarithms (above all those of scales) are clamped to this before the exponential. It is far beyond any scene, and
+/// keeps the exponential finite, so that a backward pass has no 0 · infinity.
 pub const MAX_LOGARITHM: f32 = 40.0;

@@ -1,15 +1,15 @@
-//! Quantization steps: which an encoder takes, and which a decoder takes.
+//! Quantization steps: which ones an encoder accepts, and which ones a decoder accepts.
 
 use crate::{CodecError, adaptive::LARGEST_STEP, bytes::Section, plane_layout::PlaneAxes};
 
-/// The smallest step that the encoder takes. Under it the numbers of a trained scene, some tens on either side of 0, still
-/// fit into the 2^22 steps that a symbol can count.
+/// The smallest step that the encoder accepts. With this step the numbers of a trained scene, which are within some
+/// tens of 0, still fit into the 2^22 steps of a symbol.
 pub const LEAST_STEP: f32 = 1e-5;
 
-/// The smallest step that a decoder takes: a value is never a subnormal number, which takes long.
+/// The smallest step that a decoder accepts: with it no value is a subnormal number, which processors compute slowly.
 pub(crate) const LEAST_STEP_IN_STREAM: f32 = 1.0 / (1u64 << 60) as f32;
 
-/// A number for the planes over space and one for the planes over an axis and time.
+/// A number for the space-only planes and one for the space-time planes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PerGroup {
     /// For planes without time.
@@ -19,7 +19,7 @@ pub struct PerGroup {
 }
 
 impl PerGroup {
-    /// That for planes over these axes.
+    /// The number for planes over these axes.
     pub fn of(self, axes: PlaneAxes) -> f32 {
         if axes.is_space_time() { self.space_time } else { self.space_only }
     }
@@ -33,9 +33,9 @@ pub fn plane_step(step: f32) -> Result<(), CodecError> {
     check_step(Section::FeaturePlanes.name(), "step", step, LEAST_STEP)
 }
 
-/// The nearest steps that [`plane_step`] takes: learned steps are not bounded by anything else.
+/// The nearest steps that [`plane_step`] accepts. Learned steps have no other bounds.
 pub fn nearest_plane_steps(steps: PerGroup) -> PerGroup {
-    // NaN becomes the smallest, which `clamp` would keep.
+    // NaN becomes the smallest step; `clamp` would keep NaN.
     let nearest = |step: f32| if step > LEAST_STEP { step.min(LARGEST_STEP) } else { LEAST_STEP };
     PerGroup { space_only: nearest(steps.space_only), space_time: nearest(steps.space_time) }
 }
@@ -56,7 +56,8 @@ pub fn attribute_step(attribute: &str, step: f32) -> Result<(), CodecError> {
     check_step(Section::Gaussians.name(), format!("step of {attribute}"), step, least_step(attribute))
 }
 
-/// The smallest step that the encoder takes for an attribute. That of the positions is relative to the size of Gaussians.
+/// The smallest step that the encoder accepts for an attribute. That of the positions is relative to the size of
+/// Gaussians.
 pub(crate) fn least_step(attribute: &str) -> f32 {
     if attribute == "means" { f32::MIN_POSITIVE } else { LEAST_STEP }
 }

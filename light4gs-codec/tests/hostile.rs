@@ -1,4 +1,4 @@
-//! Damage on purpose: checksums that fit, and counts that would fill the memory.
+//! Deliberate damage: checksums that fit, and counts that would fill the memory.
 
 mod common;
 
@@ -10,16 +10,16 @@ use std::{
 use common::{ENTRY, forge_header, forge_section, payload, put, sample, start, table_at, u64_at, with_payload};
 use light4gs_codec::{CodecError, Limits, decode, decode_with_limits, encode, info};
 
-/// Remembers the largest piece of memory that anybody asked for.
+/// Remembers the largest allocation.
 struct Watch;
 
 static LARGEST: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call goes to the system's allocator as it came.
+// SAFETY: every call is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Watch {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         LARGEST.fetch_max(layout.size(), Ordering::Relaxed);
-        // SAFETY: what the caller promises is what the system asks for.
+        // SAFETY: the caller's promise is what the system's allocator requires.
         unsafe { System.alloc(layout) }
     }
 
@@ -32,7 +32,7 @@ unsafe impl GlobalAlloc for Watch {
 #[global_allocator]
 static WATCH: Watch = Watch;
 
-/// Both ways in refuse `bytes`, and nobody asks for much memory. Returns what `decode` says.
+/// `decode` and `info` refuse `bytes` without a large allocation. Returns the error of `decode`.
 fn refuse(bytes: &[u8]) -> CodecError {
     let error = decode(bytes).expect_err("hostile");
     let _ = info(bytes);
@@ -103,7 +103,8 @@ fn a_table_that_lies() {
     let bytes = encode(&sample()).unwrap();
     let length = |section: usize| u64_at(&bytes, table_at(&bytes) + ENTRY * section + 8);
     let lied = |section, value: u64| forged_entry(section, 8, &value.to_le_bytes());
-    // Too long: the last one is cut short. Too short: something is left at the end, or the bytes are others'.
+    // Too long: the last section is cut short. Too short: bytes are left at the end, or the bytes are those of the next
+    // section.
     assert!(matches!(lied(0, length(0) + 1), CodecError::Truncated { section: "feature_planes", .. }));
     assert!(matches!(lied(2, u64::MAX), CodecError::Truncated { section: "scene_coordinates", .. }));
     assert!(matches!(lied(4, length(4) + 1), CodecError::Truncated { section: "feature_planes", .. }));
@@ -121,7 +122,7 @@ fn a_table_that_lies() {
 
 #[test]
 fn a_missing_section() {
-    // The last entry of the table goes, and its section with it.
+    // The last entry of the table is removed, and its section with it.
     let bytes = encode(&sample()).unwrap();
     let (table, cut) = (table_at(&bytes), start(&bytes, 4));
     let mut shorter = bytes[..table + 4 * ENTRY].to_vec();
@@ -161,7 +162,7 @@ fn huge_counts_in_sections() {
     for at in [0, 1, 3, 4, 5, 6, 8] {
         over(replaced(4, at + 1, &[&payload(&bytes, 4)[..at], &HUGE].concat()));
     }
-    // The most that the limits allow is not there either.
+    // Counts just at the limits are refused too, since the bytes are missing.
     let cut = |error: CodecError| assert!(matches!(error, CodecError::Truncated { .. }), "{error}");
     cut(forged(0, 0, &(1u32 << 26).to_le_bytes()));
     cut(replaced(4, 1, &[0x80, 0x20])); // 2^12 channels
@@ -179,7 +180,7 @@ fn contradictions_in_sections() {
     assert!(forged(4, 0, &[0]).to_string().contains("channels"));
     assert!(forged(4, 3, &[0]).to_string().contains("width of plane 0.xy is 0"));
     let nan = f32::NAN.to_le_bytes();
-    // Behind the count and the list of attributes.
+    // After the count and the list of attributes.
     assert!(forged(0, 65, &nan).to_string().contains("value 0 of means is NaN"));
     assert!(forged(2, 4, &nan).to_string().contains("value 1 of mean is NaN"));
 }

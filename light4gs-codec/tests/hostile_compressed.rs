@@ -1,4 +1,4 @@
-//! Damage on purpose in compressed streams: checksums that fit, and numbers that lie.
+//! Deliberate damage in compressed streams: checksums that fit, and false numbers.
 
 mod common;
 
@@ -24,15 +24,15 @@ struct Watch;
 
 static USED: AtomicUsize = AtomicUsize::new(0);
 static MOST: AtomicUsize = AtomicUsize::new(0);
-/// Tests that watch the memory run one after the other.
+/// Tests that watch the memory run one after the other, each holding this lock.
 static ALONE: Mutex<()> = Mutex::new(());
 
-// SAFETY: every call goes to the system's allocator as it came.
+// SAFETY: every call is passed to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Watch {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let used = USED.fetch_add(layout.size(), Ordering::Relaxed) + layout.size();
         MOST.fetch_max(used, Ordering::Relaxed);
-        // SAFETY: what the caller promises is what the system asks for.
+        // SAFETY: the caller's promise is what the system's allocator requires.
         unsafe { System.alloc(layout) }
     }
 
@@ -46,7 +46,7 @@ unsafe impl GlobalAlloc for Watch {
 #[global_allocator]
 static WATCH: Watch = Watch;
 
-/// Streams with something of everything.
+/// Streams in which every kind of data occurs.
 fn streams() -> Vec<Vec<u8>> {
     let mut streams: Vec<_> = [Profile::Compact, Profile::Paper].map(tiny).to_vec();
     let (scene, coupled) = tiny(Profile::Compact);
@@ -59,7 +59,7 @@ fn sections(bytes: &[u8]) -> usize {
     u32_at(bytes, 12) as usize
 }
 
-/// Decodes within 256 MiB; what comes out does not matter.
+/// Decodes within 256 MiB; the result does not matter.
 fn survive(bytes: &[u8], limits: &Limits) {
     let before = USED.load(Ordering::Relaxed);
     MOST.store(before, Ordering::Relaxed);
@@ -69,7 +69,7 @@ fn survive(bytes: &[u8], limits: &Limits) {
     assert!(used < 256 << 20, "{used} bytes");
 }
 
-/// Enough for the streams here, so that a lie about a size does not take long to find out.
+/// Enough for the streams here, so that a false size is refused soon.
 fn tight() -> Limits {
     Limits { nanoseconds: 20_000_000, ..Limits::default() }
 }
@@ -89,7 +89,8 @@ fn every_flipped_bit_without_a_checksum() {
     for bytes in streams() {
         for section in 0..sections(&bytes) {
             let mut payload = payload(&bytes, section).to_vec();
-            // Heads whole; a step prime to 8 meets every bit of a byte. The rest is for `tests/hostile`.
+            // Heads as a whole; beyond them every n-th bit, where n is odd, so that every bit of a byte occurs.
+            // `tests/hostile` does the rest.
             let bits = 8 * payload.len();
             for bit in (0..bits.min(512)).chain((512..bits).step_by(11)) {
                 payload[bit / 8] ^= 1 << (bit % 8);
@@ -115,7 +116,7 @@ fn heads_that_lie_within_the_default_limits() {
     }
 }
 
-/// A sound stream just below the default limits, of a shape that pads badly, and one beyond.
+/// A legal stream just below the default limits, of a shape that needs much padding, and one above.
 #[test]
 fn the_largest_planes_of_a_small_stream() {
     let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
@@ -153,7 +154,7 @@ fn every_section_cut_short() {
             for length in (0..payload.len()).step_by(if payload.len() > 1000 { 7 } else { 1 }) {
                 survive(&with_payload(&bytes, section, &payload[..length]), &tight());
             }
-            // Range-coded weights do not know where they end.
+            // A reader cannot tell where range-coded weights end.
             let longer = [payload, &[1]].concat();
             if let Ok(scene) = decode(&with_payload(&bytes, section, &longer)) {
                 assert_eq!(scene, decode(&bytes).unwrap());
@@ -193,7 +194,7 @@ fn sections_and_encodings_that_do_not_belong() {
         let error = entry(section, 3, encoding);
         assert!(matches!(error, CodecError::UnknownEncoding { .. }), "{section} {encoding}: {error}");
     }
-    // The planes in full precision need no context model, and coded ones need theirs.
+    // Planes in full precision have no context model, and coded ones need theirs.
     let (scene, input) = tiny(Profile::Compact);
     let plain = encode_compressed(&scene, &CompressionInput { planes: None, ..input }).unwrap().bytes;
     let mut both = with_payload(bytes, 4, payload(&plain, 4));
@@ -211,7 +212,7 @@ fn sections_and_encodings_that_do_not_belong() {
 fn values_that_take_no_bytes_are_limited() {
     let (scene, input) = tiny(Profile::Paper);
     let bytes = encode_compressed(&scene, &input).unwrap().bytes;
-    // Each byte may ask for four bytes and 400 nanoseconds, so a limit of nothing refuses only what asks for more.
+    // Each byte may take four bytes and 400 nanoseconds, so limits of zero refuse only streams that need more.
     let (scene, input) = tiny(Profile::Compact);
     let dense = encode_compressed(&scene, &input).unwrap().bytes;
     let error = decode_with_limits(&dense, &Limits { memory_bytes: 0, ..Limits::default() }).unwrap_err();

@@ -1,8 +1,8 @@
 //! The decoder on bytes whose checksums fit.
 //!
-//! Datasets, point clouds and images have targets in `light4gs-data/fuzz`. Checkpoints (safetensors) and configurations (TOML)
-//! have none: their readers are in a crate that pulls in Burn, which would be built a second time with libFuzzer's flags.
-//! Seeded tests of that crate damage both by the thousand instead.
+//! Datasets, point clouds and images have targets in `light4gs-data/fuzz`. Checkpoints (safetensors) and configurations
+//! (TOML) have none: their readers are in a crate that depends on Burn, which would be built a second time with
+//! libFuzzer's flags. Instead, seeded tests of that crate damage thousands of both.
 //!
 //! Start from the golden streams, from the folder of `light4gs-codec` and with a nightly compiler:
 //! `cargo +nightly fuzz run decode fuzz/corpus/decode ../tests/golden-streams`
@@ -15,7 +15,7 @@ use light4gs_codec::{Limits, decode_with_limits, encode, info};
 const PRELUDE: usize = 32;
 const ENTRY: usize = 16;
 
-/// Small enough that a lie about a size is found out quickly.
+/// Small enough that a false size is refused soon.
 const LIMITS: Limits = Limits {
     file_bytes: 1 << 20,
     meta_bytes: 1 << 12,
@@ -51,7 +51,7 @@ fuzz_target!(|data: &[u8]| {
     }
 });
 
-/// Makes the length of the stream, those of the sections and the checksums fit, where there is a table at all.
+/// Makes the length of the stream, the lengths of the sections and the checksums fit, if there is a table at all.
 fn forge(bytes: &mut [u8]) -> Option<()> {
     let length = bytes.len() as u64;
     bytes.get_mut(20..28)?.copy_from_slice(&length.to_le_bytes());
@@ -64,7 +64,7 @@ fn forge(bytes: &mut [u8]) -> Option<()> {
         let entry = table + section * ENTRY;
         let left = bytes.len() - start;
         let stated = u64::from_le_bytes(*bytes.get(entry + 8..)?.first_chunk()?);
-        // The last section takes what the others have left.
+        // The last section gets all remaining bytes.
         let size = if section + 1 == sections { left } else { left.min(stated.try_into().unwrap_or(left)) };
         let crc = crc32c::crc32c(&bytes[start..start + size]);
         bytes[entry + 4..entry + 8].copy_from_slice(&crc.to_le_bytes());

@@ -2,9 +2,9 @@
 
 use super::range_coder::{BitCoder, Probability};
 
-/// Observations after which the fast estimate forgets.
+/// Observations after which the fast estimate begins to forget.
 const FAST: u8 = 18;
-/// Observations after which the slow estimate forgets.
+/// Observations after which the slow estimate begins to forget.
 const SLOW: u8 = 250;
 
 /// `RATES[n]` is the weight, in units of 2^-16, of one observation after `n` others.
@@ -21,8 +21,8 @@ const RATES: [u16; SLOW as usize + 1] = {
 
 /// The probability of a binary decision, learned from the decisions before it.
 ///
-/// Two estimates are averaged. Both are the mean of all observations at first; one goes on with a window of some
-/// 20, the other of some 250. The first follows change, the second is sharp where nothing changes.
+/// Two estimates are averaged. At first both are the mean of all observations. Later one has a window of some 20
+/// observations, the other of some 250. The first follows changes, the second is precise where nothing changes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdaptiveBit {
     fast: u16,

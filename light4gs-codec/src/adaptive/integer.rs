@@ -11,14 +11,14 @@ const LEADING: u32 = 3;
 ///
 /// A value is a zero flag, a sign, and its magnitude `m >= 1` as an Exp-Golomb code: `floor(log2 m)` in unary, then the
 /// binary digits below the first. Flag, sign, unary part and the leading digits adapt, separately in each of the
-/// caller's contexts; the other digits are written as they are. So a value costs few decisions whatever its size, and a
-/// smooth distribution is met within a fraction of a percent after some hundred values.
+/// caller's contexts; the other digits are written raw. So a value takes few decisions whatever its size, and after
+/// some hundred values of a smooth distribution the code is within a fraction of a percent of its entropy.
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptiveInteger {
     contexts: Vec<Context>,
 }
 
-/// A context index for an expected magnitude: two levels an octave, 0 for 0, the last for all that is large.
+/// A context index for an expected magnitude: two levels an octave; 0 for 0, the last one for all large magnitudes.
 ///
 /// ```text
 /// magnitude  0  1  2  3  4..6  6..8  8..12  12..16 ...
@@ -67,7 +67,7 @@ impl AdaptiveInteger {
 }
 
 impl Context {
-    /// Codes `magnitude`, which is not 0. A decoder passes anything.
+    /// Codes `magnitude`, which is not 0. A decoder may pass any value.
     #[inline]
     fn magnitude(&mut self, coder: &mut impl BitCoder, magnitude: u32) -> u32 {
         let exponent = magnitude.checked_ilog2().unwrap_or(0);

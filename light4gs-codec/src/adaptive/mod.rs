@@ -1,11 +1,11 @@
 //! Adaptive entropy coding of bits and integers.
 //!
-//! The models learn while they code, from what both sides have seen, so a stream needs no tables. All arithmetic
-//! is on integers: the bytes and the numbers are the same on every machine.
+//! The models learn while they code, from what encoder and decoder have both seen, so a stream needs no tables. All
+//! arithmetic is on integers: the bytes and the numbers are the same on every machine.
 //!
-//! Encoder and decoder share one description of what is coded, and so cannot drift apart: a function that is
-//! generic over [`BitCoder`] takes every value and returns it. When it encodes, the value that comes back is the one
-//! that went in; when it decodes, what goes in is ignored and what comes back was read.
+//! Encoder and decoder share one function for what is coded, and so cannot differ: it is generic over [`BitCoder`],
+//! takes every value and returns it. When it encodes, it returns the value that it was given. When it decodes, it
+//! ignores the value that it was given and returns the one that was read.
 
 mod bit;
 mod integer;

@@ -15,16 +15,16 @@ use constriction::{
 /// Bits of a probability.
 const PRECISION: usize = 15;
 const ONE: u16 = 1 << PRECISION;
-/// No decision is surer than this: it costs at least 2^-10 bits or so, and at most 11.
+/// The bound of a probability near 0 and 1: a decision takes at least some 2^-10 bits, and at most 11.
 const LEAST: u32 = 1 << 4;
 /// Most bits that [`BitCoder::raw`] codes at a time.
 const RAW_CHUNK: u32 = 12;
 
-/// What the range coder reads and writes at a time. Small, because a stream ends with one or two of them.
+/// What the range coder reads and writes at a time. It is small because the end of a stream takes one or two of them.
 type Word = u16;
-/// The state of the range coder. Large, so that no interval is rounded noticeably.
+/// The state of the range coder. It is large so that no interval is rounded noticeably.
 type State = u64;
-/// Words that the decoder reads ahead: it looks that far behind the end of a sound stream, and no further.
+/// Words that the decoder reads ahead: after a sound stream it reads so many words beyond the end, and no more.
 const READ_AHEAD: u32 = State::BITS / Word::BITS;
 
 /// The probability that a bit is one, in units of 2^-15, never 0 and never 1.
@@ -45,15 +45,15 @@ pub(crate) struct Damaged;
 
 /// A coder of binary decisions, in either direction.
 pub(crate) trait BitCoder {
-    /// Codes one decision: encoding, `bit` is written and returned; decoding, `bit` is ignored and the one that was
-    /// written is returned.
+    /// Codes one decision. When encoding, `bit` is written and returned. When decoding, `bit` is ignored, and the bit
+    /// that was written is returned.
     fn bit(&mut self, one: Probability, bit: bool) -> bool;
 
-    /// Codes the lowest `bits` (at most 32) of `value`, all as likely as each other. Symmetric as [`BitCoder::bit`].
+    /// Codes the lowest `bits` (at most 32) of `value`, all equally likely. Symmetric as [`BitCoder::bit`].
     fn raw(&mut self, bits: u32, value: u32) -> u32;
 
-    /// Whether decoding still makes sense. Loops over hostile counts ask this, so that they end with the bytes.
-    /// What a damaged decoder returns is arbitrary but harmless.
+    /// Whether decoding still makes sense. Loops over counts from the stream call this, so that they end with the
+    /// bytes. What a damaged decoder returns is arbitrary but harmless.
     fn check(&self) -> Result<(), Damaged>;
 }
 
@@ -64,7 +64,7 @@ pub(crate) struct BitEncoder {
 }
 
 impl BitEncoder {
-    /// The bytes. What stands behind them does not matter to a decoder.
+    /// The bytes. A decoder ignores bytes after them.
     pub(crate) fn finish(self) -> Vec<u8> {
         self.coder.into_compressed().unwrap_infallible().into_iter().flat_map(Word::to_le_bytes).collect()
     }
@@ -137,7 +137,7 @@ impl BitCoder for BitDecoder<'_> {
     }
 }
 
-/// Little-endian words of a slice, and then as many zeros as a sound stream can ask for.
+/// Little-endian words of a slice, and then as many zeros as a decoder of a sound stream can ask for.
 #[derive(Debug)]
 struct PaddedWords<'a> {
     rest: &'a [u8],
@@ -195,13 +195,13 @@ impl DecoderModel<PRECISION> for Probability {
 #[derive(Clone, Copy, Debug)]
 struct RawBits(u32);
 
-/// The chunks of `bits` raw bits: where they stand in the value, lowest first, and their models.
+/// The chunks of `bits` raw bits: their positions in the value, lowest first, and their models.
 fn raw_chunks(bits: u32) -> impl Iterator<Item = (u32, RawBits)> {
     (0..bits).step_by(RAW_CHUNK as usize).map(move |shift| (shift, RawBits((bits - shift).min(RAW_CHUNK))))
 }
 
 impl RawBits {
-    /// How much of the unit interval, of 2^15, a symbol has.
+    /// The share of the unit interval, of 2^15, that a symbol has.
     #[inline]
     fn share(self) -> u16 {
         ONE >> self.0
@@ -261,7 +261,7 @@ mod tests {
         assert_eq!(decoder.check(), Ok(()));
         assert_eq!(read, written);
 
-        // What stands behind the end does not matter.
+        // Bytes after the end do not matter.
         bytes.extend([0xff; 9]);
         code(&mut BitDecoder::new(&bytes), &mut read);
         assert_eq!(read, written);

@@ -1,4 +1,4 @@
-//! Numbers onto integers and back.
+//! From numbers to integers and back.
 
 /// The largest index on either side of zero. Indices up to here are exact in float32.
 pub(crate) const LARGEST_INDEX: i32 = 1 << 23;
@@ -13,8 +13,8 @@ pub(crate) fn index(value: f32, step: f32, offset: f32) -> Option<i32> {
     (index.abs() <= f64::from(LARGEST_INDEX)).then_some(index as i32)
 }
 
-/// The level at `index`. Encoder and decoder take every number from here: one product and one sum in float32, each
-/// rounded, which every machine does alike.
+/// The level at `index`. Encoder and decoder compute every number by this function: one product and one sum in float32,
+/// each rounded, which is the same on every machine.
 #[inline]
 pub(crate) fn reconstruct(index: i32, step: f32, offset: f32) -> f32 {
     index as f32 * step + offset

@@ -8,10 +8,12 @@ use crate::adaptive::{AdaptiveInteger, BitCoder, BitDecoder, BitEncoder, Damaged
 
 /// The last level of an expected residual: 64 steps.
 const LAST_LEVEL: usize = 13;
-/// A residual counts for the context no more than this, so that one wild value does not spoil its neighbors'.
+/// The most that a residual counts for the context, so that one extreme value does not spoil the contexts of its
+/// neighbors.
 const LARGEST_RESIDUAL: u32 = 1 << 16;
 
-/// From so many channels before it a channel is predicted at most, so that a wide attribute takes time in proportion.
+/// A channel is predicted from at most this many channels before it, so that the time for a wide attribute grows only
+/// linearly.
 const MOST_BEFORE: usize = 7;
 
 /// Writes the channels of an attribute, each with a value for every Gaussian.
@@ -28,10 +30,10 @@ pub(super) fn decode(bytes: &[u8], count: usize, neighbors: &[[u32; NEIGHBORS]])
     Ok(channels)
 }
 
-/// Codes channel after channel: mean and weights of its prediction, then what the prediction missed by.
+/// Codes channel after channel: mean and weights of its prediction, then the residuals.
 ///
-/// The context of a residual is how large it can be expected to be: what the prediction missed by at the neighbors,
-/// and in the channel before at the same Gaussian.
+/// The context of a residual is its expected magnitude, from the residuals of the neighbors, and from that of the same
+/// Gaussian in the channel before.
 fn code(
     coder: &mut impl BitCoder,
     channels: &mut [Vec<i32>],
@@ -72,7 +74,7 @@ fn code(
     coder.check()
 }
 
-/// The context of the next residual, from those before it and the one of the channel before.
+/// The context of the next residual, from those before it and the one in the channel before.
 #[inline]
 fn expected_level(missed: &[u32], missed_before: Option<&u32>, near: &[u32; NEIGHBORS]) -> usize {
     if missed.is_empty() {

@@ -1,10 +1,10 @@
-//! What every Gaussian has, but for the higher spherical harmonics (docs/design.md).
+//! The attributes of Gaussians, except the spherical harmonics beyond degree 0 (docs/design.md).
 //!
-//! A section is a list of named attributes, each with its width and its coder; `docs/format.md` has the bytes. Without
-//! loss all are float32. Compact, positions go onto a grid and into Morton order, in which they are coded as a set
-//! (`positions.rs`). The other attributes follow in that order, uniformly quantized: each channel is predicted linearly
-//! from the nearest Gaussians before and from the channels before, and what the prediction misses by is coded adaptively.
-//! A further attribute without a step stays float32.
+//! A section is a list of named attributes, each with its width and its coder; `docs/format.md` has the bytes. In the
+//! profile without loss all are float32. In the compact one, positions are rounded to a grid and sorted in Morton
+//! order, and coded as a set (`positions.rs`). The other attributes follow in that order, uniformly quantized: each
+//! channel is predicted linearly from the nearest Gaussians before and from the channels before, and the residual is
+//! coded adaptively. A further attribute without a step stays float32.
 //!
 //! ```
 //! use light4gs_codec::{FurtherAttribute, GaussianArrays, Limits, attributes::{self, AttributeSteps}};
@@ -56,18 +56,19 @@ use crate::{
 };
 
 const SECTION: &str = Section::Gaussians.name();
-/// Bytes that many Gaussians take at least: what a count must show before memory is taken for it.
+/// A section has at least one byte for so many Gaussians: a count is checked against it before memory is taken.
 const GAUSSIANS_A_BYTE: usize = 8;
 
 /// Bytes that decoding takes for a Gaussian: 56 that stay, neighbors, and the integers of the largest attribute.
 const GAUSSIAN_BYTES: u64 = 136;
-/// Nanoseconds to find a Gaussian's neighbors and to read its built-in attributes where they take next to no bits.
+/// Nanoseconds to find a Gaussian's neighbors and to read its built-in attributes, however few bits these take.
 const GAUSSIAN_NANOSECONDS: u64 = 3000;
 /// Nanoseconds of a level of the tree of positions.
 const LEVEL_NANOSECONDS: u64 = 12;
-/// Bytes that decoding takes for a quantized number of a further attribute: itself, its integer, what predicts it.
+/// Bytes that decoding takes for a quantized number of a further attribute: the number, its integer, and its share of
+/// the prediction.
 const NUMBER_BYTES: u64 = 28;
-/// Nanoseconds to read such a number where it takes next to no bits.
+/// Nanoseconds to read such a number, however few bits it takes.
 const NUMBER_NANOSECONDS: u64 = 300;
 
 /// Coded attributes.
@@ -75,10 +76,10 @@ const NUMBER_NANOSECONDS: u64 = 300;
 pub struct EncodedAttributes {
     /// What [`decode`] reads.
     pub bytes: Vec<u8>,
-    /// `order[new]` is the index that the Gaussian `new` of the decoded arrays had in the given ones. Everything else
-    /// that belongs to a Gaussian, such as the higher spherical harmonics, has to follow.
+    /// `order[new]` is the index in the given arrays of the Gaussian `new` of the decoded ones. Everything else that
+    /// belongs to a Gaussian, such as the higher spherical harmonics, must be reordered in the same way.
     pub order: Vec<u32>,
-    /// Where the bytes went.
+    /// Bytes of each part.
     pub sizes: AttributeSizes,
 }
 
@@ -91,7 +92,7 @@ pub struct AttributeSizes {
     pub attributes: Vec<(String, usize)>,
 }
 
-/// Codes `N` Gaussians, quantized. `sh_degree` and `sh_rest` are left out.
+/// Codes `N` Gaussians, quantized, without `sh_degree` and `sh_rest`.
 ///
 /// # Errors
 /// Arrays of different lengths, NaN and infinities, names that no attribute can have, steps that are not positive, positions
@@ -119,7 +120,7 @@ pub fn encode(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<Enco
     Ok(EncodedAttributes { bytes: writer.bytes, order: quantized.order, sizes })
 }
 
-/// Writes Gaussians whose arrays belong together as float32, but for `sh_degree` and `sh_rest`.
+/// Writes Gaussians whose arrays fit together as float32, without `sh_degree` and `sh_rest`.
 pub(crate) fn write_float32(gaussians: &GaussianArrays, writer: &mut Writer) {
     let attributes = || gaussians.attributes().filter(|attribute| attribute.name != SH_REST);
     let info = |attribute: AttributeValues<'_>| AttributeInfo {
@@ -133,8 +134,8 @@ pub(crate) fn write_float32(gaussians: &GaussianArrays, writer: &mut Writer) {
     attributes().for_each(|attribute| writer.f32s(attribute.values));
 }
 
-/// Reads what [`encode`] writes: Gaussians in Morton order; `sh_degree` is 0 and `sh_rest` empty. Attributes whose coder is
-/// not known and that may be left out are left out.
+/// Reads what [`encode`] writes: Gaussians in Morton order; `sh_degree` is 0 and `sh_rest` empty. Attributes with an
+/// unknown coder are skipped if they are optional.
 ///
 /// # Errors
 /// Bytes that [`encode`] does not write, and more Gaussians than the limits allow. Memory is taken for at most eight
@@ -143,7 +144,7 @@ pub fn decode(bytes: &[u8], limits: &Limits) -> Result<GaussianArrays, CodecErro
     decode_within(bytes, Encoding::Quantized, &Budget::new(limits))
 }
 
-/// As [`decode`], for either encoding and at the cost of a budget.
+/// As [`decode`], for either encoding, within a budget.
 pub(crate) fn decode_within(bytes: &[u8], encoding: Encoding, budget: &Budget) -> Result<GaussianArrays, CodecError> {
     let mut reader = Reader::new(SECTION, bytes);
     let head = Head::read(&mut reader, encoding, &budget.limits)?;
@@ -200,7 +201,7 @@ fn read_quantized(
     let neighbors = nearest_before(&cells);
     drop(cells);
 
-    // Each attribute's integers go before the next one's come.
+    // The integers of one attribute are freed before those of the next are read.
     for attribute in others {
         match attribute.coder {
             Coder::Float32 => numbers.add(attribute, read_float32(reader, attribute)?),
@@ -218,7 +219,7 @@ fn read_quantized(
     Ok(numbers.into_gaussians())
 }
 
-/// What [`decode`] gives for what [`encode`] writes: the quantized Gaussians in their new order.
+/// What [`decode`] returns for what [`encode`] writes: the quantized Gaussians in their new order.
 ///
 /// # Errors
 /// As [`encode`].
@@ -235,7 +236,7 @@ fn read_float32(reader: &mut Reader<'_>, attribute: &AttributeInfo) -> Result<Ve
     reader.f32s(&attribute.name, attribute.bytes / 4)
 }
 
-/// Reads an attribute, refusing what could not be reconstructed.
+/// Reads an attribute, refusing numbers that could not be reconstructed.
 fn read_channels(
     stream: Reader<'_>,
     attribute: &AttributeInfo,
@@ -252,7 +253,7 @@ fn read_channels(
     }
 }
 
-/// Refuses anything behind the attributes but zeros, where these fill up the section.
+/// Refuses anything after the attributes; in a padded section, anything but zeros.
 fn finish(mut reader: Reader<'_>, padded: bool) -> Result<(), CodecError> {
     while padded && reader.demand("zeros", 1).is_ok() {
         if reader.u8("zeros")? != 0 {
@@ -266,7 +267,7 @@ fn damaged(field: &str) -> CodecError {
     CodecError::invalid(SECTION, field, "damaged or cut short", "a range-coded stream")
 }
 
-/// Attributes as they come out of a section.
+/// Attributes as they are read from a section.
 #[derive(Default)]
 struct Numbers {
     /// Those of all scenes, in the order of [`BUILT_IN`].
@@ -275,7 +276,7 @@ struct Numbers {
 }
 
 impl Numbers {
-    /// Adds the next one: the built-in ones come first.
+    /// Adds the next one; the built-in ones come first.
     fn add(&mut self, attribute: &AttributeInfo, values: Vec<f32>) {
         if self.built_in.len() < BUILT_IN.len() {
             self.built_in.push(values);

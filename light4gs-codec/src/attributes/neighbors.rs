@@ -1,14 +1,14 @@
-//! For each Gaussian the nearest ones that a decoder already has.
+//! For each Gaussian, the nearest ones of those that a decoder already has.
 
-/// How many are found.
+/// How many neighbors a Gaussian has.
 pub(super) const NEIGHBORS: usize = 4;
-/// How far back in Morton order they are looked for. Most of what is near in space is near in this order.
+/// How far back in Morton order they are searched. Most Gaussians that are near in space are near in this order.
 const WINDOW: usize = 64;
 
-/// For each cell the indices of the nearest cells before it, nearest first; the later one where two are as near.
+/// For each cell the indices of the nearest cells before it, nearest first; of two equally near ones, the later first.
 ///
-/// The first cell has no neighbors and is its own, which a caller must expect; the next few repeat the nearest.
-/// Integers decide, so all machines agree.
+/// The first cell has no neighbors: it gets its own index, which the caller must expect. The next few cells repeat
+/// their nearest neighbor. Only integers are compared, so all machines agree.
 pub(super) fn nearest_before(cells: &[[i32; 3]]) -> Vec<[u32; NEIGHBORS]> {
     let mut found = Vec::with_capacity(cells.len());
     for (index, cell) in cells.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Positions onto a grid, and the grid's order.
+//! Rounding positions to a grid, and the order of its cells.
 
 use std::array::from_fn;
 
@@ -40,7 +40,7 @@ impl PositionGrid {
         }
         let extent = (0..3).map(|axis| f64::from(most[axis]) - f64::from(least[axis])).fold(0.0, f64::max);
         let finest = (extent / f64::from((1_u32 << MOST_BITS) - 1)) as f32;
-        // Rounding to float32 must not let the last cell slip out.
+        // Even after rounding to float32 the last cell must be within the index range.
         let step = step.clamp(f32::MIN_POSITIVE, LARGEST_STEP).max(finest.next_up());
         let last = (extent / f64::from(step)).round() as u32;
         Ok(Self { origin: least, step, bits: u32::BITS - last.leading_zeros() })
@@ -98,7 +98,7 @@ pub(crate) fn check_positions(means: &[[f32; 3]]) -> Result<(), CodecError> {
     }
 }
 
-/// The Morton code of a cell: the bits of its coordinates in turn, x highest.
+/// The Morton code of a cell: the bits of its coordinates taken in turn, x highest.
 pub(super) fn morton_code(cell: [i32; 3]) -> u64 {
     let [x, y, z] = cell.map(|coordinate| spread(coordinate as u64));
     x << 2 | y << 1 | z
@@ -109,7 +109,7 @@ pub(super) fn morton_cell(code: u64) -> [i32; 3] {
     [2, 1, 0].map(|shift| gather(code >> shift) as i32)
 }
 
-/// Masks of groups of bits that halve in length, each as far from the next as twice its length.
+/// Masks of groups of bits. The groups halve in length from mask to mask, and the gaps are twice as long as the groups.
 const GROUPS: [u64; 6] = [
     0x0000_0000_001f_ffff,
     0x001f_0000_0000_ffff,

@@ -1,19 +1,19 @@
-//! Linear prediction of a channel from what a decoder already has.
+//! Linear prediction of a channel from values that a decoder already has.
 //!
-//! The encoder fits the weights by least squares, in floating point, and writes them; both sides then predict with
-//! integers. So the fit may be as clever as it likes, and no two machines can disagree about a prediction.
+//! The encoder fits the weights by least squares, in floating point, and writes them. Encoder and decoder then predict
+//! with integers. So the fit need not be exact to the bit, and no two machines can disagree about a prediction.
 
 use super::neighbors::NEIGHBORS;
 use crate::adaptive::{AdaptiveInteger, BitCoder};
 
 /// Fractional bits of a weight.
 const FRACTION: u32 = 12;
-/// Fewer Gaussians do not pay for the weights.
+/// With fewer Gaussians, weights take more bytes than they save.
 const FEWEST: usize = 200;
-/// Added to the diagonal of the normal equations, an entry, so that channels without variation are no trouble.
+/// Added to the diagonal of the normal equations for each Gaussian, so that channels without variation can be solved.
 const RIDGE: f64 = 1e-3;
 
-/// A channel and what its neighbors hold, around the channel's mean.
+/// A channel: its values, and the sums over each Gaussian's neighbors.
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) values: Vec<i32>,
@@ -23,7 +23,7 @@ pub(super) struct Channel {
 }
 
 impl Channel {
-    /// A channel with a mean, its sums not known yet.
+    /// A channel with a given mean, without sums yet.
     pub(super) fn new(values: Vec<i32>, mean: i32) -> Self {
         let around = Vec::with_capacity(values.len());
         Self { values, mean, around }
@@ -35,7 +35,7 @@ impl Channel {
         i64::from(self.values[index]) - i64::from(self.mean)
     }
 
-    /// Adds the sum of the next Gaussian, whose neighbors come before it.
+    /// Adds the sum of the next Gaussian; its neighbors come before it.
     #[inline]
     pub(super) fn gather(&mut self, neighbors: &[u32; NEIGHBORS]) {
         let index = self.around.len();
@@ -44,8 +44,9 @@ impl Channel {
     }
 }
 
-/// What a channel is predicted from: its neighbors' sum, its nearest neighbor, and for every channel coded before
-/// it the Gaussian's own value and its neighbors' sum. All are around the means.
+/// What a channel is predicted from: the sum over the neighbors, the nearest neighbor, and for every channel coded
+/// before it the Gaussian's own value and the sum over its neighbors. The channel's mean is subtracted from every
+/// value.
 #[inline]
 fn inputs<'a>(
     own: &'a Channel,
@@ -66,7 +67,7 @@ pub(super) struct LinearPrediction {
 }
 
 impl LinearPrediction {
-    /// No weights but zeros, for a channel with `before` others before it.
+    /// All weights zero, for a channel with `before` channels before it.
     pub(super) fn zero(before: usize) -> Self {
         Self { weights: vec![0; 2 + 2 * before] }
     }
@@ -112,7 +113,7 @@ impl LinearPrediction {
         let inputs = inputs(own, before, neighbors, index);
         let sum: i64 = self.weights.iter().zip(inputs).map(|(&weight, input)| i64::from(weight) * input).sum();
         let rounded = (sum + (1 << (FRACTION - 1))) >> FRACTION;
-        // Sums beyond 32 bits are those of damaged streams only.
+        // Only damaged streams have sums beyond 32 bits.
         own.mean.wrapping_add(rounded as i32)
     }
 }

@@ -70,7 +70,7 @@ impl Quantized {
         nearest_before(&self.cells())
     }
 
-    /// As they come back.
+    /// The Gaussians as a decoder gets them.
     pub(super) fn reconstructed(&self) -> GaussianArrays {
         let mut numbers = Numbers::default();
         for attribute in &self.attributes {
@@ -142,13 +142,13 @@ impl QuantizedAttribute {
 /// Which of an attribute's channels is coded first, second, and so on.
 fn place(coded: usize, coder: Coder) -> usize {
     match coder {
-        // Green first: it says most about the other two.
+        // Green first: the other two are predicted best from it.
         Coder::Colors => [1, 0, 2][coded],
         _ => coded,
     }
 }
 
-/// Rows of numbers to channels of indices, in the order in which they are coded; `order` is that of the rows.
+/// Rows of numbers to channels of indices, in the order in which they are coded; `order` is the order of the rows.
 fn split(attribute: AttributeValues<'_>, step: f32, coder: Coder, order: &[u32]) -> Result<Vec<Vec<i32>>, CodecError> {
     let AttributeValues { name, width, values, .. } = attribute;
     let quantize = |row: u32, channel: usize| {

@@ -1,4 +1,4 @@
-//! What stands before the numbers: which attributes there are, how wide they are, and how they are stored.
+//! The head of the section: which attributes there are, how wide they are, and how they are stored.
 
 use super::SECTION;
 use crate::{
@@ -34,7 +34,7 @@ pub(crate) struct Head {
 }
 
 impl Coder {
-    /// Those that have a number in a stream, in its order.
+    /// The coders that have a number in the stream, in the order of these numbers.
     const ALL: [Self; 4] = [Self::Float32, Self::Grid, Self::Channels, Self::Colors];
 
     fn number(self) -> u8 {
@@ -51,7 +51,7 @@ impl Coder {
         Self::ALL.get(usize::from(number)).copied().unwrap_or(Self::Unknown(number))
     }
 
-    /// A name for people.
+    /// A name for messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Float32 => "float32",
@@ -87,7 +87,7 @@ impl Head {
             let length = reader.varint_at_most("length of an attribute's name", LONGEST_ATTRIBUTE_NAME as u32)?;
             let name = reader.take("an attribute's name", length.into())?;
             check_name(index, name, &attributes)?;
-            // What `check_name` lets through is ASCII.
+            // `check_name` accepts ASCII only.
             let name = String::from_utf8_lossy(name).into_owned();
             let width = reader.varint_at_most(&format!("width of {name}"), limits.attribute_width)?;
             let byte = reader.u8(&format!("coder of {name}"))?;
@@ -109,15 +109,10 @@ impl Head {
 
 fn order(expected: &str, found: impl ToString) -> CodecError {
     let names = BUILT_IN.map(|row| row.name).join(", ");
-    CodecError::invalid(
-        SECTION,
-        format!("attribute {expected}"),
-        found,
-        format!("{names}, then others by names of theirs"),
-    )
+    CodecError::invalid(SECTION, format!("attribute {expected}"), found, format!("{names}, then further attributes"))
 }
 
-/// Refuses names out of order, twice, or with letters that no name has.
+/// Refuses names that are out of order, occur twice, or have other letters than those allowed.
 fn check_name(index: usize, name: &[u8], before: &[AttributeInfo]) -> Result<(), CodecError> {
     if let Some(row) = BUILT_IN.get(index) {
         return if name == row.name.as_bytes() { Ok(()) } else { Err(order(row.name, format!("{:?}", shown(name)))) };
@@ -150,7 +145,7 @@ fn check_attribute(index: usize, attribute: &AttributeInfo, encoding: Encoding) 
         return Err(CodecError::invalid(SECTION, format!("width of {name}"), width, expected));
     }
     if built_in.is_some() && *optional {
-        let expected = "no such mark: every scene needs it";
+        let expected = "no mark, since every scene needs it";
         return Err(CodecError::invalid(SECTION, format!("mark of {name}"), "may be left out", expected));
     }
     let coder_is = |expected: &str| {
@@ -161,7 +156,7 @@ fn check_attribute(index: usize, attribute: &AttributeInfo, encoding: Encoding) 
         Coder::Float32 if index > 0 || encoding == Encoding::Float32 => Ok(()),
         _ if encoding == Encoding::Float32 => coder_is("0 (float32), the encoding of the section"),
         Coder::Grid if index == 0 => Ok(()),
-        _ if index == 0 => coder_is("1 (grid), in whose order all others are"),
+        _ if index == 0 => coder_is("1 (grid), which gives the order of the Gaussians"),
         Coder::Channels => Ok(()),
         Coder::Colors if *width == 3 => Ok(()),
         // Its length is known, so it can be left out.

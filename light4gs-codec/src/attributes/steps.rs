@@ -7,17 +7,17 @@ use crate::{CodecError, adaptive::LARGEST_STEP, scene::BUILT_IN, steps};
 
 /// How finely each attribute of a Gaussian is quantized: steps by the attributes' names.
 ///
-/// Every step is the distance between two neighboring levels, so an attribute is off by half of it at most. Measured
-/// at 200 pixels, the defaults cost 0.1 dB of a scene that reaches 33 dB, and less of one that reaches 26; positions and
-/// scales are what an image feels most. Halving a step costs one bit for each of its numbers.
+/// Every step is the distance between two neighboring levels, so the error of an attribute is at most half of it.
+/// Measured at 200 pixels, the defaults cost a scene that reaches 33 dB 0.1 dB, and one that reaches 26 dB less. Errors
+/// of positions and scales change an image most. Halving a step takes one bit more for each number.
 ///
 /// | attribute | default | in units of |
 /// |---|---:|---|
-/// | `means` | 0.05 | the size of the typical Gaussian: the median over the Gaussians of the geometric mean of the three scales. What a shift does to the image depends on how large the shifted Gaussian is, and Gaussians are as small as the pixels that they were trained on; so this one number suits scenes of any extent and resolution. The grid never has more than 2^20 cells along an axis: beyond, the step grows |
-/// | `log_scales` | 0.1 | natural logarithms: a size is off by 5 % at most |
+/// | `means` | 0.05 | the size of the typical Gaussian: the median over the Gaussians of the geometric mean of the three scales. What a shift does to the image depends on how large the shifted Gaussian is, and Gaussians are as small as the pixels that they were trained on; so this one number suits scenes of any extent and resolution. The grid never has more than 2^20 cells along an axis; if the step is too small for that, a larger one is taken |
+/// | `log_scales` | 0.1 | natural logarithms: the error of a size is at most 5 % |
 /// | `quats` | 0.02 | the quaternion's components, which are not normalized |
-/// | `opacity_logits` | 0.4 | opacity before the sigmoid: 5 % of opacity at most, where it is a half |
-/// | `sh_dc` | 0.04 | degree-0 coefficients: 2.9 of 255 levels of a color, so a color is off by half of that at most |
+/// | `opacity_logits` | 0.4 | opacity before the sigmoid: the error of an opacity of one half is at most 0.05 |
+/// | `sh_dc` | 0.04 | degree-0 coefficients: 2.9 of the 255 levels of a color, so the error is at most half of that |
 ///
 /// A further attribute that has no step here is stored as float32.
 ///
@@ -40,7 +40,7 @@ impl Default for AttributeSteps {
 }
 
 impl AttributeSteps {
-    /// These steps with another one for an attribute.
+    /// These steps, with the step of one attribute replaced.
     pub fn with(mut self, attribute: &str, step: f32) -> Self {
         self.steps.insert(attribute.to_owned(), step);
         self
@@ -56,7 +56,8 @@ impl AttributeSteps {
         self.steps.iter().map(|(name, step)| (name.as_str(), *step))
     }
 
-    /// Refuses steps below [`LEAST_STEP`](crate::checks::LEAST_STEP) (that of the positions only where it is not positive) or above 1e30.
+    /// Refuses steps below [`LEAST_STEP`](crate::checks::LEAST_STEP) or above 1e30. The step of the positions only has
+    /// to be positive.
     ///
     /// # Errors
     /// Names the first one.
@@ -64,7 +65,7 @@ impl AttributeSteps {
         self.iter().try_for_each(|(attribute, step)| steps::attribute_step(attribute, step))
     }
 
-    /// The nearest steps that [`AttributeSteps::check`] takes; NaN becomes the smallest.
+    /// The nearest steps that [`AttributeSteps::check`] accepts; NaN becomes the smallest.
     pub fn clamped(mut self) -> Self {
         for (attribute, step) in &mut self.steps {
             *step = step.max(steps::least_step(attribute)).min(LARGEST_STEP);
@@ -73,7 +74,7 @@ impl AttributeSteps {
     }
 }
 
-/// Refuses a step of a stream under which a decoded number could be infinite.
+/// Refuses a step from a stream with which a decoded number could be infinite.
 pub(super) fn check_step(attribute: &str, step: f32) -> Result<(), CodecError> {
     steps::check_step(SECTION, format!("step of {attribute}"), step, f32::MIN_POSITIVE)
 }

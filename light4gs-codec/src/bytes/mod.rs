@@ -1,10 +1,10 @@
-//! Numbers and names as bytes: what every section is read and written with.
+//! Numbers and names as bytes, for reading and writing all sections.
 //!
 //! | file | what |
 //! |---|---|
 //! | `reader.rs`, `writer.rs` | little-endian values |
 //! | `sections.rs` | which sections there are, what they may hold, how their numbers are stored |
-//! | `names.rs` | names that are safe to show |
+//! | `names.rs` | names that are safe to print |
 
 pub(crate) mod names;
 mod reader;

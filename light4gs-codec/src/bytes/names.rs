@@ -1,17 +1,17 @@
-//! Names, which end on terminals and on pages.
+//! Names, which are printed on terminals and pages.
 
 use crate::{CodecError, Limits, limits::at_most};
 
 /// Characters of a refused text that a message shows.
 const SHOWN: usize = 40;
 
-/// Refuses a name that is too long or holds what a terminal obeys.
+/// Refuses a name that is too long, or that has characters which control a terminal.
 pub(crate) fn check_name(section: &'static str, field: &str, name: &str, limits: &Limits) -> Result<(), CodecError> {
     at_most(section, format!("length of {field}"), name.len() as u64, limits.name_bytes)?;
     check_text(section, field, name, |_| true)
 }
 
-/// Refuses text with characters that a terminal obeys, of those for which `obeys` holds.
+/// Refuses text with characters that control a terminal: those for which `obeys` holds.
 pub(crate) fn check_text(
     section: &'static str,
     field: &str,
@@ -26,7 +26,8 @@ pub(crate) fn check_text(
     Err(CodecError::invalid(section, field, format!("{start:?}"), "text without control characters"))
 }
 
-/// The name without what `check_name` refuses: for names of folders and files, which may hold anything.
+/// The name, with every character that `check_name` refuses replaced: for names of folders and files, which may have
+/// any.
 ///
 /// ```
 /// use light4gs_codec::legal_name;
@@ -40,7 +41,7 @@ pub fn legal_name(name: &str) -> String {
     legal
 }
 
-/// Control characters, and marks that turn the direction of writing.
+/// Control characters, and marks that change the direction of writing.
 fn is_obeyed(c: char) -> bool {
     let turns = matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     c.is_control() || turns

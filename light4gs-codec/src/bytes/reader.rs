@@ -4,7 +4,7 @@ use std::array::from_fn;
 
 use crate::{CodecError, limits::at_most};
 
-/// Takes little-endian values from a slice. Memory is taken only for bytes that are there.
+/// Reads little-endian values from a slice. Memory is taken only for bytes that are there.
 #[derive(Clone, Debug)]
 pub(crate) struct Reader<'a> {
     section: &'static str,
@@ -56,8 +56,8 @@ impl<'a> Reader<'a> {
         self.array(field).map(u64::from_le_bytes)
     }
 
-    /// An unsigned integer in groups of seven bits, lowest first, the upper bit set in all but the last. One spelling
-    /// only: the last group is not 0 unless it is the first.
+    /// An unsigned integer in groups of seven bits, lowest first, the upper bit set in all but the last. Each integer
+    /// has only one encoding: the last group is not 0 unless it is the first.
     pub(crate) fn varint(&mut self, field: &str) -> Result<u64, CodecError> {
         let mut value = 0u64;
         for shift in (0..64).step_by(7) {
@@ -71,7 +71,7 @@ impl<'a> Reader<'a> {
                 return Ok(value);
             }
         }
-        Err(CodecError::invalid(self.section, field, "spelled wrongly", "an integer below 2^64 without leading zeros"))
+        Err(CodecError::invalid(self.section, field, "a wrong varint", "an integer below 2^64 without leading zeros"))
     }
 
     /// As [`Reader::varint`], at most `limit`.
@@ -81,7 +81,7 @@ impl<'a> Reader<'a> {
         Ok(value as u32)
     }
 
-    /// A run of bytes behind its length.
+    /// A length, and then that many bytes.
     pub(crate) fn block(&mut self, field: &str) -> Result<&'a [u8], CodecError> {
         let length = self.varint(field)?;
         self.take(field, length)
@@ -129,7 +129,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Refuses bytes that nobody has read.
+    /// Refuses bytes that have not been read.
     pub(crate) fn finish(self) -> Result<(), CodecError> {
         match self.rest.len() as u64 {
             0 => Ok(()),

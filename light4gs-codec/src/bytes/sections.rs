@@ -54,19 +54,19 @@ impl Section {
 pub enum Kind {
     /// Gaussians, each with its own attributes.
     GaussiansExplicit,
-    /// Spherical harmonics as they are.
+    /// Spherical harmonics as float32.
     ShExplicit,
-    /// Spherical harmonics under one frequency table a channel.
+    /// Spherical harmonics with one frequency table for each channel.
     ShTables,
-    /// Spherical harmonics under distributions that networks give.
+    /// Spherical harmonics with distributions that networks give.
     ShNetworks,
     /// Mean, principal axes and deviations of a cloud.
     SceneCoordinatesPrincipalAxes,
     /// The same, with a mapping of their coordinates other than the paper's.
     SceneCoordinatesMapped,
-    /// A description of what moves the Gaussians; it says itself what it is.
+    /// The motion as a description, whose kind stands in the section itself.
     MotionDescription,
-    /// Planes as they are.
+    /// Planes as float32.
     FeaturePlanesExplicit,
     /// Planes under a context model.
     FeaturePlanesContextCoded,
@@ -88,7 +88,7 @@ impl Kind {
         Self::ContextModelNetworks,
     ];
 
-    /// The section that may hold it, and the number that then stands in the table.
+    /// The section that holds this kind, and the kind's number in the table.
     pub(crate) const fn place(self) -> (Section, u8) {
         match self {
             Self::GaussiansExplicit => (Section::Gaussians, 1),
@@ -136,7 +136,7 @@ impl Kind {
     }
 }
 
-/// How the numbers of a section are stored; where they are networks, their weights.
+/// How the numbers of a section are stored. In sections with networks, this is about their weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Encoding {
@@ -162,7 +162,7 @@ impl Encoding {
         known.ok_or(CodecError::UnknownEncoding { section, kind: kind.name(), encoding: number })
     }
 
-    /// A name for people.
+    /// A name for messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Float32 => "float32",
@@ -171,7 +171,7 @@ impl Encoding {
     }
 }
 
-/// Refuses an array whose length is not what the counts and shapes say.
+/// Refuses an array whose length is not the one that follows from counts and shapes.
 pub(crate) fn check_length(
     section: &'static str,
     field: impl Into<String>,

@@ -32,7 +32,7 @@ impl Writer {
         self.u8(value as u8);
     }
 
-    /// Bytes behind their length.
+    /// A length, and then the bytes.
     pub(crate) fn block(&mut self, bytes: &[u8]) {
         self.varint(bytes.len() as u64);
         self.bytes.extend_from_slice(bytes);

@@ -39,7 +39,7 @@ impl Distribution {
         Self { first, cumulative: starts, search }
     }
 
-    /// The slot that stands for the integers that have none of their own.
+    /// The slot for the integers that have no slot of their own.
     pub(super) fn escape(&self) -> usize {
         self.cumulative.len() - 2
     }
@@ -60,10 +60,10 @@ impl Distribution {
     }
 }
 
-/// Gaussians that values are coded under, in units of the quantization step.
+/// Parameters of the Gaussians under which values are coded, in units of the quantization step.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Distributions {
-    /// Standard deviations as the networks give them; they are bounded below by 0.11 when they are used.
+    /// Standard deviations as the networks give them. Values below 0.11 are raised to it when they are used.
     pub scales: Vec<f32>,
     /// Means.
     pub means: Vec<f32>,

@@ -1,4 +1,4 @@
-//! A learned distribution of integers, as it travels in the stream.
+//! A learned distribution of integers, as it is stored in the stream.
 
 use std::convert::Infallible;
 
@@ -18,16 +18,17 @@ const MOST_SYMBOLS: usize = 1 << 14;
 /// Bytes of a symbol in a table and in its [`Distribution`], and nanoseconds to read it and to place it.
 const SYMBOL_BYTES: u64 = 8;
 const SYMBOL_NANOSECONDS: u64 = 60;
-/// What a table takes besides, in symbols.
+/// The cost of a table besides its symbols, in symbols.
 const SYMBOLS_OF_A_TABLE: u64 = 100;
-/// Mass that is cut off on either side and left to the escape, since naming those symbols costs more than it saves.
+/// Probability that is cut off on either side and left to the escape, since listing those symbols takes more bytes than
+/// it saves.
 const CUT: f64 = 1.0 / 8192.0;
 
-/// Frequencies of a run of integers, and of the escape that stands for all others.
+/// Frequencies of a run of integers, and of the escape, which stands for all others.
 ///
-/// A frequency is kept as a floating-point number of one byte, four significant bits and an exponent, which is within
-/// 7 % and costs a few bits in the stream; a symbol's price rises by less than a thousandth of a bit. The integers that
-/// the coder works with follow from these by integer arithmetic alone.
+/// A frequency is kept as a floating-point number of one byte, four significant bits and an exponent. It is within 7 %
+/// and takes a few bits in the stream; a symbol takes less than a thousandth of a bit more. The frequencies of the
+/// coder follow from these by integer arithmetic alone.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrequencyTable {
     first: i32,
@@ -36,8 +37,8 @@ pub struct FrequencyTable {
 }
 
 impl FrequencyTable {
-    /// The table of a distribution: `pmf[i]` is the probability of `first + i`. What is missing to 1, and the far ends
-    /// of the distribution, go to the escape.
+    /// The table of a distribution: `pmf[i]` is the probability of `first + i`. What the probabilities lack to 1, and
+    /// the far ends of the distribution, go to the escape.
     ///
     /// ```
     /// use light4gs_codec::FrequencyTable;
@@ -73,7 +74,7 @@ impl FrequencyTable {
         Ok(Self { first: start as i32, codes })
     }
 
-    /// What a symbol costs in bits, without the digits that follow an escape.
+    /// The bits of a symbol, without the digits that follow an escape.
     pub fn bits(&self, symbol: i32) -> f64 {
         self.distribution().bits(symbol)
     }
@@ -93,7 +94,7 @@ impl FrequencyTable {
     }
 }
 
-/// How many of the first probabilities can go to the escape.
+/// How many of the first probabilities can be left to the escape.
 fn cut<'a>(pmf: impl Iterator<Item = &'a f64>) -> usize {
     let mut mass = 0.0;
     pmf.take_while(|&&probability| {
@@ -127,7 +128,7 @@ pub(crate) fn write_tables(tables: &[FrequencyTable]) -> Vec<u8> {
     }
 }
 
-/// Reads `count` tables; messages name `field`. Each may be long, though it takes few bytes.
+/// Reads `count` tables; messages name `field`. A table may have many symbols, though it takes few bytes.
 pub(crate) fn read_tables(
     section: &'static str,
     field: &'static str,
@@ -144,10 +145,10 @@ pub(crate) fn read_tables(
     }
 }
 
-/// Codes the first symbol and the number of symbols of each table, then the codes, each as the difference from the
-/// one before; the one before the first is 0.
+/// Codes the first symbol and the number of symbols of each table, then the codes, each as the difference from the one
+/// before (the first from 0).
 ///
-/// `ask` is told the symbols of each table before memory is taken for them.
+/// `ask` is called with the number of symbols of each table before memory is taken for them.
 fn code_tables<E>(
     coder: &mut impl BitCoder,
     tables: &mut [FrequencyTable],

@@ -11,20 +11,20 @@ const LEAST_SCALE: f64 = 0.11;
 const RATIO: f64 = 1.062_944_547_489_952;
 /// Its square root.
 const HALF_RATIO: f64 = 1.030_992_021_060_275_7;
-/// Standard deviations that a row covers on either side. What lies beyond, 2e-9, is left to the escape.
+/// Standard deviations that a row covers on either side. The rest, 2e-9, is left to the escape.
 const REACH: f64 = 6.0;
 
-/// A distribution a scale.
+/// One distribution for each scale.
 #[derive(Debug)]
 pub(crate) struct GaussianTable {
-    /// By rising scale. Symmetric around 0, but for the rounding of frequencies.
+    /// By ascending scale. Symmetric around 0, except for the rounding of frequencies.
     pub(crate) levels: Vec<Distribution>,
     /// `thresholds[i]` is the geometric mean of scales `i` and `i + 1`.
     thresholds: [f32; LEVELS - 1],
 }
 
 impl GaussianTable {
-    /// The level whose scale is nearest to `scale` in logarithm. NaN, negative and small scales get the first one.
+    /// The level whose scale is nearest to `scale` in logarithm. NaN, negative and small scales have the first level.
     #[inline]
     pub(crate) fn level(&self, scale: f32) -> u16 {
         self.thresholds.partition_point(|&threshold| threshold < scale) as u16
@@ -45,7 +45,7 @@ impl GaussianTable {
     }
 }
 
-/// The table, made when it is first asked for (some milliseconds).
+/// The table, made when it is first used (some milliseconds).
 pub(crate) fn gaussian_table() -> &'static GaussianTable {
     static TABLE: OnceLock<GaussianTable> = OnceLock::new();
     TABLE.get_or_init(GaussianTable::new)
@@ -53,11 +53,11 @@ pub(crate) fn gaussian_table() -> &'static GaussianTable {
 
 /// A Gaussian of mean 0, integrated over the unit intervals around `-reach..=reach`.
 ///
-/// Slot `i` begins at `i + floor(F · (2^24 - slots))`, where `F` is the share of the covered mass below it: every slot
-/// gets one unit, the rest is dealt out by mass, and the escape, the last slot, keeps its one unit.
+/// Slot `i` begins at `i + floor(F · (2^24 - slots))`, where `F` is the share of the covered probability below it. So
+/// every slot gets one unit, the rest is divided by probability, and the escape, the last slot, keeps its one unit.
 fn rounded_gaussian(scale: f64) -> Distribution {
     let reach = (REACH * scale) as i32 + 1;
-    // The mass below the upper edge of 0, 1, ..., reach; the lower half follows by symmetry.
+    // The probability below the upper edge of 0, 1, ..., reach; the lower half follows by symmetry.
     let edges: Vec<f64> = (0..=reach).map(|k| normal_distribution((f64::from(k) + 0.5) / scale)).collect();
     let below = |k: i32| if k > 0 { edges[k as usize - 1] } else { 1.0 - edges[-k as usize] };
     let (least, most) = (below(-reach), edges[reach as usize]);
@@ -109,7 +109,8 @@ mod tests {
 
     const SYMBOL_FAR: i32 = 1 << 20;
 
-    /// Scales that fall between the levels, and symbols that follow them, cost what they must within a percent.
+    /// Scales that fall between the levels, and symbols that follow them, take their ideal number of bits within a
+    /// percent.
     #[test]
     fn coded_bits_are_the_ideal_bits() {
         let table = gaussian_table();

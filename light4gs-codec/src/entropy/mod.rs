@@ -1,7 +1,7 @@
-//! Integer distributions and the coder that spends bits by them.
+//! Integer distributions and the entropy coder that uses them.
 //!
-//! Nothing here depends on what a machine's mathematical library returns: tables are made of plain float64
-//! additions, multiplications and divisions, or travel in the stream as integers.
+//! Nothing here depends on a machine's mathematical library: tables are computed by plain float64 additions,
+//! multiplications and divisions, or stand in the stream as integers.
 
 mod distribution;
 mod frequency_table;
@@ -16,7 +16,7 @@ pub(crate) use frequency_table::{read_tables, write_tables};
 pub(crate) use gaussian_table::gaussian_table;
 pub(crate) use symbol_coder::{SymbolCoder, SymbolReader, SymbolWriter};
 
-/// Nanoseconds to read a symbol that takes next to no bits: the level of its scale, its slot, and its value.
+/// Nanoseconds to read a symbol, however few bits it takes: the level of its scale, its slot, and its value.
 pub(crate) const READ_NANOSECONDS: u64 = 80;
 /// The largest magnitude of a symbol. Integers up to here are exact in float32.
 pub(crate) const SYMBOL_LIMIT: i32 = 1 << 22;

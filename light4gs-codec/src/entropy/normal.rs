@@ -1,13 +1,13 @@
 //! The distribution function of the standard normal variable from plain arithmetic.
 
-/// Where the tail, 6e-16, is lost in the rounding anyway.
+/// From here on the tail, 6e-16, is below the rounding.
 const FAR: f64 = 8.0;
 const INVERSE_SQRT_TAU: f64 = 0.398_942_280_401_432_7;
 
 /// The probability that a standard normal variable is below `x`, within 1e-13.
 ///
-/// Marsaglia's series: 1/2 plus the density times `x + x^3/3 + x^5/(3·5) + ...`, whose terms are all of one sign. Only
-/// additions, multiplications and divisions, so every machine gets the same bits.
+/// Marsaglia's series: 1/2 plus the density times `x + x^3/3 + x^5/(3·5) + ...`, whose terms all have one sign. It
+/// needs only additions, multiplications and divisions, so every machine gets the same bits.
 pub(super) fn normal_distribution(x: f64) -> f64 {
     if x < 0.0 {
         return 1.0 - normal_distribution(-x);

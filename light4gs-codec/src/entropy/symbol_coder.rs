@@ -19,8 +19,8 @@ const MOST_ZEROS: u32 = 23;
 
 /// Codes integers, in either direction.
 pub(crate) trait SymbolCoder {
-    /// Codes one symbol under `distributions[table]`: encoding, the one that `wanted` returns is remembered and
-    /// returned; decoding, `wanted` is not called and the one that was written is returned.
+    /// Codes one symbol under `distributions[table]`. When encoding, the symbol that `wanted` returns is remembered and
+    /// returned. When decoding, `wanted` is not called, and the symbol that was written is returned.
     fn code(
         &mut self,
         distributions: &[Distribution],
@@ -29,7 +29,7 @@ pub(crate) trait SymbolCoder {
     ) -> Result<i32, Damaged>;
 }
 
-/// Remembers symbols, and codes them when all are known: the coder is a stack, so the last comes first.
+/// Remembers symbols, and codes them when all are known: the coder is a stack, so the last symbol is coded first.
 #[derive(Debug, Default)]
 pub(crate) struct SymbolWriter {
     symbols: Vec<i32>,
@@ -70,8 +70,8 @@ impl SymbolWriter {
     }
 }
 
-/// Pushes what follows an escape, backwards: the side, then the distance from the table as an Exp-Golomb code of order
-/// 0.
+/// Pushes the bits after an escape, in reverse: the side, then the distance from the table as an Exp-Golomb code of
+/// order 0.
 fn push_escaped(coder: &mut DefaultAnsCoder, distribution: &Distribution, symbol: i32) {
     let (above, distance) = match symbol.checked_sub(distribution.first) {
         Some(offset) if offset >= 0 => (true, offset as u32 - distribution.escape() as u32),
@@ -106,7 +106,7 @@ impl SymbolReader {
         Ok(Self { coder: DefaultAnsCoder::from_compressed(words).map_err(|_| Damaged)? })
     }
 
-    /// Refuses bytes that hold more than was read.
+    /// Refuses bytes that hold more symbols than were read.
     pub(crate) fn finish(self) -> Result<(), Damaged> {
         if self.coder.is_empty() { Ok(()) } else { Err(Damaged) }
     }
@@ -140,7 +140,7 @@ impl SymbolCoder for SymbolReader {
     }
 }
 
-/// A bit that costs a bit.
+/// A bit that is 0 or 1 with equal probability.
 #[derive(Clone, Copy, Debug)]
 struct Coin;
 

@@ -10,11 +10,12 @@ use crate::{
     planes, sh_rest_coefficients,
 };
 
-/// A scene's motion, ready to be run at one time after the other.
+/// A scene's motion, prepared for evaluation at many times.
 ///
-/// What does not depend on the time is computed once: the product of the space-only samples of each Gaussian, which takes
-/// `4 · features` bytes a Gaussian. What depends on the time alone is computed once for each time. It runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to
-/// float tolerance, takes about a microsecond a Gaussian, and uses one thread.
+/// What does not depend on the time is computed once: the product of the space-only samples of each Gaussian, which
+/// takes `4 · features` bytes for each. What depends on the time alone is computed once for each time. The evaluator
+/// runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to float tolerance, takes about a
+/// microsecond for each Gaussian, and uses one thread.
 ///
 /// ```
 /// use light4gs_codec::{GaussianArrays, MotionEvaluator, SceneData};
@@ -58,8 +59,8 @@ impl MotionEvaluator {
     /// Prepares the motion of a scene.
     ///
     /// # Errors
-    /// A network that contradicts itself or the planes; an attribute without which the scene would look wrong, and that
-    /// nobody knows ([`SceneData::check_attributes_are_known`]).
+    /// A network that contradicts itself or the planes; an attribute without which the scene would look wrong, and of
+    /// which it is not known what it does ([`SceneData::check_attributes_are_known`]).
     pub fn new(scene: &SceneData) -> Result<Self, CodecError> {
         scene.check_attributes_are_known()?;
         let Some(MotionNetwork { network, sources, outputs }) = &scene.motion.network else {
@@ -100,7 +101,7 @@ impl MotionEvaluator {
         Ok(Self { motion: Some(motion) })
     }
 
-    /// Whether anything but the harmonics beyond degree 0 may change with time.
+    /// Whether anything but the spherical harmonics beyond degree 0 may change with time.
     pub fn moves(&self) -> bool {
         self.motion.is_some()
     }
@@ -112,8 +113,8 @@ impl MotionEvaluator {
     }
 
     /// Writes the Gaussians of a `range` at a `time` in [0, 1] into `moved`: attributes before their activations. Both
-    /// arrays are as long as those of the scene that the evaluator was made of. A long scene can be done in parts, so that
-    /// a player answers in between; parts that begin at a multiple of 8 cost the least.
+    /// arrays are as long as those of the scene for which the evaluator was made. A long scene can be done in parts, so
+    /// that a player can respond in between; parts that begin at a multiple of 8 are fastest.
     ///
     /// # Panics
     /// If the arrays have other lengths than the scene's, or the range goes beyond them.
@@ -248,7 +249,7 @@ fn set_attribute(canonical: &GaussianArrays, name: &str, block: usize, inputs: &
     }
 }
 
-/// Changes a Gaussian as a network says of it: the new value follows from the old one and the network's.
+/// Changes a value of a Gaussian by an output of the network: the output is added, or replaces the value.
 fn change(
     output: MotionOutput,
     values: &[Lanes],
@@ -274,11 +275,10 @@ fn change(
 }
 
 impl SceneData {
-    /// The centers of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves, or where
-    /// what moves them is no [`MotionNetwork`].
+    /// The centers of the Gaussians at a `time` in [0, 1], in world units: the canonical ones where nothing moves, or
+    /// where the motion is no [`MotionNetwork`].
     ///
-    /// For tools that want to look into a file without a back end; see [`MotionEvaluator`], which is made anew for each
-    /// call.
+    /// For tools that inspect a file without a back end. Each call makes a new [`MotionEvaluator`].
     ///
     /// # Errors
     /// A network that contradicts itself or the planes.

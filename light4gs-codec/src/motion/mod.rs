@@ -1,6 +1,6 @@
-//! How the Gaussians move: the bytes of its description, and where the Gaussians are at a time.
+//! How the Gaussians move: the bytes of the motion's description, and the Gaussians at a time.
 //!
-//! What moves them is data of the scene: `scene/motion.rs`.
+//! The motion as data of a scene is in `scene/motion.rs`.
 
 mod evaluator;
 pub(crate) mod query;

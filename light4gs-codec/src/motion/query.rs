@@ -1,7 +1,7 @@
-//! Points, their coordinates in the planes, and samples of a plane there.
+//! Points, their coordinates in the planes, and samples of the planes at these points.
 //!
-//! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor: the
-//! hexplane-coupled harmonics are coded by these numbers.
+//! Additions, multiplications, divisions and square roots in a fixed order, as in the exact executor, since the
+//! hexplane-coupled model codes spherical harmonics with these numbers.
 
 use crate::{CoordinateMapping, Plane, SceneCoordinateArrays, network::kernels::kept};
 
@@ -29,12 +29,12 @@ pub(crate) struct Between {
 }
 
 impl Between {
-    /// Where a coordinate in [-1, 1] falls among `samples`, the first at -1 and the last at 1; outside counts as the
-    /// border.
+    /// Where a coordinate in [-1, 1] falls among `samples`, the first at -1 and the last at 1. Coordinates outside are
+    /// moved to the border.
     pub(crate) fn of(coordinate: f32, samples: u32) -> Self {
         let last = samples as usize - 1;
         let position = (coordinate + 1.0) * 0.5 * last as f32;
-        // NaN goes the way of 0.
+        // NaN is treated as 0.
         let position = if position > 0.0 { position } else { 0.0 };
         let low = (position as usize).min(last);
         let share = position - low as f32;
@@ -60,7 +60,7 @@ fn multiply_by_sample(plane: &Plane, across: f32, down: f32, product: &mut [f32]
     }
 }
 
-/// Multiplies `product [channels]` by the samples of a scale's planes without time at a point, in their order.
+/// Multiplies `product [channels]` by the samples of a scale's space-only planes at a point, in their order.
 pub(crate) fn multiply_by_space_samples(planes: &[Plane], point: [f32; 3], product: &mut [f32]) {
     for plane in planes.iter().filter(|plane| !plane.axes.is_space_time()) {
         let [across, down] = plane.axes.axes();
@@ -68,7 +68,7 @@ pub(crate) fn multiply_by_space_samples(planes: &[Plane], point: [f32; 3], produ
     }
 }
 
-/// The planes of each scale, which stand one behind the other.
+/// The planes of each scale, which are neighbors in the list.
 pub(crate) fn scales(planes: &[Plane]) -> impl Iterator<Item = &[Plane]> {
     planes.chunk_by(|a, b| a.scale == b.scale)
 }

@@ -11,13 +11,13 @@ use crate::{
 };
 
 const SECTION: &str = Section::Motion.name();
-/// Numbers of the sources of a network; a name follows the last one.
+/// Numbers of the kinds of sources. After the last one a name follows.
 const FEATURES: u8 = 0;
 const POINT: u8 = 1;
 const TIME: u8 = 2;
 const ATTRIBUTE: u8 = 3;
 
-/// Writes arrays that are sound, as float32 where there is no precision; returns them as a decoder gets them.
+/// Writes checked arrays, as float32 where there is no precision; returns them as a decoder gets them.
 pub(crate) fn write(
     motion: &MotionArrays,
     precision: Option<WeightPrecision>,

@@ -1,4 +1,4 @@
-//! What a network must be before it runs.
+//! Requirements that a network must meet before it runs.
 
 use super::{Layer, LayerKind, Network, Operation, Value};
 use crate::{CodecError, Limits, limits::at_most};
@@ -36,12 +36,12 @@ impl Operation {
         }
     }
 
-    /// Whether it takes two values, element by element.
+    /// Whether it combines two values, element by element.
     pub(super) fn is_binary(&self) -> bool {
         matches!(self, Self::Add | Self::Subtract | Self::Multiply | Self::Divide)
     }
 
-    /// Channels of its value, from those of its inputs.
+    /// Channels of its result, from those of its inputs.
     pub(super) fn channels(&self, inputs: impl IntoIterator<Item = u64>) -> u64 {
         let mut inputs = inputs.into_iter();
         match self {
@@ -53,7 +53,7 @@ impl Operation {
         }
     }
 
-    /// Refuses numbers of its own that it cannot have. `first` are the channels of its first input.
+    /// Refuses parameters that the operation cannot have. `first` is the number of channels of its first input.
     fn check_numbers(&self, first: u64, section: &'static str, name: &str) -> Result<(), CodecError> {
         let refuse = |field: &str, found: String, expected: &str| {
             Err(CodecError::invalid(section, format!("{field} of {name}"), found, expected))
@@ -80,7 +80,7 @@ impl Operation {
         }
     }
 
-    /// Whether its input must be there as a whole map, since it looks beyond one place.
+    /// Whether it needs its input as a whole map, since it looks beyond one place.
     pub(super) fn reads_map(&self) -> bool {
         match self {
             Self::Layer(layer) => match layer.kind {
@@ -93,7 +93,7 @@ impl Operation {
         }
     }
 
-    /// Whether it is computed as a whole map, not place by place.
+    /// Whether its result is computed as a whole map, not place by place.
     pub(super) fn makes_map(&self) -> bool {
         match self {
             Self::Layer(layer) => layer.kind == LayerKind::Doubling,
@@ -106,7 +106,7 @@ impl Operation {
         matches!(self, Self::Layer(layer) if layer.kind == LayerKind::Checkerboard)
     }
 
-    /// Zeros beyond the border that its input needs.
+    /// The width of the border of zeros that its input needs.
     pub(super) fn border(&self) -> usize {
         match self {
             Self::Layer(layer) if layer.kind == LayerKind::Doubling => 1,
@@ -117,7 +117,7 @@ impl Operation {
 }
 
 impl Network {
-    /// Channels of every value of a network whose nodes read only what is before them.
+    /// Channels of every value. Every node reads only values before its own.
     pub(crate) fn channels(&self) -> Vec<u64> {
         let mut channels: Vec<u64> = self.inputs.iter().map(|&channels| channels.into()).collect();
         for node in &self.nodes {
@@ -140,7 +140,7 @@ impl Network {
         (0..self.inputs.len()).map(reads).collect()
     }
 
-    /// Refuses what is no network, or one beyond the limits, before anything is computed. `name` is what messages call it.
+    /// Refuses an illegal network, or one beyond the limits, before anything is computed. Messages call it `name`.
     pub(crate) fn check(&self, section: &'static str, name: &str, limits: &Limits) -> Result<(), CodecError> {
         self.check_structure(section, name, limits)?;
         for (index, node) in self.nodes.iter().enumerate() {
@@ -151,7 +151,7 @@ impl Network {
         Ok(())
     }
 
-    /// [`Network::check`] without a look at the weights.
+    /// [`Network::check`] without the weights.
     pub(crate) fn check_structure(&self, section: &'static str, name: &str, limits: &Limits) -> Result<(), CodecError> {
         let refuse = |field: String, found: String, expected: &str| {
             Err(CodecError::invalid(section, format!("{name}, {field}"), found, expected))
@@ -189,7 +189,7 @@ impl Network {
         if let Some(missing) = self.outputs.iter().find(|value| value.0 as usize >= all) {
             return refuse("an output".into(), missing.0.to_string(), &format!("less than {all}"));
         }
-        // Concatenations may double channels from node to node.
+        // Concatenations may double the number of channels from node to node.
         let mut channels: Vec<u64> = self.inputs.iter().map(|&channels| channels.into()).collect();
         let mut total: u64 = channels.iter().sum();
         for (index, node) in self.nodes.iter().enumerate() {
@@ -216,8 +216,8 @@ impl Network {
         self.check_anchors(section, name)
     }
 
-    /// Anchors are half a map: only a checkerboard convolution can read them, and what comes of them is known at the
-    /// other half of the places alone.
+    /// Anchors are half of a map. Only a checkerboard convolution can read them, and its result exists only at the
+    /// other half of the places.
     fn check_anchors(&self, section: &'static str, name: &str) -> Result<(), CodecError> {
         let anchors = self.anchor_inputs();
         let mut depends = vec![false; self.inputs.len()];
@@ -252,14 +252,14 @@ impl Network {
                     section,
                     format!("{name}, node {index}"),
                     found,
-                    "what looks at one place only",
+                    "an operation that looks at one place only",
                 ))
             }
             None => Ok(()),
         }
     }
 
-    /// Refuses a network with another number of outputs or output channels than those.
+    /// Refuses a network whose outputs differ from the expected ones in number or channels.
     pub(crate) fn check_outputs(&self, section: &'static str, name: &str, expected: &[u64]) -> Result<(), CodecError> {
         let channels = self.channels();
         let found: Vec<u64> = self.outputs.iter().map(|value| channels[value.0 as usize]).collect();
@@ -270,7 +270,7 @@ impl Network {
         Err(CodecError::invalid(section, field, format!("{found:?}"), format!("{expected:?}")))
     }
 
-    /// Height and width of every value, for inputs of these sizes and a target; refuses what does not fit together.
+    /// Height and width of every value, for inputs of these sizes and a target; refuses sizes that do not fit together.
     pub(crate) fn sizes(
         &self,
         section: &'static str,

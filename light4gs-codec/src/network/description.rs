@@ -1,4 +1,4 @@
-//! A network as bytes: its description, and then, elsewhere, the weights of its layers in order.
+//! A network as bytes: its description, and, elsewhere in the section, the weights of its layers in order.
 
 use super::{Layer, LayerKind, Network, Node, Operation, Value, kernels::masked_taps};
 use crate::{
@@ -34,9 +34,9 @@ const CLAMP: u8 = 22;
 const GROUP_SUM: u8 = 23;
 const GROUP_MAXIMUM: u8 = 24;
 const SELECT: u8 = 25;
-/// Set in a code where the first input is the value before.
+/// Set in the code of an operation whose first input is the value just before its own.
 const READS_LAST: u8 = 0x80;
-/// The slope that [`LEAKY_RELU`] stands for.
+/// The slope of [`LEAKY_RELU`].
 const USUAL_SLOPE: f32 = 0.01;
 
 impl Operation {
@@ -123,7 +123,7 @@ impl Network {
             .map(|_| reader.varint_at_most("channels of an input", limits.layer_width))
             .collect::<Result<Vec<_>, _>>()?;
         let mut channels: Vec<u64> = inputs.iter().map(|&channels| channels.into()).collect();
-        // A selection is longer than its bytes, so what all of them may take is bounded on the way.
+        // A selection can be longer than its bytes, so the sum of all selections is bounded while they are read.
         let mut selected = 0;
         let count = reader.varint_at_most("number of a network's nodes", limits.nodes)?;
         let mut nodes = Vec::new();
@@ -133,7 +133,7 @@ impl Network {
                 selected += channels.len() as u64;
                 at_most(section, format!("{name}, selected channels"), selected, limits.layer_width)?;
             }
-            // The check below says it properly, if it is too many.
+            // If these are too many, the check below has a better message.
             let own = node.operation.channels(node.inputs.iter().map(|value| channels[value.0 as usize]));
             channels.push(own);
             nodes.push(node);
@@ -152,12 +152,12 @@ impl Network {
         })
     }
 
-    /// The weights as a stream holds them: weight and bias of each layer, without what a mask hides.
+    /// The weights as a stream holds them: weight and bias of each layer, without masked numbers.
     pub(crate) fn stored_tensors(&self) -> Vec<Vec<f32>> {
         self.layers().flat_map(|layer| [stored_weight(layer), layer.bias.clone()]).collect()
     }
 
-    /// Takes weights as a stream holds them, of [`Network::tensor_lengths`].
+    /// Sets the weights from the form that a stream holds, of lengths [`Network::tensor_lengths`].
     pub(crate) fn set_stored_tensors(&mut self, tensors: &mut impl Iterator<Item = Vec<f32>>) {
         for layer in self.layers_mut() {
             let weight = tensors.next().unwrap_or_default();
@@ -171,7 +171,7 @@ fn read_value(reader: &mut Reader<'_>) -> Result<Value, CodecError> {
     reader.varint_at_most("a value of a network", u32::MAX).map(Value)
 }
 
-/// A node behind values of these channels.
+/// Reads a node; `channels` are those of the values before it.
 fn read_node(
     reader: &mut Reader<'_>,
     section: &'static str,
@@ -249,7 +249,7 @@ fn read_node(
     Ok(Node { operation, inputs })
 }
 
-/// Channels as runs of neighbors: where each begins, and its length.
+/// Channels as runs of successive numbers: the first of each run, and its length.
 fn write_selection(channels: &[u32], writer: &mut Writer) {
     let runs: Vec<&[u32]> = channels.chunk_by(|a, b| a.checked_add(1) == Some(*b)).collect();
     writer.varint(runs.len() as u64);
@@ -270,7 +270,7 @@ fn read_selection(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<u32>, 
     Ok(channels)
 }
 
-/// A weight without what a mask hides.
+/// A weight without its masked numbers.
 fn stored_weight(layer: &Layer) -> Vec<f32> {
     if layer.kind != LayerKind::Checkerboard {
         return layer.weight.clone();
@@ -279,7 +279,7 @@ fn stored_weight(layer: &Layer) -> Vec<f32> {
     kernels.flat_map(|kernel| masked_taps(layer.kernel).map(|tap| kernel[tap])).collect()
 }
 
-/// The whole weight, zeros where it is masked.
+/// The whole weight, with zeros where it is masked.
 fn whole_weight(layer: &Layer, stored: Vec<f32>) -> Vec<f32> {
     if layer.kind != LayerKind::Checkerboard {
         return stored;
@@ -313,7 +313,7 @@ mod tests {
         let read = |bytes: &[u8]| Network::read(&mut Reader::new("motion", bytes), "motion", "the network", &limits);
         let error = read(&writer.bytes).unwrap_err().to_string();
         assert!(error.contains("the network, selected channels"), "{error}");
-        // A run beyond the limit by itself.
+        // One run that is beyond the limit.
         let mut writer = Writer::default();
         [1, 1, 1].into_iter().for_each(|number| writer.varint(number));
         writer.u8(SELECT);

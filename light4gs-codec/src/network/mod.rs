@@ -1,9 +1,9 @@
-//! Networks as data: what a model exports, a stream carries, and the exact executor runs.
+//! Networks as data: a model describes them, a stream stores them, and the exact executor runs them.
 //!
 //! A [`Network`] is a bounded list of [`Node`]s, each of which reads only values before it. Values are maps `[channels,
-//! height, width]`; where a network speaks of single points, such as Gaussians, every map has one place. What the inputs
-//! are, and what the outputs mean, is said where the network is used: [`crate::Condition`], [`crate::ShPrior`],
-//! [`crate::MotionArrays`]. So a new composition of layers needs no line in this crate.
+//! height, width]`. Where a network is evaluated for single points, such as Gaussians, height and width are 1. What the
+//! inputs and outputs mean depends on where the network is used: [`crate::Condition`], [`crate::ShPrior`],
+//! [`crate::MotionArrays`]. So a new composition of layers needs no new line in this crate.
 //!
 //! ```
 //! use light4gs_codec::network::{Layer, Network};
@@ -19,18 +19,18 @@
 //!
 //! # Exactness
 //!
-//! An encoder and a decoder that disagree about one bit of a parameter read two different streams, so nothing is left to
+//! If an encoder and a decoder differ in one bit of a parameter, the decoder reads wrong symbols. So nothing depends on
 //! a library: every output of a layer is its bias, plus the products of weight and input in a fixed order, each product
-//! and each sum rounded to float32. There are no fused multiply-adds (Rust does not contract) and no functions of the
-//! platform but comparison, division and square root, which IEEE 754 defines to the bit; exponential and logarithm are made of
-//! these.
+//! and each sum rounded to float32. There are no fused multiply-adds (Rust does not contract). Of the platform's
+//! functions only comparison, division and square root are used, which IEEE 754 defines to the bit; exponential and
+//! logarithm are computed from these.
 //!
 //! | file | what |
 //! |---|---|
-//! | `check.rs` | what a network must be before it runs: channels, sizes, limits |
+//! | `check.rs` | requirements that a network must meet before it runs: channels, sizes, limits |
 //! | `description.rs` | a network without its weights as bytes |
 //! | `weights.rs`, `tensors.rs` | weights as bytes, quantized or float32 |
-//! | `program/` | a network ready to run, and what running it costs |
+//! | `program/` | a network prepared for running, and what running it costs |
 //! | `kernels/` | the operations |
 
 mod check;
@@ -44,7 +44,7 @@ pub(crate) use program::{Maps, Program, Workspace, blocks};
 
 use crate::{CodecError, Limits};
 
-/// A value of a network: the inputs come first, then one value a node.
+/// A value of a network: the inputs come first, then one value for each node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Value(pub u32);
 
@@ -53,7 +53,7 @@ pub struct Value(pub u32);
 pub struct Network {
     /// Channels of each input.
     pub inputs: Vec<u32>,
-    /// What is computed, in this order.
+    /// The operations, in the order in which they are computed.
     pub nodes: Vec<Node>,
     /// The results.
     pub outputs: Vec<Value>,
@@ -62,13 +62,13 @@ pub struct Network {
 /// One step of a network.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
-    /// What it does.
+    /// What it computes.
     pub operation: Operation,
     /// What it reads: values before it.
     pub inputs: Vec<Value>,
 }
 
-/// What a node does with its inputs.
+/// What a node computes from its inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Operation {
     /// A layer with weights, of one input.
@@ -87,12 +87,13 @@ pub enum Operation {
     Transpose,
     /// The input, whose height or width may be 1, repeated to the size of the network's target.
     Spread,
-    /// The channels of two or more inputs of the same size behind each other.
+    /// The channels of two or more inputs of the same size, one input after the other.
     Concatenate,
     /// The sum of two inputs, element by element. As in [`Operation::Subtract`], [`Operation::Multiply`] and
-    /// [`Operation::Divide`], the second one may have fewer channels, a divisor of the first's; they are repeated then.
+    /// [`Operation::Divide`], the second input may have fewer channels, a divisor of the first's; they are then
+    /// repeated.
     Add,
-    /// The first input less the second one.
+    /// The first input minus the second one.
     Subtract,
     /// The product of two inputs.
     Multiply,
@@ -111,22 +112,22 @@ pub enum Operation {
         /// Finite.
         offset: f32,
     },
-    /// `x`, or the end of the range that it is beyond.
+    /// `x`, or the nearest end of the range where it is outside.
     Clamp {
         /// Finite.
         least: f32,
         /// Finite, not below the other end.
         most: f32,
     },
-    /// The sum of each group of so many neighboring channels.
+    /// The sum of each group of this many neighboring channels.
     GroupSum(u32),
-    /// The largest of each group of so many neighboring channels.
+    /// The largest of each group of this many neighboring channels.
     GroupMaximum(u32),
     /// The channels of these numbers, in this order.
     Select(Vec<u32>),
 }
 
-/// How a layer moves over a map.
+/// How a layer is applied to a map.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerKind {
     /// A convolution that keeps the size; zeros lie beyond the border.
@@ -135,7 +136,7 @@ pub enum LayerKind {
     Halving,
     /// A transposed convolution with kernel 5, stride 2, padding 2, output padding 1 and one group, which doubles the size.
     Doubling,
-    /// A convolution of which only the taps at an odd distance (rows plus columns) from the center count. Its input must
+    /// A convolution whose taps are 0 where their distance from the center (rows plus columns) is even. Its input must
     /// be the anchors of a checkerboard.
     Checkerboard,
 }
@@ -143,7 +144,7 @@ pub enum LayerKind {
 /// A layer: `outputs` sums of a bias and weighted inputs.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layer {
-    /// How it moves.
+    /// How it is applied.
     pub kind: LayerKind,
     /// Channels of its input.
     pub inputs: u32,
@@ -168,13 +169,13 @@ impl Layer {
         Self { kind: LayerKind::Convolution, inputs, outputs, kernel: 1, groups: 1, weight, bias }
     }
 
-    /// Numbers that [`Layer::weight`] must have.
+    /// The length that [`Layer::weight`] must have.
     pub fn weights(&self) -> u64 {
         let kernel = u64::from(self.kernel);
         u64::from(self.outputs) * u64::from(self.inputs / self.groups.max(1)) * kernel * kernel
     }
 
-    /// Numbers of the weight that count, which are those that a stream holds.
+    /// The length of the weight without masked numbers, as a stream holds it.
     pub(crate) fn stored_weights(&self) -> u64 {
         let taps = u64::from(self.kernel) * u64::from(self.kernel);
         match self.kind {
@@ -185,7 +186,7 @@ impl Layer {
 }
 
 impl Network {
-    /// A network without nodes, and its inputs, of so many channels each.
+    /// A network without nodes, and its inputs, with the given numbers of channels.
     pub fn new<const N: usize>(inputs: [u32; N]) -> (Self, [Value; N]) {
         let network = Self { inputs: inputs.to_vec(), ..Self::default() };
         (network, std::array::from_fn(|index| Value(index as u32)))
@@ -212,7 +213,7 @@ impl Network {
         self.node(Operation::LeakyRelu(slope), &[input])
     }
 
-    /// Appends numbers that are the same everywhere: a layer that reads any value with weights of 0.
+    /// Appends a value that is the same at all places: a layer that reads `any` value with weights of 0.
     pub fn constant(&mut self, any: Value, channels: u32, numbers: Vec<f32>) -> Value {
         self.layer(any, Layer::linear(vec![0.0; channels as usize * numbers.len()], numbers))
     }
@@ -238,7 +239,7 @@ impl Network {
         })
     }
 
-    /// Whether another network has the same nodes, whatever their weights are.
+    /// Whether another network has the same inputs, nodes and outputs, whatever their weights are.
     pub fn has_structure_of(&self, other: &Self) -> bool {
         let bare = |network: &Self| {
             let mut network = network.clone();
@@ -250,7 +251,7 @@ impl Network {
 
     /// The outputs at one place from the inputs there, exactly as a decoder computes them.
     ///
-    /// For tests, and for tools that want single values; it prepares the network anew each time.
+    /// For tests, and for tools that need single values. It prepares the network anew each time.
     ///
     /// # Errors
     /// A network that is not legal, or that looks at more than one place; inputs of other lengths.

@@ -31,7 +31,7 @@ pub(crate) fn write_tensors(
     Ok(tensors)
 }
 
-/// Tensors of known lengths from bytes, all of which must be used.
+/// Tensors of known lengths from bytes. All bytes must be used.
 pub(crate) fn read_tensors(
     section: &'static str,
     bytes: &[u8],
@@ -51,7 +51,7 @@ pub(crate) fn read_tensors(
     Ok(tensors)
 }
 
-/// Appends the weights of networks, and makes them what a decoder gets.
+/// Appends the weights of networks, and replaces them by those that a decoder gets.
 pub(crate) fn write_weights(
     section: &'static str,
     networks: &mut [&mut Network],
@@ -64,7 +64,7 @@ pub(crate) fn write_weights(
     Ok(())
 }
 
-/// Reads the weights of networks that have none yet.
+/// Reads the weights of networks, whose weights are still empty.
 pub(crate) fn read_weights(
     section: &'static str,
     networks: &mut [&mut Network],
@@ -72,7 +72,7 @@ pub(crate) fn read_weights(
     encoding: Encoding,
     budget: &Budget,
 ) -> Result<(), CodecError> {
-    // What a mask hides is not in the stream, but in memory.
+    // Masked numbers take memory, though they are not in the stream.
     let whole = networks.iter().fold(0u64, |sum, network| sum.saturating_add(network.weights()));
     budget.things(section, whole, 4, 4)?;
     let lengths: Vec<_> = networks.iter().flat_map(|network| network.tensor_lengths(NAME)).collect();

@@ -1,8 +1,8 @@
 //! Compact coding of network weights (docs/design.md).
 //!
 //! Each tensor is quantized uniformly, by a step of its own, and the integers are coded adaptively; the context of a
-//! weight is how large the ones before it were. Names and lengths are not in the bytes: whoever reads a network knows
-//! its shape first.
+//! weight is the magnitude of the weights before it. Names and lengths are not in the bytes: the reader of a network
+//! knows its shape before it reads the weights.
 //!
 //! ```
 //! use light4gs_codec::{Limits, network_weights::{self, TensorLength, WeightPrecision, WeightTensor}};
@@ -20,9 +20,9 @@
 //! # Ok::<(), light4gs_codec::CodecError>(())
 //! ```
 //!
-//! The bytes are one range-coded stream: for each tensor that is not empty its step as the 32 raw bits of a float32,
-//! 0 for a tensor of zeros, and then its integers. Zeros at the end bring it to one byte for 256 weights, so that a
-//! length can be trusted.
+//! The bytes are one range-coded stream: for each tensor that is not empty its step as the 32 raw bits of a float32, 0
+//! for a tensor of zeros, and then its integers. Zeros at the end fill it up to one byte for 256 weights, so that a
+//! reader can check a length against the bytes.
 
 use crate::{
     CodecError, Limits,
@@ -35,9 +35,9 @@ use crate::{
     steps,
 };
 
-/// Weights that a byte stands for at most.
+/// The most weights that one byte can stand for.
 const WEIGHTS_A_BYTE: u64 = 256;
-/// Nanoseconds to read a weight that takes next to no bits.
+/// Nanoseconds to read a weight, however few bits it takes.
 const WEIGHT_NANOSECONDS: u64 = 300;
 /// The last level of the expected magnitude.
 const LAST_LEVEL: usize = 24;
@@ -73,7 +73,7 @@ impl WeightPrecision {
 pub struct WeightTensor<'a> {
     /// Its name in messages.
     pub name: &'a str,
-    /// Its numbers, in any order that the reader knows too.
+    /// Its numbers, in an order that the reader knows too.
     pub values: &'a [f32],
     /// How finely it is quantized.
     pub precision: WeightPrecision,
@@ -88,7 +88,7 @@ pub struct TensorLength<'a> {
     pub length: u64,
 }
 
-/// Coded tensors.
+/// Tensors as bytes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodedWeights {
     /// What [`decode`] reads.
@@ -125,7 +125,7 @@ pub fn decode(
     decode_within(section, bytes, lengths, &Budget::new(limits))
 }
 
-/// As [`decode`], at the cost of a budget.
+/// As [`decode`], within a budget.
 pub(crate) fn decode_within(
     section: &'static str,
     bytes: &[u8],
@@ -144,7 +144,7 @@ pub(crate) fn decode_within(
     budget.things(section, weights, 8, WEIGHT_NANOSECONDS)?;
     let mut quantized: Vec<_> = lengths
         .iter()
-        // No more than 256 times the bytes, so it fits.
+        // At most 256 times the number of bytes, so it fits.
         .map(|tensor| Quantized { step: 0.0, indices: vec![0; tensor.length as usize] })
         .collect();
     code(&mut BitDecoder::new(bytes), &mut quantized)
@@ -164,7 +164,7 @@ pub(crate) fn decode_within(
 /// A tensor as integers.
 #[derive(Clone, Debug)]
 struct Quantized {
-    /// 0 where all integers are.
+    /// 0 where all integers are 0.
     step: f32,
     indices: Vec<i32>,
 }
@@ -238,7 +238,7 @@ struct ExpectedMagnitude {
 }
 
 impl Default for ExpectedMagnitude {
-    /// A guess for the first weight; the next ones soon tell better.
+    /// A guess for the first weight, which the next ones soon replace.
     fn default() -> Self {
         Self { mean: 16 << FRACTION }
     }

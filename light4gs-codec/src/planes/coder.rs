@@ -23,14 +23,14 @@ const SECTION: &str = Section::FeaturePlanes.name();
 /// What [`encode`] makes.
 #[derive(Debug)]
 pub(crate) struct CodedPlanes {
-    /// One entry a sub-stream, in the order of [`stream_order`].
+    /// One entry for each sub-stream, in the order of [`stream_order`].
     pub(crate) sub_streams: Vec<Vec<u8>>,
     /// The planes as a decoder gets them.
     pub(crate) decoded: FeaturePlaneArrays,
 }
 
-/// Codes planes whose arrays agree with the model. `steps` has one entry, or one a scale; `latent_symbols`
-/// has those of each plane with a latent, `[N, H/4, W/4]`.
+/// Codes planes whose arrays fit the model. `steps` has one entry, or one for each scale; `latent_symbols` has those of
+/// each plane with a latent, `[N, H/4, W/4]`.
 pub(crate) fn encode(
     planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
@@ -71,7 +71,7 @@ pub(crate) fn decode(
             let streams = &streams[first..first + sub_streams(model, index)];
             let values = plane_coder.decode_plane(index, planes, streams).map_err(|Damaged| {
                 let field = format!("symbols of plane {}", layout.planes()[index].name());
-                CodecError::invalid(SECTION, field, "damaged", "what an encoder writes")
+                CodecError::invalid(SECTION, field, "damaged", "symbols as an encoder writes them")
             })?;
             Ok((values, ()))
         },
@@ -79,7 +79,7 @@ pub(crate) fn decode(
     )
 }
 
-/// Refuses planes that ask for more than the limits allow.
+/// Refuses planes whose decoding costs more than the limits allow.
 pub(crate) fn check_cost(layout: &PlaneLayout, model: &ContextModelArrays, limits: &Limits) -> Result<(), CodecError> {
     PlaneCoder::new(model, layout, &[], &Budget::new(limits)).map(drop)
 }
@@ -104,7 +104,8 @@ impl<'a> PlaneCoder<'a> {
         Ok(Self { model, stages, steps })
     }
 
-    /// Does `work` for every plane, those of a stage at once, and replaces the planes' values by what it returns.
+    /// Does `work` for every plane, for all planes of a stage at the same time, and replaces the planes' values by its
+    /// results.
     fn run<T: Send>(
         &self,
         mut planes: FeaturePlaneArrays,
@@ -182,7 +183,7 @@ impl<'a> PlaneCoder<'a> {
         Ok(values)
     }
 
-    /// Codes the symbols of a latent: channel, row, column. A decoder's `symbols` are not looked at.
+    /// Codes the symbols of a latent: channel, row, column. A decoder ignores the values in `symbols`.
     fn code_latent(
         &self,
         [height, width]: [usize; 2],
@@ -196,8 +197,8 @@ impl<'a> PlaneCoder<'a> {
     }
 }
 
-/// Scales and means of every value of a plane, given that and the planes that it is coded from, all decoded; and the
-/// symbols of its latent, where it has one. Values are `[M, height, width]`.
+/// Scales and means of every value of a plane, given this plane and the planes that it is coded from, all decoded; and
+/// the symbols of its latent, if it has one. Values are `[M, height, width]`.
 pub(crate) fn parameters(
     planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
@@ -232,7 +233,7 @@ fn size_of(plane: &Plane) -> [usize; 2] {
     [plane.height as usize, plane.width as usize]
 }
 
-/// One coder a part of the plane.
+/// One coder for each part of the plane.
 fn coders<C>(model: &ExactModel<'_>, plane: usize, mut coder: impl FnMut() -> C) -> Vec<(Part, C)> {
     let has_anchors = model.arrays.prior(plane).has_anchors();
     let parts: &[Part] = if has_anchors { &[Part::Anchors, Part::Others] } else { &[Part::All] };

@@ -8,28 +8,29 @@ use crate::{
 
 pub(super) const SECTION: &str = "context_model";
 
-/// Everything that is needed to read planes: the networks that give each value's distribution, and which of them speak
-/// for which plane.
+/// Everything that is needed to decode planes: the networks that give each value's distribution, and which planes each
+/// of them is for.
 ///
-/// Each plane has a [`PlanePrior`]. Its conditions read what is known before the plane itself, and its distribution turns
-/// what they say into the scale and the mean of every value. Planes enter a network as value minus center.
+/// Each plane has a [`PlanePrior`]. Its conditions read values that are decoded before, and its distribution turns
+/// their outputs into the scale and the mean of every value. As inputs of networks, planes have their center
+/// subtracted.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ContextModelArrays {
     /// Channels `M` of a plane.
     pub channels: u32,
-    /// What is subtracted from a plane before any network sees it.
+    /// The center: it is subtracted from a plane before a network reads it.
     pub centers: PerGroup,
     /// The latent of the planes that have one.
     pub latent: Option<LatentArrays>,
-    /// The networks. Conditions and distributions are places in this list.
+    /// The networks. Conditions and distributions are indices into this list.
     pub networks: Vec<Network>,
-    /// The priors that there are. [`ContextModelArrays::plane_priors`] are places in this list.
+    /// The priors. [`ContextModelArrays::plane_priors`] are indices into this list.
     pub priors: Vec<PlanePrior>,
     /// The prior of each plane, in the order of the planes.
     pub plane_priors: Vec<u32>,
 }
 
-/// A latent that is transmitted for a plane: `N` channels of a quarter of the plane's height and width.
+/// A latent that is coded for a plane: `N` channels of a quarter of the plane's height and width.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LatentArrays {
     /// The distribution of the symbols of each channel.
@@ -41,14 +42,14 @@ pub struct LatentArrays {
 /// Where the distributions of a plane's values come from.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlanePrior {
-    /// One for each input of the distribution; nothing where that input is zeros.
+    /// One for each input of the distribution; `None` where that input is zeros.
     pub conditions: Vec<Option<Condition>>,
-    /// The network that gives scales and means, `2 M` channels, in units of the step, from what the conditions say at the
-    /// same place.
+    /// The network that gives scales and means, `2 M` channels, in units of the step, from the outputs of the
+    /// conditions at the same place.
     pub distribution: u32,
 }
 
-/// A network that says something about a plane, and what it reads.
+/// A network that describes a plane, and what it reads.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Condition {
     /// The network, which has one output, of the plane's size.
@@ -62,8 +63,9 @@ pub struct Condition {
 pub enum PlaneSource {
     /// The plane's latent, `[N, H / 4, W / 4]`.
     Latent,
-    /// The plane's own anchors: the values at places whose row and column have an odd sum. A plane with such a condition
-    /// is coded in two passes, the anchors first; for them the condition says zeros.
+    /// The plane's own anchors: the values at places whose row and column have an odd sum. A plane with such a
+    /// condition is coded in two passes, the anchors first. For the anchors themselves, the output of the condition is
+    /// zeros.
     Anchors,
     /// The decoded plane over these axes in the same scale.
     SameScale(PlaneAxes),
@@ -92,10 +94,10 @@ impl ContextModelArrays {
         self.latent.as_ref().map_or(0, |latent| latent.medians.len() as u32)
     }
 
-    /// The prior of a plane, by its place in the list of planes.
+    /// The prior of a plane, by the plane's index.
     ///
     /// # Panics
-    /// Where a plane's prior is not in [`ContextModelArrays::priors`].
+    /// If a plane's prior is not in [`ContextModelArrays::priors`].
     pub fn prior(&self, plane: usize) -> &PlanePrior {
         &self.priors[self.plane_priors[plane] as usize]
     }
@@ -108,7 +110,7 @@ impl ContextModelArrays {
         (0..self.plane_priors.len()).map(|plane| self.prior(plane).has_latent()).collect()
     }
 
-    /// Refuses arrays that make no context model, or one beyond the limits.
+    /// Refuses an illegal context model, or one beyond the limits.
     pub(crate) fn check(&self, limits: &Limits) -> Result<(), CodecError> {
         self.check_structure(limits)?;
         for (index, network) in self.networks.iter().enumerate() {
@@ -127,7 +129,7 @@ impl ContextModelArrays {
         Ok(())
     }
 
-    /// [`ContextModelArrays::check`] without a look at the weights.
+    /// [`ContextModelArrays::check`] without the weights.
     pub(crate) fn check_structure(&self, limits: &Limits) -> Result<(), CodecError> {
         for (name, center) in [("space-only", self.centers.space_only), ("space-time", self.centers.space_time)] {
             if !center.is_finite() {
@@ -157,8 +159,8 @@ impl ContextModelArrays {
         Ok(())
     }
 
-    /// Refuses a sound model that was made for other planes: another number of them, sources that are not there, planes that
-    /// wait for each other.
+    /// Refuses a legal model that does not fit these planes: it has another number of planes, its sources do not exist,
+    /// or its planes depend on each other in a circle.
     pub(crate) fn check_planes(&self, layout: &PlaneLayout) -> Result<(), CodecError> {
         if self.plane_priors.len() != layout.len() {
             let expected = format!("{}, one for each plane", layout.len());
@@ -171,7 +173,7 @@ impl ContextModelArrays {
                     PlaneSource::LowerScale if layout.one_scale_below(plane).is_none() => "the scale below",
                     _ => continue,
                 };
-                return invalid(&format!("a source of plane {}", shape.name()), missing, "something that is there");
+                return invalid(&format!("a source of plane {}", shape.name()), missing, "a plane that exists");
             }
         }
         (0..layout.scales()).try_for_each(|scale| levels(self, layout, scale).map(drop))
@@ -226,8 +228,8 @@ impl ContextModelArrays {
     }
 }
 
-/// In which round each plane of a scale can be coded: a plane comes after those that it reads. Refuses planes that wait
-/// for each other. The planes' sources are there.
+/// The round in which each plane of a scale can be coded: a plane comes after those that it reads. Refuses planes that
+/// depend on each other in a circle. The planes' sources must exist.
 pub(super) fn levels(model: &ContextModelArrays, layout: &PlaneLayout, scale: usize) -> Result<Vec<usize>, CodecError> {
     let planes = layout.scale(scale);
     let first = planes.start;
@@ -248,7 +250,7 @@ pub(super) fn levels(model: &ContextModelArrays, layout: &PlaneLayout, scale: us
     }
     if let Some(place) = levels.iter().position(Option::is_none) {
         let field = format!("sources of plane {}", layout.planes()[first + place].name());
-        let found = "planes that wait for this one";
+        let found = "planes that depend on this one";
         return Err(CodecError::invalid(SECTION, field, found, "planes that can be decoded before it"));
     }
     Ok(levels.into_iter().flatten().collect())

@@ -19,7 +19,7 @@ const ANCHORS: u64 = 6;
 const LATENT: u64 = 7;
 const LOWER_SCALE: u64 = 8;
 
-/// Writes a model that is sound, with float32 weights where there is no precision; returns it as a decoder gets it.
+/// Writes a checked model, with float32 weights where there is no precision; returns it as a decoder gets it.
 pub(crate) fn write(
     model: &ContextModelArrays,
     precision: Option<WeightPrecision>,
@@ -53,7 +53,7 @@ fn write_prior(prior: &PlanePrior, writer: &mut Writer) {
             continue;
         };
         writer.varint(u64::from(*network) + 1);
-        // How many there are is known: one for each input of the network.
+        // Their number is known: one for each input of the network.
         for &source in sources {
             writer.varint(match source {
                 PlaneSource::SameScale(axes) => axes as u64,

@@ -1,4 +1,4 @@
-//! What reading planes takes, before it is done.
+//! The cost of reading planes, known before they are read.
 
 use super::{
     context_model::{Condition, SECTION, network_name},
@@ -16,9 +16,10 @@ use crate::{
     plane_layout::PlaneShape,
 };
 
-/// Nanoseconds of a row besides what its values take.
+/// Nanoseconds of a row, without those of its values.
 const ROW_NANOSECONDS: u64 = 1000;
-/// Nanoseconds to take one channel from a condition to a distribution, or from that to a row, at eight places.
+/// Nanoseconds to copy one channel from a condition to a distribution, or from a distribution to a row, at eight
+/// places.
 const CHANNEL_NANOSECONDS: u64 = 16;
 /// Bytes of a value of a row that is being computed: scale, mean, level.
 const ROW_BYTES: u64 = 10;
@@ -42,7 +43,7 @@ pub(super) fn ask(model: &ExactModel<'_>, stages: &[Vec<usize>], budget: &Budget
     budget.memory(SECTION, most)
 }
 
-/// Asks for the time of one plane; returns the memory that it takes besides its values.
+/// Asks for the time of one plane; returns the memory that it takes, without its values.
 fn ask_plane(model: &ExactModel<'_>, plane: usize, budget: &Budget) -> Result<u64, CodecError> {
     let prior = &model.arrays.priors[model.prior_of(plane)];
     let size @ [height, width] = model.layout.planes()[plane].size.map(|side| side as u32);

@@ -1,4 +1,4 @@
-//! The context model, ready for the exact executor.
+//! The context model, prepared for the exact executor.
 
 use super::context_model::{Condition, PlanePrior, PlaneSource, SECTION};
 use crate::{
@@ -12,21 +12,22 @@ use crate::{
     plane_layout::PlaneLayout,
 };
 
-/// The networks of a context model whose arrays are sound, with weights laid out for the executor.
+/// The networks of a checked context model, with weights in the executor's layout.
 #[derive(Debug)]
 pub(super) struct ExactModel<'a> {
     pub(super) arrays: &'a ContextModelArrays,
     /// The planes that it is for.
     pub(super) layout: &'a PlaneLayout,
     pub(super) latent_distributions: Vec<Distribution>,
-    /// The networks as conditions; nothing for those that are none.
+    /// The networks that are conditions; `None` for the others.
     conditions: Vec<Option<Program>>,
-    /// The distributions of each prior: for the anchors, who know less, and for the others, or all.
+    /// The distributions of each prior: one for the anchors, for which fewer inputs are known, and one for the other
+    /// places, or for all.
     pub(super) distributions: Vec<[Program; 2]>,
 }
 
 impl<'a> ExactModel<'a> {
-    /// Refuses a model that takes more memory than there is.
+    /// Refuses a model that takes more memory than the budget has.
     pub(super) fn new(
         arrays: &'a ContextModelArrays,
         layout: &'a PlaneLayout,
@@ -34,7 +35,7 @@ impl<'a> ExactModel<'a> {
     ) -> Result<Self, CodecError> {
         let (mut as_distribution, mut as_condition) = (vec![0; arrays.networks.len()], vec![0; arrays.networks.len()]);
         for prior in &arrays.priors {
-            // Two programs share the weights of one more.
+            // The two programs of a prior share the weights of a third one.
             as_distribution[prior.distribution as usize] += 1;
             let conditions = prior.conditions.iter().flatten();
             conditions.for_each(|condition| as_condition[condition.network as usize] = 1);
@@ -70,7 +71,7 @@ impl<'a> ExactModel<'a> {
         self.conditions[network as usize].as_ref().expect("made for every network that is a condition's")
     }
 
-    /// The place of a plane's prior.
+    /// The index of a plane's prior.
     pub(super) fn prior_of(&self, plane: usize) -> usize {
         self.arrays.plane_priors[plane] as usize
     }
@@ -79,7 +80,7 @@ impl<'a> ExactModel<'a> {
         self.arrays.centers.of(self.layout.planes()[plane].axes)
     }
 
-    /// The latent `[N, height, width]` of its symbols, symbol plus median, with a border.
+    /// The latent `[N, height, width]` from its symbols (symbol plus median), with a border.
     pub(super) fn latent(&self, symbols: &[i32], [height, width]: [usize; 2], border: usize) -> PaddedMap {
         let medians = self.arrays.latent.as_ref().map_or(&[][..], |latent| &latent.medians);
         let mut map = PaddedMap::zeros(medians.len(), height, width, border);
@@ -92,7 +93,7 @@ impl<'a> ExactModel<'a> {
         map
     }
 
-    /// A decoded plane as networks see it.
+    /// A decoded plane as the input of a network.
     pub(super) fn plane(&self, decoded: &FeaturePlaneArrays, plane: usize, border: usize) -> PaddedMap {
         let center = self.center_of(plane);
         let plane = &decoded.planes[plane];
@@ -109,7 +110,8 @@ fn present(prior: &PlanePrior, with_anchors: bool) -> Vec<bool> {
     prior.conditions.iter().map(known).collect()
 }
 
-/// The decoded plane that a source of a plane is; none where the source is the plane's own.
+/// The index of the decoded plane that is a source of a plane; `None` where the source is the plane itself or its
+/// latent.
 pub(super) fn source_plane(source: PlaneSource, plane: usize, layout: &PlaneLayout) -> Option<usize> {
     match source {
         PlaneSource::Latent | PlaneSource::Anchors => None,

@@ -1,4 +1,4 @@
-//! Planes as plain numbers.
+//! Planes as float32.
 
 use super::head::{Head, SECTION};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
     bytes::{Reader, Writer},
 };
 
-/// Writes planes that [`super::head::check`] has passed.
+/// Writes planes that [`super::head::check`] has accepted.
 pub(crate) fn write(planes: &FeaturePlaneArrays, writer: &mut Writer) {
     Head::of_checked(planes).write(writer);
     planes.planes.iter().for_each(|plane| writer.f32s(&plane.values));

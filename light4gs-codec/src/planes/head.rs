@@ -1,4 +1,4 @@
-//! Which planes there are, and their sizes: what stands before the numbers.
+//! The head of the section: which planes there are, and their sizes.
 
 use crate::{
     CodecError, FeaturePlaneArrays, Limits,
@@ -8,7 +8,7 @@ use crate::{
 };
 
 pub(super) const SECTION: &str = Section::FeaturePlanes.name();
-/// The bit of a scale whose planes do not agree about the cells along an axis.
+/// The bit of a scale whose planes differ in size along a common axis.
 const OWN_SIZES: u8 = 1 << PlaneAxes::ALL.len();
 
 /// Channels and planes.
@@ -23,7 +23,7 @@ impl Head {
         Ok(Self { channels: planes.channels, layout: planes.layout()? })
     }
 
-    /// Of planes that [`check`] has passed.
+    /// For planes that [`check`] has accepted.
     pub(super) fn of_checked(planes: &FeaturePlaneArrays) -> Self {
         Self::of(planes).expect("`check` has looked at the order")
     }
@@ -72,7 +72,7 @@ impl Head {
         Ok(head)
     }
 
-    /// Writes a head that [`Head::check`] has passed.
+    /// Writes a head that [`Head::check`] has accepted.
     pub(crate) fn write(&self, writer: &mut Writer) {
         writer.varint(self.channels.into());
         writer.varint(self.layout.scales() as u64);
@@ -118,7 +118,7 @@ impl Head {
     }
 }
 
-/// Cells along each axis that planes of a scale span; nothing where they disagree.
+/// The size along each axis that planes of a scale span; `None` where planes differ.
 fn cells(planes: &[PlaneShape]) -> Option<[Option<usize>; AXIS_NAMES.len()]> {
     let mut cells = [None; AXIS_NAMES.len()];
     for plane in planes {
@@ -132,7 +132,7 @@ fn cells(planes: &[PlaneShape]) -> Option<[Option<usize>; AXIS_NAMES.len()]> {
     Some(cells)
 }
 
-/// Refuses planes that are out of order, beyond the limits, or not as long as their sizes say.
+/// Refuses planes that are out of order, beyond the limits, or whose length does not follow from their size.
 pub(crate) fn check(planes: &FeaturePlaneArrays, limits: &Limits) -> Result<(), CodecError> {
     let head = Head::of(planes)?;
     head.check(limits)?;

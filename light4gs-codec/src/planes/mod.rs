@@ -1,16 +1,16 @@
-//! The feature planes in a stream: as they are, or entropy coded under a context model (paper III-C, docs/design.md).
+//! The feature planes in a stream: as float32, or entropy coded with a context model (paper III-C, docs/design.md).
 //!
-//! Encoder and decoder run the same walk over the planes and ask the same networks for every value's distribution; they
-//! differ only in the [`SymbolCoder`](crate::entropy::SymbolCoder) that they hand to it.
+//! Encoder and decoder visit the planes by the same function, and evaluate the same networks for every value's
+//! distribution. They differ only in the [`SymbolCoder`](crate::entropy::SymbolCoder) that they pass to it.
 //!
 //! | file | what |
 //! |---|---|
-//! | `head.rs`, `explicit.rs` | which planes there are, and their sizes; planes as plain numbers |
+//! | `head.rs`, `explicit.rs` | which planes there are, and their sizes; planes as float32 |
 //! | `coding.rs` | how planes are coded, as data |
 //! | `context_model.rs`, `context_section.rs` | the context model as data, and as bytes |
-//! | `plan.rs` | when each plane is coded |
-//! | `exact_model.rs` | the context model, ready to run |
-//! | `cost.rs` | what reading planes takes, before it is done |
+//! | `plan.rs` | the order in which planes are coded |
+//! | `exact_model.rs` | the context model, prepared for running |
+//! | `cost.rs` | the cost of reading planes, known beforehand |
 //! | `plane_parameters.rs` | scales and means of a row |
 //! | `walk.rs` | the symbols of one plane, in order |
 //! | `coder.rs`, `section.rs` | all planes: encode, decode; their bytes |

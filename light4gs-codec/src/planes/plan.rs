@@ -1,10 +1,10 @@
-//! When each plane is coded.
+//! The order in which planes are coded.
 
 use super::context_model::levels;
 use crate::{ContextModelArrays, plane_layout::PlaneLayout};
 
-/// The planes in the order in which they are coded, by stages: those of a stage need only planes of the stages before.
-/// The model is sound, and made for these planes.
+/// The planes in the order in which they are coded, in stages (the rounds of `docs/format.md`): planes of a stage need
+/// only planes of the stages before. The model must have been checked for these planes.
 pub(crate) fn stages(model: &ContextModelArrays, layout: &PlaneLayout) -> Vec<Vec<usize>> {
     let mut stages = Vec::new();
     for scale in 0..layout.scales() {
@@ -17,7 +17,7 @@ pub(crate) fn stages(model: &ContextModelArrays, layout: &PlaneLayout) -> Vec<Ve
     stages
 }
 
-/// Sub-streams of a plane: the latent's, the anchors', that of the others.
+/// The number of sub-streams of a plane: of the latent, of the anchors, of the others.
 pub(crate) fn sub_streams(model: &ContextModelArrays, plane: usize) -> usize {
     let prior = model.prior(plane);
     1 + usize::from(prior.has_latent()) + usize::from(prior.has_anchors())

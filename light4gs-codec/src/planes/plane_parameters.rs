@@ -12,7 +12,7 @@ use crate::{
     },
 };
 
-/// A mean beyond this, or one that is no number, counts as 0: the symbol must stay one that float32 can hold.
+/// A mean beyond this, or NaN, is replaced by 0: the symbol must stay within the exact integers of float32.
 const MEAN_LIMIT: f32 = 1_048_576.0;
 
 /// The positions of a row that are coded in one pass.
@@ -27,7 +27,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// First column and distance of the columns of row `y`.
+    /// First column, and distance of the columns, of this part of row `y`.
     pub(super) fn columns(self, y: usize) -> Columns {
         match self {
             Self::All => Columns { first: 0, step: 1 },
@@ -48,7 +48,7 @@ pub(super) struct RowParameters {
     pub(super) means: Vec<f32>,
 }
 
-/// What is known about one plane before its own values.
+/// What is known about a plane before its own values.
 pub(super) struct PlaneParameters<'a> {
     model: &'a ExactModel<'a>,
     prior: usize,
@@ -57,14 +57,14 @@ pub(super) struct PlaneParameters<'a> {
     width: usize,
 }
 
-/// A condition with what is computed of it beforehand.
+/// A condition, and what is computed for it beforehand.
 struct KnownCondition<'a> {
     maps: Maps<'a>,
     reads_anchors: bool,
 }
 
 impl<'a> PlaneParameters<'a> {
-    /// From the planes that the plane's prior reads, which are decoded, and the symbols of its latent where it has one.
+    /// From the planes that the plane's prior reads, already decoded, and the symbols of its latent, if it has one.
     pub(super) fn new(
         model: &'a ExactModel<'a>,
         plane: usize,
@@ -79,7 +79,7 @@ impl<'a> PlaneParameters<'a> {
                 let border = program.border(input);
                 match source {
                     PlaneSource::Latent => Some(model.latent(latent_symbols, size.map(|side| side / 4), border)),
-                    // Anchors come row by row.
+                    // Anchors are given row by row.
                     _ => source_plane(source, plane, model.layout).map(|plane| model.plane(decoded, plane, border)),
                 }
             };
@@ -91,7 +91,8 @@ impl<'a> PlaneParameters<'a> {
         Self { model, prior, conditions, width: size[1] }
     }
 
-    /// Scales and means of the positions of row `y` that belong to `part`. `anchors` are needed for the others alone.
+    /// Scales and means of the positions of row `y` that belong to `part`. `anchors` are needed only for
+    /// [`Part::Others`].
     pub(super) fn row(&self, y: usize, part: Part, anchors: Option<&AnchorMap>) -> RowParameters {
         let channels = self.model.arrays.channels as usize;
         let count = part.count(self.width);
@@ -127,7 +128,7 @@ impl<'a> PlaneParameters<'a> {
     }
 }
 
-/// A mean that a network gives, or 0 where that is not usable.
+/// The mean that a network gives, or 0 where it is not usable.
 pub(crate) fn bounded_mean(mean: f32) -> f32 {
     if mean.abs() <= MEAN_LIMIT { mean } else { 0.0 }
 }

@@ -1,4 +1,4 @@
-//! Planes under a context model: sizes, steps, and a sub-stream for each part of each plane.
+//! Planes with a context model: sizes, steps, and a sub-stream for each part of each plane.
 
 use super::{
     coder::{self, CodedPlanes},
@@ -33,8 +33,8 @@ impl PlaneBytes {
     }
 }
 
-/// Refuses what cannot be coded: a model that is unsound or asks for too much, planes, steps and latents that contradict
-/// it or each other.
+/// Refuses what cannot be coded: a model that is illegal or beyond the limits; planes, steps and latents that
+/// contradict it or each other.
 pub(crate) fn check(planes: &FeaturePlaneArrays, coding: &PlaneCoding, limits: &Limits) -> Result<(), CodecError> {
     let PlaneCoding { model, steps, latent_symbols } = coding;
     model.check(limits)?;
@@ -58,7 +58,7 @@ pub(crate) fn check(planes: &FeaturePlaneArrays, coding: &PlaneCoding, limits: &
     coder::check_cost(&head.layout, model, limits)
 }
 
-/// Refuses planes other than the model's, and sizes that a latent or a checkerboard cannot have.
+/// Refuses planes that do not fit the model, and sizes that a latent or a checkerboard cannot have.
 fn check_model(head: &Head, model: &ContextModelArrays) -> Result<(), CodecError> {
     if head.channels != model.channels {
         let expected = format!("{}, those of the context model", model.channels);
@@ -85,7 +85,7 @@ fn check_steps(steps: &[PerGroup], scales: usize) -> Result<(), CodecError> {
     }
 }
 
-/// Writes planes that [`check`] has passed; returns them as a decoder gets them.
+/// Writes planes that [`check`] has accepted; returns them as a decoder gets them.
 pub(crate) fn write(
     planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
@@ -103,7 +103,7 @@ pub(crate) fn write(
     Ok(decoded)
 }
 
-/// A section taken apart.
+/// The parts of a section.
 pub(crate) struct Parts<'a> {
     pub(crate) head: Head,
     pub(crate) steps: Vec<PerGroup>,
@@ -139,7 +139,7 @@ pub(crate) fn read(
     coder::decode(&head.layout, model, &steps, &sub_streams, budget)
 }
 
-/// Head, steps and the bytes of every plane, without decoding. The weights of the model are not looked at.
+/// Head, steps and the bytes of every plane, without decoding. The weights of the model are not needed.
 pub(crate) fn plane_bytes<'a>(
     bytes: &'a [u8],
     model: &ContextModelArrays,

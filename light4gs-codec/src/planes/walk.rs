@@ -11,8 +11,7 @@ use crate::{
 /// Rows whose parameters are computed together.
 pub(super) const BATCH: usize = 16;
 
-/// The grid that the values of a plane lie on: a value is `(symbol + mean) * step + center`, each operation rounded to
-/// float32.
+/// The grid of the values of a plane: a value is `(symbol + mean) * step + center`, each operation rounded to float32.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     pub(super) step: f32,
@@ -21,7 +20,7 @@ pub(super) struct Grid {
 
 impl Grid {
     fn symbol(self, value: f32, mean: f32) -> i32 {
-        // Out of range saturates, and is then refused.
+        // Values out of range saturate, and are refused later.
         ((value - self.center) / self.step - mean).round_ties_even() as i32
     }
 
@@ -30,8 +29,8 @@ impl Grid {
     }
 }
 
-/// Codes the values `[M, height, width]` of a plane, with one coder a part. An encoder's values become the decoded
-/// ones.
+/// Codes the values `[M, height, width]` of a plane, with one coder for each part. An encoder's values are replaced by
+/// the decoded ones.
 ///
 /// Order within a part: row, channel, column.
 pub(super) fn walk<C: SymbolCoder>(

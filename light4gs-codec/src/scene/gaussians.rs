@@ -1,9 +1,9 @@
-//! The Gaussians of a scene as plain arrays, and the table of what every Gaussian has.
+//! The Gaussians of a scene as plain arrays, and the table of the attributes that every Gaussian has.
 
-/// `N` Gaussians. All arrays have `N` entries but `sh_rest`, which has `N` times [`sh_rest_coefficients`] times 3.
+/// `N` Gaussians. All arrays have `N` entries, except `sh_rest`, which has `N` times [`sh_rest_coefficients`] times 3.
 ///
-/// What every Gaussian of every scene has stands in fields; [`GaussianArrays::further`] is what this scene's have besides.
-/// [`GaussianArrays::attributes`] walks all of them.
+/// The attributes of all scenes are fields; [`GaussianArrays::further`] has those that this scene has besides.
+/// [`GaussianArrays::attributes`] iterates over both.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct GaussianArrays {
     /// Centers, in world units.
@@ -24,7 +24,7 @@ pub struct GaussianArrays {
     pub further: Vec<FurtherAttribute>,
 }
 
-/// An attribute that every Gaussian of a scene has beyond those of all scenes.
+/// An attribute that not every scene has.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FurtherAttribute {
     /// 1 to [`LONGEST_ATTRIBUTE_NAME`] lower-case letters, digits, `-` and `_`; unique, and none of the built-in names.
@@ -54,7 +54,7 @@ pub fn legal_attribute_name(name: &str) -> bool {
     (1..=LONGEST_ATTRIBUTE_NAME).contains(&name.len()) && name.bytes().all(legal) && !is_built_in(name)
 }
 
-/// One attribute of all Gaussians, for those who treat all attributes alike.
+/// One attribute of all Gaussians, for code that treats all attributes alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AttributeValues<'a> {
     /// The name of the field, or of the [`FurtherAttribute`].
@@ -77,9 +77,9 @@ pub enum Coder {
     Grid,
     /// Quantized; each channel is predicted from neighbors and from the channels before.
     Channels,
-    /// As [`Coder::Channels`], for red, green, blue: green comes first, since it says most about the other two.
+    /// As [`Coder::Channels`], for red, green, blue: green comes first, since the other two are predicted best from it.
     Colors,
-    /// One of a newer program.
+    /// A coder of a newer program.
     Unknown(u8),
 }
 
@@ -88,14 +88,14 @@ pub enum Coder {
 pub(crate) struct BuiltIn {
     pub(crate) name: &'static str,
     pub(crate) width: usize,
-    /// How it is stored where it is quantized.
+    /// Its coder where it is quantized.
     pub(crate) coder: Coder,
     /// The default quantization step.
     pub(crate) step: f32,
 }
 
-/// What every Gaussian of every scene has, in the order of a stream. `sh_rest` is not here: its width depends on the scene,
-/// and it has a section of its own.
+/// The attributes of every Gaussian of every scene, in the order of a stream. `sh_rest` is not among them: its width
+/// depends on the scene, and it has a section of its own.
 pub(crate) const BUILT_IN: [BuiltIn; 5] = [
     BuiltIn { name: MEANS, width: 3, coder: Coder::Grid, step: 0.05 },
     BuiltIn { name: "log_scales", width: 3, coder: Coder::Channels, step: 0.1 },
@@ -109,7 +109,7 @@ pub(crate) const MEANS: &str = "means";
 /// The name of the harmonics beyond degree 0.
 pub(crate) const SH_REST: &str = "sh_rest";
 
-/// Whether every Gaussian of every scene has an attribute of this name.
+/// Whether the Gaussians of all scenes have an attribute of this name.
 pub(crate) fn is_built_in(name: &str) -> bool {
     name == SH_REST || BUILT_IN.iter().any(|row| row.name == name)
 }
@@ -125,7 +125,7 @@ impl GaussianArrays {
         self.means.is_empty()
     }
 
-    /// Every attribute: those of all scenes in the order of the fields, then the further ones in theirs.
+    /// Every attribute: the built-in ones in the order of the fields, then the further ones in theirs.
     pub fn attributes(&self) -> impl Iterator<Item = AttributeValues<'_>> {
         let Self { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further } = self;
         let fields: [&[f32]; BUILT_IN.len()] = [
@@ -146,7 +146,7 @@ impl GaussianArrays {
         BUILT_IN.iter().zip(fields).map(row).chain([rest]).chain(further.iter().map(FurtherAttribute::view))
     }
 
-    /// The attribute of a name.
+    /// The attribute with a name.
     pub fn attribute(&self, name: &str) -> Option<AttributeValues<'_>> {
         self.attributes().find(|attribute| attribute.name == name)
     }
@@ -159,7 +159,7 @@ impl FurtherAttribute {
     }
 }
 
-/// Number of spherical harmonics a channel beyond degree 0: `(degree + 1)^2 - 1`.
+/// Number of spherical harmonics beyond degree 0 for each channel: `(degree + 1)^2 - 1`.
 ///
 /// ```
 /// assert_eq!([0, 1, 2, 3].map(light4gs_codec::sh_rest_coefficients), [0, 3, 8, 15]);

@@ -1,4 +1,4 @@
-//! What a file holds, as plain arrays.
+//! The contents of a file, as plain arrays.
 
 mod gaussians;
 mod motion;
@@ -21,22 +21,22 @@ use crate::{
 /// A whole dynamic scene: everything that a `.l4gs` stream holds.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneData {
-    /// What the scene is called, how long it plays, where it lies.
+    /// Name, frames, box, background and camera.
     pub meta: SceneMeta,
     /// The canonical Gaussians.
     pub gaussians: GaussianArrays,
     /// The scene coordinates that normalize positions before the planes are queried.
     pub coordinates: SceneCoordinateArrays,
-    /// The feature planes; none where nothing reads any.
+    /// The feature planes; empty where nothing reads them.
     pub feature_planes: FeaturePlaneArrays,
     /// How the Gaussians move.
     pub motion: MotionArrays,
 }
 
-/// The facts about a scene that a player needs before it decodes anything.
+/// Facts about a scene that a player needs before it decodes anything.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneMeta {
-    /// A name for people.
+    /// A name for display.
     pub name: String,
     /// Number of frames of the source; time 0 is the first and time 1 the last.
     pub frame_count: u32,
@@ -54,7 +54,7 @@ pub struct SceneMeta {
     pub height: u32,
     /// Horizontal field of view in radians of the source's default camera.
     pub fov_x: f32,
-    /// Free notes, such as the program that wrote the file.
+    /// Extra entries, such as the program that wrote the file.
     pub extra: BTreeMap<String, String>,
 }
 
@@ -72,7 +72,7 @@ pub struct SceneCoordinateArrays {
 }
 
 impl Default for SceneCoordinateArrays {
-    /// Those of the world itself: mean 0, the world's axes, deviations 1.
+    /// World coordinates: mean 0, the world's axes, deviations 1.
     fn default() -> Self {
         Self {
             mean: [0.0; 3],
@@ -89,7 +89,7 @@ impl Default for SceneCoordinateArrays {
 pub struct CoordinateMapping {
     /// Whether space is contracted into the ball of radius 2 first.
     pub contracts: bool,
-    /// Then each coordinate is multiplied by this...
+    /// Each coordinate is then multiplied by this...
     pub scale: [f32; 3],
     /// ...and this is added.
     pub offset: [f32; 3],
@@ -100,21 +100,21 @@ pub struct CoordinateMapping {
 }
 
 impl Default for CoordinateMapping {
-    /// Contracted and halved; time as it is.
+    /// Contracted and halved; the time unchanged.
     fn default() -> Self {
         Self { contracts: true, scale: [0.5; 3], offset: [0.0; 3], time_scale: 1.0, time_offset: 0.0 }
     }
 }
 
 impl CoordinateMapping {
-    /// The field's time at a time of the scene, both in [0, 1].
+    /// The field's time for a time of the scene, both in [0, 1].
     pub fn time(&self, time: f32) -> f32 {
         time * self.time_scale + self.time_offset
     }
 }
 
-/// Feature planes over pairs of the axes x, y, z, t, at several scales. A feature is the product of the samples of a scale's
-/// planes, channel by channel, the scales side by side.
+/// Feature planes over pairs of the axes x, y, z, t, at several scales. A feature is the product of the samples of a
+/// scale's planes, channel by channel; the features of all scales are concatenated.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FeaturePlaneArrays {
     /// Channels of every plane.
@@ -136,10 +136,10 @@ impl FeaturePlaneArrays {
         Self { channels, planes: layout.planes().iter().map(plane).collect() }
     }
 
-    /// Which planes there are.
+    /// The layout of the planes.
     ///
     /// # Errors
-    /// Planes that do not stand in the order of a layout.
+    /// Planes that are not in the order of a layout.
     pub fn layout(&self) -> Result<PlaneLayout, CodecError> {
         let planes = self.planes.iter().map(Plane::shape).collect();
         PlaneLayout::new(planes).map_err(|illegal| {
@@ -163,7 +163,7 @@ impl FeaturePlaneArrays {
 pub struct Plane {
     /// From 0, the lowest.
     pub scale: u32,
-    /// What it spans.
+    /// The axes that it spans.
     pub axes: PlaneAxes,
     /// Samples along the second axis.
     pub height: u32,

@@ -13,23 +13,23 @@ const LONGEST_KIND: usize = 64;
 
 /// How the Gaussians move.
 ///
-/// This crate runs whatever [`MotionNetwork`] there is; `kind` is for the model that made it, and names the type that it
-/// makes of these arrays. A kind that a program does not know still decodes.
+/// This crate runs any [`MotionNetwork`]. `kind` tells a program which deformation field to make from these arrays.
+/// Arrays of an unknown kind can still be decoded.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionArrays {
-    /// What the arrays are, such as `hexplane`: at most 64 lower-case letters, digits, `-`, `_` and `.`; empty where
-    /// nothing moves.
+    /// The name of the deformation field, such as `hexplane`: at most 64 lower-case letters, digits, `-`, `_` and `.`;
+    /// empty where nothing moves.
     pub kind: String,
-    /// What moves each Gaussian from features at its place, where there is such a network.
+    /// The network that moves each Gaussian, if there is one.
     pub network: Option<MotionNetwork>,
-    /// What else a field consists of. The built-in ones have none.
+    /// Further parameters of the field. The built-in fields have none.
     pub tensors: Vec<NamedTensor>,
 }
 
 /// A network that gives the attributes of one Gaussian at a time, or offsets of them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionNetwork {
-    /// It looks at one Gaussian at a time.
+    /// It is evaluated for one Gaussian at a time.
     pub network: Network,
     /// What its inputs are.
     pub sources: Vec<MotionSource>,
@@ -40,21 +40,21 @@ pub struct MotionNetwork {
 /// What a [`MotionNetwork`] may read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum MotionSource {
-    /// For each scale and channel of the planes the product of their samples at the Gaussian's canonical center and the
-    /// time.
+    /// For each scale and channel of the planes, the product of their samples at the Gaussian's canonical center and
+    /// the time.
     Features,
-    /// The canonical center as the planes have it: x, y, z in [-1, 1].
+    /// The canonical center in the planes' coordinates: x, y, z in [-1, 1].
     Point,
     /// The time in [0, 1].
     Time,
-    /// An attribute of the canonical Gaussian by its name in [`crate::GaussianArrays::attributes`], as it is stored there:
-    /// `means` (3, in world units), `log_scales` (3), `quats` (4), `opacity_logits` (1), `sh_dc` (3), `sh_rest`, and what the
-    /// Gaussians of the scene have besides.
+    /// An attribute of the canonical Gaussian by its name in [`crate::GaussianArrays::attributes`], as it is stored
+    /// there: `means` (3, in world units), `log_scales` (3), `quats` (4), `opacity_logits` (1), `sh_dc` (3), `sh_rest`,
+    /// and further attributes of the scene.
     Attribute(String),
 }
 
-/// What an output of a [`MotionNetwork`] is added to, or what it takes the place of. Canonical attributes are those of
-/// [`crate::GaussianArrays`].
+/// The attribute to which an output of a [`MotionNetwork`] is added, or whose place it takes. Canonical attributes are
+/// those of [`crate::GaussianArrays`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotionOutput {
     /// The center, 3 channels.
@@ -65,8 +65,8 @@ pub enum MotionOutput {
     Quaternion,
     /// The opacity before the sigmoid, 1 channel.
     OpacityLogit,
-    /// Spherical harmonics: for each coefficient, degree 0 included, red, green, blue. Those that a scene does not have
-    /// are left out.
+    /// Spherical harmonics: for each coefficient, degree 0 included, red, green, blue. Coefficients that a scene does
+    /// not have are ignored.
     Sh,
     /// As [`MotionOutput::Position`], in place of the canonical center.
     NewPosition,
@@ -92,14 +92,14 @@ pub struct NamedTensor {
 }
 
 impl NamedTensor {
-    /// Numbers that the shape asks for.
+    /// The number of values that follows from the shape.
     pub(crate) fn length(&self) -> u64 {
         self.shape.iter().fold(1, |length: u64, &side| length.saturating_mul(side.into()))
     }
 }
 
 impl MotionSource {
-    /// Its channels, for planes with so many features and these Gaussians; none if they have no such attribute.
+    /// Its channels, for planes with so many features and these Gaussians; `None` if they have no such attribute.
     fn channels(&self, features: u64, gaussians: &GaussianArrays) -> Option<u64> {
         match self {
             Self::Features => Some(features),
@@ -111,7 +111,8 @@ impl MotionSource {
 }
 
 impl MotionOutput {
-    /// All, in the order of their numbers in a stream: first those that are added, then those that take the place.
+    /// All, in the order of their numbers in a stream: first those that are added, then those that replace an
+    /// attribute.
     pub(crate) const ALL: [Self; 10] = [
         Self::Position,
         Self::LogScale,
@@ -125,12 +126,12 @@ impl MotionOutput {
         Self::NewSh,
     ];
 
-    /// What is added to the attribute that this one changes.
+    /// The variant that is added to the same attribute.
     pub(crate) fn added(self) -> Self {
         Self::ALL[self as usize % (Self::ALL.len() / 2)]
     }
 
-    /// Whether it takes the place of the attribute.
+    /// Whether it replaces the attribute.
     pub(crate) fn replaces(self) -> bool {
         self as usize >= Self::ALL.len() / 2
     }
@@ -146,8 +147,8 @@ impl MotionOutput {
 }
 
 impl MotionArrays {
-    /// Whether what an attribute does is known from here: the network reads it, or there is no network and the kind, which
-    /// only a program that knows it can use, is all there is.
+    /// Whether the meaning of an attribute is known: the network reads it, or there is no network, so that only a
+    /// program that knows the kind can show the scene.
     fn knows(&self, attribute: &str) -> bool {
         let is_read = |source: &MotionSource| matches!(source, MotionSource::Attribute(name) if name == attribute);
         match &self.network {
@@ -171,7 +172,7 @@ impl MotionArrays {
         Ok(())
     }
 
-    /// [`MotionArrays::check`] without a look at the numbers.
+    /// [`MotionArrays::check`] without the numbers.
     pub(crate) fn check_structure(&self, limits: &Limits) -> Result<(), CodecError> {
         let legal = |byte: u8| byte.is_ascii_lowercase() || byte.is_ascii_digit() || b"-_.".contains(&byte);
         let nothing = self.network.is_none() && self.tensors.is_empty();
@@ -196,7 +197,8 @@ impl MotionArrays {
         at_most(SECTION, "number of weights", total, limits.layer_weights)
     }
 
-    /// Refuses a network that reads other features than the planes give, or attributes that these Gaussians do not have.
+    /// Refuses a network that reads a number of features other than that of the planes, or attributes that these
+    /// Gaussians do not have.
     pub(crate) fn check_sources(&self, features: u64, gaussians: &GaussianArrays) -> Result<(), CodecError> {
         let Some(MotionNetwork { network, sources, .. }) = &self.network else { return Ok(()) };
         for (source, &found) in sources.iter().zip(&network.inputs) {
@@ -215,7 +217,7 @@ impl MotionArrays {
 
 impl SceneData {
     /// Refuses to show a scene that would look wrong: one whose Gaussians have a further attribute that is not
-    /// [optional](crate::FurtherAttribute::optional), and that the motion does not read. Decoding such a scene is no error.
+    /// [optional](crate::FurtherAttribute::optional), and that the motion does not read. Such a scene can be decoded.
     ///
     /// # Errors
     /// [`CodecError::UnknownAttribute`] with the first such name.
@@ -251,7 +253,7 @@ impl MotionNetwork {
             let found = channels[value.0 as usize];
             let again = outputs[..index].iter().any(|other| other.added() == output.added());
             if !output.has_channels(found) || again {
-                let expected = "those of what it changes, once";
+                let expected = "those of the attribute that it changes, each attribute once";
                 return Err(CodecError::invalid(
                     SECTION,
                     format!("output {output:?}"),

@@ -10,7 +10,7 @@ pub(super) const SECTION: &str = Section::Sh.name();
 /// How the spherical harmonics are coded.
 #[derive(Clone, Debug, PartialEq)]
 pub enum ShCoding {
-    /// One distribution a channel: the factorized bottleneck, and the mixture of logistics.
+    /// One distribution for each channel: the factorized bottleneck, and the mixture of logistics.
     Tables {
         /// Quantization step; a value is symbol times step.
         step: f32,
@@ -21,7 +21,7 @@ pub enum ShCoding {
     Networks {
         /// Quantization step; a value is symbol plus mean, times step.
         step: f32,
-        /// Each speaks for some channels, in the order of the channels. Together they speak for all.
+        /// Each is for some channels, in the order of the channels. Together they are for all.
         priors: Vec<ShPrior>,
     },
 }
@@ -29,24 +29,24 @@ pub enum ShCoding {
 /// Where the distributions of some channels come from.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ShPrior {
-    /// It looks at one Gaussian at a time. Its one output is the scales of `C` channels, then their means, in units of the
-    /// step: `2 C` channels.
+    /// It is evaluated for one Gaussian at a time. Its one output is the scales of `C` channels, then their means, in
+    /// units of the step: `2 C` channels.
     pub network: Network,
     /// What its inputs are.
     pub sources: Vec<ShSource>,
 }
 
-/// What the network of an [`ShPrior`] may read. All of it is decoded before.
+/// What the network of an [`ShPrior`] may read. All of it has been decoded before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShSource {
     /// The harmonics of degree 0: red, green, blue.
     Dc,
-    /// The channels of the priors before.
+    /// The channels of the priors before this one.
     Decoded,
-    /// For each scale and channel of the planes the product of the samples of the planes over space at the Gaussian's
+    /// For each scale and channel of the planes, the product of the samples of the space-only planes at the Gaussian's
     /// center.
     SpaceFeatures,
-    /// The Gaussian's center as the planes have it: x, y, z in [-1, 1].
+    /// The Gaussian's center in the planes' coordinates: x, y, z in [-1, 1].
     Position,
     /// Logarithms of the scales.
     LogScale,
@@ -75,7 +75,7 @@ impl ShSource {
         Self::ALL.get(usize::try_from(number).ok()?).copied()
     }
 
-    /// Channels of this source, for planes with so many features and after so many channels.
+    /// Channels of this source, for planes with so many features, after so many decoded channels.
     fn channels(self, features: u64, decoded: u64) -> u64 {
         match self {
             Self::Dc | Self::Position | Self::LogScale => 3,
@@ -109,7 +109,7 @@ impl ShCoding {
         }
     }
 
-    /// Refuses a step, tables or networks that do not fit the degree and the features of the planes.
+    /// Refuses a step, tables or networks that do not fit the degree or the features of the planes.
     pub(crate) fn check(&self, degree: u8, features: u64, limits: &Limits) -> Result<(), CodecError> {
         let step = self.step();
         if !(step.is_finite() && step >= LEAST_STEP_IN_STREAM) {
@@ -139,8 +139,8 @@ pub(super) fn prior_name(index: usize) -> String {
     format!("priors[{index}]")
 }
 
-/// Refuses priors that do not speak for all channels, once each, or that read what is not there; weights are not looked
-/// at.
+/// Refuses priors that do not cover all channels exactly once, or that read what does not exist. Weights are not
+/// checked.
 pub(super) fn check_priors(
     priors: &[ShPrior],
     channels: u64,

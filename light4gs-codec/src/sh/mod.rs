@@ -1,4 +1,4 @@
-//! The spherical harmonics beyond degree 0 in a stream: as they are, or entropy coded (paper III-D, docs/design.md).
+//! The spherical harmonics beyond degree 0 in a stream: as float32, or entropy coded (paper III-D, docs/design.md).
 //!
 //! Channels are `coefficient · 3 + color`. They fall into groups by degree, 9, 15 and 21 channels, and each group has
 //! a sub-stream of its own. Within a group symbols run Gaussian by Gaussian, channel by channel.

@@ -13,10 +13,10 @@ use crate::{
 const FEATURE_NANOSECONDS: u64 = 600;
 /// Nanoseconds to gather a channel of eight Gaussians.
 const INPUT_NANOSECONDS: u64 = 24;
-/// Nanoseconds of a prior for eight Gaussians, besides.
+/// Nanoseconds of a prior for eight Gaussians, without its network and inputs.
 const PRIOR_NANOSECONDS: u64 = 400;
 
-/// The networks of priors that are sound, and what they read.
+/// The networks of checked priors, and what they read.
 #[derive(Debug)]
 pub(super) struct Networks<'a> {
     priors: Vec<ExactPrior<'a>>,
@@ -31,7 +31,7 @@ struct ExactPrior<'a> {
     sources: &'a [ShSource],
     program: Program,
     workspace: Workspace,
-    /// The first channel that it speaks for, and how many.
+    /// The first channel that it is for, and the number of channels.
     channels: (usize, usize),
 }
 
@@ -63,7 +63,7 @@ impl<'a> Networks<'a> {
         self.priors.len()
     }
 
-    /// Looks at the Gaussians from `first` on, [`LANES`] of them.
+    /// Prepares the Gaussians from `first` on, [`LANES`] of them.
     pub(super) fn begin(&mut self, first: usize) {
         if !self.reads_features {
             return;
@@ -83,8 +83,8 @@ impl<'a> Networks<'a> {
         }
     }
 
-    /// The first channel of a prior, and scales and means of its channels, for the Gaussians from `first` on. `values` are
-    /// those of all channels, `[Gaussians, channels]`, of which those of the priors before are decoded.
+    /// The first channel of a prior, and scales and means of its channels, for the Gaussians from `first` on. `values`
+    /// has all channels, `[Gaussians, channels]`; those of the priors before must be decoded.
     pub(super) fn parameters(
         &mut self,
         prior: usize,

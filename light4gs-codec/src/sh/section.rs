@@ -22,7 +22,7 @@ use crate::{
     sh_rest_coefficients,
 };
 
-/// What stands before everything else.
+/// The head of the section.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Head {
     pub(crate) count: u32,
@@ -45,7 +45,7 @@ impl Head {
         writer.u8(self.degree);
     }
 
-    /// Numbers of all Gaussians.
+    /// The number of coefficients of all Gaussians.
     fn values(self) -> u64 {
         u64::from(self.count) * sh_rest_coefficients(self.degree) as u64 * 3
     }
@@ -55,7 +55,7 @@ fn check_degree(degree: u8) -> Result<(), CodecError> {
     if degree <= 3 { Ok(()) } else { Err(CodecError::invalid(SECTION, "degree", degree, "0, 1, 2 or 3")) }
 }
 
-/// Refuses an unknown degree and an array of another length than the degree asks for.
+/// Refuses an unknown degree, and an array whose length does not follow from the degree.
 pub(crate) fn check(gaussians: &GaussianArrays) -> Result<(), CodecError> {
     check_degree(gaussians.sh_degree)?;
     let (count, rest) = (gaussians.len(), sh_rest_coefficients(gaussians.sh_degree));
@@ -72,7 +72,7 @@ pub struct ShBytes {
     pub degrees: Vec<u64>,
 }
 
-/// Writes `sh_rest` as plain numbers.
+/// Writes `sh_rest` as float32.
 pub(crate) fn write_explicit(gaussians: &GaussianArrays, writer: &mut Writer) {
     Head::of(gaussians).write(writer);
     writer.f32s(&gaussians.sh_rest);
@@ -148,7 +148,7 @@ fn read_priors(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<ShPrior>,
     (0..count as usize).map(read).collect()
 }
 
-/// Whether decoding looks at the feature planes.
+/// Whether decoding needs the feature planes.
 pub(crate) fn reads_feature_planes(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<bool, CodecError> {
     if kind != Kind::ShNetworks {
         return Ok(false);
@@ -219,7 +219,7 @@ pub(crate) fn read(
     }
 
     let lengths = (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
-    let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "what an encoder writes");
+    let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "symbols as an encoder writes them");
     let mut readers = Vec::new();
     for length in lengths {
         readers.push(SymbolReader::new(reader.take("sub-stream", length)?).map_err(damaged)?);

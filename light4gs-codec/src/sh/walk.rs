@@ -16,14 +16,14 @@ use crate::{
 /// Where distributions come from.
 #[derive(Debug)]
 pub(super) enum HarmonicsModel<'a> {
-    /// One a channel.
+    /// One for each channel.
     Tables(Vec<Distribution>),
     /// Networks.
     Networks(Networks<'a>),
 }
 
 impl<'a> HarmonicsModel<'a> {
-    /// From a coding that is sound.
+    /// From a coding that has been checked.
     pub(super) fn new(coding: &'a ShCoding, conditions: Conditions<'a>) -> Self {
         match coding {
             ShCoding::Tables { tables, .. } => Self::Tables(tables.iter().map(|table| table.distribution()).collect()),
@@ -31,7 +31,7 @@ impl<'a> HarmonicsModel<'a> {
         }
     }
 
-    /// The distributions that the tables of [`walk`]'s symbols are numbers of.
+    /// The distributions into which the table numbers of [`walk`]'s symbols point.
     pub(super) fn distributions(&self) -> &[Distribution] {
         match self {
             Self::Tables(distributions) => distributions,
@@ -39,7 +39,7 @@ impl<'a> HarmonicsModel<'a> {
         }
     }
 
-    /// Nanoseconds for eight Gaussians, symbols aside.
+    /// Nanoseconds for eight Gaussians, without those of the symbols.
     pub(super) fn nanoseconds(&self) -> u64 {
         match self {
             Self::Tables(_) => 0,
@@ -48,7 +48,8 @@ impl<'a> HarmonicsModel<'a> {
     }
 }
 
-/// Codes `values`, `[count, channels]`, with one coder a degree. An encoder's values become the decoded ones.
+/// Codes `values`, `[count, channels]`, with one coder for each degree. An encoder's values are replaced by the decoded
+/// ones.
 pub(super) fn walk<C: SymbolCoder>(
     model: &mut HarmonicsModel<'_>,
     step: f32,
@@ -97,7 +98,7 @@ pub(super) fn walk<C: SymbolCoder>(
     Ok(())
 }
 
-/// The nearest integer. Out of range saturates, and is then refused.
+/// The nearest integer. Values out of range saturate, and are refused later.
 fn nearest(value: f32) -> i32 {
     value.round_ties_even() as i32
 }

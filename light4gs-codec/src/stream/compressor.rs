@@ -1,4 +1,4 @@
-//! A scene into a compressed stream.
+//! From a scene to a compressed stream.
 
 use super::{
     OpenStream,
@@ -35,20 +35,20 @@ pub struct Encoded {
 pub struct CompressionReport {
     /// Prelude, meta and table.
     pub header_bytes: u64,
-    /// Every section: its name, what it holds, how its numbers are stored, and its bytes.
+    /// Every section: its name, its kind, its encoding, and its bytes.
     pub sections: Vec<(&'static str, Kind, Encoding, u64)>,
     /// Every plane, in the order of [`FeaturePlaneArrays::planes`]; empty where planes are float32.
     pub planes: Vec<PlaneBytes>,
     /// The spherical harmonics.
     pub sh: ShBytes,
-    /// What a reader must allow.
+    /// What a reader must allow to decode the stream.
     pub demand: Demand,
 }
 
 /// Compresses a scene.
 ///
-/// What is quantized is quantized here, and every network is used as the stream holds it. The stream is decoded again
-/// and compared, bit by bit, with what the encoder expects before it is returned.
+/// Quantization takes place here, and every network is used as the stream holds it. Before the stream is returned, it
+/// is decoded again and compared, bit by bit, with what the encoder expects.
 ///
 /// # Errors
 /// What [`crate::encode`] refuses; a model, tables or layers that contradict themselves or the scene; values beyond
@@ -57,7 +57,7 @@ pub fn encode_compressed(scene: &SceneData, input: &CompressionInput) -> Result<
     encode_compressed_with_limits(scene, input, &Limits::large())
 }
 
-/// As [`encode_compressed`], within limits of the caller's: those of the readers that the stream is for.
+/// As [`encode_compressed`], within limits of the caller: those of the readers that the stream is for.
 ///
 /// # Errors
 /// As [`encode_compressed`].
@@ -89,7 +89,7 @@ pub fn encode_compressed_with_limits(
     let precision = compact(input.weights.sh);
     let (sh_rest, sh) = sh::section::write(&with_rest, &input.sh, precision, conditions, limits, &mut writer)?;
     let kind = input.sh.kind();
-    // Tables are coded in either profile.
+    // Tables are entropy coded in either profile.
     let encoding = if kind == Kind::ShTables { Encoding::Quantized } else { encoding_of(precision) };
     push(&mut sections, kind, encoding, writer);
 
@@ -122,7 +122,7 @@ fn encoding_of(precision: Option<WeightPrecision>) -> Encoding {
     if precision.is_some() { Encoding::Quantized } else { Encoding::Float32 }
 }
 
-/// The attributes but for `sh_rest`, as decoded, and which of the given Gaussians each of them was.
+/// The attributes without `sh_rest`, as decoded, and the index of each Gaussian in the given arrays.
 fn write_gaussians(
     gaussians: &GaussianArrays,
     input: &CompressionInput,
@@ -140,7 +140,7 @@ fn write_gaussians(
     Ok((GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.clone() }, order))
 }
 
-/// The planes as decoded, and what each of them takes.
+/// The planes as decoded, and the bytes of each.
 fn write_planes(
     feature_planes: &FeaturePlaneArrays,
     coding: Option<&PlaneCoding>,

@@ -33,7 +33,7 @@ pub(crate) struct Entry {
     pub(crate) bytes: u64,
 }
 
-/// The fixed first bytes, checked as far as they can be alone.
+/// The fixed first bytes, checked as far as possible without the rest.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Prelude {
     pub(crate) version: u16,
@@ -76,7 +76,7 @@ impl Prelude {
     }
 }
 
-/// A stream whose header, meta and table are sound. The sections' checksums are checked as they are read.
+/// A stream whose header, meta and table have been checked. The sections' checksums are checked when they are read.
 #[derive(Clone, Debug)]
 pub(crate) struct Container<'a> {
     bytes: &'a [u8],
@@ -125,12 +125,12 @@ impl<'a> Container<'a> {
         self.entries.iter().any(|entry| entry.section == section)
     }
 
-    /// What a section holds, and its bytes, checked against their checksum.
+    /// The kind, encoding and bytes of a section; the bytes are checked against their checksum.
     pub(crate) fn section(&self, section: Section) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
         let name = section.name();
         let entry = self.entries.iter().find(|entry| entry.section == section);
         let entry = entry.ok_or(CodecError::MissingSection { section: name })?;
-        // `read_table` has found the range inside the stream, whose length is a `usize`.
+        // `read_table` has checked that the range is inside the stream, whose length is a `usize`.
         let payload = &self.bytes[entry.offset as usize..(entry.offset + entry.bytes) as usize];
         let computed = crc32c::crc32c(payload);
         if computed != entry.crc {
@@ -169,7 +169,7 @@ fn read_table(table: &[u8], start: u64, end: u64) -> Result<Vec<Entry>, CodecErr
     }
 }
 
-/// The checksum of a header: all of it but the checksum itself.
+/// The checksum of a header: over all of it except the checksum itself.
 fn header_checksum(header: &[u8]) -> u32 {
     crc32c::crc32c_append(crc32c::crc32c(&header[..PRELUDE_COVERED]), &header[PRELUDE..])
 }

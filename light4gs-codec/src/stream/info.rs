@@ -1,4 +1,4 @@
-//! What a stream holds, without decoding its numbers.
+//! The contents of a stream, without decoding its numbers.
 
 use super::{container::Container, input::Profile};
 use crate::{
@@ -13,14 +13,14 @@ use crate::{
     planes, sh,
 };
 
-/// What a stream holds.
+/// The contents of a stream.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StreamInfo {
     /// Version of the format.
     pub version: u16,
     /// Flags of the header; there are none yet.
     pub flags: u16,
-    /// What a compressed stream keeps in full precision; nothing where nothing is compressed.
+    /// The profile of a compressed stream; `None` where nothing is compressed.
     pub profile: Option<Profile>,
     /// Bytes of the whole stream.
     pub bytes: u64,
@@ -32,7 +32,7 @@ pub struct StreamInfo {
     pub sections: Vec<SectionInfo>,
     /// Number of Gaussians.
     pub gaussian_count: u32,
-    /// What every Gaussian has, but for the harmonics beyond degree 0.
+    /// The attributes of every Gaussian, without the spherical harmonics beyond degree 0.
     pub attributes: Vec<AttributeInfo>,
     /// Degree of the spherical harmonics.
     pub sh_degree: u8,
@@ -42,9 +42,9 @@ pub struct StreamInfo {
     pub planes: PlaneLayout,
     /// Bytes of each plane, in the order of the planes; empty where they are float32.
     pub plane_bytes: Vec<PlaneBytes>,
-    /// Quantization steps of the planes, one entry for all scales or one a scale; empty where they are float32.
+    /// Quantization steps of the planes, one entry for all scales or one for each; empty where they are float32.
     pub plane_steps: Vec<PerGroup>,
-    /// The context model without its numbers, where planes are coded under one.
+    /// The context model without its numbers, where planes are coded with one.
     pub context_model: Option<ContextModelArrays>,
     /// How the Gaussians move, without the numbers.
     pub motion: MotionArrays,
@@ -55,7 +55,7 @@ pub struct StreamInfo {
 pub struct SectionInfo {
     /// Its name.
     pub name: &'static str,
-    /// What it holds.
+    /// Its kind.
     pub kind: Kind,
     /// How its numbers are stored.
     pub encoding: Encoding,
@@ -67,17 +67,17 @@ pub struct SectionInfo {
     pub crc: u32,
 }
 
-/// What a stream holds: header, meta, counts, and the size of every section.
+/// Summarizes a stream: header, meta, counts, and the size of every section.
 ///
-/// All checksums are checked, so that this is also the quick test of a file for damage.
+/// All checksums are checked, so this is also a quick test of a file for damage.
 ///
 /// # Errors
-/// As [`crate::decode`], but for what only decoded numbers can show.
+/// As [`crate::decode`], except for errors that show only in decoded numbers.
 pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
     info_with_limits(bytes, &Limits::default())
 }
 
-/// As [`info`], within limits of the caller's.
+/// As [`info`], within limits of the caller.
 ///
 /// # Errors
 /// As [`info`].

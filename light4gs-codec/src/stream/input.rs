@@ -7,10 +7,10 @@ use crate::{
     planes, steps,
 };
 
-/// What a compressed stream keeps in full precision.
+/// Which parts of a compressed stream stay in full precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Profile {
-    /// Everything is quantized and entropy coded. Gaussians come back in another order.
+    /// Everything is quantized and entropy coded. Decoded Gaussians have another order.
     #[default]
     Compact,
     /// As in the paper: planes and spherical harmonics are entropy coded; the other attributes of the Gaussians and all
@@ -19,7 +19,7 @@ pub enum Profile {
 }
 
 impl Profile {
-    /// A name for people.
+    /// A name for display.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Compact => "compact",
@@ -31,9 +31,9 @@ impl Profile {
 /// How [`crate::encode_compressed`] codes a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CompressionInput {
-    /// What stays in full precision.
+    /// Which parts stay in full precision.
     pub profile: Profile,
-    /// The coding of the planes; float32 where there is none.
+    /// The coding of the planes; `None` writes them as float32.
     pub planes: Option<PlaneCoding>,
     /// The coding of the spherical harmonics beyond degree 0.
     pub sh: ShCoding,
@@ -66,11 +66,11 @@ impl CompressionInput {
 /// How finely the weights of each kind of network are quantized.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeightPrecisions {
-    /// Of what moves the Gaussians, whose errors show in the image.
+    /// Those of the motion, whose errors change the image.
     pub motion: WeightPrecision,
-    /// Of the context model, whose errors only cost bits.
+    /// Those of the context model, whose errors only cost bits.
     pub context_model: WeightPrecision,
-    /// Of the networks of the spherical harmonics, likewise.
+    /// Those of the networks of the spherical harmonics, whose errors only cost bits.
     pub sh: WeightPrecision,
 }
 

@@ -13,7 +13,7 @@ use crate::{
 
 const SECTION: &str = "meta";
 
-/// Refuses what cannot be written or makes no sense. That numbers are finite is checked elsewhere.
+/// Refuses metadata that cannot be written or makes no sense. Another function checks that numbers are finite.
 pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError> {
     check_name(SECTION, "name", &meta.name, limits)?;
     at_most(SECTION, "number of extra entries", meta.extra.len() as u64, limits.extras)?;
@@ -24,7 +24,7 @@ pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError>
     }
     at_most(SECTION, "frame_count", meta.frame_count.into(), limits.frames)?;
     limits.check_image(meta.width, meta.height)?;
-    // That numbers are finite is checked elsewhere.
+    // Another function checks that numbers are finite.
     if meta.fov_x >= PI && meta.fov_x.is_finite() {
         return Err(CodecError::invalid(SECTION, "fov_x", meta.fov_x, "an angle below π"));
     }
@@ -78,7 +78,7 @@ pub(crate) fn read(bytes: &[u8], limits: &Limits) -> Result<SceneMeta, CodecErro
     Ok(meta)
 }
 
-/// Keys rise strictly, so that a meta has one spelling only.
+/// Keys are strictly ascending, so that each meta has only one encoding.
 fn read_extra(reader: &mut Reader<'_>, limits: &Limits) -> Result<BTreeMap<String, String>, CodecError> {
     let count = reader.u32("number of extra entries")?;
     at_most(SECTION, "number of extra entries", count.into(), limits.extras)?;

@@ -1,11 +1,11 @@
-//! A scene to bytes and back.
+//! From a scene to bytes and back.
 //!
 //! | file | what |
 //! |---|---|
 //! | `container.rs` | header and table |
-//! | `meta.rs`, `scene_coordinates.rs` | the simple parts; the others have rooms of their own |
-//! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and doing it |
-//! | `open.rs`, `info.rs` | decoding section by section, and looking without decoding |
+//! | `meta.rs`, `scene_coordinates.rs` | the simple sections; the others have modules of their own |
+//! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and the compressor |
+//! | `open.rs`, `info.rs` | decoding section by section; a summary without decoding |
 
 mod compressor;
 pub(crate) mod container;
@@ -35,7 +35,7 @@ use crate::{
 
 /// Turns a scene into a `.l4gs` stream without loss: all numbers float32.
 ///
-/// The stream is decoded again and compared with `scene`, bit by bit, before it is returned.
+/// Before the stream is returned, it is decoded again and compared with `scene`, bit by bit.
 ///
 /// # Errors
 /// An array whose length disagrees with the others, a NaN or an infinity, a number beyond [`Limits::large`]; the
@@ -68,13 +68,13 @@ pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
 /// Turns a `.l4gs` stream into the scene that it holds.
 ///
 /// # Errors
-/// Whatever is wrong with the bytes; the message names the section. No input makes it panic, and none makes it take
-/// more memory or time than [`Limits`] says.
+/// Anything that is wrong with the bytes; the message names the section. No input causes a panic, or takes more memory
+/// or time than [`Limits`] allows.
 pub fn decode(bytes: &[u8]) -> Result<SceneData, CodecError> {
     decode_with_limits(bytes, &Limits::default())
 }
 
-/// As [`decode`], within limits of the caller's.
+/// As [`decode`], within limits of the caller.
 ///
 /// # Errors
 /// As [`decode`].
@@ -82,7 +82,7 @@ pub fn decode_with_limits(bytes: &[u8], limits: &Limits) -> Result<SceneData, Co
     OpenStream::with_limits(bytes, limits)?.scene()
 }
 
-/// Refuses a scene that contradicts itself, for the encoder and the decoder alike.
+/// Refuses a scene that contradicts itself, both in the encoder and in the decoder.
 pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError> {
     meta::check(&scene.meta, limits)?;
     attributes::check(&scene.gaussians, limits)?;

@@ -10,7 +10,7 @@ use crate::{
     sh::{self, coding::Conditions},
 };
 
-/// A stream whose header is sound and whose sections are decoded when they are asked for.
+/// A stream whose header has been checked and whose sections are decoded one by one, on request.
 ///
 /// For programs that need a part of a scene, or want to know how long each part takes; [`crate::decode`] decodes all of
 /// it.
@@ -37,7 +37,7 @@ impl<'a> OpenStream<'a> {
         Self::with_limits(bytes, &Limits::default())
     }
 
-    /// As [`OpenStream::new`], within limits of the caller's.
+    /// As [`OpenStream::new`], within limits of the caller.
     ///
     /// # Errors
     /// As [`OpenStream::new`].
@@ -55,7 +55,7 @@ impl<'a> OpenStream<'a> {
         &self.container.meta
     }
 
-    /// The Gaussians but for `sh_degree` and `sh_rest`.
+    /// The Gaussians without `sh_degree` and `sh_rest`.
     ///
     /// # Errors
     /// As [`crate::decode`].
@@ -108,7 +108,7 @@ impl<'a> OpenStream<'a> {
         planes::section::read(payload, &model, budget)
     }
 
-    /// Whether [`OpenStream::sh`] looks at the planes it is given.
+    /// Whether [`OpenStream::sh`] needs the planes.
     ///
     /// # Errors
     /// As [`crate::decode`].
@@ -117,8 +117,8 @@ impl<'a> OpenStream<'a> {
         sh::section::reads_feature_planes(payload, kind, &self.limits)
     }
 
-    /// `gaussians`, which come from this stream, with their `sh_degree` and `sh_rest`. The planes may be empty unless
-    /// [`OpenStream::sh_needs_feature_planes`].
+    /// `gaussians`, which come from this stream, completed by `sh_degree` and `sh_rest`. The planes may be empty if
+    /// [`OpenStream::sh_needs_feature_planes`] is false.
     ///
     /// # Errors
     /// As [`crate::decode`].
@@ -144,7 +144,7 @@ impl<'a> OpenStream<'a> {
         Ok(GaussianArrays { sh_degree: head.degree, sh_rest, ..gaussians })
     }
 
-    /// Everything. Sections that do not depend on each other are decoded at the same time where there are threads.
+    /// The whole scene. Sections that do not depend on each other are decoded at the same time where there are threads.
     ///
     /// # Errors
     /// As [`crate::decode`].
@@ -152,7 +152,7 @@ impl<'a> OpenStream<'a> {
         self.scene_and_demand().map(|(scene, _)| scene)
     }
 
-    /// Everything, and what it took.
+    /// The whole scene, and its cost.
     pub(crate) fn scene_and_demand(&self) -> Result<(SceneData, Demand), CodecError> {
         let budget = self.budget();
         self.check_sections()?;
@@ -178,7 +178,7 @@ impl<'a> OpenStream<'a> {
         Ok((scene, budget.demand()))
     }
 
-    /// Refuses a context model without coded planes, and the other way round.
+    /// Refuses a context model without coded planes, and coded planes without a context model.
     fn check_sections(&self) -> Result<(), CodecError> {
         let coded = self.container.section(Section::FeaturePlanes)?.0 == Kind::FeaturePlanesContextCoded;
         if self.container.has(Section::ContextModel) && !coded {
@@ -195,8 +195,8 @@ mod tests {
 
     use super::*;
 
-    /// What was asked for against what it took, on one thread: `LIGHT4GS_STREAMS=folder cargo test --release -p
-    /// light4gs-codec --lib calibration -- --ignored --nocapture`. The first must be more.
+    /// Compares the estimated time with the real one, on one thread: `LIGHT4GS_STREAMS=folder cargo test --release -p
+    /// light4gs-codec --lib calibration -- --ignored --nocapture`. The estimate must be larger.
     #[test]
     #[ignore = "needs a folder of streams"]
     fn calibration() {

@@ -1,6 +1,6 @@
-//! Parts of the compressor by themselves, for those who measure, compare or draw.
+//! Parts of the compressor, for programs that measure, compare or draw.
 //!
-//! Decoding by parts is [`crate::OpenStream`]'s; the other attributes are in [`crate::attributes`].
+//! To decode by parts, see [`crate::OpenStream`]; the other attributes are in [`crate::attributes`].
 
 use crate::{
     CodecError, Distributions, FeaturePlaneArrays, GaussianArrays, Limits, PlaneCoding, SceneCoordinateArrays,
@@ -10,7 +10,7 @@ use crate::{
     sh::{self, coding::Conditions},
 };
 
-/// The bytes of coded planes, with the model's weights as they are given.
+/// The bytes of coded planes. The model's weights are used as given.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`].
@@ -22,8 +22,8 @@ pub fn encode_planes(feature_planes: &FeaturePlaneArrays, coding: &PlaneCoding) 
     Ok(writer.bytes)
 }
 
-/// The bytes of coded spherical harmonics, with float32 weights. `coordinates` and `feature_planes`, decoded, matter to priors
-/// that read them.
+/// The bytes of coded spherical harmonics, with float32 weights. `coordinates` and `feature_planes`, decoded, are used
+/// by priors that read them.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`].
@@ -43,11 +43,11 @@ pub fn encode_sh(
     Ok(writer.bytes)
 }
 
-/// What the exact executor gives for one of decoded planes, `[M, height, width]`: the distributions that a
-/// stream's intervals come from. The step is not asked for, since all networks see planes in their own units.
+/// The distributions of a decoded plane as the exact executor computes them, `[M, height, width]`. A stream's coding
+/// intervals come from these. No step is needed, since all networks read planes in their own units.
 ///
 /// # Errors
-/// As [`crate::encode_compressed`]; a plane that is not there.
+/// As [`crate::encode_compressed`]; a plane that does not exist.
 pub fn plane_distributions(
     feature_planes: &FeaturePlaneArrays,
     coding: &PlaneCoding,
@@ -63,7 +63,8 @@ pub fn plane_distributions(
     Ok(Distributions { scales, means })
 }
 
-/// What the exact executor gives for the spherical harmonics of decoded Gaussians, `[N, channels]`.
+/// The distributions of the spherical harmonics of decoded Gaussians as the exact executor computes them, `[N,
+/// channels]`.
 ///
 /// # Errors
 /// As [`crate::encode_compressed`]; a coding without networks.

@@ -5,7 +5,7 @@ use crate::{
     bytes::{Reader, Section, Writer, sections::Kind},
 };
 
-/// The kind that holds scene coordinates: the mapping is written only where it is not the paper's.
+/// The kind for scene coordinates: a mapping is written only where it differs from the paper's.
 pub(crate) fn kind(coordinates: &SceneCoordinateArrays) -> Kind {
     match coordinates.mapping == CoordinateMapping::default() {
         true => Kind::SceneCoordinatesPrincipalAxes,

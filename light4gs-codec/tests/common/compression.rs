@@ -26,7 +26,7 @@ impl Random {
         (self.0 >> 40) as f32 / (1u64 << 23) as f32 - 1.0
     }
 
-    /// About normal, of variance 1.
+    /// Roughly normal, of variance 1.
     pub fn normal(&mut self) -> f32 {
         (0..12).map(|_| self.uniform()).sum::<f32>() * 0.5
     }
@@ -36,7 +36,7 @@ impl Random {
     }
 }
 
-/// What a model consists of; the codec knows nothing of these.
+/// The parts of a model. The codec itself has no such parts.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Parts {
     pub hyperprior: bool,
@@ -95,7 +95,7 @@ pub fn reference_shape(channels: u32, parts: Parts) -> Shape {
 }
 
 impl Random {
-    /// Random weights that keep the size of what they are applied to.
+    /// Random weights that keep the magnitude of their inputs.
     pub fn layer(&mut self, kind: LayerKind, inputs: u32, outputs: u32, kernel: u32, groups: u32) -> Layer {
         let mut layer = Layer { kind, inputs, outputs, kernel, groups, weight: Vec::new(), bias: Vec::new() };
         let fan_in = (inputs / groups * kernel * kernel) as f32;
@@ -252,12 +252,12 @@ pub fn plane_coding(planes: &FeaturePlaneArrays, model: ContextModelArrays, step
     PlaneCoding { model, steps, latent_symbols }
 }
 
-/// Both steps alike.
+/// The same step for both groups.
 pub fn step(step: f32) -> Vec<PerGroup> {
     vec![PerGroup { space_only: step, space_time: step }]
 }
 
-/// A table a channel.
+/// One table for each channel.
 pub fn sh_tables(degree: u8) -> ShCoding {
     ShCoding::Tables { step: 0.02, tables: vec![laplace_table(0.6); 3 * sh_rest_coefficients(degree)] }
 }
@@ -267,9 +267,9 @@ pub fn sh_tables(degree: u8) -> ShCoding {
 pub enum ShKind {
     /// Degree by degree, from the color and all lower degrees.
     Autoregressive,
-    /// One network, from the planes over space.
+    /// One network, from the space-only planes.
     HexPlaneCoupled,
-    /// One network a degree, from everything that there is.
+    /// One network for each degree, from all sources.
     Everything,
 }
 
@@ -352,19 +352,19 @@ fn fill(mut scene: SceneData, mut random: Random) -> SceneData {
     scene
 }
 
-/// All parts, tables for the harmonics.
+/// All parts; tables for the spherical harmonics.
 pub fn input(scene: &SceneData, profile: Profile, shape: Shape) -> CompressionInput {
     CompressionInput {
         profile,
         planes: Some(plane_coding(&scene.feature_planes, model(shape, &scene.feature_planes, 3), step(0.1))),
         sh: sh_tables(scene.gaussians.sh_degree),
-        // The label has no step.
+        // The attribute `label` has no step.
         attributes: AttributeSteps::default().with("age", 0.01),
         weights: Default::default(),
     }
 }
 
-/// Two small scenes and how to code them, with something of everything between them.
+/// Two small scenes and their coding. In the two together every kind of data occurs.
 pub fn tiny(profile: Profile) -> (SceneData, CompressionInput) {
     let scene = scene(6, 2, 4, [8, 4, 4, 4], &[1, 2]);
     let (shape, kind) = match profile {

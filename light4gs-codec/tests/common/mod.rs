@@ -1,4 +1,4 @@
-//! A small scene that has something of everything.
+//! A small scene in which every kind of data occurs.
 
 #![allow(dead_code, unreachable_pub)] // each test binary uses its part
 
@@ -12,7 +12,7 @@ use light4gs_codec::{
     sh_rest_coefficients,
 };
 
-/// Numbers that differ from each other, are exact in float32 and follow from their position alone.
+/// Numbers that all differ, are exact in float32 and depend only on their position.
 pub fn numbers(count: usize) -> Vec<f32> {
     (0..count).map(|i| (i as f32 - 3.0) / 8.0).collect()
 }
@@ -36,7 +36,7 @@ pub fn gaussians(count: usize, sh_degree: u8) -> GaussianArrays {
     }
 }
 
-/// An attribute beyond those of all scenes, which may be left out.
+/// An optional further attribute.
 pub fn further(name: &str, width: usize, count: usize) -> FurtherAttribute {
     FurtherAttribute { name: name.into(), width: width as u32, values: numbers(width * count), optional: true }
 }
@@ -62,7 +62,7 @@ pub fn linear(inputs: usize, outputs: usize) -> Layer {
     Layer::linear(numbers(inputs * outputs), numbers(outputs))
 }
 
-/// A network that moves positions and rotations, and a tensor that nobody knows.
+/// A network that moves positions and rotations, and a tensor of no known use.
 pub fn motion(features: u32) -> MotionArrays {
     let (mut network, inputs) = Network::new([features, 1]);
     let known = network.node(Operation::Concatenate, &inputs);
@@ -127,7 +127,7 @@ pub fn put(bytes: &mut [u8], at: usize, new: &[u8]) {
     bytes[at..at + new.len()].copy_from_slice(new);
 }
 
-/// Computes the header's checksum again, as somebody would who means harm.
+/// Computes the header's checksum again, as an attacker would.
 pub fn forge_header(bytes: &mut [u8]) {
     let end = (table_at(bytes) + ENTRY * u32_at(bytes, 12) as usize).min(bytes.len());
     let crc = crc32c::crc32c_append(crc32c::crc32c(&bytes[..28]), &bytes[32..end]);

@@ -1,4 +1,4 @@
-//! Coded attributes: what comes back, what is refused, what damage does.
+//! Coded attributes: round trips, refusals, damage.
 
 use light4gs_codec::{
     FurtherAttribute, GaussianArrays, Limits,
@@ -53,7 +53,7 @@ fn further(name: &str, width: u32, count: usize) -> FurtherAttribute {
     }
 }
 
-/// Encodes, decodes, compares, and gives the bytes.
+/// Encodes, decodes, compares, and returns the bytes.
 fn round_trip(given: &GaussianArrays, steps: &AttributeSteps) -> Vec<u8> {
     let encoded = attributes::encode(given, steps).unwrap();
     let decoded = attributes::decode(&encoded.bytes, &Limits::default()).unwrap();
@@ -116,7 +116,7 @@ proptest! {
     #[test]
     fn any_bytes_end(bytes in prop::collection::vec(any::<u8>(), 0..400), count in 0..3000_u32) {
         let _ = attributes::decode(&bytes, &Limits::default());
-        // Most bytes fail at their head; these get to the streams.
+        // Most random bytes fail at the head; these get as far as the streams.
         let mut sound = attributes::encode(&cloud(300), &AttributeSteps::default()).unwrap().bytes;
         sound[..4].copy_from_slice(&count.to_le_bytes());
         let streams = sound.len() - 400..;
@@ -141,7 +141,7 @@ fn further_attributes_follow_their_gaussians() {
         let mut given = cloud(count);
         given.further = vec![further("lifetime", 2, count), further("a", 1, count), further("features", 20, count)];
         given.further[1].optional = true;
-        // Those without a step are float32.
+        // Attributes without a step are float32.
         for steps in [AttributeSteps::default(), AttributeSteps::default().with("lifetime", 0.01).with("features", 0.1)]
         {
             round_trip(&given, &steps);
@@ -149,7 +149,7 @@ fn further_attributes_follow_their_gaussians() {
     }
 }
 
-/// The bytes of a further attribute are its own: those of the others stay the same.
+/// A further attribute has bytes of its own: the bytes of the others stay the same.
 #[test]
 fn a_further_attribute_changes_no_other_stream() {
     let steps = AttributeSteps::default().with("lifetime", 0.01);
@@ -162,12 +162,12 @@ fn a_further_attribute_changes_no_other_stream() {
     assert_eq!(with.bytes[with.sizes.overhead..][..length], without.bytes[begin..]);
 }
 
-/// A row of the list in a section: name, width, coder with the mark of what may be left out, bytes of the stream.
+/// A row of the list in a section: name, width, coder with the mark that it may be left out, bytes of the stream.
 fn row(name: &[u8], width: &[u8], coder: u8, bytes: &[u8]) -> Vec<u8> {
     [&[name.len() as u8], name, width, &[coder], bytes].concat()
 }
 
-/// Ten Gaussians with these rows in place of the further attributes', and these bytes behind all others.
+/// Ten Gaussians with these rows in place of those of the further attributes, and these bytes after all others.
 fn forged(rows: &[Vec<u8>], behind: &[u8]) -> Result<GaussianArrays, String> {
     let encoded = attributes::encode(&cloud(10), &AttributeSteps::default()).unwrap();
     let (head, streams) = encoded.bytes.split_at(encoded.sizes.overhead);
@@ -203,7 +203,7 @@ fn what_a_stream_says_of_further_attributes_is_checked() {
     refused(&[row(b"age", &[1], 2, &[41])], "age needs 41 bytes, 40 are left");
     refused(&vec![plain(b"age"); 60], "number of attributes is 65, at most 64");
 
-    // A coder that nobody knows, and an attribute that may be left out.
+    // An unknown coder, and an optional attribute.
     refused(&[row(b"age", &[1], 9, &[40])], "coder of age is 9 (unknown), expected one that this program knows");
     assert_eq!(forged(&[row(b"age", &[1], 0x80 | 9, &[40])], &numbers).unwrap().further, []);
 }
@@ -226,7 +226,7 @@ fn the_built_in_attributes_are_all_there() {
     assert!(change(12, 0).contains("coder of means is 0 (float32)"));
 }
 
-/// A wide attribute of next to no bytes must be paid for like anything else.
+/// The memory of a wide attribute counts, though its stream has nearly no bytes.
 #[test]
 fn width_is_within_the_budget() {
     let count = 40_000;
@@ -299,7 +299,7 @@ fn damage_never_panics() {
     for end in 0..bytes.len() {
         assert!(attributes::decode(&bytes[..end], &Limits::default()).is_err(), "cut at {end}");
     }
-    // A step prime to 8 meets every bit of a byte.
+    // The step is odd, so that every bit of a byte occurs.
     for bit in (0..8 * bytes.len()).step_by(3) {
         let mut flipped = bytes.clone();
         flipped[bit / 8] ^= 1 << (bit % 8);

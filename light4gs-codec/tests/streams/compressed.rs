@@ -1,4 +1,4 @@
-//! Compressed scenes: what comes back is what the encoder said, for every shape and every part.
+//! Compressed scenes: what is decoded is what the encoder promised, for every shape and every part.
 
 use crate::common;
 
@@ -74,7 +74,7 @@ fn every_combination_of_parts() {
     }
 }
 
-/// What a network costs beside its weights.
+/// The bytes of a network besides its weights.
 #[test]
 fn a_description_is_short() {
     let scene = scene(0, 0, 16, [4, 4, 4, 4], &[1, 2]);
@@ -88,13 +88,13 @@ fn a_description_is_short() {
         layers.sum()
     };
     let weights: u64 = model.networks.iter().map(stored).sum();
-    // Beside the description there are the latent's medians and its tables, some 20 bytes each.
+    // Besides the description there are the latent's medians and its tables, some 20 bytes each.
     let description = encoded.report.sections[5].3 - 4 * weights;
     assert!(description < 200, "{description} bytes");
 }
 
-/// A context model that the codec has never heard of: halved and doubled maps, sums, products and rectifiers, planes that
-/// read planes over other axes in a chain, two networks over anchors, a latent at higher scales alone.
+/// A context model unlike any built-in one: halved and doubled maps, sums, products and rectifiers, planes that read
+/// planes over other axes in a chain, two networks over anchors, a latent at higher scales alone.
 #[test]
 fn a_composition_of_ones_own() {
     const M: u32 = 4;
@@ -102,7 +102,7 @@ fn a_composition_of_ones_own() {
     let mut random = Random::new(21);
     let mut networks = Vec::new();
 
-    // 0: what a decoded plane of any size says: halved, rectified, doubled, plus itself through a 7 x 7 kernel.
+    // 0: from a decoded plane of any size: halved, rectified, doubled, plus itself through a 7 x 7 kernel.
     let (mut network, [plane]) = Network::new([M]);
     let resized = network.node(Operation::Resize, &[plane]);
     let half = network.layer(resized, random.layer(LayerKind::Halving, M, 3, 5, 1));
@@ -155,7 +155,7 @@ fn a_composition_of_ones_own() {
         }),
         networks,
         priors,
-        // xy, then xz from it, then xt from that, then yz and yt and zt from what stands after them.
+        // xy, then xz from it, then xt from that, then yz, yt and zt from those before them.
         plane_priors: vec![0, 1, 2, 3, 0, 2, 4, 5, 4, 5, 4, 0],
     };
     for profile in [Profile::Compact, Profile::Paper] {
@@ -170,7 +170,7 @@ fn a_composition_of_ones_own() {
         assert_eq!(has_latent[6..], [true, true, true, true, true, false]);
     }
 
-    // Planes that wait for each other, and for what is not there.
+    // Planes that depend on each other, and on planes that do not exist.
     let sound = self::model(compact_shape(M, ALL_PARTS), &scene.feature_planes, 1);
     let refused = |spoil: &dyn Fn(&mut ContextModelArrays)| {
         let mut model = model.clone();
@@ -178,10 +178,10 @@ fn a_composition_of_ones_own() {
         let coding = PlaneCoding { model, ..plane_coding(&scene.feature_planes, sound.clone(), step(0.1)) };
         encode_planes(&scene.feature_planes, &coding).unwrap_err().to_string()
     };
-    assert!(refused(&|model| model.plane_priors[..6].fill(2)).contains("planes that wait for this one"));
+    assert!(refused(&|model| model.plane_priors[..6].fill(2)).contains("planes that depend on this one"));
     assert!(
         refused(&|model| model.priors[2].conditions[0] = other(PlaneAxes::Xt))
-            .contains("planes that wait for this one")
+            .contains("planes that depend on this one")
     );
     assert!(refused(&|model| model.plane_priors[0] = 4).contains("a source of plane 0.xy is the scale below"));
     assert!(refused(&|model| model.plane_priors[0] = 9).contains("prior of planes[0] is 9, expected less than 6"));
@@ -304,7 +304,8 @@ fn harmonics_need_no_planes_unless_coupled() {
     }
 }
 
-/// The distributions of the decoded planes are those that the planes were coded under: the coded bits say so.
+/// The distributions of the decoded planes are those with which the planes were coded: the coded bits are those that
+/// they expect.
 #[test]
 fn the_coded_bits_are_those_of_the_distributions() {
     let scene = scene(0, 0, 16, [32, 32, 32, 16], &[1, 2]);

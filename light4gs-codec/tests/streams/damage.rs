@@ -1,4 +1,4 @@
-//! Damage by accident: always found.
+//! Accidental damage is always found.
 
 use crate::common;
 

@@ -19,7 +19,7 @@ fn a_scene_through_a_file() {
     assert!(read_file(folder.path()).unwrap_err().to_string().contains("it is a folder"));
 }
 
-/// A pipe would wait for its other end, a device may never end.
+/// Opening a pipe would wait for its writer, and a device may never end.
 #[cfg(target_os = "linux")]
 #[test]
 fn only_regular_files_are_opened() {

@@ -1,4 +1,4 @@
-//! Streams of earlier days stay readable, and today's bytes are theirs.
+//! Streams that were written earlier stay readable, and the same scenes still give their bytes.
 
 use crate::common;
 
@@ -14,7 +14,7 @@ fn float32_reads_and_writes_as_it_did() {
     assert_eq!(encode(&sample()).unwrap(), FLOAT32);
 }
 
-/// Compressed streams of a day, each with the scene that it decoded to then, as a stream without loss.
+/// Compressed streams that were written once, each with the scene that it decoded to then, as a stream without loss.
 const COMPRESSED: [(Profile, &[u8], &[u8]); 2] = [
     (
         Profile::Compact,
@@ -39,7 +39,7 @@ fn compressed_streams_read_as_they_did() {
 }
 
 /// The encoder's own arithmetic is as exact as the decoder's: every build of it writes the same bytes, whatever
-/// instructions the compiler may use. A better encoder may change these checksums.
+/// instructions the compiler may use. An improved encoder may change these checksums.
 #[test]
 fn every_build_writes_the_same_bytes() {
     let checksums = [Profile::Compact, Profile::Paper].map(|profile| {

@@ -1,4 +1,4 @@
-//! The stream: written and read back, damaged, refused, and what each of its parts costs.
+//! The stream: writing and reading, damage, refusals, and the bytes of each part.
 
 #[path = "../common/mod.rs"]
 mod common;

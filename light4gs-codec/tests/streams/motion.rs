@@ -1,4 +1,4 @@
-//! Positions at a time, on a scene small enough to do by hand.
+//! Positions at a time, on a scene small enough to compute by hand.
 
 use crate::common;
 
@@ -9,7 +9,7 @@ use light4gs_codec::{
     network::{Layer, Operation},
 };
 
-/// One channel; all planes are 1 but xt, which rises from 0 to 2 over time; the network passes the feature on.
+/// One channel; all planes are 1 except xt, which rises from 0 to 2 over time; the network outputs the feature.
 fn scene() -> SceneData {
     let mut scene = SceneData { gaussians: common::gaussians(1, 0), ..sample() };
     scene.gaussians.means = vec![[0.5, 0.0, 0.0]];
@@ -37,13 +37,13 @@ fn scene() -> SceneData {
 #[test]
 fn features_move_positions() {
     let scene = scene();
-    // time, feature: 2 f - 1, rectified, plus 0.5.
+    // Time; then 2 f - 1 for the feature f, rectified, plus 0.5.
     for (time, hidden) in [(0.0, 0.5), (0.25, 0.5), (0.5, 1.5), (0.75, 2.5), (1.0, 3.5), (7.0, 3.5)] {
         assert_eq!(scene.positions_at(time).unwrap(), [[0.5 + hidden, -hidden, 4.0]], "at {time}");
     }
 }
 
-/// A field that this crate has never heard of: circles around a point, without planes, of a kind of its own.
+/// A field unknown to this crate: circles around a point, without planes, of a kind of its own.
 #[test]
 fn any_network_of_known_sources_moves() {
     let mut scene = SceneData { feature_planes: Default::default(), ..scene() };
@@ -58,7 +58,7 @@ fn any_network_of_known_sources_moves() {
     scene.motion = MotionArrays { kind: "never-heard-of".into(), network: Some(motion), tensors: Vec::new() };
     let decoded = decode(&encode(&scene).unwrap()).unwrap();
     assert_eq!(decoded, scene);
-    // Inside of the unit ball a coordinate is half a world unit.
+    // Within the unit ball, a coordinate is half a world unit.
     scene.gaussians.means.iter_mut().for_each(|mean| *mean = mean.map(|x| x / 100.0));
     for (moved, mean) in scene.positions_at(0.5).unwrap().iter().zip(&scene.gaussians.means) {
         for (axis, scale) in [0.5f32, 1.0, 1.5].into_iter().enumerate() {
@@ -95,7 +95,7 @@ fn a_network_that_does_not_fit_is_refused() {
     assert!(message(|scene| network(scene).outputs.clear()).contains("number of named outputs is 1, expected 0"));
 }
 
-/// A scene would look wrong without an attribute that nobody knows: it decodes, and is not shown.
+/// A scene that would look wrong without an unknown attribute can be decoded, but is not shown.
 #[test]
 fn unknown_attributes_are_refused_where_a_scene_is_shown() {
     let age = FurtherAttribute { name: "age".into(), width: 1, values: vec![0.5, 1.5], optional: false };
@@ -112,7 +112,7 @@ fn unknown_attributes_are_refused_where_a_scene_is_shown() {
     assert_eq!((&described.name[..], described.width, described.bytes, described.optional), ("age", 1, 8, false));
     refused(&scene);
 
-    // It may be left out, or the network reads it, or what moves the Gaussians is known by its kind alone.
+    // The scene is shown if the attribute is optional, if the network reads it, or if the motion has only a kind.
     let mut optional = scene.clone();
     optional.gaussians.further[0].optional = true;
     assert!(MotionEvaluator::new(&decode(&encode(&optional).unwrap()).unwrap()).is_ok());

@@ -1,4 +1,4 @@
-//! Coded network weights: what comes back, what is refused, what damage does.
+//! Coded network weights: round trips, refusals, damage.
 
 use light4gs_codec::{
     CodecError, Limits,
@@ -95,7 +95,7 @@ fn damage_never_panics() {
     }
 }
 
-/// Bytes of the deformation networks of trained scenes, as the test of the same name in `attributes.rs`.
+/// Bytes of the deformation networks of trained scenes; run it like the test of the same name in `attributes.rs`.
 #[test]
 #[ignore = "needs trained scenes"]
 fn measured_on_trained_scenes() {

@@ -1,4 +1,4 @@
-//! The operations of networks on single places: values, refusals, bytes.
+//! The operations of networks at single places: values, refusals, bytes.
 
 use crate::common;
 
@@ -7,7 +7,7 @@ use light4gs_codec::{
     network::{Layer, Node, Operation, Value},
 };
 
-/// What one node makes of its inputs.
+/// The result of one node.
 fn run(operation: Operation, inputs: &[&[f32]]) -> Vec<f32> {
     try_run(operation, inputs).unwrap()
 }
@@ -73,15 +73,15 @@ fn operations_that_do_not_fit_are_refused() {
     assert!(network.evaluate(&[vec![1.0]]).unwrap_err().to_string().contains("channels of all values"));
 }
 
-/// A scene without planes, whose Gaussians fade and turn: everything new in one network.
+/// A scene without planes, whose Gaussians fade and turn: one network with all operations that `hexplane` does not use.
 fn scene() -> SceneData {
     let mut scene =
         SceneData { feature_planes: Default::default(), gaussians: common::gaussians(11, 1), ..common::sample() };
     let (mut network, [time, means, quats, logits, dc]) = Network::new([1, 3, 4, 1, 3]);
-    // Of the time alone: a turn about z as a quaternion, and a center.
+    // From the time alone: a turn about z as a quaternion, and a center.
     let turn = network.layer(time, Layer::linear(vec![0.0, 0.0, 0.0, 1.0], vec![1.0, 0.0, 0.0, 0.0]));
     let center = network.constant(time, 1, vec![0.5, -1.0, 2.0]);
-    // exp(-|x - c|² / 2) is how much of the turn a Gaussian takes.
+    // exp(-|x - c|² / 2) is the share of the turn that a Gaussian follows.
     let offset = network.node(Operation::Subtract, &[means, center]);
     let square = network.node(Operation::Multiply, &[offset, offset]);
     let square = network.node(Operation::GroupSum(3), &[square]);
@@ -124,7 +124,7 @@ fn motion_reads_attributes_and_replaces_them() {
     let canonical = &scene.gaussians;
     let mut moved = canonical.clone();
     let time = 0.75f32;
-    // In parts, of which one begins within a block of eight.
+    // In parts, one of which begins within a block of eight.
     for range in [0..3, 3..9, 9..canonical.len()] {
         evaluator.apply(canonical, time, range, &mut moved);
     }
@@ -159,6 +159,6 @@ fn sources_and_outputs_that_do_not_fit_are_refused() {
     assert!(message.contains("velocity") && message.contains("an attribute that the Gaussians have"), "{message}");
     assert!(refused(|motion| motion.sources[1] = MotionSource::Attribute("quats".into())).contains("expected 4"));
     assert!(refused(|motion| motion.outputs[0] = MotionOutput::NewPosition).contains("NewPosition"));
-    // Added to and replaced at once.
+    // An attribute that is both added to and replaced.
     assert!(refused(|motion| motion.outputs[2] = MotionOutput::OpacityLogit).contains("OpacityLogit"));
 }

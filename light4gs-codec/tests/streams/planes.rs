@@ -1,4 +1,5 @@
-//! Feature planes that are no hexplane: other sets of axes, other sets at other scales, sizes that do not agree.
+//! Feature planes other than a hexplane: other axes, different axes at each scale, sizes that differ along a common
+//! axis.
 
 use super::common;
 use super::common::compression::{
@@ -14,12 +15,12 @@ use proptest::prelude::*;
 
 const CHANNELS: u32 = 4;
 
-/// One plane, filled later.
+/// One plane, without values yet.
 fn plane(scale: u32, axes: PlaneAxes, [width, height]: [u32; 2]) -> Plane {
     Plane { scale, axes, height, width, values: vec![0.0; (CHANNELS * width * height) as usize] }
 }
 
-/// Sets of planes that a program may have.
+/// Sets of planes that a field may have.
 fn sets() -> Vec<(&'static str, FeaturePlaneArrays)> {
     let of = |axes: &[PlaneAxes], multipliers: &[u32]| planes(axes, CHANNELS, [8, 12, 4, 16], multipliers);
     let list = |planes: Vec<Plane>| FeaturePlaneArrays { channels: CHANNELS, planes };
@@ -88,7 +89,7 @@ fn any_set_of_planes_is_coded_under_a_context_model() {
                 assert_eq!(given.shape(), decoded.shape(), "{name}");
                 let errors = given.values.iter().zip(&decoded.values).map(|(a, b)| (a - b).abs());
                 assert!(errors.fold(0.0, f32::max) <= 0.0501, "{name}, plane {}", given.shape().name());
-                // A latent where nothing else speaks for the plane.
+                // A latent for planes that no other part of the model predicts.
                 let layout = scene.feature_planes.layout().unwrap();
                 let alone = layout.one_scale_below(index).is_none() && layout.over_time(index).is_none();
                 assert_eq!(encoded.report.planes[index].latent > 0, alone, "{name}, plane {}", given.shape().name());
@@ -100,7 +101,7 @@ fn any_set_of_planes_is_coded_under_a_context_model() {
     }
 }
 
-/// A feature is the product of the planes that are there, and of nothing else.
+/// A feature is the product of exactly those planes that exist.
 #[test]
 fn motion_reads_the_planes_that_are_there() {
     let moved = |planes: FeaturePlaneArrays| {
@@ -131,7 +132,7 @@ fn motion_reads_the_planes_that_are_there() {
     }
 }
 
-/// What a stranger may write where the planes are listed.
+/// Hostile bytes in the list of planes.
 #[test]
 fn lists_of_planes_that_lie() {
     // Channels, 2 scales, which planes there are, cells along x, y, z, t.
@@ -151,24 +152,24 @@ fn lists_of_planes_that_lie() {
     let no_bits = spoilt(2, 0).to_string();
     assert!(no_bits.contains("planes of scale 0 is 0b00000000, expected a bit for each of xy"), "{no_bits}");
     assert!(spoilt(7, 0b1011_1111).to_string().contains("planes of scale 1"));
-    // Planes of sizes of their own that agree have another spelling.
+    // Planes with sizes of their own must not agree: that has another encoding.
     let own = [1, 1, 0b100_0011, 2, 1, 2, 1];
     assert!(refuse(&own).to_string().contains("sizes of scale 0 is one for each plane"));
-    // One that disagrees: the same bytes of values are too many.
+    // One size differs: then there are too many bytes of values.
     let own = [1, 1, 0b100_0011, 2, 1, 1, 1];
     assert!(matches!(refuse(&own), CodecError::TrailingBytes { section: "feature_planes", .. }));
     assert!(matches!(spoilt(1, 17), CodecError::OverLimit { limit: 16, .. }));
     assert!(spoilt(6, 0).to_string().contains("height of plane 0.xt is 0"));
-    // Fewer planes than numbers, and more.
+    // Fewer planes than the values are for, and more.
     assert!(matches!(spoilt(2, 0b01_1111), CodecError::Invalid { .. } | CodecError::TrailingBytes { .. }));
     assert!(matches!(refuse(&[1, 2, 0b11_1111, 3, 2, 2, 3, 0b11_1111, 4, 2, 2, 3]), CodecError::Truncated { .. }));
-    // Sixteen scales of the largest planes are asked for and not there; nothing is allocated for them.
+    // Sixteen scales of the largest planes, without their bytes: nothing is allocated for them.
     let large: Vec<u8> = (0..16).flat_map(|_| [&[0b11_1111][..], &[0x80, 0x80, 0x04].repeat(4)].concat()).collect();
     let error = refuse(&[&[1, 16][..], &large].concat());
     assert!(matches!(error, CodecError::Truncated { .. }), "{error}");
 }
 
-/// A model that was made for other planes.
+/// A model that was made for other planes is refused.
 #[test]
 fn models_of_other_planes_are_refused() {
     let hexplane = planes(&PlaneAxes::ALL, CHANNELS, [8, 8, 8, 4], &[1, 2]);
@@ -191,7 +192,7 @@ fn models_of_other_planes_are_refused() {
     assert!(found.contains("number of planes with a prior is 12, expected 6"), "{found}");
     let found = message(triplane.clone(), &|input| input.planes = Some(coding(&triplane, &of_space)));
     assert!(found.contains("a source of plane 0.xy is xt"), "{found}");
-    // A plane above without one below.
+    // A plane at the upper scale without one below.
     let mut planes = hexplane.clone();
     planes.planes.remove(5);
     let mut some = priors.clone();
@@ -206,7 +207,7 @@ fn models_of_other_planes_are_refused() {
 }
 
 prop_compose! {
-    /// Any list of planes in order.
+    /// Any legal list of planes.
     fn lists()(
         bits in prop::collection::vec(1u8..64, 1..4),
         cells in prop::array::uniform4(1u32..4),
@@ -236,7 +237,7 @@ proptest! {
         let coded = encode_compressed(&scene, &input(&scene, Profile::Compact, compact_shape(CHANNELS, ALL_PARTS)));
         let coded = coded.unwrap();
         prop_assert_eq!(&decode(&coded.bytes).unwrap(), &coded.decoded);
-        // A bit of the head that has changed is refused or decodes; it never panics.
+        // With one changed bit in the head, the stream is refused or decodes; it never panics.
         let mut payload = common::payload(&coded.bytes, 4).to_vec();
         let bit = cut.index(8 * payload.len().min(32));
         payload[bit / 8] ^= 1 << (bit % 8);

@@ -1,7 +1,7 @@
-//! Networks that nobody would draw: random graphs, huge shapes, work bombs.
+//! Unusual networks: random graphs, huge shapes, and networks that would take very long.
 //!
-//! Whatever the nodes say, a file that holds them decodes to what the encoder promises or is refused, soon and in little
-//! memory; it never brings the decoder down.
+//! Whatever the nodes are, a file that holds them either decodes to what the encoder promises or is refused, soon and
+//! in little memory. It never crashes the decoder.
 
 use crate::common;
 
@@ -20,7 +20,7 @@ use proptest::prelude::*;
 
 const M: u32 = 2;
 
-/// A node of any kind that reads any values before it, so that channels often fit.
+/// A node of any kind that reads any values before it; often its channels fit.
 fn node(choice: u8, picks: [u8; 3], channels: &[u32], random: &mut Random) -> Node {
     let value = |pick: u8| Value(u32::from(pick) % channels.len() as u32);
     let first = value(picks[0]);
@@ -64,7 +64,7 @@ fn node(choice: u8, picks: [u8; 3], channels: &[u32], random: &mut Random) -> No
     Node { operation, inputs }
 }
 
-/// A graph over some inputs, whose end is made to fit: a linear layer at the plane's size.
+/// A graph over some inputs, with a last node that makes it fit: a linear layer at the plane's size.
 fn graph(inputs: &[u32], choices: &[(u8, [u8; 3])], random: &mut Random) -> Network {
     let mut network = Network { inputs: inputs.to_vec(), ..Network::default() };
     let mut channels = inputs.to_vec();
@@ -88,7 +88,7 @@ fn graph(inputs: &[u32], choices: &[(u8, [u8; 3])], random: &mut Random) -> Netw
     network
 }
 
-/// A model in which one graph speaks for every plane from all kinds of sources.
+/// A model in which one graph predicts every plane from all kinds of sources.
 fn model(graph: Network, sources: Vec<PlaneSource>, random: &mut Random) -> ContextModelArrays {
     let own = Some(Condition { network: 0, sources });
     let priors = vec![
@@ -119,7 +119,8 @@ proptest! {
         let scene = scene(2, 0, M, [4, 8, 4, 4], &[1, 2]);
         let model = model(network, sources, &mut random);
         let others = input(&scene, Profile::Paper, compact_shape(M, ALL_PARTS));
-        // Whether there is a latent is said by sources alone, so the coding can be made before the model is checked.
+        // Whether there is a latent depends on the sources alone, so the coding can be made before the model is
+        // checked.
         let planes = Some(plane_coding(&scene.feature_planes, model, step(0.1)));
         match encode_compressed(&scene, &CompressionInput { planes, ..others }) {
             Ok(encoded) => {
@@ -134,7 +135,7 @@ proptest! {
         }
     }
 
-    /// A sound stream whose description is overwritten, with checksums that fit.
+    /// A legal stream whose description is overwritten, with checksums that fit.
     #[test]
     fn any_bytes_as_a_description(
         at in 0usize..160,
@@ -161,7 +162,7 @@ proptest! {
 
 static STREAM: std::sync::OnceLock<Vec<u8>> = std::sync::OnceLock::new();
 
-/// What the encoder says to a model with this network for the higher scales.
+/// The error of the encoder for a model with this network for the higher scales.
 fn refusal(network: Network, sources: &[PlaneSource]) -> CodecError {
     let mut random = Random::new(3);
     let scene = scene(0, 0, M, [64, 64, 64, 64], &[1, 2]);
@@ -199,7 +200,7 @@ fn bombs_are_refused_before_they_go_off() {
     network.output(value);
     over(refusal(network, &lower));
 
-    // Wide layers: the file would be small, since weights of zero take next to no bytes.
+    // Wide layers: the file would be small, since weights of zero take nearly no bytes.
     let (mut network, [value]) = Network::new([M]);
     let wide =
         |inputs: u32, outputs: u32| Layer::linear(vec![0.0; (inputs * outputs) as usize], vec![0.0; outputs as usize]);

@@ -1,4 +1,4 @@
-//! What the encoder does not write.
+//! Scenes that the encoder refuses.
 
 use crate::common;
 
@@ -15,12 +15,12 @@ fn network(scene: &mut SceneData) -> &mut MotionNetwork {
     scene.motion.network.as_mut().unwrap()
 }
 
-/// The first layer of what moves the sample.
+/// The first layer of the sample's motion.
 fn layer(scene: &mut SceneData) -> &mut Layer {
     network(scene).network.layers_mut().next().unwrap()
 }
 
-/// The message for the sample after `spoil`.
+/// The message for the sample after a change by `spoil`.
 fn message(spoil: impl FnOnce(&mut SceneData)) -> String {
     let mut scene = sample();
     spoil(&mut scene);
@@ -103,7 +103,7 @@ fn numbers_beyond_the_limits() {
     over(|scene| layer(scene).outputs = u32::MAX);
 }
 
-/// What a configuration may ask before anything is trained; the encoder asks the same.
+/// The checks that a configuration can call before training are those of the encoder.
 #[test]
 fn what_is_refused_before_training() {
     let planes = |channels: u32, resolution: [usize; 4], multipliers: &[usize]| {

@@ -1,4 +1,4 @@
-//! What goes in comes out, to the last bit.
+//! A decoded scene is the given one, to the last bit.
 
 use crate::common;
 
@@ -59,10 +59,10 @@ fn info_tells_what_is_inside() {
 
 prop_compose! {
     fn metas()(
-        // No control characters, and none that turn the direction of text (general categories Cc and Cf).
+        // No control characters, and none that change the direction of text (general categories Cc and Cf).
         name in "[^\\p{Cc}\\p{Cf}]{0,12}",
         frame_count in 0u32..=100_000,
-        // 2^25 pixels are the most.
+        // At most 2^25 pixels.
         size_of_images in prop::array::uniform2(0u32..=5792),
         fps in 0.0f32..1e6,
         corner in prop::array::uniform3(-1e6f32..1e6),
@@ -99,7 +99,7 @@ prop_compose! {
             feature_planes: hexplane(channels, resolution, &multipliers),
             motion: if moves && features > 0 { motion(features) } else { MotionArrays::default() },
         };
-        // Any finite bit pattern may stand anywhere.
+        // Any finite bit pattern may occur anywhere.
         let mut random = values.iter().cycle();
         let arrays = [scene.gaussians.means.as_flattened_mut(), scene.gaussians.sh_rest.as_mut_slice()];
         let planes = scene.feature_planes.planes.iter_mut().map(|plane| plane.values.as_mut_slice());
@@ -118,7 +118,7 @@ proptest! {
         let bytes = encode(&scene).unwrap();
         let decoded = decode(&bytes).unwrap();
         prop_assert_eq!(&decoded, &scene);
-        // The same bits, not only equal numbers: the bytes are the same.
+        // The same bits, not only equal numbers.
         prop_assert_eq!(encode(&decoded).unwrap(), bytes.clone());
         prop_assert_eq!(info(&bytes).unwrap().planes, scene.feature_planes.layout().unwrap());
     }
@@ -152,7 +152,7 @@ fn a_mapping_of_coordinates_is_kept_and_used() {
     let mut paper = scene.clone();
     paper.coordinates.mapping = CoordinateMapping::default();
     assert_eq!(encode(&paper).unwrap().len() + 33, bytes.len());
-    // Half the time from the middle on: the beginning of the one is the middle of the other.
+    // Half the time from the middle on: the beginning of this scene is the middle of the other.
     let mut late = scene.clone();
     late.coordinates.mapping = CoordinateMapping { time_scale: 1.0, time_offset: 0.0, ..scene.coordinates.mapping };
     assert_eq!(scene.positions_at(0.0).unwrap(), late.positions_at(0.5).unwrap());

@@ -17,7 +17,7 @@ pub(crate) struct Convolution {
 }
 
 impl Convolution {
-    /// From a layer whose shape is sound.
+    /// From a layer that has been checked.
     pub(crate) fn new(layer: &Layer) -> Self {
         let (groups, kernel) = (layer.groups as usize, layer.kernel as usize);
         let (outputs, inputs_per_group) = (layer.outputs as usize / groups, layer.inputs as usize / groups);
@@ -26,7 +26,8 @@ impl Convolution {
         Self { groups, inputs_per_group, kernel }
     }
 
-    /// The outputs around `columns` of row `y` of the input, which has a border of half the kernel. `window` is memory to work in.
+    /// The outputs around `columns` of row `y` of the input, which has a border of half the kernel. `window` is scratch
+    /// memory.
     pub(crate) fn apply(
         &self,
         map: &PaddedMap,
@@ -51,8 +52,8 @@ impl Convolution {
         }
     }
 
-    /// The outputs of a kernel of side 1 from the inputs at eight positions. Without groups, inputs that are left out
-    /// at the end do not take part.
+    /// The outputs of a kernel of side 1 from the inputs at eight positions. Without groups, inputs may be left out at
+    /// the end; they are then not in the sums.
     pub(crate) fn apply_pointwise(&self, inputs: &[Lanes], mut outputs: &mut [Lanes]) {
         if let [group] = &self.groups[..] {
             return group.apply(inputs, outputs);
@@ -79,7 +80,7 @@ impl Convolution {
         self.pointwise_nanoseconds() + GATHER_NANOSECONDS * self.groups.len() as u64 * self.window()
     }
 
-    /// Inputs that an output looks at.
+    /// Inputs that an output reads.
     pub(crate) fn window(&self) -> u64 {
         (self.inputs_per_group * self.kernel * self.kernel) as u64
     }

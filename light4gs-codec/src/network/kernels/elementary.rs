@@ -1,21 +1,21 @@
 //! Exponential and logarithm from plain float32 arithmetic: the same bits on every machine.
 //!
-//! Additions, multiplications, divisions and powers of two that are put together from their bits. Both are within 2 units in
-//! the last place of the true value. docs/format.md has the same constants and the same order.
+//! They use additions, multiplications, divisions and powers of two, which are put together from their bits. Both are
+//! within 2 units in the last place of the true value. docs/format.md has the same constants and the same order.
 
 use std::f32::consts::LOG2_E;
 
-/// `ln 2` in two parts, the first of so few bits that its product with an exponent is exact.
+/// `ln 2` in two parts. The first has so few bits that its product with an exponent is exact.
 const LN_2_HIGH: f32 = 0.693_359_4;
 const LN_2_LOW: f32 = -2.121_944_4e-4;
-/// Above this the exponential is no float32, below the other end it is nearer to 0 than what counts as 0.
+/// Above this the exponential is no float32. Below the other bound it is replaced by 0.
 const LARGEST: f32 = 88.722_83;
 const LEAST: f32 = -40.0;
 /// 1.5 · 2^23: adding and subtracting it rounds to a whole number, ties to even.
 const ROUND: f32 = 12_582_912.0;
 /// The exponential's series after `1 + r`: 1/2!, 1/3!, ... 1/7!.
 const SERIES: [f32; 6] = [1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 720.0, 1.0 / 5040.0];
-/// `sqrt(2)`: mantissas lie between a half of it and it.
+/// `sqrt(2)`: mantissas lie between half of it and it.
 const SQRT_2: f32 = std::f32::consts::SQRT_2;
 
 /// `2^k` for `k` in -126..=127.
@@ -23,7 +23,7 @@ fn power_of_two(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
-/// `exp(x)`: infinite above 88.72283, 0 below -40; no number of no number.
+/// `exp(x)`: infinite above 88.72283, 0 below -40; NaN of NaN.
 pub(crate) fn exponential(x: f32) -> f32 {
     if x > LARGEST {
         return f32::INFINITY;
@@ -38,17 +38,17 @@ pub(crate) fn exponential(x: f32) -> f32 {
     let k = (x * LOG2_E + ROUND) - ROUND;
     let r = (x - k * LN_2_HIGH) - k * LN_2_LOW;
     let series = SERIES.iter().rev().fold(0.0, |sum, &term| (sum + term) * r);
-    // `k` may be 128, which is the exponent of no float32.
+    // `k` may be 128, which no float32 has as its exponent.
     let half = power_of_two(k as i32 - 1);
     ((r + series * r) + 1.0) * half * 2.0
 }
 
-/// `ln(x)`: minus infinity at 0, no number below.
+/// `ln(x)`: minus infinity at 0, NaN below.
 pub(crate) fn logarithm(x: f32) -> f32 {
     if x == 0.0 {
         return f32::NEG_INFINITY;
     }
-    // What enters is no subnormal number (see `kept`), so the exponent stands in the bits.
+    // The input is not subnormal (see `kept`), so the exponent can be read from its bits.
     if !(x > 0.0 && x.is_finite()) {
         return if x > 0.0 { x } else { f32::NAN };
     }
@@ -96,7 +96,7 @@ mod tests {
     #[test]
     fn the_logarithm_is_accurate() {
         let mut worst = 0.0f64;
-        // Every exponent of what counts, and 1.
+        // Every exponent of numbers that are kept, and 1.
         for exponent in -50..128 {
             for i in 0..2048 {
                 let x = (1.0 + i as f32 / 2048.0) * power_of_two(exponent);
@@ -119,7 +119,7 @@ mod tests {
         assert!([f32::NAN, -1.0, f32::NEG_INFINITY].into_iter().all(|x| logarithm(x).is_nan()));
     }
 
-    /// Bits that no machine may change.
+    /// These bits must be the same on every machine.
     #[test]
     fn bits_are_those_of_every_machine() {
         let mut digest = 0u32;

@@ -1,4 +1,4 @@
-//! A linear layer on eight positions at a time.
+//! A linear layer at eight positions at a time.
 
 /// Positions that are computed together.
 pub(crate) const LANES: usize = 8;
@@ -10,25 +10,25 @@ const PANEL: usize = 4;
 /// One number for each output of a panel.
 type Panel = [f32; PANEL];
 
-/// What is nearer to 0 than this counts as 0, in weights and in values. So no product and no sum is ever a subnormal
-/// number, each of which takes many processors a hundred times as long as another one.
+/// Weights and values with a magnitude below this are replaced by 0. So no product and no sum is ever subnormal: many
+/// processors take a hundred times as long for subnormal numbers as for others.
 pub(crate) const LEAST_MAGNITUDE: f32 = 1.0 / (1u64 << 50) as f32;
 
-/// A weight or a value, or 0 where it is too near to that.
+/// A weight or a value, or 0 where its magnitude is too small.
 #[inline]
 pub(crate) fn kept(value: f32) -> f32 {
-    // No number at all is kept as it is.
+    // NaN is kept.
     if value.abs() < LEAST_MAGNITUDE { 0.0 } else { value }
 }
 
 /// Nanoseconds of a product of four outputs with one input at eight places.
 const PRODUCT_NANOSECONDS: u64 = 4;
-/// Nanoseconds of a matrix of no inputs.
+/// Nanoseconds of a matrix without inputs.
 const MATRIX_NANOSECONDS: u64 = 10;
 /// Nanoseconds to gather one channel of a window at eight places.
 pub(super) const GATHER_NANOSECONDS: u64 = 8;
 
-/// `y = W x + b`, with `W` laid out for [`Matrix::apply`].
+/// `y = W x + b`, with `W` in the memory layout of [`Matrix::apply`].
 #[derive(Clone, Debug)]
 pub(super) struct Matrix {
     columns: usize,
@@ -39,7 +39,7 @@ pub(super) struct Matrix {
 }
 
 impl Matrix {
-    /// `columns` inputs, one output for each of `bias`.
+    /// A matrix with `columns` inputs, and one output for each element of `bias`.
     pub(super) fn new(columns: usize, bias: &[f32], weight: impl Fn(usize, usize) -> f32) -> Self {
         let outputs = bias.len();
         let panel = |first: usize, value: &dyn Fn(usize) -> f32| {
@@ -70,14 +70,14 @@ impl Matrix {
         self.bias.len() as u64 * (MATRIX_NANOSECONDS + PRODUCT_NANOSECONDS * self.columns as u64)
     }
 
-    /// Bytes of a matrix of so many columns and outputs, its heads and those of the allocator included.
+    /// Bytes of a matrix of so many columns and outputs, with the overhead of vectors and allocator.
     pub(super) fn bytes(columns: u64, outputs: u64) -> u64 {
         let panels = outputs.div_ceil(PANEL as u64);
         panels.saturating_mul(columns.saturating_add(1)).saturating_mul(size_of::<Panel>() as u64).saturating_add(128)
     }
 
-    /// Each output is its bias plus the products with the inputs, in their order. Where `inputs` are fewer than the
-    /// columns, the others do not take part.
+    /// Each output is its bias plus the products with the inputs, in their order. If there are fewer `inputs` than
+    /// columns, the missing ones are not in the sums.
     pub(super) fn apply(&self, inputs: &[Lanes], outputs: &mut [Lanes]) {
         debug_assert!(inputs.len() <= self.columns && outputs.len() == self.outputs);
         let weights = self.weights.chunks_exact(self.columns);
@@ -90,7 +90,7 @@ impl Matrix {
     }
 }
 
-/// A function of its own, and this plain, so that the sums stay in vector registers.
+/// A separate and simple function, so that the compiler keeps the sums in vector registers.
 #[inline(never)]
 fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
     let mut sums = bias.map(|bias| [bias; LANES]);

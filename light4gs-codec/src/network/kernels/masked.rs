@@ -1,4 +1,4 @@
-//! The checkerboard-masked convolution: what the decoded anchors say about the others (paper III-C).
+//! The checkerboard-masked convolution: from the decoded anchors to the other positions (paper III-C).
 
 use super::{
     Columns, Lanes, PaddedMap, kept,
@@ -12,16 +12,16 @@ pub(crate) struct AnchorMap {
     packed: PaddedMap,
 }
 
-/// Rows, and packed columns, that the largest window reaches beyond its center.
+/// The rows, and packed columns, that the largest window extends beyond its center.
 const REACH: usize = 3;
 
-/// Positions in a kernel, row-major, that the checkerboard mask leaves: row plus column is odd.
+/// Positions in a kernel, row-major, that the checkerboard mask keeps: row plus column is odd.
 pub(crate) fn masked_taps(kernel: u32) -> impl Iterator<Item = usize> {
     (0..kernel * kernel).filter(move |tap| (tap / kernel + tap % kernel) % 2 == 1).map(|tap| tap as usize)
 }
 
 impl AnchorMap {
-    /// The anchors of a plane `[channels, height, width]` (even width), each less `center`.
+    /// The anchors of a plane `[channels, height, width]` (even width), with `center` subtracted.
     pub(crate) fn new(values: &[f32], [height, width]: [usize; 2], center: f32) -> Self {
         let mut packed = PaddedMap::zeros(values.len() / (height * width), height, width / 2, REACH);
         for (index, row) in values.chunks_exact(width).enumerate() {
@@ -40,19 +40,19 @@ pub(crate) fn first_anchor(y: usize) -> usize {
     1 - y % 2
 }
 
-/// A convolution that sees only positions at an odd distance (rows plus columns), with groups.
+/// A convolution that reads only positions at an odd distance (rows plus columns), with groups.
 ///
 /// Order of an output's sum: bias, then input channels of its group, kernel rows, the unmasked kernel columns.
 #[derive(Clone, Debug)]
 pub(crate) struct MaskedConvolution {
     groups: Vec<Matrix>,
     inputs_per_group: usize,
-    /// Rows and columns from the center of the taps that count.
+    /// The unmasked taps, as rows and columns from the center.
     taps: Vec<(isize, isize)>,
 }
 
 impl MaskedConvolution {
-    /// From a layer whose shape is sound. Its masked weights count as zeros whatever they are.
+    /// From a layer that has been checked. Its masked weights are ignored.
     pub(crate) fn new(layer: &Layer) -> Self {
         let groups = layer.groups as usize;
         let (outputs, inputs) = (layer.outputs as usize / groups, layer.inputs as usize / groups);
@@ -106,7 +106,7 @@ impl MaskedConvolution {
         products + GATHER_NANOSECONDS * self.groups.len() as u64 * self.window()
     }
 
-    /// Inputs that an output looks at.
+    /// Inputs that an output reads.
     pub(crate) fn window(&self) -> u64 {
         (self.inputs_per_group * self.taps.len()) as u64
     }

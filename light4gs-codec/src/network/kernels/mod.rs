@@ -1,13 +1,13 @@
 //! The operations of a network, each in a fixed order of its sums (see [`crate::network`]).
 //!
-//! Loops run over several positions or outputs at once, which changes no output's order.
+//! Loops run over several positions or outputs at once, which does not change the order of any sum.
 //!
 //! | file | what |
 //! |---|---|
-//! | `lanes.rs` | a linear layer on eight positions at a time |
+//! | `lanes.rs` | a linear layer at eight positions at a time |
 //! | `padded_map.rs` | channels of a map with a border of zeros, and windows of it |
 //! | `convolution.rs`, `transposed.rs`, `masked.rs` | the kinds of convolution |
-//! | `upsampling.rs`, `reductions.rs` | to another size, means, transposition |
+//! | `upsampling.rs`, `reductions.rs` | resizing, means, transposition |
 //! | `elementary.rs` | exponential and logarithm |
 
 mod convolution;

@@ -13,7 +13,7 @@ pub(crate) struct Columns {
 /// The largest [`Columns::step`].
 const MOST_STEPS: usize = 4;
 
-/// A map `[channels, height, width]` in a border of zeros, so that a window needs no bounds.
+/// A map `[channels, height, width]` in a border of zeros, so that a window needs no check of bounds.
 #[derive(Clone, Debug)]
 pub(crate) struct PaddedMap {
     pub(crate) channels: usize,
@@ -25,15 +25,15 @@ pub(crate) struct PaddedMap {
 }
 
 impl PaddedMap {
-    /// A map of zeros with `border` more on each side.
+    /// A map of zeros with `border` added on each side.
     pub(crate) fn zeros(channels: usize, height: usize, width: usize, border: usize) -> Self {
-        // Lanes may reach beyond the end of a row, into the next one; what they find there is not used.
+        // Lanes may extend beyond the end of a row, into the next one; their values there are not used.
         let stride = width + 2 * border;
         let values = vec![0.0; channels * (height + 2 * border) * stride + MOST_STEPS * LANES];
         Self { channels, height, width, border, stride, values }
     }
 
-    /// A map of given values `[channels, height, width]`, each less `center`.
+    /// A map of given values `[channels, height, width]`, with `center` subtracted.
     pub(crate) fn centered(values: &[f32], [height, width]: [usize; 2], center: f32, border: usize) -> Self {
         let mut map = Self::zeros(values.len() / (height * width), height, width, border);
         for (index, row) in values.chunks_exact(width).enumerate() {
@@ -63,12 +63,12 @@ impl PaddedMap {
         &mut self.values[start..start + self.width]
     }
 
-    /// Where a row begins, counted from the top of the border.
+    /// Where a row begins; `bordered_y` counts from the top of the border.
     fn start(&self, channel: usize, bordered_y: usize) -> usize {
         (channel * (self.height + 2 * self.border) + bordered_y) * self.stride
     }
 
-    /// The value of one channel at `columns`, displaced by `(dy, dx)`, which may be as large as the border.
+    /// The values of one channel at `columns`, displaced by `(dy, dx)`, each at most the border.
     #[inline]
     pub(crate) fn lanes(&self, channel: usize, y: usize, columns: Columns, dy: isize, dx: isize) -> Lanes {
         let row = self.start(channel, (y + self.border).wrapping_add_signed(dy));

@@ -8,22 +8,23 @@ use crate::network::Layer;
 
 /// A transposed convolution with kernel 5, stride 2, padding 2 and output padding 1: `[I, H, W]` to `[O, 2H, 2W]`.
 ///
-/// Order of an output's sum: bias, then input channels, kernel rows, kernel columns, ascending, of those that reach it.
+/// Order of an output's sum: bias, then input channels, kernel rows, kernel columns, ascending, as far as they reach
+/// the output.
 #[derive(Clone, Debug)]
 pub(crate) struct TransposedConvolution {
-    /// For outputs in even and odd rows, each in even and odd columns: an ordinary convolution of the input.
+    /// For outputs in even and odd rows, in even and odd columns each: an ordinary convolution of the input.
     phases: [[Matrix; 2]; 2],
     inputs: usize,
 }
 
 const KERNEL: usize = 5;
 
-/// Kernel indices that reach outputs of a parity, and where they find their input, relative to half the output's
+/// Kernel indices that reach outputs of a parity, and the position of their input, relative to half the output's
 /// position: output `y` takes input `(y + 2 - k) / 2` for each `k` of its own parity.
 const TAPS: [&[(usize, isize)]; 2] = [&[(0, 1), (2, 0), (4, -1)], &[(1, 1), (3, 0)]];
 
 impl TransposedConvolution {
-    /// From a layer whose shape is sound; its weight is `[inputs, outputs, 5, 5]`.
+    /// From a layer that has been checked; its weight is `[inputs, outputs, 5, 5]`.
     pub(crate) fn new(layer: &Layer) -> Self {
         let (inputs, outputs) = (layer.inputs as usize, layer.outputs as usize);
         let phase = |rows: &[(usize, isize)], columns: &[(usize, isize)]| {
@@ -71,7 +72,7 @@ impl TransposedConvolution {
         self.phases[0][0].nanoseconds() + GATHER_NANOSECONDS * self.window()
     }
 
-    /// Inputs that an output looks at, at most.
+    /// Inputs that an output reads, at most.
     pub(crate) fn window(&self) -> u64 {
         (self.inputs * TAPS[0].len() * TAPS[0].len()) as u64
     }

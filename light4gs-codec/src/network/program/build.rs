@@ -1,4 +1,4 @@
-//! A network into a program.
+//! From a network to a program.
 
 use std::sync::Arc;
 
@@ -9,33 +9,33 @@ use crate::network::{
 };
 
 impl Program {
-    /// A program over maps, and anchors where a checkerboard convolution reads an input.
+    /// A program over maps, and over anchors where a checkerboard convolution reads an input.
     pub(crate) fn over_maps(network: &Network) -> Self {
         let kind = |anchors: bool| if anchors { InputKind::Anchors } else { InputKind::Map };
         let inputs = network.anchor_inputs().into_iter().map(kind).collect();
         Self::new(network, inputs, &vec![true; network.inputs.len()], &[], None)
     }
 
-    /// A program over numbers at single places, of a network that [`Network::check_pointwise`] has passed. Inputs that
-    /// are not `present` are zeros; those that are at the end of what a layer reads take no part in its sums.
+    /// A program over numbers at single places, of a network that [`Network::check_pointwise`] has accepted. Inputs
+    /// that are not `present` are zeros; at the end of a layer's inputs they are left out of the sums.
     pub(crate) fn pointwise(network: &Network, present: &[bool]) -> Self {
         Self::new(network, vec![InputKind::Lanes; network.inputs.len()], present, &[], None)
     }
 
-    /// A pointwise program some of whose inputs are the same at all places: what follows from these alone is computed by
-    /// [`Program::run_uniform`], once for all of them.
+    /// A pointwise program of which some inputs are the same at all places. Values that depend only on these are
+    /// computed by [`Program::run_uniform`], once for all places.
     pub(crate) fn pointwise_with_uniform(network: &Network, uniform: &[bool]) -> Self {
         let inputs = vec![InputKind::Lanes; network.inputs.len()];
         Self::new(network, inputs, &vec![true; network.inputs.len()], uniform, None)
     }
 
-    /// This pointwise program of a network, with other inputs present.
+    /// The same pointwise program, with other inputs present.
     pub(crate) fn with_present(&self, network: &Network, present: &[bool]) -> Self {
         Self::new(network, self.inputs.clone(), present, &[], Some(self))
     }
 
-    /// `uniform` inputs are the same at all places; those that it does not mention are not. `shared` is another program of
-    /// the same network, whose weights are used.
+    /// `uniform` inputs are the same at all places; inputs beyond the end of the list are not. `shared` is another
+    /// program of the same network, whose weights are used.
     fn new(
         network: &Network,
         inputs: Vec<InputKind>,
@@ -52,11 +52,11 @@ impl Program {
         for (value, &present) in values.iter_mut().zip(present) {
             value.known = if present { value.channels } else { 0 };
         }
-        // Where a value is read: once is a chance to merge an activation into the step before.
+        // How often each value is read. If it is once, an activation can be merged into the step before.
         let mut reads = vec![0usize; channels.len()];
         network.nodes.iter().flat_map(|node| &node.inputs).for_each(|value| reads[value.0 as usize] += 1);
         network.outputs.iter().for_each(|value| reads[value.0 as usize] += 1);
-        // The value that stands for each one.
+        // The value that replaces each one.
         let mut stands: Vec<usize> = (0..channels.len()).collect();
         let mut steps: Vec<Step> = Vec::with_capacity(network.nodes.len());
         for (index, node) in network.nodes.iter().enumerate() {
@@ -127,7 +127,7 @@ impl Program {
         program
     }
 
-    /// Takes out of the schedule what follows from uniform inputs alone.
+    /// Removes from the schedule what depends on uniform inputs only.
     fn split_schedule(&mut self, uniform: &[bool]) {
         if !uniform.contains(&true) {
             return;
@@ -135,7 +135,7 @@ impl Program {
         let mut is_uniform = uniform.to_vec();
         is_uniform.resize(self.inputs.len(), false);
         for step in &self.steps {
-            // What is merged into the step before has no value of its own, and nobody reads it.
+            // A step that is merged into the one before has no value of its own, and no step reads it.
             let from_uniform = !step.inputs.is_empty() && step.inputs.iter().all(|&input| is_uniform[input]);
             is_uniform.push(from_uniform);
         }
@@ -144,7 +144,7 @@ impl Program {
         (self.uniform, self.schedule) = schedule.into_iter().partition(once);
     }
 
-    /// Finds what makes each map and the outputs, and when a map is done with.
+    /// Finds the actions that compute each map and the outputs, and after which map each map can be freed.
     fn plan(&mut self) {
         self.schedule = self.schedule_of(&self.outputs, false);
         let first = self.inputs.len();
@@ -176,7 +176,7 @@ impl Program {
         self.maps = maps;
     }
 
-    /// What makes `roots` at a place. `anew` where they are to be computed even if they have maps.
+    /// The actions that compute `roots` at a place. With `anew` they are computed even if they have maps.
     fn schedule_of(&self, roots: &[usize], anew: bool) -> Vec<Action> {
         let first = self.inputs.len();
         let mut needed = vec![false; self.values.len()];
@@ -199,7 +199,7 @@ impl Program {
         actions
     }
 
-    /// The maps that a schedule looks at.
+    /// The maps that a schedule reads.
     fn maps_read(&self, schedule: &[Action]) -> Vec<usize> {
         let read = schedule.iter().filter_map(|action| match *action {
             Action::Load(value) => Some(value),

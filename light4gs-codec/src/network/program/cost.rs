@@ -1,8 +1,8 @@
-//! What running a program takes, before it is done: nanoseconds of one thread, and numbers in memory.
+//! The cost of running a program, known before it runs: nanoseconds on one thread, and numbers in memory.
 //!
-//! The rates were measured on a server core of 2023 (`calibration.rs`) and rounded up, so that a decoder that keeps a limit
-//! in these nanoseconds keeps it in real ones. They are the same on every machine: whether a file is within a limit must
-//! not depend on who reads it.
+//! The rates were measured on a server core of 2023 (`calibration.rs`) and rounded up, so that real time stays below a
+//! limit on these nanoseconds. They are the same on every machine: whether a file is within a limit must not depend on
+//! the machine that reads it.
 
 use super::{Action, Program, StepKind, ValuePlan};
 use crate::network::{
@@ -10,18 +10,19 @@ use crate::network::{
     kernels::{Convolution, LANES, PaddedMap, TransposedConvolution},
 };
 
-/// What running a program takes.
+/// The cost of running a program.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Cost {
-    /// Of one thread.
+    /// On one thread.
     pub(crate) nanoseconds: u64,
     /// Numbers in memory.
     pub(crate) numbers: u64,
 }
 
-/// Nanoseconds of one action at eight places, besides what its channels take.
+/// Nanoseconds of one action at eight places, without those for its channels.
 const ACTION: u64 = 16;
-/// Nanoseconds of a channel at eight places: to compute it from as many others, to take it from a map, to put it there.
+/// Nanoseconds of a channel at eight places: to compute it from as many others, to read it from a map, to write it to a
+/// map.
 const ELEMENT: u64 = 6;
 const LOAD: u64 = 12;
 const STORE: u64 = 20;
@@ -34,12 +35,12 @@ const MEAN: u64 = 20;
 const TRANSPOSE: u64 = 160;
 /// The scattered output of a doubling convolution.
 const SCATTER: u64 = 40;
-/// Nanoseconds to make memory for the values of eight places, a channel.
+/// Nanoseconds to allocate the values of eight places, for each channel.
 const WORKSPACE: u64 = 6;
 
 impl Program {
-    /// What it costs to run over a target, given the sizes of all values: to make all maps and the outputs everywhere; and
-    /// the most numbers that its maps hold at a time.
+    /// The cost of running over a target, given the sizes of all values: of all maps, and of the outputs at all places;
+    /// and the most numbers that its maps hold at a time.
     pub(crate) fn cost(&self, sizes: &[[u32; 2]], target: [u32; 2]) -> Cost {
         let mut cost = Cost::default();
         let first = self.inputs.len();
@@ -75,19 +76,19 @@ impl Program {
         cost
     }
 
-    /// Nanoseconds at eight places, for programs that are not over maps.
+    /// Nanoseconds at eight places, for pointwise programs.
     pub(crate) fn nanoseconds(&self) -> u64 {
         self.nanoseconds_of(&self.schedule)
     }
 
-    /// Nanoseconds to make a workspace.
+    /// Nanoseconds to allocate a workspace.
     pub(crate) fn workspace_nanoseconds(&self) -> u64 {
         100 + WORKSPACE * self.slots as u64
     }
 
     /// Bytes of a workspace.
     pub(crate) fn workspace_bytes(&self) -> u64 {
-        // The window of a convolution is as long as the weights of one of its outputs, and grows by doubling.
+        // The window of a convolution is as long as the weights of one of its outputs; its vector grows by doubling.
         let window = self.steps.iter().map(|step| step.kind.window()).max().unwrap_or(0);
         (self.slots as u64 + 2 * window) * size_of::<[f32; LANES]>() as u64 + 128
     }
@@ -126,7 +127,7 @@ impl Program {
 }
 
 impl Network {
-    /// Bytes of a [`Program`] of this network, weights laid out.
+    /// Bytes of a [`Program`] of this network, including the weights in their layout.
     pub(crate) fn program_bytes(&self) -> u64 {
         let weights = self.layers().fold(0u64, |sum, layer| {
             sum.saturating_add(match layer.kind {
@@ -137,7 +138,8 @@ impl Network {
         weights.saturating_add(self.plan_bytes())
     }
 
-    /// Bytes of a [`Program`] without its weights: each value has a plan, a step and a part in the schedule of each map.
+    /// Bytes of a [`Program`] without its weights: each value has a plan, a step, and actions in the schedule of each
+    /// map.
     pub(crate) fn plan_bytes(&self) -> u64 {
         let values = (self.inputs.len() + self.nodes.len()) as u64;
         let selected = self.nodes.iter().map(|node| match &node.operation {
@@ -149,7 +151,7 @@ impl Network {
 }
 
 impl StepKind {
-    /// Channels times taps that an output looks at at once.
+    /// Channels times taps that an output reads.
     fn window(&self) -> u64 {
         match self {
             Self::Convolution { convolution, .. } => convolution.window(),
@@ -160,7 +162,7 @@ impl StepKind {
     }
 }
 
-/// Groups of eight places of a map, as they are computed: neighbors in a row.
+/// Groups of eight neighboring places in a row, in which a map is computed.
 pub(crate) fn blocks([height, width]: [u32; 2]) -> u64 {
     u64::from(height) * u64::from(width.div_ceil(LANES as u32))
 }

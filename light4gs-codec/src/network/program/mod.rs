@@ -1,13 +1,14 @@
-//! A network ready to run.
+//! A network prepared for running.
 //!
-//! Values are computed either as whole maps, where something looks beyond one place of them, or place by place, eight
-//! places at a time, where they are asked for. So a plane's network costs no more than the places that are coded by it.
+//! A value is computed as a whole map if an operation that reads it looks beyond one place. Otherwise it is computed
+//! place by place, eight places at a time, where it is needed. So a plane's network is run only at the places that are
+//! coded with it.
 //!
 //! | file | what |
 //! |---|---|
-//! | `build.rs` | a network into a program |
+//! | `build.rs` | from a network to a program |
 //! | `run.rs` | a program over maps, or at single places |
-//! | `cost.rs` | what that takes, before it is done |
+//! | `cost.rs` | the cost of running it |
 
 mod build;
 mod cost;
@@ -30,27 +31,27 @@ enum InputKind {
     Lanes,
 }
 
-/// A network that [`Network::check`] has passed, with its weights laid out.
+/// A network that [`Network::check`] has accepted, with its weights in the layout for running.
 #[derive(Debug)]
 pub(crate) struct Program {
     inputs: Vec<InputKind>,
     values: Vec<ValuePlan>,
     steps: Vec<Step>,
     outputs: Vec<usize>,
-    /// What makes values that are the same everywhere, and the outputs need.
+    /// The actions that compute values which are the same at all places, and which the outputs need.
     uniform: Vec<Action>,
-    /// What makes the outputs at a place, after that.
+    /// The actions that then compute the outputs at a place.
     schedule: Vec<Action>,
-    /// Values that are made as whole maps, in order, with what makes each.
+    /// Values that are computed as whole maps, in order, with the plan of each.
     maps: Vec<MapPlan>,
     slots: usize,
 }
 
-/// Where a value is.
+/// Where a value is stored.
 #[derive(Clone, Copy, Debug)]
 struct ValuePlan {
     channels: usize,
-    /// Channels that may be other than 0: the first ones.
+    /// Channels that may differ from 0: the first ones.
     known: usize,
     /// Where its channels begin among the slots of a workspace.
     slot: usize,
@@ -64,7 +65,7 @@ struct Step {
     kind: Arc<StepKind>,
     /// Values.
     inputs: Vec<usize>,
-    /// What follows at once, in place.
+    /// An activation that follows at once, in place.
     activation: Option<Activation>,
 }
 
@@ -103,7 +104,7 @@ enum StepKind {
     GroupSum(usize),
     GroupMaximum(usize),
     Select(Vec<u32>),
-    /// It has become a part of the step before, whose value is its own.
+    /// Merged into the step before, which computes its value.
     Merged,
 }
 
@@ -113,25 +114,25 @@ enum Activation {
     LeakyRelu(f32),
 }
 
-/// What happens at a place.
+/// An action at a place.
 #[derive(Clone, Copy, Debug)]
 enum Action {
-    /// A value is taken from its map.
+    /// Read a value from its map.
     Load(usize),
-    /// A value is computed by its step.
+    /// Compute a value by its step.
     Run(usize),
 }
 
 #[derive(Debug)]
 struct MapPlan {
     value: usize,
-    /// What makes it at a place, unless its step makes the whole map.
+    /// The actions that compute it at a place, unless its step computes the whole map.
     schedule: Option<Vec<Action>>,
-    /// Maps that nobody needs after this one.
+    /// Maps that are not needed after this one.
     done: Vec<usize>,
 }
 
-/// A program with everything that is computed as whole maps.
+/// A program with all its whole maps computed.
 #[derive(Debug)]
 pub(crate) struct Maps<'a> {
     program: &'a Program,
@@ -166,7 +167,7 @@ impl Program {
         self.values[..self.inputs.len()].iter().map(|value| value.channels as u64).sum()
     }
 
-    /// Where the numbers of an input of a pointwise program belong.
+    /// Where to write an input of a pointwise program.
     pub(crate) fn input_lanes<'w>(&self, workspace: &'w mut Workspace, input: usize) -> &'w mut [Lanes] {
         let ValuePlan { slot, channels, .. } = self.values[input];
         &mut workspace.slots[slot..slot + channels]

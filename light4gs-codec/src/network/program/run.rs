@@ -7,8 +7,8 @@ use crate::network::kernels::{
 };
 
 impl Program {
-    /// Computes what is needed as whole maps, from a map for each input that is one, with the border of
-    /// [`Program::border`], and the height and width of the target.
+    /// Computes the whole maps. `maps` has a map for each input that is one, with the border of [`Program::border`];
+    /// `target` is the height and width of the target.
     pub(crate) fn maps(&self, mut maps: Vec<Option<PaddedMap>>, target: [usize; 2]) -> Maps<'_> {
         maps.resize_with(self.values.len(), || None);
         let mut workspace = self.workspace();
@@ -20,7 +20,7 @@ impl Program {
         Maps { program: self, maps }
     }
 
-    /// Computes what is the same at all places, before [`Program::run`] is called for them with this workspace.
+    /// Computes the values that are the same at all places. Called before [`Program::run`], with the same workspace.
     pub(crate) fn run_uniform(&self, workspace: &mut Workspace) {
         self.perform(&self.uniform, &[], None, 0, Columns { first: 0, step: 1 }, workspace);
     }
@@ -44,7 +44,7 @@ impl Program {
         for action in schedule {
             let (Action::Load(value) | Action::Run(value)) = *action;
             let ValuePlan { slot, channels, .. } = self.values[value];
-            // A value's slots lie behind those of what it reads.
+            // A value's slots come after those of its inputs.
             let (before, own) = slots.split_at_mut(slot);
             let own = &mut own[..channels];
             if let Action::Load(_) = action {
@@ -115,7 +115,7 @@ impl Program {
         }
     }
 
-    /// One value as a map, from those before it.
+    /// Computes one value as a map, from the values before it.
     fn make_map(
         &self,
         plan: &MapPlan,
@@ -152,7 +152,7 @@ impl Program {
         map
     }
 
-    /// Height and width of a value whose operands lead to maps.
+    /// Height and width of a value, from the maps that it is computed from.
     fn size_of(&self, value: usize, maps: &[Option<PaddedMap>], target: [usize; 2]) -> [usize; 2] {
         let mut value = value;
         loop {
@@ -174,7 +174,7 @@ impl Activation {
     fn apply(self, values: &mut [Lanes]) {
         let slope = match self {
             Self::Relu => {
-                // Not 0 times `x`, which is no number where `x` is infinite.
+                // Not 0 times `x`, which is NaN where `x` is infinite.
                 values.as_flattened_mut().iter_mut().for_each(|x| *x = if *x >= 0.0 { *x } else { 0.0 });
                 return;
             }
@@ -207,7 +207,7 @@ impl Maps<'_> {
     }
 }
 
-/// A map of which height or width may be 1, at places of a larger one.
+/// A map whose height or width may be 1, at places of a larger map.
 fn spread(map: &PaddedMap, y: usize, columns: Columns, outputs: &mut [Lanes]) {
     let y = if map.height == 1 { 0 } else { y };
     for (channel, lanes) in outputs.iter_mut().enumerate() {
@@ -229,7 +229,7 @@ fn change(own: &mut [Lanes], from: &[Lanes], operation: impl Fn(f32) -> f32) {
     numbers.for_each(|(own, &x)| *own = kept(operation(x)));
 }
 
-/// Each group of neighboring channels into one, from the first to the last.
+/// Reduces each group of neighboring channels to one, from the first to the last.
 fn reduce(own: &mut [Lanes], from: &[Lanes], group: usize, operation: impl Fn(f32, f32) -> f32) {
     for (own, group) in own.iter_mut().zip(from.chunks_exact(group)) {
         *own = group[0];
@@ -240,7 +240,7 @@ fn reduce(own: &mut [Lanes], from: &[Lanes], group: usize, operation: impl Fn(f3
     }
 }
 
-/// No number stays none.
+/// NaN stays NaN.
 fn clamped(x: f32, least: f32, most: f32) -> f32 {
     if x < least {
         least
