@@ -1,7 +1,8 @@
-//! Files that are either complete or absent: write beside, flush to the disk, then rename.
+//! Files that are either complete or absent: write under a temporary name in the same folder, flush to the disk, then
+//! rename.
 //!
-//! What is being written is locked by its writer, and the lock ends with the process: a temporary file that nobody has
-//! locked was left by a process that was killed, and is removed.
+//! The writer holds a lock on its temporary file, and the lock ends with the process. So a temporary file without a
+//! lock was left by a process that was killed, and is removed.
 
 use crate::error::DataError;
 use std::collections::BTreeSet;
@@ -14,8 +15,9 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// How names of temporary files begin.
 const PREFIX: &str = ".light4gs-";
 
-/// Refuses to put a file in the place of what is neither a file nor a folder: a rename would replace `/dev/null` itself, or
-/// cut a pipe off from its reader. A link into `/proc`, as `/dev/stdout` is, would be replaced as well.
+/// Refuses to replace anything but a file or a folder. A rename would replace `/dev/null` itself by a file, and readers
+/// of a pipe would never get the data. Links into `/proc`, such as `/dev/stdout`, are refused too: the rename would
+/// replace the link.
 fn refuse_special_file(path: &Path) -> io::Result<()> {
     let special = fs::metadata(path).is_ok_and(|metadata| !(metadata.is_file() || metadata.is_dir()));
     let of_a_process = || fs::read_link(path).is_ok_and(|target| target.starts_with("/proc"));
@@ -26,27 +28,27 @@ fn refuse_special_file(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// A name in the folder of `path` that no other call of this process uses.
+/// A name in the folder of `path` that no other call in this process uses.
 ///
-/// It does not contain the name of `path`, so that a name of the longest legal length still works.
+/// The name of `path` is not a part of it, so that even a name of the longest legal length can be written.
 fn sibling(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let count = COUNTER.fetch_add(1, Ordering::Relaxed);
     path.with_file_name(format!("{PREFIX}{}-{count}.part", std::process::id()))
 }
 
-/// The folder that `path` lies in.
+/// The folder of `path`.
 fn folder_of(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Whether a file or a folder of this name is one that [`write_atomically`] writes before it gets its name.
+/// Whether this is the name of a temporary file or folder of [`write_atomically`].
 pub fn is_temporary_name(name: &str) -> bool {
     name.starts_with(PREFIX) && (name.ends_with(".part") || name.ends_with(".tmp"))
 }
 
-/// Removes what writes that were killed have left in a folder: temporary files and folders that no process has locked.
-/// What cannot be read or removed stays; a folder that is not there has nothing to sweep.
+/// Removes what killed writes have left in a folder: temporary files and folders that no process has locked. What
+/// cannot be read or removed stays. A folder that does not exist is no error.
 pub fn sweep_leftovers(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if entry.file_name().to_str().is_some_and(is_temporary_name) {
@@ -57,7 +59,7 @@ pub fn sweep_leftovers(folder: &Path) {
 
 /// Removes a file or folder that no process has locked.
 fn remove_unless_locked(path: &Path) {
-    // Nothing else than a file or a folder: opening a pipe would wait for its other end.
+    // Only files and folders: opening a pipe would wait for its writer.
     let Ok(kind) = fs::symlink_metadata(path).map(|metadata| metadata.file_type()) else { return };
     if !(kind.is_file() || kind.is_dir()) {
         return;
@@ -77,17 +79,18 @@ fn sweep_once(folder: &Path) {
     }
 }
 
-/// Locks a new temporary file. False if a sweep was faster: between its making and its locking it looks left behind.
+/// Locks a new temporary file. Returns false if a sweep of another process has locked or removed it: between its
+/// creation and its lock it looks like a leftover.
 fn claim(part: &Path, file: &File) -> bool {
     match file.lock() {
         Ok(()) => part.symlink_metadata().is_ok(),
-        // A file system without locks: sweeps cannot lock it either, and leave it alone.
+        // A file system without locks: other processes cannot lock the file either, and leave it alone.
         Err(_) => true,
     }
 }
 
-/// Makes a folder under a temporary name beside `path`, lets `fill` fill it, and gives it its name when that is done.
-/// `path` must not exist, or be an empty folder.
+/// Makes a folder under a temporary name beside `path`, lets `fill` fill it, and then renames it. `path` must not
+/// exist, or be an empty folder.
 pub(crate) fn make_folder_atomically(
     path: &Path,
     fill: impl FnOnce(&Path) -> Result<(), DataError>,
@@ -98,7 +101,7 @@ pub(crate) fn make_folder_atomically(
         fs::create_dir_all(&part).map_err(DataError::io("create", &part))?;
         match File::open(&part) {
             Ok(folder) if !claim(&part, &folder) => {}
-            // Where a folder cannot be opened and locked, it is not swept either.
+            // A folder that cannot be opened and locked is not swept by others either.
             opened if part.is_dir() => break (part, opened),
             _ => {}
         }
@@ -115,7 +118,7 @@ pub(crate) fn make_folder_atomically(
     made
 }
 
-/// Writes a file so that a reader sees the old content or the new, never a part.
+/// Writes a file so that a reader sees either the old content or the new one, never a part.
 ///
 /// `fill` writes the content to a temporary file in the same folder, which must exist. The content is flushed to
 /// the disk (fsync), the file takes the name `path`, and on Unix the folder is flushed as well, so that the name
@@ -147,17 +150,17 @@ pub fn write_atomically(
         Ok(created) => created,
         Err(source) => return Err(failed(source)),
     };
-    // Locked until it has its name: a sweep between the two would remove it.
+    // The lock is held until the rename: a sweep between the two would remove the file.
     let written = fill_and_flush(file, fill).and_then(|_locked| fs::rename(&part, path));
     if let Err(source) = written {
-        // The first error is the one to report; a leftover is all that could go wrong here.
+        // The first error is reported. If the removal fails as well, only a leftover remains.
         let _ = fs::remove_file(&part);
         return Err(failed(source));
     }
     flush_folder(path).map_err(failed)
 }
 
-/// A new, empty file beside `path`. A name that is taken (a leftover of a process of the same number) is passed over.
+/// A new, empty file beside `path`. A name that exists already (left by a process with the same number) is skipped.
 fn create_sibling(path: &Path) -> io::Result<(PathBuf, File)> {
     sweep_once(folder_of(path));
     loop {
@@ -178,8 +181,8 @@ fn fill_and_flush(file: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Res
     Ok(file)
 }
 
-/// Flushes the entry of a file that has just been renamed. The file is there and complete, so a system that cannot
-/// flush a folder, or a folder that may be written but not read, is no error; a disk that fails is.
+/// Flushes the folder's entry of a file that has just been renamed. The file is complete, so it is no error if the
+/// system cannot flush folders, or if the folder may be written but not read. A failing disk is an error.
 fn flush_folder(path: &Path) -> io::Result<()> {
     if !cfg!(unix) {
         return Ok(());
@@ -224,7 +227,7 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
 
-    /// `light4gs decode x.l4gs --out /dev/null` of a superuser has replaced the device by a file.
+    /// Run by a superuser, `light4gs decode x.l4gs --out /dev/null` once replaced the device by a file.
     #[cfg(unix)]
     #[test]
     fn what_is_no_file_is_not_replaced() {
@@ -257,7 +260,7 @@ mod tests {
         fs::write(&theirs, b"mine").unwrap();
         write_atomically(&folder.path().join("a.bin"), |out| {
             assert!(!left.exists() && !left_folder.exists() && theirs.exists());
-            // A sweep of somebody else meanwhile.
+            // Meanwhile another process sweeps the folder.
             sweep_leftovers(folder.path());
             out.write_all(b"whole")
         })

@@ -5,14 +5,14 @@ use glam::{DMat3, DVec3, Mat3, Mat4, Vec3, Vec4};
 /// How far `R^T R` may be from the identity before a pose is refused.
 const ROTATION_TOLERANCE: f64 = 1e-3;
 
-/// How far from the origin a camera may be, world units. Coordinates of maps stay below 1e7; float32 numbers of a scene that is
-/// much larger do not stay finite in training.
+/// How far from the origin a camera may be, world units. Coordinates of maps stay below 1e7; in much larger scenes
+/// float32 numbers overflow in training.
 const MOST_DISTANCE: f64 = 1e8;
 
-/// Focal lengths in image sides: fields of view that float32 tells from 0 and from π.
+/// Focal lengths in image sides: within these, float32 can tell the field of view from 0 and from π.
 const FOCAL_SIDES: std::ops::RangeInclusive<f64> = 1e-5..=1e6;
 
-/// How far from the image's middle the principal point may be, in image sides: crops have it outside.
+/// How far from the image's middle the principal point may be, in image sides. In cropped images it may lie outside.
 const MOST_OFF_CENTER: f64 = 1e3;
 
 /// An OpenCV pinhole camera: +x right, +y down, +z forward; `x_cam = rotation * x_world + translation`.
@@ -65,7 +65,7 @@ impl Intrinsics {
     }
 }
 
-/// Why four rows of numbers are not a camera pose.
+/// What is wrong with a camera pose or its intrinsics.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum PoseError {
@@ -79,7 +79,7 @@ pub enum PoseError {
         /// The entry.
         value: f32,
     },
-    /// The camera is absurdly far from the origin.
+    /// The camera is too far from the origin.
     #[error("the camera is {distance:e} world units from the origin, expected at most {MOST_DISTANCE:e}")]
     TooFar {
         /// From the origin, world units.
@@ -107,7 +107,7 @@ pub enum PoseError {
         /// The angle that was given, radians.
         fov_x: f32,
     },
-    /// A focal length is not positive, or the principal point is not finite, or either is absurd for the image.
+    /// A focal length is not positive, or the principal point is not finite, or either is unusable for the image.
     #[error(
         "focal lengths are {fx} x {fy} and the principal point is ({cx}, {cy}), expected focal lengths of {} to {:e} image sides and a principal point within {MOST_OFF_CENTER} of them", FOCAL_SIDES.start(), FOCAL_SIDES.end()
     )]
@@ -131,7 +131,7 @@ pub enum PoseError {
     },
 }
 
-/// Refuses what is not orthonormal with determinant 1.
+/// Refuses a matrix that is not orthonormal with determinant 1.
 fn check_rotation(rotation: DMat3) -> Result<(), PoseError> {
     let excess = rotation.transpose() * rotation - DMat3::IDENTITY;
     let error = excess.to_cols_array().iter().fold(0.0f64, |worst, v| worst.max(v.abs()));
@@ -143,7 +143,7 @@ fn check_rotation(rotation: DMat3) -> Result<(), PoseError> {
     Err(PoseError::NotRotation { determinant, error })
 }
 
-/// Refuses a center from which float32 numbers would not stay finite.
+/// Refuses a camera center so far away that float32 numbers would overflow.
 fn check_distance(center: DVec3) -> Result<(), PoseError> {
     let distance = center.length();
     // Written so that NaN is refused.
@@ -162,8 +162,8 @@ impl Camera {
     /// `fov_x` is the full horizontal field of view in radians.
     ///
     /// # Errors
-    /// [`PoseError`] when an entry is not finite or absurdly large, the matrix is not a rigid motion, the field of
-    /// view is not in (0, pi) or too near to either, or the image is empty.
+    /// [`PoseError`] when an entry is not finite or too large, the matrix is not a rigid motion, the field of view is
+    /// not in (0, pi) or too near to either, or the image is empty.
     pub fn from_camera_to_world_opengl(
         c2w: &[[f32; 4]; 4],
         fov_x: f32,
@@ -203,8 +203,8 @@ impl Camera {
     /// A camera from a rotation from world to camera (OpenCV axes), its center in world units, and intrinsics in pixels.
     ///
     /// # Errors
-    /// [`PoseError`] when a number is not finite as an `f32` or absurdly large, the matrix is not a rotation, a focal length
-    /// is not positive or absurd for the image, or the image is empty.
+    /// [`PoseError`] when a number is not finite as an `f32` or too large, the matrix is not a rotation, a focal length
+    /// is not positive or unusable for the image, or the image is empty.
     pub fn from_pose(rotation: DMat3, center: DVec3, intrinsics: &Intrinsics) -> Result<Self, PoseError> {
         let Intrinsics { width, height, fx, fy, cx, cy } = *intrinsics;
         let translation = -(rotation * center);
@@ -236,8 +236,8 @@ impl Camera {
 
     /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the image.
     ///
-    /// `fov_x` is the full horizontal field of view in radians; pixels are square. If `eye` equals
-    /// `target` the camera looks along +y; if `up` is parallel to the view, another axis stands in.
+    /// `fov_x` is the full horizontal field of view in radians; pixels are square. If `eye` equals `target`, the camera
+    /// looks along +y. If `up` is parallel to the view, another axis is taken.
     pub fn look_at(eye: Vec3, target: Vec3, up: Vec3, fov_x: f32, width: u32, height: u32) -> Self {
         let (eye64, up64) = (eye.as_dvec3(), up.as_dvec3());
         let forward = (target.as_dvec3() - eye64).try_normalize().unwrap_or(DVec3::Y);
@@ -284,7 +284,7 @@ impl Camera {
         }
     }
 
-    /// `(tan(fov_x / 2), tan(fov_y / 2))`, taking the principal point to be in the middle.
+    /// `(tan(fov_x / 2), tan(fov_y / 2))`, as if the principal point were in the middle.
     pub fn tan_half_fov(&self) -> (f32, f32) {
         (self.width as f32 / (2.0 * self.fx), self.height as f32 / (2.0 * self.fy))
     }
@@ -321,7 +321,7 @@ impl Camera {
 
     /// A world point in pixels `(u, v)` (integers are pixel centers) and its depth along +z.
     ///
-    /// Points with a depth of 0 or less are behind the camera: their `u`, `v` mean nothing.
+    /// Points with a depth of 0 or less are behind the camera: their `u` and `v` are meaningless.
     pub fn project(&self, point: Vec3) -> (f32, f32, f32) {
         let p = self.rotation * point + self.translation;
         (self.fx * p.x / p.z + self.cx - 0.5, self.fy * p.y / p.z + self.cy - 0.5, p.z)
@@ -333,7 +333,7 @@ impl Camera {
         (self.rotation.transpose() * in_camera).normalize()
     }
 
-    /// Rows of the camera-to-world matrix in OpenGL axes: what a Blender/NeRF transforms file holds.
+    /// Rows of the camera-to-world matrix in OpenGL axes, as in a Blender/NeRF transforms file.
     pub fn camera_to_world_opengl(&self) -> [[f32; 4]; 4] {
         let c2w = self.rotation.transpose();
         let center = self.center();
@@ -400,8 +400,8 @@ mod tests {
         assert!(Camera::from_camera_to_world_opengl(&good, 0.7, 0, 8).is_err());
     }
 
-    /// Finite numbers that no camera has: training on them ended in numbers that are not finite, or the encoder refused the
-    /// field of view after the old run had been replaced.
+    /// Finite numbers that no camera has. With them training overflowed, or the encoder refused the field of view after
+    /// the old run had been replaced.
     #[test]
     fn absurd_cameras_are_refused() {
         let far = |x: f32| {

@@ -18,7 +18,7 @@ pub enum DataError {
         #[source]
         source: std::io::Error,
     },
-    /// A text file is not what its format says: no field can be named.
+    /// A text file does not have its format, so no field can be named.
     #[error("{}: not valid JSON: {source}; export the file again", path.display())]
     Json {
         /// The file.
@@ -95,7 +95,7 @@ pub enum DataError {
     },
 }
 
-/// What to do about the system's reason, where that is plain.
+/// The remedy, where it follows from the system's reason.
 fn remedy_of(source: &std::io::Error) -> &'static str {
     match source.kind() {
         ErrorKind::NotFound => "; restore the file, or check the path",
@@ -107,7 +107,7 @@ fn remedy_of(source: &std::io::Error) -> &'static str {
 }
 
 impl DataError {
-    /// A function for `map_err` that adds what was attempted, and on which file.
+    /// A function for `map_err` that adds what was attempted, and with which file.
     pub fn io(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_path_buf();
         move |source| Self::Io { action, path, source }

@@ -9,11 +9,11 @@ use std::path::PathBuf;
 pub struct Mask {
     /// An image of the frame's size, or of another; its pixels are 0 or not.
     pub path: PathBuf,
-    /// What 0 means.
+    /// What 0 means in it.
     pub zero: MaskMeaning,
 }
 
-/// What the pixels that are 0 in a mask have in common.
+/// What a mask's zero pixels mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MaskMeaning {
     /// They are neither trained on nor measured.
@@ -27,13 +27,13 @@ pub enum MaskMeaning {
 pub struct Frame {
     /// A name without folder and extension, such as `r_003`. [`crate::Scene::new`] makes it unique in its split.
     pub name: String,
-    /// The camera, at the size at which images are used: after any resizing, and without distortion.
+    /// The camera, at the size at which images are used: after resizing, and without distortion.
     pub camera: Camera,
     /// Time in `[0, 1]`.
     pub time: f32,
     /// The image's file; empty for a frame without an image (a video path).
     pub path: PathBuf,
-    /// Width of the image in its file (upright, where the file says how to turn it), pixels; 0 without an image.
+    /// Width of the image in its file (after any rotation that the file asks for), pixels; 0 without an image.
     pub source_width: u32,
     /// Height of the image in its file, pixels; 0 without an image.
     pub source_height: u32,
@@ -41,7 +41,7 @@ pub struct Frame {
     pub camera_id: u32,
     /// A file that marks pixels.
     pub mask: Option<Mask>,
-    /// What bent the rays when the image was taken. Images come out of the store straightened.
+    /// The lens with which the image was taken. The image store undistorts images.
     pub lens: Option<Lens>,
 }
 

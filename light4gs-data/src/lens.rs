@@ -1,4 +1,4 @@
-//! Lens distortion: what bends straight lines, and the pinhole image that a lens would have recorded without it.
+//! Lens distortion, and the pinhole image that would have been recorded without it.
 
 use glam::DVec2;
 
@@ -79,7 +79,7 @@ impl Distortion {
         }
     }
 
-    /// Whether every coefficient is 0, so that the lens is a pinhole's.
+    /// Whether every coefficient is 0, so that the lens is a pinhole.
     fn is_none(&self) -> bool {
         match self {
             Self::RadialTangential { radial, tangential } => radial.iter().chain(tangential).all(|k| *k == 0.0),
@@ -91,7 +91,7 @@ impl Distortion {
     }
 }
 
-/// `a / b`, and 1 where both vanish.
+/// `a / b`, and 1 where both are 0.
 fn ratio(a: f64, b: f64) -> f64 {
     if b > 1e-9 { a / b } else { 1.0 }
 }
@@ -102,7 +102,7 @@ fn tangential_shift(p: DVec2, [p1, p2]: [f64; 2]) -> DVec2 {
     DVec2::new(2.0 * p1 * xy + p2 * (r2 + 2.0 * p.x * p.x), 2.0 * p2 * xy + p1 * (r2 + 2.0 * p.y * p.y))
 }
 
-/// A lens that is no pinhole: distortion, and pixels whose columns lean.
+/// A lens other than a pinhole: distortion, and skewed pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lens {
     /// How rays are bent.
@@ -112,7 +112,7 @@ pub struct Lens {
 }
 
 impl Lens {
-    /// The lens of these coefficients; `None` where it is a plain pinhole.
+    /// The lens with these coefficients; `None` where it is a pinhole.
     pub fn new(distortion: Distortion, skew: f64) -> Option<Self> {
         (!distortion.is_none() || skew != 0.0).then_some(Self { distortion, skew })
     }

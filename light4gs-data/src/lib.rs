@@ -1,10 +1,9 @@
 //! Cameras, frames, point clouds and dataset readers.
 //!
-//! [`Scene::open`] turns a folder into cameras with times, a point cloud and an extent; a [`DatasetLayout`] says how
-//! a folder is read, and [`Layouts`] lists those that are known;
-//! [`ImageStore`] decodes the images lazily, within a memory bound;
-//! [`write_synthetic`] makes a small moving scene to try things on.
-//! Nothing here depends on Burn, and no user input makes this crate panic.
+//! [`Scene::open`] turns a folder into cameras with times, a point cloud and an extent. A [`DatasetLayout`] reads one
+//! kind of folder, and [`Layouts`] lists those that are known. [`ImageStore`] decodes the images lazily, within a
+//! memory bound. [`write_synthetic`] makes a small moving scene for trying things out. Nothing here depends on Burn,
+//! and no user input makes this crate panic.
 //!
 //! Conventions: cameras are OpenCV pinholes
 //! (+x right, +y down, +z forward), time is in `[0, 1]`, images are `[H, W, 3]`, row-major,

@@ -47,14 +47,14 @@ pub struct LoadOptions {
     pub layout: Option<String>,
     /// The size at which images are used.
     pub resolution: Resolution,
-    /// Length of the sequence in frames: later ones are left out, and the time of frame `i` is `i / frames` where the
-    /// dataset counts frames instead of saying times (layout `neu3d`, whose captures have 300). `None`: all there are.
+    /// Length of the sequence in frames: later ones are left out. Where the dataset counts frames instead of giving
+    /// times (layout `neu3d`, whose captures have 300), the time of frame `i` is `i / frames`. `None`: all frames.
     pub frames: Option<usize>,
-    /// What shows through transparent pixels: red, green, blue in `[0, 1]`.
+    /// The color behind transparent pixels: red, green, blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Seed of the random point cloud.
     pub seed: u64,
-    /// Number of random points, where the dataset brings no point cloud.
+    /// Number of random points, where the dataset has no point cloud.
     pub random_points: usize,
     /// Half the side of the cube of the random points, world units.
     pub random_half_size: f32,
@@ -76,7 +76,7 @@ impl Default for LoadOptions {
 }
 
 impl LoadOptions {
-    /// Refuses what no image can have.
+    /// Refuses options that are out of range.
     pub(crate) fn check(&self) -> Result<(), DataError> {
         let bad = |option: &'static str, problem: String| Err(DataError::Options { option, problem });
         if self.background.iter().any(|v| !(0.0..=1.0).contains(v)) {

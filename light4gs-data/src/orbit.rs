@@ -1,4 +1,4 @@
-//! Video paths: a camera that circles the scene while time runs.
+//! Video paths: a camera that circles the scene while time goes on.
 
 use crate::camera::Camera;
 use glam::Vec3;

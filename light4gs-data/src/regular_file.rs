@@ -1,4 +1,4 @@
-//! Reading whole files that somebody else wrote: regular files only, up to a size.
+//! Reading whole files from others: regular files only, up to a size.
 
 use std::fs::{self, File};
 use std::io::{self, Read};
@@ -6,11 +6,11 @@ use std::path::Path;
 
 /// Opens a file to read it.
 ///
-/// A pipe, a device or a folder is refused before it is opened: a pipe would wait for its other end, and a device may
-/// never end.
+/// A pipe, a device or a folder is refused before it is opened: opening a pipe would wait for its writer, and a device
+/// may never end.
 ///
 /// # Errors
-/// As the system says; [`io::ErrorKind::InvalidInput`] for what is no regular file.
+/// As the system says; [`io::ErrorKind::InvalidInput`] for anything but a regular file.
 pub fn open_regular_file(path: &Path) -> io::Result<File> {
     let kind = fs::metadata(path)?.file_type();
     if !kind.is_file() {
@@ -33,7 +33,7 @@ pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The same for text. The mark with which some editors and programs of Windows begin a file (U+FEFF) is left out.
+/// The same for text. The byte order mark (U+FEFF) with which some programs of Windows begin a file is left out.
 ///
 /// # Errors
 /// As [`read_regular_file`]; [`io::ErrorKind::InvalidData`] for what is not UTF-8.

@@ -13,9 +13,9 @@ use std::str::FromStr;
 pub enum Split {
     /// Frames to learn from.
     Train,
-    /// Frames to judge on: never trained.
+    /// Frames to measure quality on; never trained on.
     Test,
-    /// More frames to judge on; may be empty.
+    /// More frames to measure quality on; may be empty.
     Val,
     /// A camera path without images.
     Video,
@@ -59,9 +59,9 @@ impl FromStr for Split {
 pub struct SplitFrames {
     /// Frames to learn from; at least one.
     pub train: Vec<Frame>,
-    /// Frames to judge on; at least one.
+    /// Frames to measure quality on; at least one.
     pub test: Vec<Frame>,
-    /// More frames to judge on; may be empty.
+    /// More frames to measure quality on; may be empty.
     pub val: Vec<Frame>,
     /// A camera path without images; may be empty.
     pub video: Vec<Frame>,
@@ -80,13 +80,13 @@ pub struct Scene {
     pub layout: &'static str,
     /// Frames to learn from; at least one.
     pub train: Vec<Frame>,
-    /// Frames to judge on; at least one.
+    /// Frames to measure quality on; at least one.
     pub test: Vec<Frame>,
-    /// More frames to judge on; may be empty.
+    /// More frames to measure quality on; may be empty.
     pub val: Vec<Frame>,
     /// A camera path without images.
     pub video: Vec<Frame>,
-    /// What shows through transparent pixels: red, green, blue in `[0, 1]`.
+    /// The color behind transparent pixels: red, green, blue in `[0, 1]`.
     pub background: [f32; 3],
     /// Where the Gaussians start.
     pub points: PointCloud,
@@ -95,19 +95,20 @@ pub struct Scene {
     /// 1.1 times the largest distance of a training camera's center from their mean, world units
     /// (1 if they all coincide, since learning rates are multiplied by it).
     pub extent: f32,
-    /// What a user should know about how the folder was read: images without a pose, frames left out.
+    /// What a user should know about how the folder was read, such as images without a pose, or frames that were left
+    /// out.
     pub notes: Vec<String>,
 }
 
-/// Far above any capture: 20 cameras of half an hour.
+/// Far more than any capture has: 20 cameras for half an hour.
 const MAX_FRAMES: usize = 1_000_000;
 
 impl Scene {
-    /// A scene of frames and points that a [`crate::DatasetLayout`] has read from the folder `root`.
+    /// A scene from frames and points that a [`crate::DatasetLayout`] has read in the folder `root`.
     ///
     /// The name is that of the folder; `camera_mean` and `extent` follow from the training cameras. Frames of a split
-    /// whose names are the same, or differ in case only, get other names: with the folder of the image before it, or a
-    /// number after it, so that files which are named after frames do not overwrite each other.
+    /// whose names are equal, or differ only in case, are renamed: the folder of the image is put before the name, or a
+    /// number after it. So files that are named after frames do not overwrite each other.
     ///
     /// # Errors
     /// [`DataError::Field`] when there is no training or no test frame, or no point to start from.
@@ -169,7 +170,7 @@ fn mean_and_extent(frames: &[Frame]) -> ([f32; 3], f32) {
     (mean.as_vec3().to_array(), extent as f32)
 }
 
-/// Gives frames of the same name others, see [`Scene::new`]. Names that are unique stay as they are.
+/// Renames frames of equal names, see [`Scene::new`]. Unique names stay as they are.
 fn make_names_unique(frames: &mut [Frame]) {
     let folded = |name: &str| name.to_lowercase();
     let mut uses: HashMap<String, usize> = HashMap::new();

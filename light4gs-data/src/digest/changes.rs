@@ -1,9 +1,9 @@
-//! The difference between two digests, in words.
+//! The difference between two digests, as text.
 
 use super::{DatasetDigest, FrameDigest};
 use std::collections::HashMap;
 
-/// Numbers that went through another image size may differ in the last bits.
+/// Numbers that were converted between image sizes may differ in the last bits.
 const TOLERANCE: f32 = 1e-4;
 
 pub(super) fn between(before: &DatasetDigest, after: &DatasetDigest) -> Vec<String> {
@@ -23,7 +23,7 @@ pub(super) fn between(before: &DatasetDigest, after: &DatasetDigest) -> Vec<Stri
     changes
 }
 
-/// A file, and which of the frames with this file it is.
+/// A file, and the number of the frame among those with this file.
 type Key<'a> = (&'a str, usize);
 
 fn keyed(frames: &[FrameDigest]) -> Vec<(Key<'_>, &FrameDigest)> {
@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(changes(&|d| drop(d.frames.remove(1))), ["train: 1 frame was removed: b"]);
         assert_eq!(changes(&|d| drop(d.frames.drain(1..3))), ["train: 2 frames were removed, the first is b"]);
         assert_eq!(changes(&|d| d.frames.insert(0, frame("x"))), ["train: 1 frame was added: x"]);
-        // The same file twice: the second counts as another frame.
+        // The same file twice: the second is another frame.
         assert_eq!(changes(&|d| d.frames.push(frame("a"))), ["train: 1 frame was added: a"]);
         assert_eq!(changes(&|d| d.frames.swap(0, 2)), ["train: 2 frames stand in another order, the first is c"]);
         assert_eq!(changes(&|d| d.frames[2].size = [9, 8]), ["train: the image of 1 frame was replaced: c"]);

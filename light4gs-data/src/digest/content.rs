@@ -7,7 +7,8 @@ use sha2::{Digest, Sha256};
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// Blocks that are read, and their size in bytes. A file that is no longer than all of them is read whole.
+/// Number of blocks that are read, and their size in bytes. A file that is no longer than all of them together is read
+/// as a whole.
 const BLOCKS: u64 = 8;
 const BLOCK: u64 = 4096;
 
@@ -16,7 +17,7 @@ const BLOCK: u64 = 4096;
 pub(super) struct Content {
     /// Bytes.
     length: u64,
-    /// SHA-256 of what was read, its first 16 bytes, hexadecimal.
+    /// The first 16 bytes of the SHA-256 of the blocks, hexadecimal.
     hash: String,
 }
 
@@ -37,7 +38,7 @@ fn sampled(path: &Path) -> io::Result<Content> {
     } else {
         let mut block = [0; BLOCK as usize];
         for i in 0..BLOCKS {
-            // The first block and the last are the file's ends.
+            // The first block and the last one are at the file's ends.
             file.seek(SeekFrom::Start((length - BLOCK) / (BLOCKS - 1) * i))?;
             file.read_exact(&mut block)?;
             hash.update(block);

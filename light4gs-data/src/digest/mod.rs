@@ -1,4 +1,4 @@
-//! The digest of a dataset, which a run keeps, and what has changed since it was taken, in words.
+//! The digest of a dataset, which a run keeps, and the changes since it was taken, as text.
 
 mod changes;
 mod content;
@@ -12,12 +12,12 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::path::Path;
 
-/// What a dataset was when it was opened: frames in their order, poses, intrinsics, times, the content of image files,
-/// and the points.
+/// The state of a dataset when it was opened: frames in their order, poses, intrinsics, times, the content of image
+/// files, and the points.
 ///
-/// Of a file larger than 32 KiB only its length and eight blocks of 4 KiB, spread evenly, are read: 6000 images take
-/// about a second, and an image that was replaced or drawn on differs there, since compressed files differ almost
-/// everywhere. Dates of files do not count, nor does where the dataset lies or the size at which images are used.
+/// Of a file larger than 32 KiB only its length and eight blocks of 4 KiB, spread evenly, are read, so 6000 images take
+/// about a second. This is enough to notice an image that was replaced or edited, since compressed files then differ
+/// almost everywhere. Dates of files are ignored, and so are the dataset's path and the size at which images are used.
 ///
 /// ```
 /// use light4gs_data::{DatasetDigest, LoadOptions, Scene, SyntheticOptions, write_synthetic};
@@ -41,11 +41,11 @@ pub struct DatasetDigest {
     points: String,
 }
 
-/// What a frame was.
+/// The state of a frame.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct FrameDigest {
     split: String,
-    /// Relative to the dataset; the file's name where it lies elsewhere.
+    /// Path relative to the dataset; for a file outside of it, its name.
     file: String,
     /// Pixels of the image file.
     size: [u32; 2],
@@ -56,12 +56,12 @@ struct FrameDigest {
     pose: [f32; 12],
     /// Focal lengths and principal point as shares of width and height.
     intrinsics: [f32; 4],
-    /// The lens in words; empty for a pinhole.
+    /// The lens as text; empty for a pinhole.
     lens: String,
 }
 
 impl DatasetDigest {
-    /// The digest of an opened scene. It reads every image file, see above.
+    /// The digest of an opened scene. It reads a part of every image file, see above.
     ///
     /// # Errors
     /// [`DataError::Io`] naming the file that cannot be read.
@@ -82,7 +82,7 @@ impl DatasetDigest {
         })
     }
 
-    /// What has changed since an earlier digest, in sentences for people; empty if nothing has.
+    /// The changes since an earlier digest, in sentences for people; empty if there are none.
     pub fn changes_since(&self, earlier: &Self) -> Vec<String> {
         changes::between(earlier, self)
     }

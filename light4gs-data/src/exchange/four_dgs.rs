@@ -1,7 +1,8 @@
-//! Moving Gaussians in the `4dgs` container: a population at successive times, as keyframes and the changes between them.
+//! Moving Gaussians in the `4dgs` container: the Gaussians at successive times, as keyframes and the changes between
+//! them.
 //!
-//! The container's keyframes know one color a Gaussian, so that what depends on the direction of view is lost; positions,
-//! scales, rotations and opacities are rounded to the grids of its `fine` profile.
+//! The container's keyframes have one color for each Gaussian, so colors that depend on the viewing direction are lost.
+//! Positions, scales, rotations and opacities are rounded to the steps of its profile `fine`.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,17 +17,18 @@ use crate::error::DataError;
 use crate::ply::GaussianPly;
 use crate::points::SH_C0;
 
-/// Every so many samples is written whole.
+/// Every how many samples there is a keyframe.
 const KEYFRAME_INTERVAL: usize = 8;
-/// Gaussians fade with their distance in time; these fade so slowly, in durations of the scene, that none is seen to.
+/// The container's Gaussians fade with their distance in time. These fade so slowly, in durations of the scene, that it
+/// cannot be seen.
 const FADING: f64 = 1000.0;
 
-/// The Gaussians from a moment on; row `i` is the same Gaussian in every sample.
+/// The Gaussians from a time on; row `i` is the same Gaussian in every sample.
 #[derive(Clone, Debug)]
 pub struct MotionSample {
     /// Seconds since the beginning; the first sample's is 0.
     pub begin: f64,
-    /// As they are then.
+    /// The Gaussians at that time.
     pub gaussians: GaussianPly,
 }
 

@@ -1,7 +1,7 @@
 //! One static set of Gaussians as binary glTF 2.0 with the extension `KHR_gaussian_splatting`.
 //!
-//! The extension keeps what is drawn, not what is trained: scales and opacities are activated, quaternions have unit length
-//! and the order (x, y, z, w). Its spherical harmonics are those of 3DGS, coefficient by coefficient.
+//! The extension holds activated values: scales and opacities are activated, quaternions have unit length and the order
+//! (x, y, z, w). Its spherical harmonics are those of 3DGS, coefficient by coefficient.
 
 use std::io::Write;
 use std::path::Path;
@@ -19,7 +19,7 @@ const POINTS: u32 = 0;
 const FLOAT: u32 = 5126;
 const ARRAY_BUFFER: u32 = 34962;
 
-/// What else the file says.
+/// Options of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GlbOptions {
     /// Highest degree of the spherical harmonics that is written, 0 to 3.
@@ -117,7 +117,7 @@ fn attributes(gaussians: &GaussianPly, options: &GlbOptions) -> Attributes {
     let mut attributes = Attributes::default();
     let opacities = gaussians.opacity_logits.iter().map(|logit| 1.0 / (1.0 + (-logit).exp()));
     attributes.add("POSITION".into(), gaussians.means.iter().copied(), true);
-    // For viewers that know only points: linear, where the harmonics give sRGB.
+    // For viewers that know only points: linear colors, whereas the harmonics give sRGB.
     let color = |(dc, alpha): (&[f32; 3], f32)| {
         let [r, g, b] = dc.map(|value| srgb_to_linear((value * SH_C0 + 0.5).clamp(0.0, 1.0)));
         [r, g, b, alpha]

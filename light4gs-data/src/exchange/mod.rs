@@ -1,4 +1,4 @@
-//! Gaussians in files that other programs play: glTF with the Khronos extension, and the 4dgs container.
+//! Gaussians in files for other players: glTF with the Khronos extension, and the 4dgs container.
 
 mod four_dgs;
 mod glb;

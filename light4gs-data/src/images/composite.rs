@@ -7,28 +7,27 @@ use fast_image_resize::{FilterType, pixels::F32x3};
 
 /// Color over background as floats in `[0, 1]`.
 ///
-/// f64, and in this order of operations, because the truncation below shows the last bit.
+/// f64, and in this order of operations, because the truncation below depends on the last bit.
 fn over(color: u8, alpha: u8, background: f32) -> f64 {
     let alpha = f64::from(alpha) / 255.0;
     f64::from(color) / 255.0 * alpha + f64::from(background) * (1.0 - alpha)
 }
 
-/// Composites `[H, W, 4]` bytes (straight alpha) on a background and gives `[H, W, 3]` bytes,
-/// `value * 255` truncated, as the field's reference loader does.
+/// Composites `[H, W, 4]` bytes (straight alpha) on a background and returns `[H, W, 3]` bytes, `value * 255`
+/// truncated, as the reference's loader does.
 ///
 /// A trailing incomplete pixel is dropped.
 pub fn composite(rgba: &[u8], background: [f32; 3]) -> Vec<u8> {
     rgba.chunks_exact(4).flat_map(|p| [0, 1, 2].map(|c| (over(p[c], p[3], background[c]) * 255.0) as u8)).collect()
 }
 
-/// Composites an image of `source` = (width, height) pixels on a background and brings it to
-/// `target` = (width, height): unchanged size as [`composite`]; otherwise composited in floats,
-/// filtered, and rounded.
+/// Composites an image of `source` = (width, height) pixels on a background and resizes it to `target` = (width,
+/// height). At the same size this is [`composite`]; otherwise it is composited in floats, filtered, and rounded.
 ///
-/// The filter is the plain mean over the covered pixels where both sides shrink by whole factors
-/// (800 to 400, 200...): what a sensor with larger pixels would have recorded, unbiased, no ringing
-/// at silhouettes against a white background, and what D-NeRF's own half-size loader uses. A box
-/// aliases at fractional factors, so those get an antialiased Lanczos window of radius 3.
+/// Where both sides shrink by whole factors (800 to 400, 200...), the filter is the plain mean over the covered pixels.
+/// This is what a sensor with larger pixels would have recorded; it is unbiased, has no ringing at silhouettes against
+/// a white background, and is what D-NeRF's own half-size loader uses. At fractional factors a box filter aliases, so
+/// an antialiased Lanczos window of radius 3 is used there.
 ///
 /// # Errors
 /// [`DataError::Options`] when a size is 0 or `rgba` does not have `width * height * 4` bytes.
@@ -85,7 +84,7 @@ mod tests {
 
     #[test]
     fn transparent_colors_do_not_bleed() {
-        // A transparent red pixel beside a white one on white is white.
+        // A transparent red pixel beside a white one, on white, gives white.
         let rgba = [255, 0, 0, 0, 255, 255, 255, 255];
         let small = composite_resized(&rgba, (2, 1), (1, 1), [1.0; 3]).unwrap();
         assert_eq!(small.pixels, [255; 3]);

@@ -1,4 +1,4 @@
-//! From an image file to the `[H, W, 3]` bytes that are trained on: decoded, turned, straightened, composited, resized.
+//! From an image file to the `[H, W, 3]` bytes that are trained on: decoded, rotated, undistorted, composited, resized.
 
 use super::composite::{composite, composite_resized};
 use super::header;
@@ -13,7 +13,7 @@ use std::sync::{Mutex, PoisonError};
 
 /// Decoding a single image may take at most this much memory for the pixels as they are stored.
 const MAX_DECODED_BYTES: u64 = 1 << 30;
-/// From this many pixels on an image counts as large: it is decoded alone, and with less memory a pixel.
+/// From this many pixels on an image is large: only one is decoded at a time, with less memory for each pixel.
 const LARGE_PIXELS: u64 = 1 << 24;
 
 /// One large image at a time, however many threads ask for one.
@@ -55,7 +55,7 @@ pub(super) fn decode(frame: &Frame, background: [f32; 3]) -> Result<RgbImage8, D
     composite_resized(&rgba, source, target, background)
 }
 
-/// The pixels of an image that must be of the size `expected`. One that lies on its side is turned as its EXIF data say.
+/// Decodes an image that must have the size `expected`. One that lies on its side is rotated as its EXIF data say.
 pub(super) fn decode_upright(path: &Path, expected: (u32, u32)) -> Result<DynamicImage, DataError> {
     let mut reader = header::open(path)?;
     let mut limits = image::Limits::default();
@@ -92,7 +92,7 @@ mod tests {
     use crate::camera::Camera;
     use glam::Vec3;
 
-    /// A JPEG whose EXIF data say that it must be turned by a quarter clockwise (orientation 6).
+    /// A JPEG whose EXIF data say that it must be rotated by a quarter turn clockwise (orientation 6).
     fn sideways_jpeg(path: &Path) {
         let pixels =
             image::RgbImage::from_fn(64, 32, |x, _| image::Rgb(if x < 32 { [220, 20, 20] } else { [20, 20, 220] }));
@@ -110,7 +110,7 @@ mod tests {
         sideways_jpeg(&path);
         let upright = decode_upright(&path, (32, 64)).unwrap().into_rgb8();
         assert!(upright.get_pixel(16, 10)[0] > 150 && upright.get_pixel(16, 54)[2] > 150);
-        // A camera that lies as the file does: the mark is passed over, as COLMAP does.
+        // If the camera lies on its side like the file, the EXIF rotation is ignored, as COLMAP does.
         let stored = decode_upright(&path, (64, 32)).unwrap().into_rgb8();
         assert!(stored.get_pixel(10, 16)[0] > 150 && stored.get_pixel(54, 16)[2] > 150);
         assert!(decode_upright(&path, (30, 64)).unwrap_err().to_string().contains("expected 30 x 64"));

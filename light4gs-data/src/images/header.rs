@@ -1,4 +1,4 @@
-//! What an image file says about itself before it is decoded: format, size, whether its end is there.
+//! What an image file tells before it is decoded: format, size, and whether its end is there.
 
 use crate::error::DataError;
 use crate::regular_file::open_regular_file;
@@ -9,24 +9,24 @@ use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// The longest side of an image file, pixels: that of the renderer's own limit.
+/// The longest side of an image file, pixels: the renderer's own limit.
 const MAX_SIDE: u32 = 65_535;
-/// Pixels of a PNG: it is read row by row where it is large, so memory is no question, but time is.
+/// Pixels of a PNG. A large one is read row by row, so that this bounds time, not memory.
 const MAX_PNG_PIXELS: u64 = 1 << 28;
 /// Pixels of any other image, which is decoded as a whole (3 bytes a pixel, and 3 for the result).
 const MAX_PIXELS: u64 = 1 << 27;
-/// How far before the end of a file its end mark may lie: some programs append data of their own.
+/// How far from the end of a file its end mark may be, since some programs append data of their own.
 const TAIL: u64 = 64 << 10;
 
 /// Format and size of an image file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ImageHeader {
     pub(crate) format: ImageFormat,
-    /// Width and height of the stored pixels, whatever the orientation mark says.
+    /// Width and height of the stored pixels, before any EXIF rotation.
     pub(crate) size: (u32, u32),
 }
 
-/// Opens an image file far enough to know its format. Only plain files: a pipe would wait for ever.
+/// Opens an image file and finds its format. Regular files only: opening a pipe would wait for ever.
 pub(crate) fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, DataError> {
     let remedy = "restore the file or remove its frame";
     let cannot = |e: std::io::Error| DataError::image(path, format!("cannot be read: {e}"), remedy);
@@ -36,7 +36,7 @@ pub(crate) fn open(path: &Path) -> Result<ImageReader<BufReader<File>>, DataErro
     ImageReader::open(path).and_then(ImageReader::with_guessed_format).map_err(cannot)
 }
 
-/// Reads the header of an image, refuses sizes beyond the limits, and looks for the mark at the file's end.
+/// Reads the header of an image, refuses sizes beyond the limits, and looks for the end mark of the file.
 pub(crate) fn read_header(path: &Path) -> Result<ImageHeader, DataError> {
     let reader = open(path)?;
     let bad = |what: String| DataError::image(path, what, "restore the file or remove its frame");
@@ -65,7 +65,7 @@ pub(crate) fn read_header(path: &Path) -> Result<ImageHeader, DataError> {
 /// The headers of many images, read in parallel, in their order.
 ///
 /// # Errors
-/// The first one in the list that has one, whatever the threads do.
+/// The first error in the order of the list, whatever the threads do.
 pub(crate) fn read_headers<'a>(
     paths: impl IntoParallelIterator<Item = &'a Path, Iter: IndexedParallelIterator>,
 ) -> Result<Vec<ImageHeader>, DataError> {
@@ -76,19 +76,19 @@ pub(crate) fn read_headers<'a>(
 /// Size (width, height) of an image, from its header alone.
 ///
 /// # Errors
-/// [`DataError::Image`] when the file is missing, its header is damaged, its end is not there, or it is larger than any
-/// image that is accepted.
+/// [`DataError::Image`] when the file is missing, its header is damaged, its end is missing, or it is larger than the
+/// limits.
 pub fn image_size(path: &Path) -> Result<(u32, u32), DataError> {
     Ok(read_header(path)?.size)
 }
 
-/// How the image must be turned to stand upright, as its EXIF data say; as stored where they say nothing.
+/// The rotation with which the image stands upright, as its EXIF data say; without EXIF data, none.
 pub(crate) fn orientation(path: &Path) -> Result<Orientation, DataError> {
     let decoder = open(path)?.into_decoder();
     Ok(decoder.ok().and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms))
 }
 
-/// Whether an orientation exchanges width and height.
+/// Whether an orientation swaps width and height.
 pub(crate) fn turns_sideways(orientation: Orientation) -> bool {
     matches!(
         orientation,
@@ -99,7 +99,7 @@ pub(crate) fn turns_sideways(orientation: Orientation) -> bool {
 /// Whether the mark that ends a file of this format is near its end. Formats without one always pass.
 fn has_end(path: &Path, format: ImageFormat) -> std::io::Result<bool> {
     let mark: &[u8] = match format {
-        // The chunk's name and its checksum, which is always the same.
+        // The chunk's name, and its checksum, which is always the same.
         ImageFormat::Png => b"IEND\xae\x42\x60\x82",
         ImageFormat::Jpeg => b"\xff\xd9",
         _ => return Ok(true),

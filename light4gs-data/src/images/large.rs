@@ -1,4 +1,4 @@
-//! Images of many megapixels, in memory that follows from the size that is wanted, not from that of the file.
+//! Images of many megapixels, in memory that depends on the size that is wanted, not on that of the file.
 
 use super::composite::composite;
 use super::resize::resize;
@@ -20,11 +20,11 @@ pub(super) fn resize_rgb(rgb: Vec<u8>, source: (u32, u32), target: (u32, u32)) -
     resize(&colors, source, target, FilterType::Lanczos3)
 }
 
-/// Reads a PNG row by row and shrinks it on the way: means of whole blocks of pixels, as large as still leaves twice the
-/// wanted size, then the filter of [`resize_rgb`].
+/// Reads a PNG row by row and shrinks it while reading: first to means of whole blocks of pixels, with blocks so large
+/// that at least twice the wanted size is left; then by the filter of [`resize_rgb`].
 ///
-/// `None` where that does not help: the file is interlaced, so that its rows come in another order, or the image is not
-/// to become smaller by a factor of 2 at least.
+/// `None` where that does not help: if the file is interlaced, so that its rows come in another order, or if the image
+/// does not become smaller by a factor of at least 2.
 pub(super) fn shrink_png(
     path: &Path,
     target: (u32, u32),
@@ -47,7 +47,7 @@ pub(super) fn shrink_png(
     if info.interlaced || factor < 2 {
         return Ok(None);
     }
-    // Columns and rows that fill no whole block are spread over the last one.
+    // Columns and rows that do not fill a whole block are added to the last block.
     let (columns, rows) = (width / factor, height / factor);
     let mut small = Vec::with_capacity(columns as usize * rows as usize * 3);
     let mut sums = vec![[0u32; 4]; columns as usize];
@@ -63,7 +63,7 @@ pub(super) fn shrink_png(
             sum[3] += 1;
         }
         y += 1;
-        // The last block of rows takes what is left over.
+        // The last block of rows takes the remaining rows.
         if (y % factor == 0 && y / factor < rows) || y == height {
             for sum in &mut sums {
                 let count = sum[3].max(1);
@@ -95,7 +95,7 @@ mod tests {
     fn row_by_row_gives_what_the_whole_image_gives() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a.png");
-        // Smooth, so that the filters agree; odd sizes, so that blocks are left over.
+        // Smooth, so that the filters agree; odd sizes, so that rows and columns remain after the blocks.
         let (width, height) = (1003u32, 757u32);
         let wave = |v: u32, period: f32| (127.5 + 127.0 * (v as f32 / period).sin()) as u8;
         let rgba: Vec<u8> = (0..width * height)
@@ -108,7 +108,7 @@ mod tests {
         assert_eq!((small.width, small.height), target);
         let worst = small.pixels.iter().zip(&whole.pixels).map(|(a, b)| a.abs_diff(*b)).max().unwrap();
         assert!(worst <= 6, "{worst}");
-        // Not much smaller: nothing to gain.
+        // Only a little smaller: `None`.
         assert!(shrink_png(&path, (400, 300), [1.0; 3]).unwrap().is_none());
     }
 

@@ -1,4 +1,4 @@
-//! Which pixels of an image count.
+//! Which pixels of an image are used.
 
 use super::decode::decode_upright;
 use super::undistort::{is_recorded_everywhere, undistort_mask};
@@ -13,12 +13,12 @@ pub struct PixelMask {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// `height * width` values, row-major: 1 where a pixel counts, otherwise 0.
+    /// `height * width` values, row-major: 1 where a pixel is used, otherwise 0.
     pub pixels: Vec<u8>,
 }
 
-/// The pixels that a frame may be trained on; `None` where it is all of them. Not: what its mask ignores, and what its
-/// lens did not record.
+/// The pixels that a frame may be trained on: all except those that its mask ignores, and those that its lens did not
+/// record. `None` where it is all of them.
 pub(super) fn trained_pixels(frame: &Frame) -> Result<Option<PixelMask>, DataError> {
     let ignored = frame.mask.as_ref().filter(|mask| mask.zero == MaskMeaning::Ignored);
     let size = (frame.source_width, frame.source_height);
@@ -34,8 +34,8 @@ pub(super) fn trained_pixels(frame: &Frame) -> Result<Option<PixelMask>, DataErr
     }
 }
 
-/// The pixels that masked measures look at: those that the frame's mask does not ignore, or those where something moves;
-/// `None` without a mask.
+/// The pixels of masked metrics: those that the frame's mask does not ignore, or those where something moves; `None`
+/// without a mask.
 ///
 /// # Errors
 /// [`DataError::Image`] where the mask cannot be read.
@@ -62,7 +62,7 @@ fn same_aspect(path: &Path, found: (u32, u32), size: (u32, u32)) -> Result<(), D
     Ok(())
 }
 
-/// Marks of the image's file as the frame's camera sees them.
+/// From marks at the size of the image's file to marks of the frame's camera.
 fn at_camera(frame: &Frame, marks: Vec<u8>) -> PixelMask {
     let source = (frame.source_width, frame.source_height);
     let straight = match &frame.lens {
@@ -114,7 +114,7 @@ mod tests {
         let moving = frame(folder.path(), MaskMeaning::Moving);
         assert_eq!(trained_pixels(&moving).unwrap(), None);
         assert_eq!(measured_pixels(&moving).unwrap().unwrap().pixels, left);
-        // A mask on its side is refused; none is none.
+        // A mask that lies on its side is refused; a frame without a mask has none.
         image::GrayImage::new(4, 8).save(folder.path().join("m.png")).unwrap();
         assert!(measured_pixels(&moving).unwrap_err().to_string().contains("m.png"));
         assert_eq!(measured_pixels(&Frame { mask: None, ..moving }).unwrap(), None);

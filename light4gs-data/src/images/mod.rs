@@ -1,5 +1,5 @@
-//! Images in memory: headers, decoding within a bound, straightening, compositing on the background, resizing, and
-//! writing as PNG.
+//! Images in memory: headers, decoding within a memory bound, undistortion, compositing on the background, resizing,
+//! and writing as PNG.
 
 mod composite;
 mod decode;

@@ -1,5 +1,5 @@
-//! Resizing of float colors. Only this type of pixels is asked for: the general entry of `fast_image_resize`, or its kernels
-//! for bytes, take longer to compile than everything else in this crate together.
+//! Resizing of float colors. Only this type of pixels is used: the general entry of `fast_image_resize`, and its
+//! kernels for bytes, take longer to compile than everything else in this crate together.
 
 use super::rgb::RgbImage8;
 use crate::error::DataError;
@@ -7,7 +7,7 @@ use fast_image_resize::images::{TypedImage, TypedImageRef};
 use fast_image_resize::pixels::F32x3;
 use fast_image_resize::{FilterType, ResizeAlg, ResizeOptions, Resizer};
 
-/// Brings `source` = (width, height) colors in `[0, 1]`, row by row, to the size `target` with an antialiased filter, and
+/// Resizes `source` = (width, height) colors in `[0, 1]`, row by row, to `target` with an antialiased filter, and
 /// rounds them to bytes.
 ///
 /// # Errors

@@ -1,4 +1,4 @@
-//! Images in memory: decoded when needed, composited, resized, kept within a bound.
+//! Images in memory: decoded when needed, composited, resized, within a memory bound.
 
 use super::decode::decode;
 use super::mask::{PixelMask, trained_pixels};
@@ -12,21 +12,22 @@ use std::fmt;
 use std::path::PathBuf;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// An image, and which of its pixels are trained on; `None` is all.
+/// An image, and the pixels that are trained on; `None` means all.
 type Masked = (Arc<RgbImage8>, Option<Arc<PixelMask>>);
 
 /// An image file at a size.
 type Key = (PathBuf, u32, u32);
 
-/// Whether an image was decoded ahead and has not been asked for since, and when that was or it was last asked for. The
-/// smallest is dropped first: in a shuffled order, what has just been used is needed last of all.
+/// Whether an image was decoded ahead and not yet asked for, and when it was decoded or last asked for. The smallest is
+/// dropped first: in a shuffled order, the image that has just been used is needed last.
 type Age = (bool, u64);
 
 /// A thread-safe store of the images of frames: `[H, W, 3]` bytes, on the background, at the size
 /// of the frame's camera.
 ///
-/// Images are decoded on demand. When the bound is reached, the least recently used are dropped, and only after them those
-/// that were decoded ahead and still wait to be used. Clones share one store. An image is decoded once even if several threads ask for it.
+/// Images are decoded on demand. When the bound is reached, the least recently used are dropped first, and last those
+/// that were decoded ahead and not yet used. Clones share one store. An image is decoded only once even if several
+/// threads ask for it.
 #[derive(Clone)]
 pub struct ImageStore {
     inner: Arc<Inner>,
@@ -42,7 +43,7 @@ struct Inner {
 #[derive(Default)]
 struct State {
     kept: HashMap<Key, (Masked, Age)>,
-    /// The first is dropped first.
+    /// The first one is dropped first.
     by_age: BTreeMap<Age, Key>,
     bytes: usize,
     clock: u64,
@@ -74,7 +75,7 @@ impl ImageStore {
         }
     }
 
-    /// The image of a frame, decoded now if it is not kept.
+    /// The image of a frame. It is decoded now if it is not in memory.
     ///
     /// # Errors
     /// [`DataError::Image`] when the frame has no image, or it is missing, damaged, or of
@@ -83,8 +84,8 @@ impl ImageStore {
         Ok(self.get_masked(frame)?.0)
     }
 
-    /// The image of a frame as [`Self::get`] gives it, and which of its pixels may be trained on: not those that its mask
-    /// ignores, nor those that its lens did not record. `None` is all of them.
+    /// The image of a frame as [`Self::get`] returns it, and the pixels that may be trained on: all except those that
+    /// its mask ignores, and those that its lens did not record. `None` means all of them.
     ///
     /// # Errors
     /// As [`Self::get`], also for the mask.
@@ -98,7 +99,7 @@ impl ImageStore {
             if !state.decoding.contains(&key) {
                 break;
             }
-            // The other thread is running, not queued, so this ends.
+            // The other thread is decoding already, not waiting, so this ends.
             state = self.inner.decoded.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
         state.decoding.insert(key.clone());
@@ -109,13 +110,13 @@ impl ImageStore {
     /// The images of several frames, in their order, decoded in parallel.
     ///
     /// # Errors
-    /// As [`Self::get`], for the first frame that has one.
+    /// As [`Self::get`], for the first frame with an error.
     pub fn get_many(&self, frames: &[Frame]) -> Result<Vec<Arc<RgbImage8>>, DataError> {
         frames.par_iter().map(|frame| self.get(frame)).collect()
     }
 
-    /// Starts to decode images in the background, in order, as many as fit in the bound together;
-    /// returns at once. What fails here is reported by the [`Self::get`] of that frame.
+    /// Starts to decode images in the background, in order, as many as fit into the bound together; returns at once.
+    /// Errors are reported by [`Self::get`] of the frame.
     pub fn prefetch(&self, frames: &[Frame]) {
         let mut bytes = 0usize;
         for frame in frames {
@@ -135,7 +136,7 @@ impl ImageStore {
                     return;
                 }
                 drop(state);
-                // Said by `get`, to the caller who wants the image.
+                // `get` reports the error, to the caller that needs the image.
                 let _ = inner.decode_claimed(&frame, key, true);
             });
         }
@@ -178,7 +179,7 @@ impl Inner {
 
     /// Decodes an image that this thread has marked in `decoding`, and keeps it if it fits.
     fn decode_claimed(&self, frame: &Frame, key: Key, ahead: bool) -> Result<Masked, DataError> {
-        /// Takes the mark back, also if a decoder panics: others would wait for ever.
+        /// Removes the mark, even if a decoder panics: otherwise other threads would wait for ever.
         struct Claim<'a>(&'a Inner, Key);
         impl Drop for Claim<'_> {
             fn drop(&mut self) {
@@ -257,7 +258,7 @@ mod tests {
         let first = store.get(&frames[0]).unwrap();
         store.get(&frames[3]).unwrap();
         assert_eq!((store.len(), store.bytes()), (3, 576));
-        // 1 went, 0 stayed: without files, only what is kept can be had.
+        // Image 1 was dropped, image 0 stayed: without the files, only images in memory can be returned.
         for i in 0..5 {
             std::fs::remove_file(&frames[i].path).unwrap();
         }
@@ -289,7 +290,7 @@ mod tests {
             assert_eq!(frame.name, image.pixels[0].to_string());
         }
         assert!(store.bytes() <= 20 * 192 && store.bytes() == store.len() * 192);
-        // Everything fits: a prefetch ends with all of them there.
+        // Everything fits, so all images are in memory after a prefetch.
         let store = ImageStore::new(&LoadOptions::default(), 40 * 192);
         store.prefetch(&frames);
         for _ in 0..1000 {

@@ -1,13 +1,13 @@
-//! The image that a pinhole would have recorded, from one that was taken through a lens.
+//! From an image taken through a lens to the one that a pinhole would have recorded.
 
 use crate::camera::Camera;
 use crate::lens::Lens;
 use glam::DVec2;
 
-/// Straightens `[H, W, 4]` bytes of `size` = (width, height) pixels (straight alpha): same size, focal lengths and
-/// principal point, without distortion and skew. `camera` may be of another size; its intrinsics are scaled.
+/// Undistorts `[H, W, 4]` bytes of `size` = (width, height) pixels (straight alpha): same size, focal lengths and
+/// principal point, without distortion and skew. `camera` may have another size; its intrinsics are scaled.
 ///
-/// Between pixels it is bilinear. What lies outside of the recorded image takes the color of its edge.
+/// Between pixels it is bilinear. Places outside of the recorded image get the color of its edge.
 pub(super) fn undistort(rgba: &[u8], size: (u32, u32), camera: &Camera, lens: &Lens) -> Vec<u8> {
     let map = Map::new(size, camera, lens);
     let (width, height) = (size.0 as usize, size.1 as usize);
@@ -34,7 +34,7 @@ pub(super) fn undistort(rgba: &[u8], size: (u32, u32), camera: &Camera, lens: &L
     out
 }
 
-/// `[H, W]` bytes of a mask, straightened by taking the nearest pixel; outside of the recorded image it is `outside`.
+/// `[H, W]` bytes of a mask, undistorted by taking the nearest pixel; outside of the recorded image it is `outside`.
 pub(super) fn undistort_mask(mask: &[u8], size: (u32, u32), camera: &Camera, lens: &Lens, outside: u8) -> Vec<u8> {
     let map = Map::new(size, camera, lens);
     let (width, height) = (size.0 as usize, size.1 as usize);
@@ -50,7 +50,8 @@ pub(super) fn undistort_mask(mask: &[u8], size: (u32, u32), camera: &Camera, len
     (0..height).flat_map(|j| (0..width).map(move |i| (i, j))).map(|(i, j)| value(i, j)).collect()
 }
 
-/// Whether every pixel of the pinhole image was recorded. The image's rim decides: what lies within it is seen if it is.
+/// Whether every pixel of the pinhole image was recorded. Only the pixels at its edge are checked: if they were
+/// recorded, so were those inside.
 pub(super) fn is_recorded_everywhere(size: (u32, u32), camera: &Camera, lens: &Lens) -> bool {
     let map = Map::new(size, camera, lens);
     let (right, bottom) = (f64::from(size.0) - 1.0, f64::from(size.1) - 1.0);
@@ -94,7 +95,7 @@ fn blend(rgba: &[u8], corners: [(usize, f32); 4]) -> [u8; 4] {
     [sum[0] as u8, sum[1] as u8, sum[2] as u8, 255]
 }
 
-/// Colors weigh as much as they are opaque: those of transparent pixels mean nothing.
+/// Colors are weighted by their alpha: the color of a transparent pixel is meaningless.
 fn blend_with_alpha(rgba: &[u8], corners: [(usize, f32); 4]) -> [u8; 4] {
     let mut sum = [0.0f32; 3];
     let mut alpha = 0.0;
@@ -121,7 +122,8 @@ mod tests {
         [wave(9.0 * p.x), wave(11.0 * p.y), wave(7.0 * (p.x - p.y)), 255]
     }
 
-    /// The image of the pattern through a lens: every recorded pixel looks up which direction it saw.
+    /// The image of the pattern through a lens: for every recorded pixel, the pattern in the direction that the pixel
+    /// sees.
     fn recorded(camera: &Camera, lens: &Lens) -> Vec<u8> {
         let mut out = Vec::new();
         for j in 0..camera.height {

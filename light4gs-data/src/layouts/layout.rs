@@ -1,4 +1,4 @@
-//! What a dataset layout must be able to do.
+//! The requirements of a dataset layout.
 
 use crate::error::DataError;
 use crate::options::LoadOptions;
@@ -10,18 +10,18 @@ use std::path::Path;
 /// A layout reads metadata only. Images stay on disk until [`crate::ImageStore`] decodes them, so
 /// [`open`](Self::open) is quick even for a large capture.
 ///
-/// A layout of this crate is one file in `layouts/`, its line in `layouts/mod.rs`, and a preset. A layout of another crate is
-/// added to a [`Layouts`](crate::Layouts), and nothing here changes: see `examples/own_dataset_layout.rs` of the
+/// A layout of this crate is one file in `layouts/`, its line in `layouts/mod.rs`, and a preset. A layout of another
+/// crate is added to a [`Layouts`](crate::Layouts), without changes here: see `examples/own_dataset_layout.rs` of the
 /// repository.
 pub trait DatasetLayout: Send + Sync {
     /// Lower-case name, unique among the layouts: for [`LoadOptions::layout`] and [`Scene::layout`].
     fn name(&self) -> &'static str;
 
-    /// The file or files that mark the layout, for the message when a folder holds no known one.
+    /// The file or files by which the layout is recognized, for the message when a folder holds no known one.
     fn signature(&self) -> &'static str;
 
-    /// The preset of `light4gs-train` that fits datasets of this layout: `light4gs train` takes it where no configuration is
-    /// named. None where one has to be named.
+    /// The preset of `light4gs-train` that fits datasets of this layout: `light4gs train` takes it where no
+    /// configuration is named. `None` if the user must name one.
     fn preset(&self) -> Option<&'static str> {
         None
     }
@@ -32,7 +32,7 @@ pub trait DatasetLayout: Send + Sync {
 
     /// Reads the metadata of the dataset in the folder `root`. `options` have been checked.
     ///
-    /// Cameras come out at the size that [`LoadOptions::resolution`] asks for, times in `[0, 1]`. [`Scene::new`] adds
+    /// Cameras have the size that [`LoadOptions::resolution`] asks for, and times are in `[0, 1]`. [`Scene::new`] adds
     /// what follows from the frames.
     ///
     /// # Errors

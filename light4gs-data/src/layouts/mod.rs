@@ -1,7 +1,7 @@
 //! Dataset layouts: [`DatasetLayout`] is the seam, [`Layouts`] the list of those that are known.
 //!
-//! To add one to this crate: its own file in this folder, its `mod` line and its place in [`Layouts::default`], and a preset in
-//! `light4gs-train/configs/`, which a test asks for.
+//! To add a layout to this crate: its own file in this folder, its `mod` line and its place in [`Layouts::default`],
+//! and a preset in `light4gs-train/configs/`, whose presence a test checks.
 
 pub(crate) mod colmap;
 mod dnerf;
@@ -40,7 +40,7 @@ pub struct Layouts {
 }
 
 impl Default for Layouts {
-    /// The layouts of this crate. Where two might match one folder, the more specific one stands first.
+    /// The layouts of this crate. If two match the same folder, the more specific one comes first.
     fn default() -> Self {
         Self {
             list: vec![
@@ -93,7 +93,7 @@ impl Layouts {
         Err(DataError::UnknownLayout { path: root.to_path_buf(), problem, remedy })
     }
 
-    /// The layout of a name.
+    /// The layout with a name.
     ///
     /// # Errors
     /// [`DataError::Options`] with the known names.
@@ -116,7 +116,7 @@ impl Scene {
         Self::open_with(&Layouts::default(), root, options)
     }
 
-    /// As [`Self::open`], with layouts of your own: `Layouts::default().with(MyLayout)`.
+    /// As [`Self::open`], with further layouts: `Layouts::default().with(MyLayout)`.
     ///
     /// # Errors
     /// As [`Self::open`].

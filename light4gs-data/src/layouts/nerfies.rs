@@ -21,18 +21,20 @@ use std::collections::HashSet;
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
-/// Folders of images, of which the one with most images is used, of equal ones the first: the reference trains at half size.
+/// Folders of images. The one with the most images is used; of equal ones the first, since the reference trains at half
+/// size.
 const SCALES: [&str; 5] = ["2x", "1x", "4x", "8x", "16x"];
-/// Without `val_ids`, of four images one trains and the one between it and the next tests, as in the reference.
+/// Without `val_ids`, every fourth image is for training, and those half way between are for testing, as in the
+/// reference.
 const STRIDE: usize = 4;
-/// What every bad field is told.
+/// The remedy for every bad field.
 const REMEDY: &str = "export the capture again, or correct the field";
 
 /// The layout `hypernerf`: nerfies and HyperNeRF captures.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HyperNerf;
 
-/// The layout `nerfds`: NeRF-DS captures, two cameras (`ID_left`, `ID_right`) and masks of what moves.
+/// The layout `nerfds`: NeRF-DS captures, two cameras (`ID_left`, `ID_right`) and masks of moving things.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NerfDs;
 
@@ -131,7 +133,7 @@ fn read_entries(root: &Path) -> Result<Vec<Entry>, DataError> {
         return Err(DataError::field(&path, "ids", "a list of 0, expected at least one image", REMEDY));
     }
     for (i, id) in ids.iter().enumerate() {
-        // An identifier is part of file names.
+        // An id is a part of file names.
         files::inside(root, &path, &format!("ids[{i}]"), id)?;
     }
     let list = |field: &str| match document.get(field) {
@@ -152,7 +154,7 @@ fn read_entries(root: &Path) -> Result<Vec<Entry>, DataError> {
     let metadata_path = root.join("metadata.json");
     let metadata = json::read(&metadata_path)?;
     let mut entries = Vec::with_capacity(ids.len());
-    // Without `val_ids`, the last image that trains has no image after it that tests.
+    // Without `val_ids`, no test image follows the last training image.
     let last_trained = (ids.len() - 1) / STRIDE * STRIDE;
     for (i, id) in ids.iter().enumerate() {
         let (time, camera_id) = read_metadata(&metadata_path, id, metadata.get(id))?;
@@ -173,7 +175,7 @@ fn read_entries(root: &Path) -> Result<Vec<Entry>, DataError> {
     Ok(entries)
 }
 
-/// What counts time, and the camera.
+/// The number that counts time, and the camera.
 fn read_metadata(path: &Path, id: &str, entry: Option<&Value>) -> Result<(f64, u32), DataError> {
     let name = files::shorten(id);
     let entry = entry.and_then(Value::as_object).ok_or_else(|| {
@@ -194,7 +196,7 @@ fn read_metadata(path: &Path, id: &str, entry: Option<&Value>) -> Result<(f64, u
     Ok((time, camera as u32))
 }
 
-/// The folder of images, of the scale that is there.
+/// The folder of images, of the scale that exists.
 fn image_folder(root: &Path, entries: &[Entry]) -> Result<PathBuf, DataError> {
     let rgb = root.join("rgb");
     let present = |folder: &PathBuf| {
@@ -258,7 +260,8 @@ fn read_camera(root: &Path, entry: &Entry, image: PathBuf) -> Result<PosedImage,
 }
 
 /// The mask of an image, if there is one: `mask/Nx/ID.png.png` of NeRF-DS (0 where something moves), or
-/// `covisible/Nx/val/ID.png` of DyCheck (0 where no training camera sees the place). One of the image's scale comes first.
+/// `covisible/Nx/val/ID.png` of DyCheck (0 where no training camera sees the place). A mask of the image's own scale is
+/// preferred.
 fn find_mask(root: &Path, image: &Path, id: &str) -> Option<Mask> {
     let own = image.parent().and_then(Path::file_name).and_then(OsStr::to_str);
     own.into_iter().chain(SCALES).find_map(|scale| {

@@ -1,8 +1,8 @@
 //! The layout of nerfstudio and instant-ngp: `transforms.json` with intrinsics, shared or of each frame.
 //!
-//! `transform_matrix` is camera to world in OpenGL axes. `camera_model` says which lens `k1 k2 k3 k4 p1 p2` belong to.
-//! `time` of a frame is optional; without it the images' names count, see [`places`]. `train_filenames`,
-//! `val_filenames` and `test_filenames` are the splits where they are there. This is also what `light4gs prepare` writes.
+//! `transform_matrix` is camera to world in OpenGL axes. `camera_model` says to which lens `k1 k2 k3 k4 p1 p2` belong.
+//! `time` of a frame is optional; without it the time comes from the images' names, see [`places`]. `train_filenames`,
+//! `val_filenames` and `test_filenames` are the splits, if they are there. `light4gs prepare` writes this layout, too.
 
 use super::colmap::{frame_name, split};
 use super::layout::DatasetLayout;
@@ -22,7 +22,7 @@ use serde_json::Value;
 use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// What a malformed field is told.
+/// The remedy for a malformed field.
 const REMEDY: &str = "export the capture again, or correct the field";
 /// Camera models, and whether they bend by the angle.
 const PINHOLES: [&str; 7] =
@@ -84,7 +84,7 @@ impl DatasetLayout for Nerfstudio {
     }
 }
 
-/// Names for frames, of their images' paths: the last part, and the folder before it where that is not enough.
+/// Names for frames, from their images' paths: the last part, with the folder before it where that alone is not unique.
 fn frame_names(paths: &[String]) -> Vec<String> {
     let last = |count: usize| -> Vec<String> {
         let of = |path: &String| {
@@ -104,7 +104,7 @@ struct File<'a> {
     path: PathBuf,
 }
 
-/// An image that is there: its number in `frames` with the path that it should have, and the path that it has.
+/// An image that exists: its number in `frames`, the path that the file names, and the path that it has.
 type Present = ((usize, PathBuf), PathBuf);
 
 impl File<'_> {
@@ -117,7 +117,7 @@ impl File<'_> {
         files::inside(self.root, &self.path, &field, name)
     }
 
-    /// Cameras and times: from `time` where every frame has one, otherwise from the names.
+    /// Cameras and times: from `time` if every frame has one, otherwise from the names.
     fn places(&self, entries: &[Value], present: &[Present], names: &[String]) -> Result<Vec<Place>, DataError> {
         let mut found = places(names);
         let timed = present.iter().filter(|((i, _), _)| entries[*i].get("time").is_some()).count();
@@ -132,7 +132,7 @@ impl File<'_> {
         }
         let first = times.iter().copied().fold(f64::INFINITY, f64::min);
         let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        // Times in [0, 1] are taken as they are; others are brought there.
+        // Times in [0, 1] stay as they are; others are mapped to that range.
         let (from, span) = if first >= 0.0 && last <= 1.0 { (0.0, 1.0) } else { (first, last - first) };
         for (place, time) in found.iter_mut().zip(times) {
             place.time = if span > 0.0 { (time - from) / span } else { 0.0 };
@@ -174,7 +174,7 @@ impl File<'_> {
         })
     }
 
-    /// Intrinsics and lens of a frame. What the frame itself does not say stands at the top of the file.
+    /// Intrinsics and lens of a frame. Fields that the frame lacks are taken from the top of the file.
     fn camera(
         &self,
         document: &Value,
@@ -230,7 +230,8 @@ impl File<'_> {
         let tangential = [number("p1")?.unwrap_or(0.0), number("p2")?.unwrap_or(0.0)];
         let (field, model) = value("camera_model");
         let model = model.filter(|model| !model.is_null());
-        // nerfstudio's `k4` is the next term of the polynomial; OpenCV's divides, in a model that always has `k5` and `k6`.
+        // nerfstudio's `k4` is the next term of the polynomial. OpenCV's is in the denominator, in a model that always
+        // has `k5` and `k6`.
         let divides = k[4] != 0.0 || k[5] != 0.0 || model.is_some_and(|model| model == "FULL_OPENCV");
         let perspective = if divides || k[3] == 0.0 {
             Distortion::RadialTangential { radial: k, tangential }
@@ -256,7 +257,7 @@ impl File<'_> {
         Ok((intrinsics, Lens::new(distortion, 0.0)))
     }
 
-    /// The splits that the file names, or those of `tests`.
+    /// The splits that the file names, or those by `tests`.
     fn splits(&self, document: &Value, frames: Vec<Frame>, tests: &[bool]) -> Result<SplitFrames, DataError> {
         let mut named: HashMap<PathBuf, &str> = HashMap::new();
         let paths: HashSet<PathBuf> = frames.iter().map(|frame| frame.path.clone()).collect();
@@ -271,7 +272,7 @@ impl File<'_> {
                 known |= paths.contains(&path);
                 named.insert(path, split);
             }
-            // Some may be missing; if all are, the names are not those of this capture.
+            // Some names may be missing. If all are, they are not those of this capture.
             if !known {
                 let found = files::shorten(&names[0]);
                 let problem = format!("none of its {} names is that of a frame; the first is `{found}`", names.len());
@@ -282,7 +283,7 @@ impl File<'_> {
             return Ok(split(frames, tests));
         }
         let of = |frame: &Frame| named.get(&frame.path).copied();
-        // nerfstudio itself judges on `val` where there is no `test`.
+        // nerfstudio itself measures on `val` where there is no `test`.
         let judged = if named.values().any(|split| *split == "test") { "test" } else { "val" };
         let (val, rest): (Vec<Frame>, Vec<Frame>) = frames
             .into_iter()

@@ -1,14 +1,14 @@
 //! The PLY layout of the original 3D Gaussian Splatting, which viewers and editors read.
 //!
-//! `x y z nx ny nz f_dc_0..2 f_rest_0..44 opacity scale_0..2 rot_0..3`, where `f_rest` runs over the
-//! channels outside and the coefficients inside: coefficient `k` of channel `c` is `f_rest_{c*15+k}`.
+//! `x y z nx ny nz f_dc_0..2 f_rest_0..44 opacity scale_0..2 rot_0..3`, where `f_rest` is ordered by channel, then by
+//! coefficient: coefficient `k` of channel `c` is `f_rest_{c*15+k}`.
 
 use super::property::{Encoding, Property, Scalar};
 use super::table::{self, VertexTable};
 use crate::error::DataError;
 use std::path::Path;
 
-/// Coefficients a channel above degree 0, for SH degree 3.
+/// Coefficients above degree 0 for each channel, for SH degree 3.
 const REST: usize = 15;
 
 /// Static Gaussians as plain arrays; every list has the same length `N`.
@@ -18,7 +18,7 @@ pub struct GaussianPly {
     pub means: Vec<[f32; 3]>,
     /// `[N, 3]`, degree-0 harmonic of red, green, blue.
     pub sh_dc: Vec<[f32; 3]>,
-    /// `[N, 15, 3]`, harmonics of degree 1 to 3, coefficient outside, channel inside.
+    /// `[N, 15, 3]`, harmonics of degree 1 to 3, by coefficient, then by channel.
     pub sh_rest: Vec<[[f32; 3]; REST]>,
     /// `[N]`, logits.
     pub opacity_logits: Vec<f32>,
@@ -26,7 +26,7 @@ pub struct GaussianPly {
     pub log_scales: Vec<[f32; 3]>,
     /// `[N, 4]`, `(w, x, y, z)`, not necessarily normalized.
     pub quats: Vec<[f32; 4]>,
-    /// Properties beyond the layout, by name: `[N]` each. Viewers pass over them.
+    /// Properties beyond the layout, by name: `[N]` each. Viewers ignore them.
     pub further: Vec<(String, Vec<f32>)>,
 }
 
@@ -41,8 +41,8 @@ impl GaussianPly {
         self.means.is_empty()
     }
 
-    /// Reads a file of any SH degree from 0 to 3; missing higher coefficients are 0. Properties that the layout does not have
-    /// are further ones, whatever their values are.
+    /// Reads a file of any SH degree from 0 to 3; missing higher coefficients are 0. Properties that the layout does
+    /// not have become further ones, whatever their values are.
     ///
     /// # Errors
     /// [`DataError::Io`] when it cannot be read; [`DataError::Ply`] when it is damaged, a property is
@@ -81,8 +81,8 @@ impl GaussianPly {
     /// complete or absent, never half-written.
     ///
     /// # Errors
-    /// [`DataError::Io`] when it cannot be written; [`DataError::Ply`] when the lists differ in length, or a further property
-    /// has a name of the layout, one of another, or one with spaces or control characters.
+    /// [`DataError::Io`] when it cannot be written; [`DataError::Ply`] when the lists differ in length, or the name of
+    /// a further property is one of the layout, occurs twice, or has spaces or control characters.
     pub fn write(&self, path: &Path) -> Result<(), DataError> {
         let lengths =
             [self.sh_dc.len(), self.sh_rest.len(), self.opacity_logits.len(), self.log_scales.len(), self.quats.len()];

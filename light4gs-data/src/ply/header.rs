@@ -1,4 +1,4 @@
-//! The text in front of a PLY file's data.
+//! The text at the beginning of a PLY file.
 
 use super::property::{Encoding, Property, Scalar};
 use crate::error::DataError;
@@ -22,7 +22,8 @@ pub(super) fn shorten(word: &str) -> String {
     word.chars().take(40).collect()
 }
 
-/// One line without its end, or `None` at the end of the file. `too_long` says what a line is that takes `limit` bytes.
+/// One line without its end, or `None` at the end of the file. `too_long` gives the message for a line of `limit` bytes
+/// or more.
 pub(super) fn read_line(
     path: &Path,
     input: &mut impl BufRead,

@@ -1,7 +1,7 @@
 //! PLY: point clouds and Gaussians in files that other programs read.
 //!
-//! Only scalar properties of the `vertex` element are read (ASCII or binary little endian); what
-//! follows it, such as faces, is ignored.
+//! Only scalar properties of the `vertex` element are read (ASCII or binary little endian). Elements after it, such as
+//! faces, are ignored.
 
 mod gaussians;
 mod header;

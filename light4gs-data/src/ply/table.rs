@@ -1,7 +1,6 @@
 //! The vertex table of a PLY file, read with bounded memory and written atomically.
 //!
-//! A header is not believed: memory grows with the bytes that are really there, never with a count that the header
-//! claims.
+//! The header is not trusted: memory grows with the bytes that are really there, never with a count in the header.
 
 use super::header::{read_header, read_line, shorten};
 use super::property::{Encoding, Property};
@@ -39,7 +38,7 @@ impl VertexTable {
     /// The values of a column, one a vertex.
     ///
     /// # Errors
-    /// [`DataError::Ply`] naming the columns there are, if there is none of this name.
+    /// [`DataError::Ply`] with the names of the existing columns, if there is none of this name.
     pub fn column(&self, name: &str) -> Result<Vec<f32>, DataError> {
         let index = self.index(name)?;
         Ok(self.values.iter().skip(index).step_by(self.properties.len()).copied().collect())
@@ -90,7 +89,7 @@ fn read_from(path: &Path, mut input: impl BufRead, size: u64) -> Result<VertexTa
         )
     };
     let stride: usize = header.properties.iter().map(|p| p.scalar.size()).sum();
-    // In text, a value is at least one digit and one separator.
+    // In text, a value takes at least one digit and one separator.
     let smallest_row = match header.encoding {
         Encoding::Ascii => header.properties.len() * 2 - 1,
         Encoding::BinaryLittleEndian => stride,
@@ -150,11 +149,11 @@ fn read_from(path: &Path, mut input: impl BufRead, size: u64) -> Result<VertexTa
 
 /// Writes a vertex table; the file is complete or absent, never half-written.
 ///
-/// `fill(i, row)` appends the values of vertex `i` to the empty `row`, one a property; integers are
-/// converted with saturation.
+/// `fill(i, row)` appends the values of vertex `i` to the empty `row`, one for each property; integers are converted
+/// with saturation.
 ///
 /// # Errors
-/// [`DataError::Io`] when the file cannot be written, or `fill` gave another number of values.
+/// [`DataError::Io`] when the file cannot be written, or `fill` appended a wrong number of values.
 pub fn write(
     path: &Path,
     encoding: Encoding,

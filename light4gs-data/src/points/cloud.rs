@@ -1,4 +1,4 @@
-//! Colored points: where the Gaussians start.
+//! Colored points, at which Gaussians start.
 
 use super::neighbors::mean_squared_distance_to_3_nearest;
 use crate::error::DataError;

@@ -1,4 +1,4 @@
-//! Points to start from: those that a capture brings, or random ones where its cameras look.
+//! Points to start from: those of a capture, or random ones where its cameras look.
 
 use super::cloud::PointCloud;
 use crate::error::DataError;
@@ -7,8 +7,8 @@ use crate::options::LoadOptions;
 use glam::{DMat3, DVec3};
 use std::path::Path;
 
-/// Names of point clouds, in the order in which they are tried: the reference's thinned cloud, what COLMAP and 3DGS
-/// write, what nerfstudio and the D-NeRF layout use.
+/// Names of point clouds, in the order in which they are tried: the reference's thinned cloud; then the names that
+/// COLMAP and 3DGS write; then those of nerfstudio and the D-NeRF layout.
 const NAMES: [&str; 8] = [
     "points3D_downsample2.ply",
     "points3D_downsample.ply",
@@ -27,8 +27,9 @@ impl PointCloud {
         found.map(|path| Self::read_ply(&path)).transpose()
     }
 
-    /// Random points where the cameras look: in a cube around the place that is nearest to all their axes, which reaches
-    /// half the way to the cameras. Without such a place (all axes are parallel) it is the cube of the options.
+    /// Random points where the cameras look: in a cube around the point that is nearest to all their axes, which
+    /// extends half the way to the cameras. Without such a point (if all axes are parallel), it is the cube of the
+    /// options.
     pub(crate) fn in_front_of(frames: &[Frame], options: &LoadOptions) -> Self {
         let (center, half) = seen(frames).unwrap_or((DVec3::ZERO, options.random_half_size.into()));
         let mut cloud = Self::random(options.random_points, half as f32, options.seed);
@@ -41,7 +42,7 @@ impl PointCloud {
     }
 }
 
-/// The point nearest to the axes of all cameras, and half the mean distance from it to them.
+/// The point nearest to the axes of all cameras, and half the mean distance of the cameras from it.
 fn seen(frames: &[Frame]) -> Option<(DVec3, f64)> {
     let mut matrix = DMat3::ZERO;
     let mut vector = DVec3::ZERO;
@@ -52,7 +53,7 @@ fn seen(frames: &[Frame]) -> Option<(DVec3, f64)> {
         vector += across * frame.camera.center().as_dvec3();
     }
     let count = frames.len().max(1) as f64;
-    // Of parallel axes the matrix is singular; of almost parallel ones the place is noise.
+    // If axes are parallel, the matrix is singular. If they are almost parallel, the point is noise.
     if (matrix / count).determinant().abs() < 1e-6 {
         return None;
     }

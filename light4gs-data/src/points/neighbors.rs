@@ -1,7 +1,7 @@
 //! Exact nearest neighbors: the mean squared distance to the three nearest points.
 //!
-//! A small k-d tree of our own: crates of the kind either need the axes to hold few equal
-//! coordinates (point clouds on a plane or with duplicates do not oblige) or want their own types.
+//! A small k-d tree of our own. The crates that exist either need few equal coordinates along an axis (unlike point
+//! clouds on a plane, or with duplicates), or need their own types.
 
 use rayon::prelude::*;
 
@@ -14,9 +14,9 @@ const LEAF: usize = 16;
 /// For each point the mean of the squared distances to its three nearest other points, world
 /// units squared, at least [`SMALLEST_MEAN_SQUARED_DISTANCE`].
 ///
-/// `positions` is `[N, 3]`; the result has `N` values. With fewer than four points the mean is over
-/// those there are. Points that coincide are neighbors at distance 0. Non-finite positions give
-/// unspecified (but no panicking) results.
+/// `positions` is `[N, 3]`; the result has `N` values. With fewer than four points the mean is over those that there
+/// are. Points that coincide are neighbors at distance 0. For non-finite positions the results are unspecified, without
+/// a panic.
 pub fn mean_squared_distance_to_3_nearest(positions: &[[f32; 3]]) -> Vec<f32> {
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();
     arrange(positions, &mut order, 0);
@@ -31,7 +31,7 @@ pub fn mean_squared_distance_to_3_nearest(positions: &[[f32; 3]]) -> Vec<f32> {
     means
 }
 
-/// Orders indices as a balanced tree: the middle of a range splits it along `axis`.
+/// Orders indices as a balanced tree: the middle of a range divides it along `axis`.
 fn arrange(points: &[[f32; 3]], order: &mut [u32], axis: usize) {
     if order.len() <= LEAF {
         return;

@@ -1,7 +1,7 @@
 //! From videos to a dataset: frames by `ffmpeg`, poses by `colmap`, a folder that is read as layout `nerfstudio`.
 //!
-//! The folder holds `images/`, `transforms.json` and `points3D.ply`; `work/` keeps COLMAP's database and models, and
-//! `prepare.json` says what has been done, so that a second call goes on where the first was stopped.
+//! The folder holds `images/`, `transforms.json` and `points3D.ply`. `work/` holds COLMAP's database and models, and
+//! `prepare.json` records what has been done, so that a second call continues where the first was stopped.
 
 mod poses;
 mod record;
@@ -20,19 +20,19 @@ use record::{Phase, Record, Settings};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What [`prepare`] makes a dataset of.
+/// The input and options of [`prepare`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrepareOptions {
-    /// One video of a moving camera, or one video for each camera of a rig, which begin at the same moment.
+    /// One video of a moving camera, or one video for each camera of a rig, all beginning at the same time.
     pub videos: Vec<PathBuf>,
     /// The folder to make.
     pub out: PathBuf,
-    /// Frames to take of each video, spread evenly over it; 2 to 10000. Fewer where it has fewer.
+    /// Frames to take from each video, spread evenly over it; 2 to 10000. A shorter video gives fewer.
     pub frames: usize,
     /// Wider frames are scaled down to this width, pixels.
     pub max_width: u32,
-    /// The cameras of a rig move, so that every frame needs a pose of its own. Without it, they stand still, and the
-    /// first frames are enough.
+    /// Whether the cameras of a rig move, so that every frame needs a pose of its own. If not, the first frames are
+    /// enough.
     pub moving_rig: bool,
 }
 
@@ -63,18 +63,18 @@ impl PrepareOptions {
     }
 }
 
-/// How far [`prepare`] is: told to its caller.
+/// The progress of [`prepare`], for its caller.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PrepareProgress {
-    /// What is being done, such as `features`.
+    /// The current phase, such as `features`.
     pub phase: &'static str,
     /// Steps that are done.
     pub done: usize,
-    /// Steps there are; 0 where that is not known.
+    /// Steps in all; 0 where the number is not known.
     pub total: usize,
 }
 
-/// Makes a dataset of videos, or goes on with one that was stopped. `progress` is called while it works.
+/// Makes a dataset from videos, or continues one that was stopped. `progress` is called while it works.
 ///
 /// # Errors
 /// [`DataError::Program`] where ffmpeg or colmap are absent, too old or fail, with what to do; [`DataError::Exists`] where
@@ -107,19 +107,20 @@ fn camera_folders(options: &PrepareOptions) -> Vec<String> {
     }
 }
 
-/// Extracts the frames of every video that has none yet.
+/// Extracts the frames of every video whose frames are not there yet.
 fn frames(
     options: &PrepareOptions,
     cameras: &[String],
     progress: &mut dyn FnMut(PrepareProgress),
 ) -> Result<(), DataError> {
     let total = options.videos.len();
-    // Videos of a rig keep the same rate, or their frames would not be of the same moments.
+    // Videos of a rig must have the same rate, or their frames would be of different times.
     let infos = options.videos.iter().map(|video| video_info(video)).collect::<Result<Vec<_>, _>>()?;
     let longest = infos.iter().fold(0.0f64, |longest, info| longest.max(info.duration));
     let fastest = infos.iter().fold(0.0f64, |fastest, info| fastest.max(info.rate));
     let needed = options.frames as f64 / longest.max(1e-3);
-    // Those of a rig are brought to one rate, however few frames there are: even at equal rates a phone leaves frames out.
+    // Videos of a rig are resampled to one rate, however few frames there are: even at equal nominal rates a phone
+    // drops frames.
     let rig = infos.len() > 1;
     let rate = (longest > 0.0 && (needed < 0.99 * fastest || rig)).then_some(needed.min(fastest));
     for (i, (video, camera)) in options.videos.iter().zip(cameras).enumerate() {

@@ -11,11 +11,11 @@ use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Up to this many images all pairs are matched; beyond it, neighbors in time.
+/// Up to this many images all pairs are matched; with more images, neighbors in time.
 const EXHAUSTIVE: usize = 30;
-/// Neighbors in time that are matched, and further ones at distances of powers of two.
+/// Number of neighbors in time that are matched; further ones at distances of powers of two.
 const OVERLAP: usize = 10;
-/// Features an image: half of COLMAP's own number, so that matching on a processor takes a quarter of the time.
+/// Features of an image: half of COLMAP's default, so that matching on a CPU takes a quarter of the time.
 const FEATURES: usize = 4096;
 
 /// COLMAP's files in the folder.
@@ -37,7 +37,7 @@ impl Work {
         }
     }
 
-    /// The model with most images: COLMAP writes one for each group of images that it could connect.
+    /// The model with the most images: COLMAP writes one for each group of images that it could connect.
     pub(super) fn best_model(&self) -> Result<PathBuf, DataError> {
         let models = files::entries(&self.sparse, |path| path.join("images.bin").is_file())?;
         let mut counted = Vec::with_capacity(models.len());
@@ -50,7 +50,7 @@ impl Work {
     }
 }
 
-/// The images that need a pose: all of a moving camera's, the first ones of a rig that stands still.
+/// The images that need a pose: all images of a moving camera, or the first ones of a rig that stands still.
 pub(super) fn posed_images(options: &PrepareOptions, cameras: &[String]) -> Result<Vec<String>, DataError> {
     let lists = frame_names(&options.out, cameras)?;
     if cameras.len() == 1 || options.moving_rig {
@@ -59,7 +59,7 @@ pub(super) fn posed_images(options: &PrepareOptions, cameras: &[String]) -> Resu
     Ok(lists.into_iter().filter_map(|list| list.into_iter().next()).collect())
 }
 
-/// Runs the phases that are not done yet.
+/// Runs the phases that have not been done yet.
 pub(super) fn reconstruct(
     options: &PrepareOptions,
     cameras: &[String],
@@ -91,7 +91,7 @@ pub(super) fn reconstruct(
     Ok(())
 }
 
-/// A function that passes on what a line counts.
+/// A function that reports the progress that a line shows.
 fn counting<'a>(
     phase: &'static str,
     total: usize,
@@ -117,7 +117,7 @@ fn features(work: &Work, rig: bool, total: usize, progress: &mut dyn FnMut(Prepa
         path_argument(command, "--database_path", &work.database);
         path_argument(command, "--image_path", &work.images);
         path_argument(command, "--image_list_path", &work.list);
-        // A phone's lens needs two coefficients; a camera of a rig, seen once, can only tell one.
+        // A phone's lens needs two coefficients. From the single image of a rig's camera only one can be estimated.
         command.args(["--ImageReader.camera_model", if rig { "SIMPLE_RADIAL" } else { "OPENCV" }]);
         let cameras = if rig { "--ImageReader.single_camera_per_folder" } else { "--ImageReader.single_camera" };
         command.args([cameras, "1"]);
@@ -140,7 +140,7 @@ fn matches(work: &Work, rig: bool, total: usize, progress: &mut dyn FnMut(Prepar
             command.args(["--SequentialMatching.overlap", &OVERLAP.to_string()]);
         }
     };
-    // All pairs are counted in blocks, neighbors by image.
+    // With all pairs COLMAP counts blocks, with neighbors it counts images.
     let count = move |line: &str| {
         let (done, of) = counted(line)?;
         Some(if of == total { done } else { total * done.saturating_sub(1) / of.max(1) })
@@ -149,7 +149,7 @@ fn matches(work: &Work, rig: bool, total: usize, progress: &mut dyn FnMut(Prepar
 }
 
 fn poses(work: &Work, total: usize, progress: &mut dyn FnMut(PrepareProgress)) -> Result<(), DataError> {
-    // What a mapper that was stopped has left is of no use.
+    // The results of a mapper that was stopped are useless.
     if work.sparse.exists() {
         fs::remove_dir_all(&work.sparse).map_err(DataError::io("remove", &work.sparse))?;
     }

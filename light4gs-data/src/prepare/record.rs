@@ -1,4 +1,4 @@
-//! What has been done, on disk: so that a second call goes on.
+//! A record of what has been done, on disk, so that a second call can continue.
 
 use super::PrepareOptions;
 use crate::atomic::write_atomically;
@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 /// The file in the prepared folder.
 const FILE: &str = "prepare.json";
-/// It is a few lines.
+/// The file has only a few lines.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// A phase that need not be done again.
@@ -25,7 +25,7 @@ pub(super) enum Phase {
     Dataset,
 }
 
-/// What the phases depend on.
+/// The settings on which the phases depend.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Settings {
     /// Path and bytes of each video.
@@ -64,8 +64,8 @@ pub(super) struct Record {
 }
 
 impl Record {
-    /// The record of the folder `out`, which is made if it is not there. A folder of other settings is refused, and one
-    /// that holds something else.
+    /// The record of the folder `out`, which is made if it does not exist. A folder with other settings is refused, and
+    /// so is one that holds something else.
     pub(super) fn open(out: &Path, settings: Settings) -> Result<Self, DataError> {
         let path = out.join(FILE);
         if path.exists() {

@@ -1,20 +1,20 @@
-//! What came out, and what to do if it is poor.
+//! The result, and what to do if it is poor.
 
 use std::fmt;
 
-/// Below this share of the images with a pose, something went wrong.
+/// If a smaller share of the images has a pose, something went wrong.
 const LEAST_REGISTERED: f64 = 0.8;
-/// Above this mean reprojection error, pixels, the poses blur what is trained.
+/// If the mean reprojection error, in pixels, is larger, the poses blur the trained scene.
 const MOST_ERROR: f64 = 1.5;
-/// Fewer points than this say that there was little to hold on to.
+/// If there are fewer points, the images had too little texture.
 const LEAST_POINTS: usize = 500;
 
 /// What [`crate::prepare`] found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrepareSummary {
-    /// Images that poses were looked for.
+    /// Images for which poses were searched.
     pub images: usize,
-    /// Images that have one.
+    /// Images with a pose.
     pub registered: usize,
     /// Mean distance between where points were seen and where they project, pixels.
     pub reprojection_error: f64,
@@ -27,7 +27,7 @@ pub struct PrepareSummary {
 }
 
 impl PrepareSummary {
-    /// What to do better, in sentences; empty where all is well.
+    /// What to do better, in sentences; empty if all is well.
     pub fn advice(&self) -> Vec<&'static str> {
         let mut advice = Vec::new();
         if (self.registered as f64) < LEAST_REGISTERED * self.images as f64 {

@@ -1,4 +1,5 @@
-//! `prepare` with the real programs, on videos of a textured room. Skipped, with a line, where they are not installed.
+//! `prepare` with the real programs, on videos of a textured room. Skipped, with a message, where they are not
+//! installed.
 
 use super::*;
 use crate::camera::Camera;
@@ -21,7 +22,7 @@ fn installed() -> bool {
     missing.is_empty()
 }
 
-/// A color of the room's walls: noise of several sizes, so that there is something to recognize everywhere.
+/// A color of the room's walls: noise of several sizes, so that there is texture everywhere.
 fn wall(point: Vec3) -> Vec3 {
     let hash = |cell: IVec3, salt: u32| {
         let mixed = cell.to_array().iter().fold(salt, |h, v| (h ^ *v as u32).wrapping_mul(0x9e37_79b1).rotate_left(13));
@@ -35,7 +36,7 @@ fn wall(point: Vec3) -> Vec3 {
     Vec3::new(channel(1), channel(2), channel(3))
 }
 
-/// What a camera inside of the room sees: 2 × 2 rays a pixel.
+/// The image of a camera inside of the room: 2 × 2 rays a pixel.
 fn photograph(camera: &Camera) -> RgbImage8 {
     let half = Vec3::new(3.0, 2.0, 4.0);
     let eye = camera.center();
@@ -75,7 +76,7 @@ fn film(folder: &Path, name: &str, cameras: &[Camera]) -> PathBuf {
     video
 }
 
-/// Distances between the cameras agree with the truth up to one scale, within 3 % of the largest.
+/// Checks that distances between the cameras agree with the true ones up to one scale, within 3 % of the largest.
 fn same_shape(found: &[Vec3], truth: &[Vec3]) {
     let distances = |points: &[Vec3]| -> Vec<f32> {
         points.iter().enumerate().flat_map(|(i, a)| points[..i].iter().map(|b| a.distance(*b))).collect()
@@ -119,7 +120,7 @@ fn a_moving_camera_becomes_a_dataset_and_a_second_call_goes_on() {
     same_shape(&found, &expected);
     // Upright: the cameras' downward axis points down in the world.
     assert!(frames.iter().all(|frame| frame.camera.rotation.row(1).z < -0.8));
-    // The focal length is found, and the image is the one of its time.
+    // The focal length is found, and each image is that of its time.
     let focal = frames[0].camera.fx / truth[0].fx;
     assert!((focal - 1.0).abs() < 0.1, "{focal}");
     let image = ImageStore::new(&load, 1 << 22).get(&scene.train[3]).unwrap();
@@ -127,7 +128,7 @@ fn a_moving_camera_becomes_a_dataset_and_a_second_call_goes_on() {
     let worst: u64 = image.pixels.iter().zip(&film.pixels).map(|(a, b)| u64::from(a.abs_diff(*b))).sum();
     assert!(worst / (image.pixels.len() as u64) < 12, "{}", worst / image.pixels.len() as u64);
 
-    // Nothing is done twice; what was lost is made again.
+    // Nothing is done twice; a lost file is made again.
     fs::remove_file(options.out.join("transforms.json")).unwrap();
     let mut again = Vec::new();
     assert_eq!(prepare(&options, &mut |progress| again.push(progress.phase)).unwrap(), summary);
@@ -175,7 +176,7 @@ fn bad_options_and_videos_are_named() {
     assert!(!out.exists());
     if installed() {
         assert!(message(&options).contains("a.mp4"));
-        // It may be tried again.
+        // The command may be tried again.
         assert!(message(&options).contains("a.mp4"));
     }
 }

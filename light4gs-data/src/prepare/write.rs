@@ -1,4 +1,4 @@
-//! The dataset: `transforms.json` and `points3D.ply`, from COLMAP's model.
+//! Writing the dataset: `transforms.json` and `points3D.ply`, from COLMAP's model.
 
 use super::poses::{Work, posed_images};
 use super::{PrepareOptions, PrepareSummary, frame_names};
@@ -15,11 +15,11 @@ use serde_json::{Value, json};
 use std::collections::HashMap;
 use std::io::Write;
 
-/// Mean distance of the cameras to the middle of the points, world units: that of the field's synthetic scenes, so that
-/// thresholds in world units mean the same.
+/// Mean distance of the cameras to the middle of the points, world units. It is that of D-NeRF's synthetic scenes, so
+/// that thresholds in world units mean the same.
 const CAMERA_DISTANCE: f64 = 4.0;
 
-/// Writes the dataset, and says what is in it.
+/// Writes the dataset, and summarizes it.
 pub(super) fn dataset(options: &PrepareOptions, cameras: &[String]) -> Result<PrepareSummary, DataError> {
     let mut model = read_model(&Work::of(&options.out).best_model()?)?;
     let wanted = posed_images(options, cameras)?.len();
@@ -78,8 +78,8 @@ fn frame(name: &str, time: f64, image: &ModelImage, camera: &ModelCamera) -> Val
     value
 }
 
-/// COLMAP's world has an arbitrary origin, orientation and size. Brings the mean upward direction of the cameras to z, the
-/// middle of the points to the origin, and the cameras to their usual distance.
+/// COLMAP's world has an arbitrary origin, orientation and size. Turns the mean upward direction of the cameras to z,
+/// moves the middle of the points to the origin, and scales to the usual distance of the cameras.
 fn normalize(model: &mut Model) {
     let up = model.images.iter().map(|image| -image.rotation.row(1)).sum::<DVec3>().normalize_or(DVec3::Z);
     let side = up.any_orthonormal_vector();

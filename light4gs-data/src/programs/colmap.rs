@@ -18,7 +18,7 @@ pub(crate) const COLMAP: Program = Program {
 pub(crate) struct Step<'a> {
     /// COLMAP's command, such as `mapper`.
     pub(crate) command: &'a str,
-    /// The group of options that says whether a graphics card computes: its names before and after COLMAP 3.12.
+    /// The groups of options that say whether a graphics card is used: their names before and since COLMAP 3.12.
     pub(crate) gpu_groups: &'a [&'a str],
     /// What is done, for messages.
     pub(crate) attempt: &'a str,
@@ -26,20 +26,20 @@ pub(crate) struct Step<'a> {
     pub(crate) remedy: &'a str,
 }
 
-/// Runs a step. `arguments` fills in what it works on; `line` is told every line that it prints.
+/// Runs a step. `arguments` adds the input and output; `line` is called with every line that it prints.
 ///
 /// # Errors
-/// [`DataError::Program`] where COLMAP is absent, or ends badly.
+/// [`DataError::Program`] where COLMAP is absent or fails.
 pub(crate) fn run(
     step: &Step,
     arguments: impl FnOnce(&mut Command),
     line: &mut dyn FnMut(&str),
 ) -> Result<(), DataError> {
     let mut command = COLMAP.command();
-    // It is linked with a window system that may not be there.
+    // COLMAP is linked with a window system, which may be absent.
     command.env("QT_QPA_PLATFORM", "offscreen").arg(step.command);
     if !step.gpu_groups.is_empty() {
-        // Most builds of Linux distributions cannot use a graphics card, and say so by ending.
+        // Most builds of Linux distributions cannot use a graphics card; they end with an error if asked to.
         let help =
             COLMAP.output(COLMAP.command().env("QT_QPA_PLATFORM", "offscreen").args([step.command, "--help"]))?;
         let help = String::from_utf8_lossy(&[help.stdout, help.stderr].concat()).into_owned();

@@ -16,7 +16,7 @@ pub(crate) const FFMPEG: Program = Program {
     install: "install it with `apt install ffmpeg`, `brew install ffmpeg` or from https://ffmpeg.org",
 };
 
-/// The version from which on the mode of frame rates is called `-fps_mode`.
+/// The version since which the option for frame rates is `-fps_mode`.
 const FPS_MODE: (u32, u32) = (5, 1);
 
 /// Which frames of a video are wanted, and how large.
@@ -39,12 +39,12 @@ impl Wanted {
     }
 }
 
-/// What a video's container says.
+/// Metadata of a video's container.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VideoInfo {
-    /// Seconds; 0 where it is not said.
+    /// Seconds; 0 where the container does not say.
     pub(crate) duration: f64,
-    /// Frames a second; 0 where it is not said.
+    /// Frames a second; 0 where the container does not say.
     pub(crate) rate: f64,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct VideoInfo {
 /// [`DataError::Program`] where ffmpeg is absent, or finds no video in the file.
 pub(crate) fn video_info(video: &Path) -> Result<VideoInfo, DataError> {
     let place = std::path::absolute(video).map_err(DataError::io("read", video))?;
-    // Without an output it says what it found, and ends with an error.
+    // Without an output file ffmpeg prints what it found, and ends with an error.
     let output = FFMPEG.output(FFMPEG.command().args(["-hide_banner", "-nostdin", "-i"]).arg(place))?;
     let text = String::from_utf8_lossy(&output.stderr).into_owned();
     parse_info(&text).ok_or_else(|| {
@@ -95,13 +95,13 @@ pub(crate) fn extract_frames(video: &Path, folder: &Path, wanted: &Wanted) -> Re
 /// The command that writes the frames into a folder.
 fn extraction(version: (u32, u32), video: &Path, folder: &Path, wanted: &Wanted) -> Command {
     let mut command = FFMPEG.command();
-    // The pattern of names stands alone: a `%` in a folder's name would be taken for a part of it.
+    // The pattern of names is given without a folder: a `%` in a folder's name would be taken as a part of the pattern.
     command.current_dir(folder).args(["-hide_banner", "-loglevel", "error", "-nostdin", "-i"]).arg(video);
     command.args(["-map", "0:v:0"]);
     let mut filters = Vec::new();
     match wanted.rate {
         Some(rate) => filters.push(format!("fps={rate}")),
-        // Neither doubled nor dropped, whatever the container says about the rate.
+        // No frame is doubled or dropped, whatever rate the container says.
         None => drop(command.args(if version >= FPS_MODE { ["-fps_mode", "passthrough"] } else { ["-vsync", "0"] })),
     }
     if let Some(width) = wanted.max_width {
@@ -114,7 +114,7 @@ fn extraction(version: (u32, u32), video: &Path, folder: &Path, wanted: &Wanted)
         command.arg("-frames:v").arg(argument(count));
     }
     if wanted.jpeg {
-        // The finest quality of the encoder, and all of its color.
+        // The best quality of the encoder, without color subsampling.
         command.args(["-q:v", "1", "-qmin", "1", "-pix_fmt", "yuvj444p"]);
     }
     command.args(["-start_number", "0"]).arg(format!("%04d.{}", wanted.suffix()));

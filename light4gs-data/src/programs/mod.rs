@@ -1,4 +1,4 @@
-//! Other people's programs, called as programs: found, asked for their version, run, and their last words reported.
+//! External programs: found, asked for their version, run, and the last lines of their output reported.
 
 pub(crate) mod colmap;
 pub(crate) mod ffmpeg;
@@ -27,7 +27,7 @@ pub(crate) struct Program {
 }
 
 impl Program {
-    /// A command that runs it; nothing comes from standard input.
+    /// A command that runs it, with empty standard input.
     pub(crate) fn command(&self) -> Command {
         let file = std::env::var_os(self.variable).unwrap_or_else(|| self.name.into());
         let mut command = Command::new(file);
@@ -40,7 +40,7 @@ impl Program {
         DataError::Program { program: self.name, problem: problem.into(), remedy: remedy.into() }
     }
 
-    /// Its version, major and minor; the newest there is where it does not say (builds from source have no number).
+    /// Its version, major and minor. A build from source may print no number; then it counts as the newest.
     ///
     /// # Errors
     /// [`DataError::Program`] where it is not installed or too old, with how to install it.
@@ -65,7 +65,7 @@ impl Program {
         command.output().map_err(|e| self.not_started(&e))
     }
 
-    /// What it means that a command of this program did not start.
+    /// The error for a command of this program that did not start.
     pub(crate) fn not_started(&self, error: &std::io::Error) -> DataError {
         if error.kind() == ErrorKind::NotFound {
             return self.error("is not installed, or not in PATH", self.install);
@@ -73,7 +73,7 @@ impl Program {
         self.error(format!("cannot be started: {error}"), format!("{}, or name it in {}", self.install, self.variable))
     }
 
-    /// Runs a command of this program, which must end well.
+    /// Runs a command of this program, which must succeed.
     ///
     /// # Errors
     /// [`DataError::Program`] with what was attempted and the last lines it wrote.
@@ -86,7 +86,7 @@ impl Program {
         Err(self.error(format!("{attempt} failed ({}): {words}", output.status), remedy))
     }
 
-    /// As [`Self::run`], telling `line` every line that the program prints while it runs.
+    /// As [`Self::run`], calling `line` with every line that the program prints while it runs.
     ///
     /// # Errors
     /// As [`Self::run`].
@@ -107,7 +107,7 @@ impl Program {
         for stream in streams.into_iter().flatten() {
             let sender = sender.clone();
             std::thread::spawn(move || {
-                // Bytes that are no UTF-8 end a line's text, not the reading.
+                // Bytes that are not UTF-8 end a line's text, but not the reading.
                 for bytes in BufReader::new(stream).split(b'\n').map_while(Result::ok) {
                     if sender.send(String::from_utf8_lossy(&bytes).into_owned()).is_err() {
                         break;
@@ -142,7 +142,7 @@ fn version_in(text: &str) -> Option<(u32, u32)> {
     Some((major, parts.next().and_then(|part| part.parse().ok()).unwrap_or(0)))
 }
 
-/// The last lines of a program's output that say something, in one line, without control characters.
+/// The last non-empty lines of a program's output, joined to one line, without control characters.
 pub(crate) fn last_lines(output: &[u8]) -> String {
     let text = String::from_utf8_lossy(output);
     let lines: Vec<&str> = text.lines().map(str::trim).filter(|line| !line.is_empty()).collect();

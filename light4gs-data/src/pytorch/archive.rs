@@ -1,4 +1,5 @@
-//! The ZIP archive that PyTorch writes since 1.6: `NAME/data.pkl`, and a storage each in `NAME/data/KEY`, none compressed.
+//! The ZIP archive that PyTorch has written since 1.6: `NAME/data.pkl`, and one file `NAME/data/KEY` for each storage,
+//! not compressed.
 
 use std::collections::BTreeMap;
 
@@ -24,7 +25,7 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// Data of every entry by name, checked against its checksum.
+/// The data of every entry by name. Checksums are checked.
 fn entries(bytes: &[u8]) -> Result<BTreeMap<String, &[u8]>, Problem> {
     let archive = Bytes(bytes);
     let searched = bytes.len().saturating_sub(END_SIZE + LONGEST_COMMENT);
@@ -32,7 +33,7 @@ fn entries(bytes: &[u8]) -> Result<BTreeMap<String, &[u8]>, Problem> {
     let end = tail.windows(4).rposition(|window| window == b"PK\x05\x06").map(|at| (searched + at) as u64);
     let end = end.ok_or_else(|| problem("ZIP archive", "it has no list of entries at its end: it is truncated"))?;
     let (mut count, mut at) = (archive.number(end + 10, 2)?, archive.number(end + 16, 4)?);
-    // Numbers that do not fit stand in a record of their own before this one.
+    // Numbers that do not fit stand in a further record before this one.
     if let Some(locator) = end.checked_sub(20)
         && archive.slice(locator, 4)? == b"PK\x06\x07"
     {
@@ -51,7 +52,7 @@ fn entries(bytes: &[u8]) -> Result<BTreeMap<String, &[u8]>, Problem> {
         let (name_length, extra_length, comment_length) = (field(28, 2)?, field(30, 2)?, field(32, 2)?);
         let mut offset = field(42, 4)?;
         let name = String::from_utf8_lossy(archive.slice(at + 46, name_length)?).into_owned();
-        // Sizes and places beyond 32 bits, in this order, as far as they are.
+        // Sizes and offsets beyond 32 bits, in this order, as far as they exist.
         let mut extra = archive.slice(at + 46 + name_length, extra_length)?;
         while let [a, b, c, d, rest @ ..] = extra {
             let (kind, length) = (u16::from_le_bytes([*a, *b]), usize::from(u16::from_le_bytes([*c, *d])));

@@ -1,10 +1,10 @@
 //! Tensors in PyTorch's files (`.pth`, `.pt`), read without executing anything.
 //!
 //! Such a file is a pickle, which is a program: Python's own reader calls whatever it names. This reader knows the few
-//! instructions that a saved state dict consists of, and no call but those that put a tensor together; any other is refused
-//! by name.
+//! instructions of a saved state dict, and no call except those that put a tensor together. Any other is refused by
+//! name.
 //!
-//! - here: what is read, and of what
+//! - this file: what is read, and from which containers
 //! - `archive`: today's container, a ZIP file
 //! - `legacy`: the container of PyTorch before 1.6
 //! - `pickle`: the instructions
@@ -23,19 +23,19 @@ use crate::regular_file::read_regular_file;
 use pickle::{Arena, Id, Object};
 use storage::Storages;
 
-/// Entries of a state dict within others, deep down.
+/// How deeply state dicts may be nested.
 const MAX_DEPTH: usize = 8;
 
 /// A tensor as plain numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlainTensor {
-    /// Sides, outermost first; empty for a scalar.
+    /// Lengths of the axes, outermost first; empty for a scalar.
     pub shape: Vec<usize>,
     /// Row-major; integers and booleans are converted.
     pub values: Vec<f32>,
 }
 
-/// Where in a file something is wrong, and what to do: turned into a [`DataError`] with the file's name.
+/// Where in a file something is wrong, and what: turned into a [`DataError`] with the file's name.
 type Problem = (String, String);
 
 const REMEDY: &str = "copy it again, or save it anew with `torch.save(model.state_dict(), path)`";
@@ -44,12 +44,12 @@ fn problem(field: impl Into<String>, problem: impl Into<String>) -> Problem {
     (field.into(), problem.into())
 }
 
-/// Reads every tensor of a file by its name. Names of dictionaries within dictionaries are joined by dots; a tensor that is
-/// the whole file has the name "".
+/// Reads every tensor of a file by its name. Names of nested dictionaries are joined by dots; a tensor that is the
+/// whole file has the name "".
 ///
 /// # Errors
-/// [`DataError::Io`] when the file cannot be read; [`DataError::Field`] when it is no PyTorch file, is damaged, or calls
-/// anything but what rebuilds a tensor.
+/// [`DataError::Io`] when the file cannot be read; [`DataError::Field`] when it is no PyTorch file, is damaged, or
+/// calls any function other than those that rebuild a tensor.
 pub fn read_pytorch(path: &Path) -> Result<BTreeMap<String, PlainTensor>, DataError> {
     let bytes = read_regular_file(path, u64::MAX).map_err(DataError::io("read", path))?;
     read_bytes(&bytes).map_err(|(field, problem)| DataError::field(path, field, problem, REMEDY))
@@ -66,7 +66,7 @@ fn read_bytes(bytes: &[u8]) -> Result<BTreeMap<String, PlainTensor>, Problem> {
     Ok(found.tensors)
 }
 
-/// A file taken apart.
+/// The parts of a file.
 struct Saved<'a> {
     arena: Arena,
     root: Id,
@@ -76,7 +76,8 @@ struct Saved<'a> {
 struct Found<'a> {
     saved: &'a Saved<'a>,
     tensors: BTreeMap<String, PlainTensor>,
-    /// Numbers that may still be made: tensors may share a storage, but no file has many more numbers than bytes.
+    /// The numbers that may still be read: tensors may share a storage, but no real file has many more numbers than
+    /// bytes.
     budget: usize,
 }
 

@@ -1,7 +1,7 @@
-//! A pickle as data: the instructions that a saved state dict consists of. Nothing is ever called.
+//! A pickle as data: the instructions of a saved state dict. No function is ever called.
 //!
-//! Objects lie in one list and refer to each other by their place in it. So no file can make them nest too deeply for the
-//! stack, and there are at most as many as the file has bytes.
+//! Objects are in one list and refer to each other by index. So no file can nest them too deeply for the stack, and
+//! there are at most as many as the file has bytes.
 
 use std::collections::HashMap;
 
@@ -16,14 +16,14 @@ pub(super) type Id = usize;
 pub(super) enum Object {
     Nothing,
     Bool(bool),
-    /// Longer ones keep their low 64 bits.
+    /// Longer integers keep their low 64 bits.
     Integer(i64),
     Float,
     Text(String),
     Tuple(Vec<Id>),
     List(Vec<Id>),
     Dict(Vec<(Id, Id)>),
-    /// One of the functions that put things together.
+    /// One of the functions that may be "called".
     Function(Function),
     /// A class of storages.
     StorageClass(Scalar),
@@ -34,7 +34,7 @@ pub(super) enum Object {
     Tensor(View),
 }
 
-/// What may be "called".
+/// The functions that may be "called".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Function {
     OrderedDict,
@@ -47,7 +47,7 @@ pub(super) enum Function {
 #[derive(Debug, Default)]
 pub(super) struct Arena {
     objects: Vec<Object>,
-    /// Bytes a number of every storage that was named, by key.
+    /// Bytes of a number in every named storage, by key.
     sizes: HashMap<String, usize>,
 }
 
@@ -56,7 +56,7 @@ impl Arena {
         &self.objects[id]
     }
 
-    /// Of the numbers of a storage.
+    /// Bytes of a number in a storage.
     pub(super) fn bytes_a_number(&self, key: &str) -> Option<usize> {
         self.sizes.get(key).copied()
     }
@@ -92,7 +92,7 @@ struct Machine<'a> {
     budget: usize,
 }
 
-/// Runs the pickle that `bytes` begin with. Returns its objects, the one that it leaves, and its length.
+/// Runs the pickle at the beginning of `bytes`. Returns its objects, the resulting one, and the pickle's length.
 pub(super) fn run(bytes: &[u8], name: &str) -> Result<(Arena, Id, usize), Problem> {
     let (stack, marks, memo) = (Vec::new(), Vec::new(), HashMap::new());
     let budget = 16 * bytes.len();
@@ -207,7 +207,7 @@ impl<'a> Machine<'a> {
 
     fn step(&mut self, instruction: u8, at: usize) -> Result<(), Problem> {
         match instruction {
-            // The protocol, and the length of a frame: nothing depends on them.
+            // The protocol, and the length of a frame: not needed.
             0x80 => drop(self.take(1)?),
             0x95 => drop(self.take(8)?),
             b'(' => self.marks.push(self.stack.len()),
@@ -307,7 +307,7 @@ impl<'a> Machine<'a> {
         Ok(())
     }
 
-    /// Names that are known; everything else is refused before anything could be done with it.
+    /// Known names. Any other is refused before anything is done with it.
     fn global(&mut self, module: &str, name: &str) -> Result<(), Problem> {
         let object = match (module, name) {
             ("collections", "OrderedDict") => Object::Function(Function::OrderedDict),
@@ -352,7 +352,7 @@ impl<'a> Machine<'a> {
         Ok(())
     }
 
-    /// What Python would call: put together here, from the arguments alone.
+    /// The result of a function that Python would call, made from the arguments alone.
     fn reduce(&mut self) -> Result<(), Problem> {
         let (arguments, function) = (self.pop()?, self.pop()?);
         let (Object::Function(function), Object::Tuple(arguments)) =

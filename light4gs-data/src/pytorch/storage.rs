@@ -1,4 +1,4 @@
-//! Numbers of a storage, and the tensors that look at them.
+//! Numbers of a storage, and the tensors that are views of it.
 
 use std::collections::BTreeMap;
 
@@ -78,7 +78,7 @@ fn half_to_f32(bits: u16) -> f32 {
     }
 }
 
-/// How a tensor looks at its storage.
+/// How a tensor views its storage.
 #[derive(Clone, Debug)]
 pub(super) struct View {
     pub(super) storage: String,
@@ -88,7 +88,7 @@ pub(super) struct View {
     pub(super) strides: Vec<i64>,
 }
 
-/// Bytes of every storage by its key.
+/// The bytes of every storage by its key.
 pub(super) struct Storages<'a>(BTreeMap<String, &'a [u8]>);
 
 impl<'a> Storages<'a> {
@@ -96,7 +96,7 @@ impl<'a> Storages<'a> {
         Self(storages)
     }
 
-    /// The numbers that a tensor sees, of which at most `budget` may be made; it is charged for them.
+    /// The numbers that a tensor views. They are charged to `budget`, which they must not exceed.
     pub(super) fn tensor(&self, view: &View, name: &str, budget: &mut usize) -> Result<PlainTensor, Problem> {
         let wrong = |what: String| problem(format!("tensor `{name}`"), what);
         let View { storage, scalar, offset, shape, strides } = view;

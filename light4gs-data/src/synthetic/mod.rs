@@ -27,7 +27,7 @@ use world::World;
 
 /// Distance of every camera to the origin, world units.
 const RADIUS: f32 = 4.03;
-/// Full horizontal field of view, radians: that of the Blender scenes of the field.
+/// Full horizontal field of view, radians: that of the Blender scenes of NeRF.
 const FOV_X: f32 = 0.691_111_2;
 /// Elevations of the test and validation orbits, degrees.
 const ELEVATIONS: [f32; 2] = [30.0, 50.0];
@@ -104,7 +104,7 @@ pub fn write_synthetic(root: &Path, options: &SyntheticOptions) -> Result<(), Da
     make_folder_atomically(root, |part| write_folder(part, options))
 }
 
-/// The procedural scene, for tests that photograph it with cameras of their own.
+/// The procedural scene, for tests that photograph it with other cameras.
 #[cfg(test)]
 pub(crate) struct Studio(World);
 
@@ -171,7 +171,7 @@ fn unseen_time(i: usize, count: usize, train_frames: usize) -> f32 {
     if from_grid > 0.05 {
         time as f32
     } else {
-        // Less than one step before the end, since 1 itself is never asked for.
+        // Less than one step before the end, since 1 itself is never used.
         ((((time * steps).round().min(steps - 1.0)) + 0.25) / steps) as f32
     }
 }

@@ -5,7 +5,7 @@ use super::world::{Hit, World};
 use crate::camera::Camera;
 use glam::Vec3;
 
-/// Rays a pixel along each side.
+/// Rays of a pixel along each side.
 const SAMPLES: u32 = 4;
 /// Everything is within this distance of the origin.
 const WORLD_RADIUS: f32 = 1.3;
@@ -21,8 +21,8 @@ pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Vec<u8> {
     render_rays(world, camera.center(), (camera.width, camera.height), time, direction)
 }
 
-/// As [`render`], for any camera: `direction` gives the unit direction in the world through a place in the image, in
-/// pixels from its upper left corner.
+/// As [`render`], for any camera: `direction` gives the unit direction in the world for a place in the image, in pixels
+/// from its upper left corner.
 pub(super) fn render_rays(
     world: &World,
     eye: Vec3,
@@ -63,7 +63,7 @@ pub(super) fn render_rays(
     rgba
 }
 
-/// Lambert with much ambient light, and a small broad highlight that spherical harmonics can follow.
+/// Lambert shading with much ambient light, and a small broad highlight that spherical harmonics can represent.
 fn shade(hit: &Hit, ray: Vec3) -> Vec3 {
     let light = Vec3::new(0.377, -0.472, 0.797);
     let diffuse = 0.55 + 0.45 * hit.normal.dot(light).max(0.0);

@@ -1,8 +1,8 @@
-//! Solids and where a ray meets them, in the solid's own coordinates.
+//! Solids and their intersections with rays, in the solid's own coordinates.
 
 use glam::{Vec2, Vec3};
 
-/// Sphere tracing of the torus: most steps, and when a step counts as arrival.
+/// Sphere tracing of the torus: most steps, and the distance at which a step has arrived.
 const TRACE_STEPS: usize = 64;
 const TRACE_ARRIVED: f32 = 2e-4;
 
@@ -42,7 +42,7 @@ impl Shape {
         }
     }
 
-    /// The first meeting of a ray (unit `direction`) that starts outside: distance and outward normal.
+    /// The first intersection with a ray (unit `direction`) that starts outside: distance and outward normal.
     pub(super) fn hit(self, origin: Vec3, direction: Vec3) -> Option<(f32, Vec3)> {
         match self {
             Self::Sphere { radius } => {
@@ -62,7 +62,7 @@ impl Shape {
     }
 }
 
-/// Where a ray enters and leaves a sphere around the origin, if it does so ahead.
+/// The distances at which a ray enters and leaves a sphere around the origin, if the sphere is ahead.
 pub(super) fn sphere(origin: Vec3, direction: Vec3, radius: f32) -> Option<(f32, f32)> {
     let along = -origin.dot(direction);
     // Distance of the center from the ray, computed without cancellation.
@@ -72,7 +72,7 @@ pub(super) fn sphere(origin: Vec3, direction: Vec3, radius: f32) -> Option<(f32,
 }
 
 fn block(origin: Vec3, direction: Vec3, half: Vec3) -> Option<(f32, Vec3)> {
-    // A ray along a face has no quotient; one that is almost along it has.
+    // A ray parallel to a face would be a division by zero, so tiny components are replaced.
     let tiny = direction.abs().cmplt(Vec3::splat(1e-9));
     let inverse = Vec3::select(tiny, Vec3::splat(1e-9), direction).recip();
     let center = -origin * inverse;

@@ -1,4 +1,4 @@
-//! What is in the procedural scene: solids, their motion and their textures.
+//! The procedural scene: solids, their motion and their textures.
 
 use super::shapes::Shape;
 use glam::{Mat3, Vec3};
@@ -14,7 +14,7 @@ const GROUND: f32 = -0.6;
 struct Texture {
     colors: [Vec3; 2],
     kind: Pattern,
-    /// Radians a world unit.
+    /// Radians for each world unit.
     frequency: f32,
     phase: f32,
 }
@@ -50,7 +50,7 @@ impl Texture {
     }
 }
 
-/// A solid at one moment.
+/// A solid at one time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Solid {
     shape: Shape,
@@ -62,7 +62,7 @@ pub(super) struct Solid {
     pub(super) bound: f32,
 }
 
-/// Where a ray meets the world.
+/// Where a ray hits the world.
 pub(super) struct Hit {
     pub(super) distance: f32,
     pub(super) normal: Vec3,
@@ -70,14 +70,14 @@ pub(super) struct Hit {
 }
 
 impl Solid {
-    /// Whether a ray comes near enough to be worth the exact test.
+    /// Whether a ray comes near enough that the exact test is needed.
     pub(super) fn may_hit(&self, origin: Vec3, direction: Vec3) -> bool {
         let to_center = self.center - origin;
         let along = to_center.dot(direction);
         (to_center - direction * along).length_squared() <= self.bound * self.bound
     }
 
-    /// The first meeting: distance, normal and texture color.
+    /// The first intersection: distance, normal and texture color.
     pub(super) fn hit(&self, origin: Vec3, direction: Vec3, nearer_than: f32) -> Option<Hit> {
         let to_own = self.rotation.transpose();
         let (o, d) = (to_own * (origin - self.center), to_own * direction);
@@ -90,7 +90,7 @@ impl Solid {
     }
 }
 
-/// The scene at every time.
+/// The scene at all times.
 #[derive(Debug)]
 pub(super) struct World {
     ground: Texture,
@@ -122,7 +122,7 @@ impl World {
         }
     }
 
-    /// Everything at a time in `[0, 1]`.
+    /// All solids at a time in `[0, 1]`.
     pub(super) fn at(&self, time: f32) -> [Solid; 6] {
         let wave = TAU * time;
         let solid = |shape: Shape, texture: Texture, rotation: Mat3, center: Vec3| Solid {
@@ -132,7 +132,7 @@ impl World {
             center,
             bound: shape.bound(),
         };
-        // Two bounces, the ball rolling half a turn meanwhile.
+        // Two bounces, while the ball rolls half a turn.
         let bounce = (wave.sin()).abs();
         let ball = Vec3::new(0.6, 0.1, GROUND + 0.25 + 0.55 * bounce);
         let marble = Vec3::new(-0.5 + 0.2 * wave.sin(), -0.5, GROUND + 0.2 + 0.15 * (1.0 - wave.cos()));
@@ -152,7 +152,7 @@ impl World {
             solid(
                 Shape::Sphere { radius: 0.2 },
                 self.marble,
-                // Its way along x over its radius.
+                // Distance along x over the radius.
                 Mat3::from_rotation_y(wave.sin()),
                 marble,
             ),

@@ -178,14 +178,15 @@ fn images() {
     fs::remove_file(folder.path().join("train/r_004.png")).unwrap();
     expect(folder.path(), &named);
     refuses(|v| drop(v["frames"][4].as_object_mut().unwrap().remove("file_path")), &["frames[4].file_path", "missing"]);
-    // With an extension it works as well.
+    // A name with an extension is found as well.
     let folder = scene();
     let mut value = transforms("train", 5);
     value["frames"][4]["file_path"] = json!("train/r_004.png");
     write(folder.path(), "train", &value);
     let scene = Scene::open(folder.path(), &LoadOptions::default()).unwrap();
     assert_eq!(scene.train[4].name, "r_004");
-    // What headers and ends of files show is found on opening, other damage when the image is needed.
+    // Damage that shows in headers and ends of files is found on opening; other damage is found when the image is
+    // decoded.
     let store = ImageStore::new(&LoadOptions::default(), 1 << 20);
     let path = &scene.train[2].path;
     let bytes = fs::read(path).unwrap();

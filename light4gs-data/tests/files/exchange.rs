@@ -1,4 +1,4 @@
-//! What other programs read: glTF against the rules of `KHR_gaussian_splatting`, 4dgs through the reader of its own crate.
+//! Files for other programs: glTF against the rules of `KHR_gaussian_splatting`, 4dgs with the reader of its own crate.
 
 use std::path::Path;
 
@@ -31,7 +31,7 @@ fn chunks(bytes: &[u8]) -> (Value, &[u8]) {
     (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), &bytes[28 + json..])
 }
 
-/// Rows of an attribute, after its accessor and buffer view were checked against glTF's rules.
+/// Rows of an attribute; its accessor and buffer view are checked against glTF's rules.
 fn rows(json: &Value, binary: &[u8], name: &str, kind: &str) -> Vec<Vec<f32>> {
     let primitive = &json["meshes"][0]["primitives"][0];
     let accessor =
@@ -60,7 +60,7 @@ fn assert_near(found: &[Vec<f32>], expected: impl Iterator<Item = Vec<f32>>) {
     }
 }
 
-/// The extension's table of attributes: names, types, which are required, and that degrees are whole.
+/// The extension's table of attributes: names, types, which ones are required, and that degrees are complete.
 #[test]
 fn a_glb_follows_the_extension() {
     let gaussians = example(7);
@@ -75,7 +75,7 @@ fn a_glb_follows_the_extension() {
         let primitive = &json["meshes"][0]["primitives"][0];
         assert_eq!(primitive["mode"], 0, "POINTS");
         let extension = primitive["extensions"]["KHR_gaussian_splatting"].as_object().unwrap();
-        // The schema: two required strings, two optional ones, nothing else of ours.
+        // The schema: two required strings, two optional ones, nothing else from us.
         assert_eq!(extension["kernel"], "ellipse");
         assert_eq!(extension["colorSpace"], "srgb_rec709_display");
         let known = ["kernel", "colorSpace", "projection", "sortingMethod"];
@@ -106,7 +106,7 @@ fn a_glb_follows_the_extension() {
         }
         let names = primitive["attributes"].as_object().unwrap();
         assert_eq!(names.len(), 6 + (1..=usize::from(degree)).map(|l| 2 * l + 1).sum::<usize>());
-        // Both prefixes of application attributes: glTF's own names, or the extension's.
+        // Application-specific attributes have the prefix of glTF or that of the extension.
         assert!(names.keys().all(|name| name == "POSITION" || name == "COLOR_0" || name.contains(':')));
     }
 }
@@ -171,7 +171,7 @@ fn a_four_dgs_file_reads_back_at_every_time() {
             }
         }
     }
-    // Out of order is refused by name, and the file stays as it was.
+    // Samples out of order are refused by name, and the file stays as it was.
     let error = write_four_dgs(&path, &samples[3..], 2.0).unwrap_err().to_string();
     assert!(error.contains("a.4dgs") && error.contains("t0"), "{error}");
     assert_eq!(std::fs::read(&path).unwrap(), bytes);

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 
 const TOLERANCE: f32 = 1e-5;
 
-/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter; in the set's folder or in
-/// `datasets` there.
+/// The folder or file of the golden set whose name begins with `prefix`, whatever the letter of the set; in the set's
+/// folder or in `datasets` there.
 fn golden(prefix: &str) -> PathBuf {
     let folder = std::env::var_os("LIGHT4GS_GOLDEN")
         .map_or_else(|| PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden")), PathBuf::from);
@@ -78,7 +78,7 @@ fn check_normalization(tensors: &Tensors, scene: &Scene) {
     close("translate", &translate, &tensors.floats("nerf_normalization.translate"));
 }
 
-/// The reference brings every image to 1352 × 1014 and takes a capture to have 300 frames.
+/// The reference resizes every image to 1352 × 1014 and assumes 300 frames.
 fn neu3d() -> Scene {
     let resolution = Resolution::Exact { width: 1352, height: 1014 };
     let options = LoadOptions { resolution, frames: Some(300), ..Default::default() };
@@ -110,8 +110,8 @@ fn neu3d_cameras_splits_and_times() {
     check_normalization(&tensors, &scene);
 }
 
-/// The reference's own spiral is mirrored (its rotations have determinant -1): the axis to the right is the negative of
-/// ours. Everything else agrees.
+/// The reference's own spiral is mirrored (its rotations have determinant -1): its right axis is the negative of ours.
+/// Everything else agrees.
 #[test]
 fn neu3d_spiral() {
     let tensors = Tensors::open("c12_neu3d_");
@@ -146,7 +146,7 @@ fn hypernerf_cameras_splits_and_times() {
         }
     }
     check_normalization(&tensors, &scene);
-    // What the reference passes over is known here.
+    // The reference ignores the principal point; it is used here.
     let camera = std::fs::read_to_string(root.join(format!("camera/{}.json", scene.train[0].name))).unwrap();
     let camera: serde_json::Value = serde_json::from_str(&camera).unwrap();
     let expected = camera["principal_point"][0].as_f64().unwrap() / camera["image_size"][0].as_f64().unwrap();

@@ -6,7 +6,7 @@ use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// One of these tests at a time: they measure.
+/// Only one of these tests runs at a time, since they measure times.
 static ALONE: Mutex<()> = Mutex::new(());
 
 const SIZE: (u32, u32) = (1352, 1014);
@@ -67,7 +67,7 @@ fn six_thousand_images_open_quickly() {
     let digest = DatasetDigest::of(&scene).unwrap();
     println!("opened in {opened:.2?}, digest in {:.2?}", begun.elapsed());
     assert!(digest.changes_since(&digest).is_empty());
-    // 3 s are promised; a machine that builds something else meanwhile gets more.
+    // 3 s are promised; a machine that compiles something at the same time gets more.
     assert!(opened < Duration::from_secs(12), "{opened:?}");
 }
 
@@ -83,7 +83,7 @@ fn images_decoded_ahead_are_there_when_they_are_asked_for() {
         ImageStore::new(&LoadOptions::default(), 0).get(frame).unwrap();
         begun.elapsed()
     };
-    // The longest of some: other tests run meanwhile.
+    // The longest of several, since other tests run at the same time.
     let decoding = frames[..5].iter().map(decode).max().unwrap();
     // A quarter of the images fit.
     let store = ImageStore::new(&LoadOptions::default(), 10 * (SIZE.0 * SIZE.1 * 3) as usize);
@@ -91,7 +91,7 @@ fn images_decoded_ahead_are_there_when_they_are_asked_for() {
     let mut waits = Vec::new();
     for i in 0..40 {
         store.prefetch(&frames[(i + 6).min(39)..(i + 7).min(40)]);
-        // What a step of training computes takes longer than decoding an image.
+        // A training step takes longer than decoding an image.
         std::thread::sleep(3 * decoding);
         let begun = Instant::now();
         store.get(&frames[i]).unwrap();

@@ -1,4 +1,4 @@
-//! Files that PyTorch wrote (`pytorch/make.py`), and what is left of them when they are damaged.
+//! Files that PyTorch wrote (`pytorch/make.py`), as they are and damaged.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -90,13 +90,13 @@ fn damage_is_an_error_and_not_a_panic() {
             damaged[at] ^= 1 << (at % 8);
             damaged[(at * 7) % bytes.len()] = 0xff;
             std::fs::write(&path, &damaged).unwrap();
-            // Legacy files have no checksums, so some of these are read.
+            // Legacy files have no checksums, so some of these can be read.
             let _ = read_pytorch(&path);
         }
     }
 }
 
-/// Short files that ask for much: references to references, shapes without numbers behind them.
+/// Short files that ask for much: references to references, shapes without enough numbers.
 #[test]
 fn hostile_pickles_take_no_memory() {
     let head = {
@@ -114,7 +114,7 @@ fn hostile_pickles_take_no_memory() {
     // Tuples in tuples in tuples, a million deep.
     let deep = [b")".as_slice(), &vec![0x85; 1_000_000], b"."].concat();
     assert!(refused(&deep).contains("storage keys"));
-    // Dictionaries that hold the one before many times, many levels deep.
+    // Dictionaries that each hold the one before many times, many levels deep.
     let mut nested = b"}q\x00".to_vec();
     for level in 0..30u8 {
         nested.extend(b"}(");

@@ -22,7 +22,7 @@ use model::Model;
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
-/// Folders that are tried, in this order: they hold a model, or folders `0`, `1`... with one each.
+/// Folders that are tried, in this order. Each may hold a model, or folders `0`, `1`... with one model each.
 const MODELS: [&str; 5] = ["sparse", "colmap/sparse", "distorted/sparse", "dense/sparse", "."];
 /// Folders of images that are tried, in this order.
 const IMAGES: [&str; 7] = ["images", "images_2", "images_4", "images_8", "input", "dense/images", "rgb"];
@@ -74,7 +74,7 @@ impl DatasetLayout for Colmap {
     }
 }
 
-/// Sorts frames into training and test, each in the order of time and camera; all of them together are the path of videos.
+/// Sorts frames into training and test, each by time and camera; all of them together are the camera path of videos.
 pub(super) fn split(frames: Vec<crate::frame::Frame>, tests: &[bool]) -> SplitFrames {
     let mut marked: Vec<_> = frames.into_iter().zip(tests).collect();
     marked.sort_by(|(a, _), (b, _)| a.time.total_cmp(&b.time).then(a.camera_id.cmp(&b.camera_id)));
@@ -107,12 +107,12 @@ fn model_folders(root: &Path) -> Vec<PathBuf> {
     MODELS.iter().map(of).find(|found| !found.is_empty()).unwrap_or_default()
 }
 
-/// Whether the files that every model has are there with this suffix.
+/// Whether the files of every model are there with this suffix.
 fn holds_model(folder: &Path, suffix: &str) -> bool {
     ["cameras", "images"].iter().all(|name| folder.join(format!("{name}.{suffix}")).is_file())
 }
 
-/// The model with most images; of equal ones the first.
+/// The model with the most images; of equal ones the first.
 fn largest_model(root: &Path, notes: &mut Vec<String>) -> Result<Model, DataError> {
     let folders = model_folders(root);
     let mut largest: Option<(&PathBuf, Model)> = None;
@@ -162,7 +162,7 @@ pub(crate) fn read_model(folder: &Path) -> Result<Model, DataError> {
     Ok(Model { cameras, images, points, error, images_file })
 }
 
-/// The folder in which most of the model's images are.
+/// The folder that has most of the model's images.
 fn find_images(root: &Path, model: &Model) -> Result<PathBuf, DataError> {
     let present = |folder: &PathBuf| {
         let sample = model.images.iter().step_by(model.images.len().div_ceil(32).max(1));

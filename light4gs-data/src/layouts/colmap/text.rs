@@ -53,7 +53,7 @@ impl Line<'_> {
     }
 }
 
-/// Lines that are no comments, with their numbers from 1.
+/// Lines without comments, with their numbers from 1.
 fn lines<'a>(path: &'a Path, text: &'a str) -> impl Iterator<Item = (&'a str, Line<'a>)> {
     text.lines()
         .enumerate()
@@ -91,7 +91,7 @@ pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, DataError> {
         }
         let line = line.at_least(10, "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME")?;
         let camera = line.parse(8, "the number of a camera")?;
-        // A name may contain spaces: it is all that follows the ninth word.
+        // A name may contain spaces: it is everything after the ninth word.
         let name = (0..9)
             .fold(whole, |rest, _| rest.trim_start().split_once(char::is_whitespace).map_or("", |(_, rest)| rest));
         let name = name.trim().to_owned();
@@ -103,8 +103,8 @@ pub(super) fn images(path: &Path) -> Result<Vec<ModelImage>, DataError> {
     Ok(images)
 }
 
-/// The second line of an image: coordinates and the number of a point, three by three. Programs that leave it out would
-/// make every other image disappear.
+/// The second line of an image: coordinates and the number of a point, in groups of three. If a program leaves this
+/// line out, every other image would be lost.
 fn check_keypoints(line: &Line) -> Result<(), DataError> {
     let is_point = |words: &[&str]| words.len() == 3 && words[2].parse::<i64>().is_ok();
     if line.words.chunks(3).all(is_point) {

@@ -1,4 +1,4 @@
-//! The cameras of a rig: a folder of frames or a video each.
+//! The cameras of a rig: each has a folder of frames, or a video.
 
 use crate::error::DataError;
 use crate::layouts::shared::files::{self, entries, images, name_of, natural, stem_of};
@@ -18,13 +18,13 @@ const EXTRACTED_WIDTH: u32 = 1352;
 pub(super) struct CameraFrames {
     /// Such as `cam07`.
     pub(super) name: String,
-    /// Where its frames lie, if they do.
+    /// The folder of its frames, if there is one.
     folder: Option<PathBuf>,
-    /// Where they can be had from, if they do not.
+    /// The video from which its frames can be extracted, if there is one.
     video: Option<PathBuf>,
 }
 
-/// The cameras of a folder, in natural order of their names. Where some are called `cam...`, the others are no cameras.
+/// The cameras of a folder, in natural order of their names. If some are called `cam...`, other folders are no cameras.
 pub(super) fn find(root: &Path) -> Result<Vec<CameraFrames>, DataError> {
     let mut cameras: BTreeMap<String, CameraFrames> = BTreeMap::new();
     for path in entries(root, |_| true)? {
@@ -61,9 +61,9 @@ fn frame_folder(path: &Path) -> Option<PathBuf> {
     candidates.into_iter().find(|folder| folder.is_dir() && images(folder).is_ok_and(|found| !found.is_empty()))
 }
 
-/// The row of the table that belongs to each camera. As many rows as cameras: in order, since the genuine captures count
-/// their rows though they leave out cameras. More rows: the number in the camera's name is the row, as after removing a
-/// camera that was bad.
+/// The row of the table for each camera. With as many rows as cameras, they are taken in order, since the genuine
+/// captures number their rows consecutively though they leave out cameras. With more rows, the number in the camera's
+/// name is the row, as after a bad camera has been removed.
 pub(super) fn rows(table: &Path, cameras: &[CameraFrames], rows: usize) -> Result<Vec<usize>, DataError> {
     if cameras.len() == rows {
         return Ok((0..rows).collect());
@@ -87,7 +87,7 @@ fn number_of(name: &str) -> Option<usize> {
     name[start..].parse().ok()
 }
 
-/// The frames of each camera with their instants, counted from the first of the rig. Videos without frames are
+/// The frames of each camera with their frame numbers, counted from the first of the rig. Videos without frames are
 /// extracted first: beside the video, or into the user's cache where the dataset cannot be written.
 pub(super) fn frames(
     root: &Path,
@@ -97,13 +97,13 @@ pub(super) fn frames(
 ) -> Result<Vec<Vec<(usize, PathBuf)>>, DataError> {
     let folders = cameras.par_iter().map(|camera| extracted(root, camera, length)).collect::<Result<Vec<_>, _>>()?;
     let lists = folders.iter().map(|folder| images(folder)).collect::<Result<Vec<_>, _>>()?;
-    // The number in a name is the instant, so that a missing frame does not move those after it.
+    // The number in a name is the frame number, so that a missing frame does not shift those after it.
     let numbers: Option<Vec<Vec<usize>>> =
         lists.iter().map(|list| list.iter().map(|path| number_of(&stem_of(path))).collect()).collect();
     let first = numbers.iter().flatten().flatten().min().copied().unwrap_or(0);
     let longest = lists.iter().map(Vec::len).max().unwrap_or(0);
     let span = numbers.iter().flatten().flatten().max().map_or(0, |last| last - first + 1);
-    // Names such as times of day count something else.
+    // Numbers in other names, such as times of day, do not count frames.
     let counted = numbers.filter(|_| span <= 2 * longest.max(1));
     let counts: Vec<usize> = lists.iter().map(Vec::len).collect();
     if let Some(shorter) = counts.iter().position(|count| *count < longest) {
@@ -128,12 +128,13 @@ fn extracted(root: &Path, camera: &CameraFrames, length: Option<usize>) -> Resul
         return Err(DataError::field(root, camera.name.clone(), "no frames and no video", "put one of them there"));
     };
     let wanted = Wanted { max_width: Some(EXTRACTED_WIDTH), count: length, ..Wanted::default() };
-    // Beside the video, where the reference puts them too. A part of the sequence is not for others to find.
+    // Beside the video, where the reference puts them too. A part of the sequence is not put there, since other
+    // programs would take it for the whole.
     let beside = root.join(&camera.name).join("images");
     let metadata = root.metadata().map_err(DataError::io("read", root))?;
     if !metadata.permissions().readonly() && wanted.count.is_none() {
         match extract_frames(video, &beside, &wanted) {
-            // The folder cannot be written after all.
+            // The folder cannot be written.
             Err(DataError::Io { .. }) => {}
             done => return done.map(|()| beside),
         }
@@ -145,7 +146,7 @@ fn extracted(root: &Path, camera: &CameraFrames, length: Option<usize>) -> Resul
     Ok(folder)
 }
 
-/// A folder for the frames of this very video, where the dataset is read-only.
+/// A folder for the frames of this video, where the dataset is read-only.
 fn cache_folder(camera: &CameraFrames, video: &Path, wanted: &Wanted) -> Result<PathBuf, DataError> {
     let metadata = video.metadata().map_err(DataError::io("read", video))?;
     let mut hasher = DefaultHasher::new();
@@ -175,7 +176,7 @@ mod tests {
     #[test]
     fn rows_follow_the_order_or_the_numbers() {
         let table = Path::new("poses_bounds.npy");
-        // Gaps in names and as many rows as cameras: in order.
+        // Gaps in the names, and as many rows as cameras: in order.
         assert_eq!(rows(table, &named(&["cam00", "cam03", "cam20"]), 3).unwrap(), [0, 1, 2]);
         // A camera was removed: by number.
         assert_eq!(rows(table, &named(&["cam00", "cam02"]), 3).unwrap(), [0, 2]);

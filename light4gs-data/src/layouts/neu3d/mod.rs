@@ -1,8 +1,9 @@
 //! The layout of Neural 3D Video (Neu3D, DyNeRF): a rig of synchronized cameras that do not move.
 //!
-//! `poses_bounds.npy` has a row a camera, in LLFF's axes; `camXX/images` (or `camXX` itself) holds the frames of a camera,
-//! or `camXX.mp4` its video, from which they are extracted. As in the 4DGS reference poses are neither centered nor
-//! scaled, the first camera is held out, and the time of frame `i` is `i` divided by the length of the sequence.
+//! `poses_bounds.npy` has a row for each camera, in LLFF's axes. `camXX/images` (or `camXX` itself) holds the frames of
+//! a camera, or `camXX.mp4` its video, from which they are extracted. As in the 4DGS reference, poses are neither
+//! centered nor scaled, the first camera is held out, and the time of frame `i` is `i` divided by the length of the
+//! sequence.
 
 mod cameras;
 mod spiral;
@@ -20,7 +21,7 @@ use cameras::CameraFrames;
 use glam::{DMat3, DVec3};
 use std::path::{Path, PathBuf};
 
-/// Numbers of a row: a pose of 3 × 5, the nearest and the farthest depth.
+/// Numbers of a row: a pose of 3 × 5, and the nearest and farthest depth.
 const COLUMNS: usize = 17;
 
 /// The layout `neu3d`: a static rig, `poses_bounds.npy` and a folder or a video a camera.
@@ -127,7 +128,7 @@ impl Pose {
     }
 }
 
-/// Every frame of every camera, camera after camera, and the number of instants.
+/// Every frame of every camera, camera by camera, and the number of times.
 fn images(
     path: &Path,
     poses: &[Pose],
@@ -159,7 +160,7 @@ fn images(
     (images, found)
 }
 
-/// The reference's spiral through the rig, with the intrinsics of a camera of it.
+/// The reference's spiral through the rig, with the intrinsics of one of its cameras.
 fn video(poses: &[Pose], intrinsics: &Camera) -> Vec<Frame> {
     let path = spiral::spiral(
         &poses.iter().map(|pose| (pose.rotation, pose.center)).collect::<Vec<_>>(),

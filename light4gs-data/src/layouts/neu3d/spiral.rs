@@ -3,24 +3,24 @@
 use glam::{DMat3, DVec3};
 use std::f64::consts::TAU;
 
-/// Frames of the path, and how often it goes round.
+/// Frames of the path, and number of turns.
 const FRAMES: usize = 300;
 const ROUNDS: f64 = 2.0;
-/// How often the path goes back and forth while it goes round once.
+/// How often the path goes back and forth in one turn.
 const DEPTH_RATE: f64 = 0.5;
-/// Share of the nearest and the farthest depth in the (reciprocal) depth that is looked at, and how far beyond the
-/// bounds these lie.
+/// The depth that is looked at, as a share between the (reciprocal) nearest and farthest depth; and how far beyond the
+/// bounds these two are taken.
 const FOCUS_SHARE: f64 = 0.75;
 const CLOSE_FACTOR: f64 = 0.9;
 const FAR_FACTOR: f64 = 5.0;
-/// Share of the cameras' coordinates that the radii exceed.
+/// The percentile of the cameras' coordinates that gives the radii.
 const RADIUS_PERCENTILE: f64 = 0.9;
 
 /// World-to-camera rotations (OpenCV axes) and centers of the path. `poses` are camera to world, columns right, up, back;
 /// `near` and `far` bound the depths that the cameras see, world units.
 ///
-/// The reference builds its mean pose and its views with the axis to the left where the one to the right belongs, so its
-/// videos are mirrored; here the axes are right-handed, and everything else is the same.
+/// The reference computes its mean pose and its views with the left axis in place of the right one, so its videos are
+/// mirrored. Here the axes are right-handed; everything else is the same.
 pub(super) fn spiral(poses: &[(DMat3, DVec3)], near: f64, far: f64) -> Vec<(DMat3, DVec3)> {
     let count = poses.len().max(1) as f64;
     let mean = |of: fn(&(DMat3, DVec3)) -> DVec3| poses.iter().map(of).sum::<DVec3>() / count;
@@ -49,7 +49,7 @@ pub(super) fn spiral(poses: &[(DMat3, DVec3)], near: f64, far: f64) -> Vec<(DMat
         .collect()
 }
 
-/// The value below which that share of the values lies, linear between them.
+/// The value below which that share of the values lies; linear between values.
 fn percentile(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else { return 0.0 };

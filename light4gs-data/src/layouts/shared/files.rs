@@ -1,4 +1,4 @@
-//! Finding files: suffixes in any case, names in the order people expect, nothing outside of the dataset.
+//! Finding files: suffixes in upper or lower case, names in natural order, nothing outside of the dataset.
 
 use crate::error::DataError;
 use std::cmp::Ordering;
@@ -21,8 +21,8 @@ pub(crate) fn has_suffix(path: &Path, suffixes: &[&str]) -> bool {
     path.extension().is_some_and(|found| suffixes.iter().any(|known| found.eq_ignore_ascii_case(known)))
 }
 
-/// The entries of a folder that are wanted, in natural order. Hidden ones are passed over: editors and file managers
-/// leave them.
+/// The wanted entries of a folder, in natural order. Hidden files are skipped, since editors and file managers leave
+/// some.
 pub(crate) fn entries(folder: &Path, wanted: impl Fn(&Path) -> bool) -> Result<Vec<PathBuf>, DataError> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).map_err(DataError::io("read", folder))? {
@@ -51,7 +51,7 @@ pub(crate) fn stem_of(path: &Path) -> String {
     path.file_stem().unwrap_or(OsStr::new("")).to_string_lossy().into_owned()
 }
 
-/// The order in which people count: `cam2` before `cam10`, `7.png` before `0010.png`.
+/// Natural order: `cam2` before `cam10`, `7.png` before `0010.png`.
 pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     let (mut left, mut right) = (a.as_bytes(), b.as_bytes());
     while let (Some(x), Some(y)) = (left.first(), right.first()) {
@@ -72,12 +72,12 @@ pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     left.len().cmp(&right.len()).then_with(|| a.cmp(b))
 }
 
-/// A path that a file of the dataset names, below `root`. What would leave the folder is refused: absolute paths, and
-/// more `..` than folders before them.
+/// A path that a file of the dataset names, below `root`. Paths that leave the folder are refused: absolute ones, and
+/// those with more `..` than folders before them.
 ///
-/// `file` and `field` say where the path stands.
+/// `file` and `field` say where the path was found.
 pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Result<PathBuf, DataError> {
-    // Written on Windows, it may have the other separator.
+    // Files from Windows may have the other separator.
     let name = if name.contains('/') { name.to_owned() } else { name.replace('\\', "/") };
     let mut below = PathBuf::new();
     for part in Path::new(&name).components() {
@@ -106,8 +106,8 @@ pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Resul
     Ok(root.join(below))
 }
 
-/// The image of a path with or without suffix, in upper or lower case; `None` where there is none. Where the file of the
-/// name is not there, one of another suffix will do: the images may have been converted since their names were written.
+/// The image of a path with or without suffix, in upper or lower case; `None` where there is none. If there is no file
+/// of this name, one with another suffix is taken: images may have been converted since their names were written.
 pub(crate) fn find_image(path: &Path) -> Option<PathBuf> {
     if is_image(path) || has_suffix(path, &OTHER_SUFFIXES) {
         let converted = || SUFFIXES.iter().find_map(|suffix| with_any_case(&path.with_extension(suffix)));
@@ -125,7 +125,7 @@ pub(crate) fn find_image(path: &Path) -> Option<PathBuf> {
         .find(|candidate| candidate.is_file())
 }
 
-/// The file of this path, or the one whose suffix is written in the other case.
+/// The file of this path, or the one whose suffix has the other case.
 fn with_any_case(path: &Path) -> Option<PathBuf> {
     if path.is_file() {
         return Some(path.to_path_buf());
@@ -138,8 +138,8 @@ fn with_any_case(path: &Path) -> Option<PathBuf> {
         .find(|candidate| candidate.is_file())
 }
 
-/// Whether the file of this path, or the one whose suffix is written in the other case, is there in a format that cannot
-/// be decoded.
+/// Whether the file of this path, or the one whose suffix has the other case, exists in a format that cannot be
+/// decoded.
 pub(crate) fn is_of_other_format(path: &Path) -> bool {
     has_suffix(path, &OTHER_SUFFIXES) && with_any_case(path).is_some()
 }
@@ -194,7 +194,7 @@ mod tests {
         assert_eq!(at("a").as_deref(), Some("a.PNG"));
         assert_eq!(at("c.jpeg").as_deref(), Some("c.jpeg"));
         assert_eq!(at("d.png"), None);
-        // Converted since.
+        // Converted since the names were written.
         assert_eq!(at("b.png").as_deref(), Some("b.Jpg"));
         assert_eq!(at("c.tif").as_deref(), Some("c.jpeg"));
         assert_eq!(at("a.JPG").as_deref(), Some("a.PNG"));

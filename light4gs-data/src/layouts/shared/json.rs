@@ -1,15 +1,15 @@
-//! JSON files whose every bad field can be named.
+//! Reading JSON files. Every bad field is named in the error.
 
 use crate::error::DataError;
 use crate::regular_file::read_regular_text;
 use serde_json::Value;
 use std::path::Path;
 
-/// A file of cameras is kilobytes; whatever is larger than this is not one.
+/// A file of cameras has kilobytes; a larger file than this is none.
 const MAX_BYTES: u64 = 256 << 20;
 
-/// Reads a JSON file. The words `NaN`, `Infinity` and `-Infinity`, which Python writes though JSON
-/// has no such numbers, come back as strings, so that the check of the field can name it.
+/// Reads a JSON file. The words `NaN`, `Infinity` and `-Infinity`, which Python writes though JSON has no such numbers,
+/// are returned as strings, so that the check of the field can name it.
 pub(in crate::layouts) fn read(path: &Path) -> Result<Value, DataError> {
     let text = read_regular_text(path, MAX_BYTES).map_err(DataError::io("read", path))?;
     serde_json::from_str(&text).or_else(|source| {
@@ -95,7 +95,7 @@ pub(in crate::layouts) fn numbers<const N: usize>(
     Ok(out)
 }
 
-/// Rows of `N` finite numbers: at least `M` of them; more are passed over.
+/// Rows of `N` finite numbers: at least `M` of them; further rows are ignored.
 pub(in crate::layouts) fn rows<const M: usize, const N: usize>(
     path: &Path,
     field: &str,

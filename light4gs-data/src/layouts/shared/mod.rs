@@ -1,5 +1,5 @@
-//! What the readers have in common: files and names, arrays and JSON, times and splits, and the way from posed images to
-//! frames.
+//! Code that the layouts share: files and names, arrays and JSON, times and splits, and the conversion from posed
+//! images to frames.
 
 pub(crate) mod files;
 pub(super) mod json;

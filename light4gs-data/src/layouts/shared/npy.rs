@@ -4,7 +4,7 @@ use crate::error::DataError;
 use crate::regular_file::read_regular_file;
 use std::path::Path;
 
-/// Poses and points are megabytes; whatever is larger than this is neither.
+/// Poses and points have megabytes; a larger file than this is neither.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// A two-dimensional array, row-major.
@@ -132,7 +132,7 @@ impl Number {
             ('f', 4) => f64::from(f32::from_bits(bits as u32)),
             ('f', _) => f64::from_bits(bits),
             ('u', _) => bits as f64,
-            // The sign is in the highest bit that is stored.
+            // The sign is the highest stored bit.
             (_, size) => ((bits << (64 - 8 * size)) as i64 >> (64 - 8 * size)) as f64,
         }
     }

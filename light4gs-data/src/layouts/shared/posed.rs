@@ -11,7 +11,7 @@ use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// Pixels of an image as it is used. A cache of a few should fit in memory.
+/// Most pixels of an image as it is used, so that several fit into memory.
 const MAX_USED_PIXELS: u64 = 1 << 26;
 
 /// An image of a capture with what the capture's files say about it.
@@ -24,7 +24,7 @@ pub(in crate::layouts) struct PosedImage {
     pub(in crate::layouts) rotation: DMat3,
     /// World units.
     pub(in crate::layouts) center: DVec3,
-    /// In pixels of the size that the capture's files name; the image itself may be of another.
+    /// In pixels of the size that the capture's files name. The image itself may have another size.
     pub(in crate::layouts) intrinsics: Intrinsics,
     pub(in crate::layouts) lens: Option<Lens>,
     pub(in crate::layouts) camera_id: u32,
@@ -34,10 +34,10 @@ pub(in crate::layouts) struct PosedImage {
     pub(in crate::layouts) described: (PathBuf, String),
 }
 
-/// Reads the headers of the images, and gives frames at the size that the options ask for.
+/// Reads the headers of the images, and returns frames at the size that the options ask for.
 pub(in crate::layouts) fn frames(images: &[PosedImage], options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
     let headers = read_headers(images.par_iter().map(|image| image.path.as_path()).collect::<Vec<_>>())?;
-    // Their size may be another one; that they are images is known before training begins.
+    // Masks may have another size. This makes sure before training that they are images.
     read_headers(
         images.iter().filter_map(|image| image.mask.as_ref()).map(|mask| mask.path.as_path()).collect::<Vec<_>>(),
     )?;
@@ -84,8 +84,8 @@ pub(in crate::layouts) fn used_size(
     Ok(used)
 }
 
-/// The size of an image as its camera sees it. An image that lies on its side is turned where its EXIF data say so;
-/// otherwise the marks are left alone, since the programs that estimate poses do not look at them either.
+/// The size of an image as its camera sees it. An image that lies on its side is rotated if its EXIF data say so.
+/// Otherwise EXIF rotations are ignored, since the programs that estimate poses ignore them too.
 fn upright_size(image: &PosedImage, header: ImageHeader) -> Result<(u32, u32), DataError> {
     let (width, height) = header.size;
     let (expected_width, expected_height) = (image.intrinsics.width, image.intrinsics.height);
@@ -108,7 +108,7 @@ fn upright_size(image: &PosedImage, header: ImageHeader) -> Result<(u32, u32), D
     ))
 }
 
-/// Says how many images have no mask, where a capture has masks.
+/// Adds a note with the number of images without a mask, where a capture has masks.
 pub(in crate::layouts) fn note_unmasked(images: &[PosedImage], notes: &mut Vec<String>) {
     let without: Vec<&PosedImage> = images.iter().filter(|image| image.mask.is_none()).collect();
     if let Some(first) = without.first() {
@@ -117,7 +117,7 @@ pub(in crate::layouts) fn note_unmasked(images: &[PosedImage], notes: &mut Vec<S
     }
 }
 
-/// The error about an image that is there, in a format that cannot be decoded.
+/// The error about an image that exists, but in a format that cannot be decoded.
 pub(in crate::layouts) fn other_format(path: &Path) -> DataError {
     let problem = "this format cannot be decoded, expected a PNG, JPEG or GIF image";
     let remedy = "convert the images, for example with `ffmpeg -i NAME.tif NAME.png`; the names may keep their old suffix in \
@@ -125,7 +125,7 @@ pub(in crate::layouts) fn other_format(path: &Path) -> DataError {
     DataError::image(path, problem, remedy)
 }
 
-/// Leaves out the images whose file is missing, and says so; more than half missing is an error.
+/// Leaves out the images whose file is missing, and adds a note; if more than half are missing, it is an error.
 ///
 /// `file_of` gives the file that an image should have, and the one that it has.
 pub(in crate::layouts) fn present<T>(

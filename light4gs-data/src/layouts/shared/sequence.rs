@@ -1,17 +1,17 @@
-//! Cameras, times and splits of captures whose files do not say them: from the images' names.
+//! Cameras, times and splits from the images' names, for captures whose files do not have them.
 
 use super::files::{natural, stem_of};
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-/// Of this many instants one is held out, where no camera can be.
+/// One of this many times is held out, where no camera can be.
 const HELD_OUT_EVERY: usize = 8;
-/// A rig of fewer cameras cannot spare one.
+/// A rig with fewer cameras cannot do without one.
 const LEAST_CAMERAS: usize = 4;
-/// Numbers that leave out more than this share of what they count are no frame numbers.
+/// If the numbers have larger gaps than this factor, they are no frame numbers.
 const SPARSEST: u64 = 20;
 
-/// Where an image stands in a capture.
+/// Camera and time of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::layouts) struct Place {
     /// Which camera took it, counted from 0 in natural order of the cameras' names.
@@ -22,10 +22,10 @@ pub(in crate::layouts) struct Place {
 
 /// Cameras and times of images, from their paths relative to the folder of images.
 ///
-/// The last number of a name counts the instants; what stands before it, with the folder, names the camera: `cam03/0017.png`
-/// and `cam03_0017.png` are both instant 17 of camera `cam03`, and `frame_0017.png` alone is a moving camera. Where an
-/// image was left out, the numbers leave a gap in time, as they should. Names without such numbers are taken in natural
-/// order, one instant each.
+/// The last number of a name counts the times. What stands before it, with the folder, names the camera:
+/// `cam03/0017.png` and `cam03_0017.png` are both time 17 of camera `cam03`, and `frame_0017.png` alone is a moving
+/// camera. Where an image was left out, the numbers leave a gap in time, as they should. Names without such numbers are
+/// taken in natural order, one time each.
 pub(in crate::layouts) fn places(names: &[String]) -> Vec<Place> {
     numbered(names).unwrap_or_else(|| {
         let mut order: Vec<usize> = (0..names.len()).collect();
@@ -45,7 +45,7 @@ fn numbered(names: &[String]) -> Option<Vec<Place>> {
     cameras.dedup();
     let instants: BTreeSet<u64> = keys.iter().map(|(_, number)| *number).collect();
     let unique: BTreeSet<&(String, u64)> = keys.iter().collect();
-    // A camera a name, or one name for two images: these numbers count something else.
+    // If there are as many cameras as names, or two images with the same place, the numbers count something else.
     if unique.len() < keys.len() || (cameras.len() > 1 && 2 * cameras.len() > keys.len()) {
         return None;
     }
@@ -76,8 +76,8 @@ fn camera_and_number(name: &str) -> Option<(String, u64)> {
     Some((format!("{folder}/{}|{}", &stem[..start], &stem[end..]), number))
 }
 
-/// Which images are held out for testing, where the dataset does not say: camera 0 of a rig, as the field does; of fewer
-/// than 4 cameras, or a moving one, every eighth instant, from the middle of the first eight.
+/// Which images are held out for testing, where the dataset has no split: camera 0 of a rig, as is usual; with fewer
+/// than 4 cameras, or a moving one, every eighth time, from the middle of the first eight.
 pub(in crate::layouts) fn held_out(places: &[Place]) -> Vec<bool> {
     let cameras: BTreeSet<u32> = places.iter().map(|place| place.camera).collect();
     if cameras.len() >= LEAST_CAMERAS {
@@ -124,7 +124,7 @@ mod tests {
         assert_eq!(read(&["b.png", "a.png", "c.png"]), [(0, 0.5), (0, 0.0), (0, 1.0)]);
         assert_eq!(read(&["17.5.png", "19.25.png", "18.125.png"]), [(0, 0.0), (0, 1.0), (0, 0.5)]);
         assert_eq!(read(&["ä1.png", "日本2.png", "ö.png"]).len(), 3);
-        // Times of day: far apart, so that only their order counts.
+        // Times of day have large gaps, so only their order is used.
         assert_eq!(read(&["IMG_120000.jpg", "IMG_120500.jpg", "IMG_235959.jpg"]), [(0, 0.0), (0, 0.5), (0, 1.0)]);
         assert_eq!(read(&["99999999999999999999999.png", "1.png"]), [(0, 1.0), (0, 0.0)]);
     }

@@ -6,7 +6,7 @@ use crate::lens::{Distortion, Lens};
 use crate::synthetic::Studio;
 use glam::{DVec2, Vec3};
 
-/// Width and height of the images, pixels: not square, odd, and the principal point is not in the middle.
+/// Width and height of the images, pixels: not square, odd, and with the principal point off the middle.
 pub(super) const SIZE: (u32, u32) = (97, 74);
 
 /// One image of the capture.
@@ -17,7 +17,7 @@ pub(super) struct Shot {
     pub(super) time: f32,
 }
 
-/// What is photographed, and how.
+/// The scene and the shots.
 pub(super) struct Capture {
     studio: Studio,
     pub(super) shots: Vec<Shot>,
@@ -38,8 +38,8 @@ pub(super) fn fisheye() -> Lens {
 }
 
 impl Capture {
-    /// Cameras on an arc that look at the middle. `plan` gives for each shot its name, camera on the arc (from 0 to 1),
-    /// time and lens.
+    /// Cameras on an arc that look at the middle. `plan` gives for each shot its name, the camera's place on the arc (0
+    /// to 1), time and lens.
     pub(super) fn new(centered: bool, plan: Vec<(String, f32, f32, Option<Lens>)>) -> Self {
         let shots = plan
             .into_iter()

@@ -118,7 +118,7 @@ fn a_rig_of_folders_reads_back_and_strays_are_left_out() {
     let capture = Capture::new(false, plan.collect());
     write_images(folder.path(), &capture);
     write_binary(folder.path(), &capture);
-    // Two images that COLMAP could not place.
+    // Two images that COLMAP could not pose.
     for name in ["cam0/0003.png", "cam1/0003.png"] {
         fs::copy(folder.path().join("images/cam0/0001.png"), folder.path().join("images").join(name)).unwrap();
     }
@@ -152,7 +152,7 @@ fn every_truncation_of_a_binary_file_is_an_error() {
         }
         fs::write(&path, [&whole[..], b"x"].concat()).unwrap();
         refuses(folder.path(), &[name, "1 bytes follow"]);
-        // A count that the file cannot hold allocates nothing.
+        // For a count that the file cannot hold, no memory is allocated.
         fs::write(&path, [&u64::MAX.to_le_bytes(), &whole[8..]].concat()).unwrap();
         refuses(folder.path(), &[name, "18446744073709551615"]);
         fs::write(&path, whole).unwrap();

@@ -1,5 +1,5 @@
-//! One synthetic scene, photographed through known lenses, written in every layout and read back: points land where they
-//! should, straightened images are what a pinhole would have seen, times and splits are those of the layout.
+//! One synthetic scene, photographed through known lenses, written in every layout and read back. Points project to the
+//! right places, undistorted images are those of a pinhole, times and splits are those of the layout.
 
 mod capture;
 mod colmap;
@@ -14,17 +14,17 @@ use capture::{Capture, Shot};
 use glam::Vec3;
 use std::path::Path;
 
-/// Pixels by which a point may miss.
+/// By how many pixels a point may be off.
 const MOST_PIXELS: f32 = 0.5;
-/// Decibels by which a straightened image resembles the pinhole's. Off by half a pixel it would be below 30.
+/// PSNR that an undistorted image must have against the pinhole's, dB. With an offset of half a pixel it would be below
+/// 30.
 const LEAST_PSNR: f64 = 33.0;
 
 fn options() -> LoadOptions {
     LoadOptions { background: [0.0; 3], ..Default::default() }
 }
 
-/// Opens a written capture and compares every frame with the shot it was made from; `shot_of` finds it by the frame's
-/// name.
+/// Opens a written capture and compares every frame with its shot, which `shot_of` finds by the frame's name.
 fn check(root: &Path, layout: &str, capture: &Capture, shot_of: impl Fn(&str) -> Option<usize>) -> Scene {
     let scene = Scene::open(root, &options()).unwrap();
     assert_eq!(scene.layout, layout);

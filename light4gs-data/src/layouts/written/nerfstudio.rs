@@ -88,7 +88,7 @@ fn own_intrinsics_times_and_splits() {
     assert_eq!((scene.train.len(), scene.val.len(), scene.test.len()), (4, 1, 1));
     assert_eq!(times(&scene, Split::Train), [0.0, 0.1, 0.2, 0.5]);
     assert!(scene.train[1].mask.is_some() && scene.train[0].mask.is_none());
-    // Times in seconds or frames are brought to [0, 1].
+    // Times in seconds or frames are mapped to [0, 1].
     for i in 0..6 {
         document["frames"][i]["time"] = json!(100 + i);
     }
@@ -145,7 +145,7 @@ fn the_fourth_coefficient_continues_the_polynomial() {
         let scene = check(folder.path(), "nerfstudio", &capture, by_name(&capture.shots));
         assert_eq!(scene.train[0].lens.unwrap().distortion, lens);
     }
-    // OpenCV's own model divides by it.
+    // In OpenCV's own model it is in the denominator.
     document["camera_model"] = json!("FULL_OPENCV");
     write(folder.path(), &capture, &document);
     let scene = Scene::open(folder.path(), &options()).unwrap();

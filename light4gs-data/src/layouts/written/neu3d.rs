@@ -1,4 +1,4 @@
-//! The layout `neu3d`: LLFF's table and a folder a camera.
+//! The layout `neu3d`: LLFF's table, and a folder for each camera.
 
 use super::capture::{Capture, Shot};
 use super::*;
@@ -57,7 +57,7 @@ fn a_rig_reads_back() {
     assert_eq!((scene.train.len(), scene.test.len(), scene.video.len()), (8, 4, 300));
     assert!(scene.test.iter().all(|frame| frame.camera_id == 0));
     assert_eq!(times(&scene, Split::Train), [0.0, 0.25, 0.5, 0.75]);
-    // The middle of what the cameras look at is where random points lie.
+    // Random points lie around the place that the cameras look at.
     let mean = scene.points.positions.iter().fold(Vec3::ZERO, |sum, p| sum + Vec3::from(*p)) / 2000.0;
     assert!(mean.length() < 0.3, "{mean}");
 }
@@ -74,7 +74,7 @@ fn a_missing_frame_leaves_a_gap_and_a_limit_takes_the_first() {
     let first = LoadOptions { frames: Some(3), ..options() };
     let scene = Scene::open(folder.path(), &first).unwrap();
     assert_eq!(times(&scene, Split::Test), [0.0, 1.0 / 3.0, 2.0 / 3.0]);
-    // Other folders are no cameras; one camera is too few.
+    // Other folders are no cameras, and one camera is too few.
     fs::create_dir_all(folder.path().join("colmap")).unwrap();
     fs::copy(folder.path().join("cam00/images/0000.png"), folder.path().join("colmap/x.png")).unwrap();
     assert!(Scene::open(folder.path(), &options()).is_ok());
