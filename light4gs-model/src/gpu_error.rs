@@ -1,11 +1,11 @@
-//! What can go wrong on a GPU.
+//! Errors of a GPU.
 
 use std::any::Any;
 
 /// An error of a GPU operation.
 ///
-/// Burn's operations return tensors and no results, so these errors travel as panics with a `GpuError` as their payload.
-/// [`GpuError::catch`] gives them back as results.
+/// Burn's operations return tensors, not results, so these errors are panics with a `GpuError` as their payload.
+/// [`GpuError::catch`] turns them into results.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum GpuError {
     /// A kernel did not compile or could not be launched.
@@ -14,7 +14,7 @@ pub enum GpuError {
          (`wgpu:0`, `wgpu:integrated`, `wgpu:cpu`), or compute on the CPU with `--device flex`"
     )]
     Kernel {
-        /// File in `shaders/`, without its ending.
+        /// File in `shaders/`, without its suffix.
         kernel: &'static str,
         /// Name of the runtime.
         adapter: String,
@@ -27,7 +27,7 @@ pub enum GpuError {
          Gaussians; if the device was lost, start again from the last checkpoint"
     )]
     Device {
-        /// What was waited for.
+        /// The operation that was waited for.
         operation: &'static str,
         /// What the driver says.
         reason: String,
@@ -38,14 +38,14 @@ pub enum GpuError {
          images or fewer Gaussians, or choose another adapter"
     )]
     TooLarge {
-        /// What it holds.
+        /// Its contents.
         buffer: &'static str,
-        /// Asked for.
+        /// Bytes that were asked for.
         bytes: u64,
         /// The adapter's limit.
         limit: u64,
     },
-    /// The image has more parts than a launch can name.
+    /// The image has more cells than a launch can count.
     #[error("an image of {width}×{height} is too large for this adapter; at most {limit} cells of 16×16 pixels")]
     Image {
         /// Pixels.
@@ -64,13 +64,14 @@ pub enum GpuError {
 }
 
 impl GpuError {
-    /// Panics with the error as the payload. A program that prints the error itself keeps its panic hook quiet, see [`GpuError::catch`].
+    /// Panics with the error as the payload. A program that prints the error itself should install a silent panic hook,
+    /// see [`GpuError::catch`].
     #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu back end raises"))]
     pub(crate) fn raise(self) -> ! {
         std::panic::panic_any(self)
     }
 
-    /// The error that a panic carries; any other payload comes back as it was.
+    /// The error that is the payload of a panic; any other payload is returned unchanged.
     ///
     /// # Errors
     /// The payload, if the panic was of another kind.
@@ -78,10 +79,10 @@ impl GpuError {
         payload.downcast::<Self>().map(|error| *error)
     }
 
-    /// Runs operations and gives back the error that one of them panicked with. Other panics go on.
+    /// Runs operations and returns the error with which one of them panicked. Other panics continue.
     ///
-    /// The panic hook is called all the same, and cannot read the payload: a program that prints these errors itself
-    /// should install a hook that keeps quiet where `payload().is::<GpuError>()`.
+    /// The panic hook is called even so. A program that prints these errors itself should install a hook that prints
+    /// nothing where `payload().is::<GpuError>()`.
     ///
     /// ```
     /// use light4gs_model::GpuError;
@@ -90,7 +91,7 @@ impl GpuError {
     /// ```
     ///
     /// # Errors
-    /// What the GPU could not do.
+    /// What the GPU refused.
     pub fn catch<T>(run: impl FnOnce() -> T) -> Result<T, Self> {
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
             .map_err(|payload| Self::from_panic(payload).unwrap_or_else(|other| std::panic::resume_unwind(other)))

@@ -1,11 +1,11 @@
 //! Every float parameter of a Burn module with its dotted path: for optimizers, checkpoints, learning-rate groups and tests.
 //!
-//! Burn's [`ModuleVisitor`] and [`ModuleMapper`] walk a module and say where they are; this puts the path together. A path
-//! is made of the names of fields and the indices of lists, as in `gaussians.means` or `field.hexplane.planes.3`. Options
-//! and enums add nothing to it.
+//! Burn's [`ModuleVisitor`] and [`ModuleMapper`] visit a module and report each name on the way; this joins the names
+//! to a path. A path consists of the names of fields and the indices of lists, as in `gaussians.means` or
+//! `field.hexplane.planes.3`. Options and enums add nothing to it.
 //!
-//! **Order.** Parameters come depth first, fields in the order of their declaration, lists by index. It is the same for
-//! every module of one structure.
+//! **Order.** Depth first, fields in the order of their declaration, lists by index. It is the same for all modules of
+//! the same structure.
 //!
 //! ```
 //! use burn::module::Param;
@@ -31,31 +31,31 @@
 use burn::module::{Module, ModuleMapper, ModuleVisitor, Param};
 use burn::tensor::Tensor;
 
-/// Something to do with every float parameter, whatever its rank: a closure could not be generic.
+/// A function of every float parameter, whatever its rank; a closure could not be generic.
 pub trait ParameterVisitor {
-    /// Called once a parameter.
+    /// Called once for each parameter.
     fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>);
 }
 
-/// Something that replaces every float parameter, whatever its rank.
+/// A function that replaces every float parameter, whatever its rank.
 pub trait ParameterMapper {
-    /// Called once a parameter; what it returns takes the parameter's place. Keep the identity where an optimizer or a
-    /// tape knows it: `Param::initialized(parameter.id, value)`.
+    /// Called once for each parameter; the result replaces it. Keep the identity if an optimizer or a tape knows the
+    /// parameter: `Param::initialized(parameter.id, value)`.
     fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>>;
 }
 
-/// Shows every float parameter to the visitor.
+/// Calls the visitor with every float parameter.
 pub fn visit_parameters<M: Module>(module: &M, visitor: &mut impl ParameterVisitor) {
     module.visit(&mut WithPath { path: Path::default(), inner: visitor });
 }
 
-/// The module with every float parameter replaced by what the mapper makes of it.
+/// The module with every float parameter replaced by the mapper's result.
 pub fn map_parameters<M: Module>(module: M, mapper: &mut impl ParameterMapper) -> M {
     module.map(&mut WithPath { path: Path::default(), inner: mapper })
 }
 
-/// [`map_parameters`] where the module cannot be given away. The mapper gets the only handle to each tensor, so that what
-/// it does can be done in place.
+/// [`map_parameters`] for a module that cannot be moved. The mapper gets the only handle to each tensor, so that it can
+/// work in place.
 pub fn update_parameters<M: Module>(module: &mut M, mapper: &mut impl ParameterMapper) {
     let empty = map_parameters(module.clone(), &mut Emptied);
     let full = std::mem::replace(module, empty);
@@ -71,7 +71,7 @@ impl ParameterMapper for Emptied {
     }
 }
 
-/// Where in a module a walk is.
+/// The position in a module while it is visited.
 #[derive(Default)]
 struct Path {
     /// The path so far: `names` joined by dots.

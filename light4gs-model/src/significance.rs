@@ -10,7 +10,7 @@ use crate::splatter::Splatter;
 /// Share of the Gaussians whose volume lies below the reference volume of [`VolumeWeight`].
 const VOLUME_QUANTILE: f64 = 0.9;
 
-/// What is summed over the pixels that blend a Gaussian.
+/// The quantity that is summed over the pixels that blend a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PixelContribution {
     /// Transmittance before the Gaussian times its opacity: the paper's.
@@ -19,7 +19,7 @@ pub enum PixelContribution {
     BlendingWeight,
     /// The Gaussian's opacity, as the first public code of LightGaussian does.
     Opacity,
-    /// One a pixel.
+    /// One for each pixel.
     PixelCount,
 }
 
@@ -28,12 +28,12 @@ pub enum PixelContribution {
 pub enum VolumeWeight {
     /// No factor.
     None,
-    /// `clamp(V / V_90, 0, 1)^exponent`, `V_90` the volume that 90 % stay below: the paper's.
+    /// `clamp(V / V_90, 0, 1)^exponent`, where 90 % of the volumes are below `V_90`: the paper's.
     Clamped {
         /// `beta` in the paper.
         exponent: f64,
     },
-    /// `(V / V_10)^exponent`, not clamped, with the volume that 10 % stay below: what the public code computes.
+    /// `(V / V_10)^exponent`, not clamped, where 10 % of the volumes are below `V_10`: that of the public code.
     Unclamped {
         /// `v_pow` in the public code.
         exponent: f64,
@@ -63,7 +63,7 @@ impl VolumeWeight {
     }
 }
 
-/// Sums over images of what each of `N` Gaussians contributes.
+/// Sums over images of the contributions of each of `N` Gaussians.
 ///
 /// ```
 /// use burn::tensor::Device;
@@ -86,15 +86,15 @@ pub struct Significance {
 }
 
 impl Significance {
-    /// For `count` Gaussians, nothing seen yet.
+    /// For `count` Gaussians, without any image yet.
     pub fn new(count: usize) -> Self {
         Self { sums: vec![[0.0; 4]; count] }
     }
 
-    /// Adds the image of raw attributes at a time, through a camera.
+    /// Adds the image of raw attributes at a time, seen by a camera.
     ///
     /// # Panics
-    /// If the number of Gaussians is another than at the beginning.
+    /// If the number of Gaussians has changed.
     pub fn add(&mut self, splatter: &Splatter, gaussians: GaussianTensors, camera: &Camera) {
         let gaussians = gaussians.inner();
         let (inputs, view) = splatter.inputs(gaussians.activated(), camera, None);
@@ -121,8 +121,9 @@ impl Significance {
     }
 }
 
-/// `[N]`: the least significant share of the Gaussians, those whose score is at most the one at position
-/// `share · (N - 1)`, rounded down, of the sorted scores. Equal scores share their fate, so it may be more than `share`.
+/// `[N]`: the least significant share of the Gaussians, those whose score is at most the one at position `share · (N -
+/// 1)`, rounded down, of the sorted scores. Gaussians with equal scores are treated alike, so it may be more than
+/// `share`.
 pub fn least_significant(scores: &[f64], share: f64) -> Vec<bool> {
     if scores.is_empty() || share <= 0.0 {
         return vec![false; scores.len()];

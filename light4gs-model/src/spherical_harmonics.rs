@@ -6,7 +6,7 @@ const C1: f32 = 0.488_602_5;
 const C2: [f32; 5] = [1.092_548_4, -1.092_548_4, 0.315_391_57, -1.092_548_4, 0.546_274_2];
 const C3: [f32; 7] = [-0.590_043_6, 2.890_611_4, -0.457_045_8, 0.373_176_34, -0.457_045_8, 1.445_305_7, -0.590_043_6];
 
-/// Coefficients a channel at a degree.
+/// Coefficients of a channel at a degree.
 pub const fn coefficient_count(degree: usize) -> usize {
     (degree + 1) * (degree + 1)
 }

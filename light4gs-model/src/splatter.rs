@@ -7,7 +7,7 @@ use light4gs_data::Camera;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 
-/// An image and what the optimizer wants to know of it.
+/// An image, and what training needs besides.
 #[derive(Clone, Debug)]
 pub struct Rendering {
     /// `[H, W, 3]`, over the background; not clamped above.
@@ -33,8 +33,8 @@ impl Rendering {
     }
 }
 
-/// Renders Gaussians over a background. With an autodiff device, everything that goes in gets its gradient, so a loop and a
-/// loss of your own need nothing else of this crate:
+/// Renders Gaussians over a background. On an autodiff device every input gets its gradient, so a loop and a loss of
+/// your own need nothing else from this crate:
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -55,8 +55,8 @@ pub struct Splatter {
 }
 
 impl Splatter {
-    /// `sh_degree` is the active degree: coefficients above it are ignored, and a degree above the Gaussians' own
-    /// means theirs.
+    /// `sh_degree` is the active degree: coefficients above it are ignored. A degree above that of the Gaussians means
+    /// theirs.
     pub fn new(background: [f32; 3], sh_degree: usize) -> Self {
         Self { background, sh_degree }
     }
@@ -67,15 +67,15 @@ impl Splatter {
     /// their gradient is the screen-space gradient that drives densification.
     ///
     /// # Panics
-    /// If the shapes do not belong together; the message names the tensor.
+    /// If the shapes do not fit together; the message names the tensor.
     pub fn render(&self, gaussians: GaussianTensors, camera: &Camera, screen_offsets: Option<Tensor<2>>) -> Rendering {
         self.render_activated(gaussians.activated(), camera, screen_offsets)
     }
 
-    /// Renders attributes that need no activation any more: [`Self::render`] for those who have their own.
+    /// Renders attributes that are activated already: [`Self::render`] for programs with activations of their own.
     ///
     /// # Panics
-    /// If the shapes do not belong together; the message names the tensor.
+    /// If the shapes do not fit together; the message names the tensor.
     pub fn render_activated(
         &self,
         gaussians: ActivatedGaussians,
@@ -96,10 +96,11 @@ impl Splatter {
         }
     }
 
-    /// What the operations on one image take, for those who call an operation of [`ops`](crate::ops) themselves.
+    /// The inputs of the operations on one image, for programs that call the operations of [`ops`](crate::ops)
+    /// themselves.
     ///
     /// # Panics
-    /// If the shapes do not belong together; the message names the tensor.
+    /// If the shapes do not fit together; the message names the tensor.
     pub fn inputs(
         &self,
         gaussians: ActivatedGaussians,

@@ -8,8 +8,9 @@ use super::prior::{DescribedCondition, DescribedPrior, Passes, PriorPart};
 use crate::entropy::quantization_steps::PlaneSteps;
 
 impl PlaneSteps {
-    /// A pair of steps for each scale of a layout, or one for all where they are the same. The planes without time have one
-    /// step in a scale, and those with time; where a scale has only one of the two, that step stands for both.
+    /// A pair of steps for each scale of a layout, or one for all where they are the same. In a scale, the space-only
+    /// planes have one step and the space-time planes have one; a scale that has planes of only one group gives both
+    /// the same step.
     pub fn to_groups(&self, layout: &PlaneLayout) -> Vec<PerGroup> {
         let steps = self.values();
         let pair = |scale: usize| {
@@ -31,11 +32,11 @@ impl PlaneSteps {
 }
 
 impl ContextModel {
-    /// What a decoder needs of a composition of parts, for planes of a layout. Call [`Self::update_quantiles`] first: the hyperprior's tables go
-    /// as far as its quantiles.
+    /// The data of a composition of parts that a decoder needs, for planes of a layout. Call [`Self::update_quantiles`]
+    /// first: the hyperprior's tables extend to its quantiles.
     ///
     /// # Errors
-    /// A density that gives no frequency table; the message names what is wrong with it.
+    /// A density from which no frequency table can be made; the message says why.
     pub fn to_arrays_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
@@ -78,7 +79,7 @@ impl ContextModel {
     }
 }
 
-/// The place of something in a list, at the end if it is new: what several planes use stands once.
+/// The index of an item in a list; a new item is appended. So an item that several planes use is stored once.
 fn place<T: PartialEq>(list: &mut Vec<T>, item: T) -> u32 {
     let place = list.iter().position(|other| *other == item).unwrap_or(list.len());
     if place == list.len() {

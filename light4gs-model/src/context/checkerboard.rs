@@ -39,12 +39,12 @@ impl CheckerboardConfig {
 /// The context of non-anchors from the anchors around them.
 #[derive(Module, Debug)]
 pub struct Checkerboard {
-    /// 5×5 `[M, H, W]` to `[2 M, H, W]`, only taps with row + column odd: those that reach anchors from a non-anchor.
+    /// 5×5 `[M, H, W]` to `[2 M, H, W]`; only taps with row + column odd, which lead from a non-anchor to anchors.
     pub conv: PlaneConv,
 }
 
 impl Checkerboard {
-    /// [`Self::context`] for the codec's exact executor.
+    /// The same computation as [`Self::context`], for the codec's exact executor.
     pub fn describe(&self) -> DescribedCondition {
         let layer = self.conv.to_layer();
         let (mut network, [anchors]) = Network::new([layer.inputs]);
@@ -53,8 +53,8 @@ impl Checkerboard {
         DescribedCondition { network, sources: vec![PlaneSource::Anchors] }
     }
 
-    /// The context `[2 M, H, W]` of a plane `[M, H, W]` in original units, of which only the anchors are looked at. Zero at the
-    /// anchors themselves, so that one evaluation of what follows serves both passes.
+    /// The context `[2 M, H, W]` of a plane `[M, H, W]` in original units, of which only the anchors are used. It is
+    /// zero at the anchors themselves, so that one evaluation of the following network serves both passes.
     ///
     /// ```
     /// use burn::tensor::{Device, Tensor};

@@ -1,4 +1,4 @@
-//! What training and coding ask of an entropy model of feature planes: a [`ContextModel`], and the parts around it.
+//! The interface of an entropy model of feature planes to training and coding: a [`ContextModel`], and further parts.
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::Tensor;
@@ -15,20 +15,20 @@ use crate::planes::PlaneTensors;
 
 /// An entropy model of feature planes as a composition of parts (paper III-C).
 ///
-/// [`ContextModel`] is the paper's. A model with a part of one's own holds a [`ContextModel`] and the part, names the
-/// first as its [`base`](Self::base), and lists its own part among the [`parts`](Self::parts); the rest follows. Training
-/// finds the parameters of both, since a composition is a Burn module.
+/// [`ContextModel`] is the paper's. A model with a part of your own holds a [`ContextModel`] and that part, returns the
+/// first as its [`base`](Self::base), and adds its own part to the [`parts`](Self::parts); the other methods need no
+/// change. Training finds the parameters of both, since a composition is a Burn module.
 pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
     /// What the parts share: centers, checkerboard, hyperprior, and the network that turns priors into distributions.
     fn base(&self) -> &ContextModel;
 
-    /// [`Self::base`], to start and to finish it.
+    /// [`Self::base`], for setting initial values and updating quantiles.
     fn base_mut(&mut self) -> &mut ContextModel;
 
-    /// The composition: for each plane the first part that applies gives its prior.
+    /// The parts: for each plane, the first part that applies gives its prior.
     fn parts(&self) -> Vec<Box<dyn PriorPart + '_>>;
 
-    /// Bits of the selected planes. The values are taken as they are: noisy in training, quantized in an evaluation.
+    /// Bits of the selected planes. The values are used as given: noisy in training, quantized in an evaluation.
     /// Differentiable in planes, steps and weights.
     fn rate(&self, planes: &PlaneTensors, steps: &PlaneSteps, selection: &[usize], latent: Latent) -> Vec<PlaneRate> {
         let (planes, parts) = (self.base().centered(planes, steps), self.parts());
@@ -59,23 +59,23 @@ pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
         selection.iter().map(|plane| self.base().parameters_with(&parts, &planes, *plane, latent).0).collect()
     }
 
-    /// Quantizes all planes in coding order, each with the parameters that the decoder will have: what the codec does,
-    /// with a back end's floats in place of its exact executor. Without gradients.
+    /// Quantizes all planes in coding order, each with the parameters that the decoder will have: the same as the
+    /// codec, but with the arithmetic of a back end in place of the exact executor. Without gradients.
     fn quantize(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> Vec<QuantizedPlane> {
         self.base().quantize_with(&self.parts(), planes, steps)
     }
 
-    /// For each plane the symbols `[N, H / 4, W / 4]` of its latent, where it has one. Call
-    /// [`update_quantiles`](ContextModel::update_quantiles) first, since they count from the medians.
+    /// For each plane that has a latent, its symbols `[N, H / 4, W / 4]`. Call
+    /// [`update_quantiles`](ContextModel::update_quantiles) first, since symbols are relative to the medians.
     fn latent_symbols(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> Vec<Option<Tensor<3>>> {
         self.base().latent_symbols_with(&self.parts(), planes, steps)
     }
 
-    /// What a decoder needs of the model for planes of a layout. Call [`update_quantiles`](ContextModel::update_quantiles) first: the hyperprior's
-    /// tables go as far as its quantiles.
+    /// The data of the model that a decoder needs, for planes of a layout. Call
+    /// [`update_quantiles`](ContextModel::update_quantiles) first: the hyperprior's tables extend to its quantiles.
     ///
     /// # Errors
-    /// A density that gives no frequency table; the message names what is wrong with it.
+    /// A density from which no frequency table can be made; the message says why.
     fn to_arrays(&self, layout: &PlaneLayout) -> Result<ContextModelArrays, CodecError> {
         self.base().to_arrays_with(&self.parts(), layout)
     }

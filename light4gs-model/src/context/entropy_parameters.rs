@@ -1,4 +1,4 @@
-//! From what the parts know of a plane to the Gaussian of each value.
+//! From the priors of a plane to the Gaussian of each value.
 
 use burn::config::Config;
 use burn::module::{Module, Param};
@@ -10,10 +10,10 @@ use light4gs_codec::network::Operation;
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 use crate::entropy::gaussian_conditional::NormalParameters;
 
-/// How the last layer starts.
+/// The initial values of the last layer.
 #[derive(Config, Debug, PartialEq)]
 pub enum Start {
-    /// PyTorch's default: scales near 0, where every symbol costs the most and teaches the least.
+    /// PyTorch's default: scales near 0, where symbols take the most bits and gradients are smallest.
     PyTorch,
     /// Scales near 1, means near 0, with a tenth of PyTorch's weights.
     Unit,
@@ -26,13 +26,13 @@ pub struct EntropyParametersConfig {
     pub channels: usize,
     /// Widths of the two hidden layers, C and D.
     pub hidden: [usize; 2],
-    /// How the last layer starts.
+    /// The initial values of the last layer.
     #[config(default = "Start::Unit")]
     pub start: Start,
 }
 
 impl EntropyParametersConfig {
-    /// PyTorch's default initialization but for the last layer; see [`Start`].
+    /// PyTorch's default initialization, except in the last layer; see [`Start`].
     pub fn init(&self, device: &Device) -> EntropyParameters {
         let Self { channels, hidden: [first, second], .. } = *self;
         let mut parameters = EntropyParameters {
@@ -49,7 +49,7 @@ impl EntropyParametersConfig {
 /// A network at every place: parameters `[2 M]` and context `[2 M]` to scales `[M]` and means `[M]`.
 #[derive(Module, Debug)]
 pub struct EntropyParameters {
-    /// 1×1 convolutions 4 M to C to D to 2 M, rectifiers between them.
+    /// 1×1 convolutions 4 M to C to D to 2 M, with ReLUs between them.
     pub layers: [PlaneConv; 3],
 }
 
@@ -60,7 +60,8 @@ impl EntropyParameters {
         last.bias.dims()[0] / 2
     }
 
-    /// [`Self::forward`] for the codec's exact executor: parameters and context to scales, then means.
+    /// The same computation as [`Self::forward`], for the codec's exact executor: from parameters and context to
+    /// scales, then means.
     pub fn network(&self) -> Network {
         let [first, rest @ ..] = &self.layers;
         let first = first.to_layer();
@@ -77,8 +78,7 @@ impl EntropyParameters {
     }
 
     /// Normal distributions `[M, H, W]` of the values of a plane of this size (height, width), in units of its step,
-    /// from `parameters` and `context [2 M, H, W]`; what is absent
-    /// counts as zeros.
+    /// from `parameters` and `context [2 M, H, W]`; `None` means zeros.
     pub fn forward(
         &self,
         parameters: Option<Tensor<3>>,
@@ -90,7 +90,7 @@ impl EntropyParameters {
         let weight = first.weight.val().reshape([outputs, inputs]);
         let half = inputs / 2;
         let bias = first.bias.val().unsqueeze_dim::<2>(1);
-        // Zeros are not multiplied.
+        // Products with zeros are not computed.
         let hidden = [(0, parameters), (half, context)]
             .into_iter()
             .filter_map(|(start, input)| {
@@ -106,9 +106,10 @@ impl EntropyParameters {
         NormalParameters { scales: output.clone().narrow(0, 0, channels), means: output.narrow(0, channels, channels) }
     }
 
-    /// Makes the network say about this mean and scale (in steps) for each channel, whatever it sees: the last layer's biases
-    /// become these, its weights a tenth of themselves times the channel's scale. To be called once. So a weight moves an output by
-    /// about as many standard deviations in a channel that spans hundreds of symbols as in one that spans two.
+    /// Makes the network give approximately this mean and scale (in steps) for each channel, for any input: they become
+    /// the last layer's biases, and its weights are multiplied by a tenth of the channel's scale. So a weight changes
+    /// an output by about as many standard deviations in a channel that spans hundreds of symbols as in one that spans
+    /// two. Call it only once.
     pub fn start_from(&mut self, means: &[f32], scales: &[f32]) {
         let [.., last] = &mut self.layers;
         let device = last.bias.val().device();

@@ -1,4 +1,4 @@
-//! The hyperprior: it describes a plane by a small latent, which is coded first (Ballé et al. 2018; docs/design.md).
+//! The hyperprior describes a plane by a small latent, which is coded first (Ballé et al. 2018; docs/design.md).
 
 use burn::config::Config;
 use burn::module::Module;
@@ -24,7 +24,7 @@ pub struct HyperpriorConfig {
 }
 
 impl HyperpriorConfig {
-    /// PyTorch's default initialization; the bottleneck as CompressAI.
+    /// PyTorch's default initialization; that of the bottleneck is CompressAI's.
     pub fn init(&self, device: &Device) -> Hyperprior {
         let Self { channels, latent_channels: hyper, synthesis_channels: [first, second] } = *self;
         Hyperprior {
@@ -43,14 +43,15 @@ impl HyperpriorConfig {
     }
 }
 
-/// Plane in steps `[M, H, W]`, to a latent `[N, H / 4, W / 4]`, to Gaussian parameters `[2 M, H, W]`.
+/// From a plane in steps `[M, H, W]` to a latent `[N, H / 4, W / 4]`, and from the latent to Gaussian parameters `[2 M,
+/// H, W]`.
 #[derive(Module, Debug)]
 pub struct Hyperprior {
-    /// `h_a`: convolutions with strides 1, 2, 2, rectifiers between them. Only the encoder has them.
+    /// `h_a`: convolutions with strides 1, 2, 2, with ReLUs between them. Only the encoder needs them.
     pub analysis: [PlaneConv; 3],
     /// The latent's entropy model.
     pub bottleneck: EntropyBottleneck,
-    /// `h_s`: two transposed convolutions, each with a rectifier.
+    /// `h_s`: two transposed convolutions, each followed by a ReLU.
     pub synthesis_up: [PlaneDeconv; 2],
     /// `h_s`: the last convolution.
     pub synthesis_out: PlaneConv,
@@ -64,13 +65,13 @@ impl Hyperprior {
         third.forward(leaky_relu(second.forward(hidden), LEAKY_SLOPE))
     }
 
-    /// Parameters `[2 M, H, W]` from a received latent `[N, H / 4, W / 4]`.
+    /// Parameters `[2 M, H, W]` from a decoded latent `[N, H / 4, W / 4]`.
     pub fn synthesize(&self, latent: Tensor<3>) -> Tensor<3> {
         let up = self.synthesis_up.iter().fold(latent, |hidden, layer| leaky_relu(layer.forward(hidden), LEAKY_SLOPE));
         self.synthesis_out.forward(up)
     }
 
-    /// [`Self::synthesize`] for the codec's exact executor.
+    /// The same computation as [`Self::synthesize`], for the codec's exact executor.
     pub fn synthesis_network(&self) -> Network {
         let [first, _] = &self.synthesis_up;
         let (mut network, [latent]) = Network::new([first.to_layer().inputs]);

@@ -1,4 +1,4 @@
-//! The inter-plane context: what a space-only plane can learn from its axes' space-time planes (paper III-C).
+//! The inter-plane context: a space-only plane is predicted from the space-time planes over its axes (paper III-C).
 
 use burn::config::Config;
 use burn::module::Module;
@@ -34,8 +34,9 @@ impl InterPlaneConfig {
 
 /// Parameters of the plane over (a, b) from the planes over (a, t) and (b, t).
 ///
-/// Each is averaged over time, which leaves a vector along a and one along b; spread over the plane and put side by side
-/// they are the context `[2 M, H, W]` of a convolution. (The reference averages over space; see docs/design.md.)
+/// Each is averaged over time, which leaves a vector along a and one along b. Both are spread over the plane and
+/// concatenated; this is the context `[2 M, H, W]`, the input of a convolution. (The reference averages over space; see
+/// docs/design.md.)
 #[derive(Module, Debug)]
 pub struct InterPlane {
     /// `[2 M, H, W]` to `[2 M, H, W]`.
@@ -60,7 +61,7 @@ impl InterPlane {
         Tensor::cat(vec![along_a, along_b], 0)
     }
 
-    /// [`Self::forward`] for the codec's exact executor.
+    /// The same computation as [`Self::forward`], for the codec's exact executor.
     pub fn network(&self) -> Network {
         let layer = self.conv.to_layer();
         let channels = layer.inputs / 2;
@@ -83,8 +84,7 @@ impl InterPlane {
 }
 
 impl PriorPart for InterPlane {
-    /// Applies to planes without time, where the planes over their axes and time are there
-    /// ([`PlaneLayout::over_time`]).
+    /// Applies to space-only planes, if the planes over their axes and time exist ([`PlaneLayout::over_time`]).
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let [over_a, over_b] = planes.layout().over_time(plane)?.map(|source| planes.planes[source].clone());
         let parameters = Some(self.forward(over_a, over_b));

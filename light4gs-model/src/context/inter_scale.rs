@@ -46,7 +46,7 @@ impl InterScale {
         self.conv.forward(upsample(lower, size))
     }
 
-    /// [`Self::forward`] for the codec's exact executor.
+    /// The same computation as [`Self::forward`], for the codec's exact executor.
     pub fn network(&self) -> Network {
         let layer = self.conv.to_layer();
         let (mut network, [lower]) = Network::new([layer.inputs]);
@@ -69,7 +69,7 @@ impl InterScale {
 }
 
 impl PriorPart for InterScale {
-    /// Applies where there is a plane below: no latent, one pass.
+    /// Applies if there is a plane below: no latent, one pass.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, _: Latent) -> Option<Prior> {
         let parameters = Some(self.contribution(planes, plane)?);
         Some(Prior { parameters, context: None, passes: Passes::One, latent_bits: None })
@@ -81,10 +81,11 @@ impl PriorPart for InterScale {
     }
 }
 
-/// What the reference does above the lowest scale: a hyperprior for the parameters, the inter-scale context beside it.
+/// The reference's way above the lowest scale: a hyperprior gives the parameters, and the inter-scale context is the
+/// context.
 #[derive(Clone, Debug)]
 pub struct HighScaleHyperprior<'a> {
-    /// Gives the parameters and costs bits.
+    /// Gives the parameters; its latent takes bits.
     pub hyperprior: &'a Hyperprior,
     /// Gives the context.
     pub inter_scale: &'a InterScale,
@@ -106,7 +107,7 @@ impl PriorPart for HighScaleHyperprior<'_> {
 
 /// Bilinear with corners aligned: `[C, h, w]` to `[C, H, W]`.
 ///
-/// As two products with interpolation matrices, whose gradient every back end has.
+/// It is computed as two products with interpolation matrices, for which every back end has a gradient.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -133,7 +134,7 @@ pub fn upsample(plane: Tensor<3>, [height, width]: [usize; 2]) -> Tensor<3> {
     down.matmul(plane)
 }
 
-/// `[to, from]`: the weights of the two neighbors of each place.
+/// `[to, from]`: the weights of the two neighbors of each sample.
 fn interpolation(from: usize, to: usize, device: &Device) -> Tensor<2> {
     let mut weights = vec![0.0f32; to * from];
     let last = (from - 1) as f64;

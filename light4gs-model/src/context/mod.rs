@@ -9,13 +9,13 @@
 //! | lowest scale, space-only | [`InterPlane`], from the decoded space-time planes | [`Checkerboard`] |
 //! | higher scales | [`InterScale`], from the decoded plane one scale below | all at once |
 //!
-//! Where a part is left out, or the planes that it reads are not there, the next one that applies takes its place:
-//! inter-scale, inter-plane, hyperprior, then a constant. [`EntropyParameters`] turns what the parts know into the distribution.
+//! Where a part is left out, or the planes that it reads do not exist, the next one that applies takes its place:
+//! inter-scale, inter-plane, hyperprior, then a constant. [`EntropyParameters`] turns the output of a part into the distribution.
 //!
-//! Which parts the paper's model has is said in this file and nowhere else. A new one is a file of its own with a
+//! The parts of the paper's model are listed in this file and nowhere else. A new one is a file of its own with a
 //! [`PriorPart`], which computes its prior with Burn and describes the same network for the codec, and an entry in
 //! [`PlaneEntropy::parts`]: of [`ContextModel`] here, where [`ContextPart`] gives it a name for configurations, or of a
-//! composition of one's own.
+//! composition of your own.
 
 mod arrays;
 pub(crate) mod checkerboard;
@@ -75,7 +75,7 @@ impl ContextPart {
         Self::ALL.iter().copied().find(|part| part.name() == name)
     }
 
-    /// The parts that it consists of or builds on: it cannot be there without them.
+    /// The parts that it needs: it consists of them or builds on them.
     pub fn needs(self) -> &'static [Self] {
         match self {
             Self::HighScaleHyperprior => &[Self::Hyperprior, Self::InterScale],
@@ -98,7 +98,7 @@ pub struct KernelShape {
     pub groups: usize,
 }
 
-/// Configuration of a [`ContextModel`]. Take one of the presets and change what you like.
+/// Configuration of a [`ContextModel`]. Start from one of the presets.
 #[derive(Config, Debug)]
 pub struct ContextModelConfig {
     /// Channels of a plane, M.
@@ -115,7 +115,7 @@ pub struct ContextModelConfig {
     pub inter_plane: KernelShape,
     /// The inter-scale convolution.
     pub inter_scale: KernelShape,
-    /// What is there.
+    /// The parts of the model.
     #[config(default = "ContextPart::PAPER.to_vec()")]
     pub parts: Vec<ContextPart>,
     /// Subtracted from the space-only planes before anything else.
@@ -124,7 +124,7 @@ pub struct ContextModelConfig {
     /// Subtracted from the space-time planes before anything else; they start at 1.
     #[config(default = 1.0)]
     pub space_time_center: f64,
-    /// How the last layer starts.
+    /// The initial values of the last layer.
     #[config(default = "Start::Unit")]
     pub start: Start,
 }
@@ -141,8 +141,8 @@ impl ContextModelConfig {
             .with_start(Start::PyTorch)
     }
 
-    /// Few weights, since they are part of the file: about 6000 in the decoder for 16 channels. Contexts look at each channel by
-    /// itself; only the 1×1 layers mix channels.
+    /// Few weights, since they are part of the file: about 6000 in the decoder for 16 channels. Contexts treat each channel
+    /// separately; only the 1×1 layers mix channels.
     pub fn compact(channels: usize) -> Self {
         let hidden = (3 * channels / 2).max(1);
         let inter_plane = KernelShape::new(3, 2 * channels);
@@ -153,7 +153,7 @@ impl ContextModelConfig {
     /// Random weights; see [`Start`] for the last layer.
     ///
     /// # Panics
-    /// If a part is there without those that it [needs](ContextPart::needs), or groups do not divide channels.
+    /// If a part is listed without those that it [needs](ContextPart::needs), or groups do not divide channels.
     pub fn init(&self, device: &Device) -> ContextModel {
         let has = |part| self.parts.contains(&part);
         for part in &self.parts {
@@ -184,11 +184,11 @@ impl ContextModelConfig {
     }
 }
 
-/// The context model. See the [module's documentation](self) for what it consists of.
+/// The context model. See the [module's documentation](self) for its parts.
 ///
-/// Planes are `[M, H, W]`, H and W multiples of 4, in original units; which there are says their
-/// [`PlaneLayout`](light4gs_codec::plane_layout::PlaneLayout). For training they carry uniform noise of their steps' width
-/// ([`PlaneSteps::add_noise`](crate::PlaneSteps::add_noise)), and the parameters of a plane depend only on the noisy values of others, so a random
+/// Planes are `[M, H, W]`, H and W multiples of 4, in original units; their
+/// [`PlaneLayout`](light4gs_codec::plane_layout::PlaneLayout) lists them. In training they have uniform noise of their steps' width
+/// ([`PlaneSteps::add_noise`](crate::PlaneSteps::add_noise)), and the parameters of a plane depend only on the noisy values of other planes. So a random
 /// subset of planes gives an unbiased estimate of the rate.
 ///
 /// ```

@@ -1,4 +1,4 @@
-//! What a part of the context model contributes to a plane, and what it may look at.
+//! What a part of the context model computes for a plane, and what it may read.
 
 use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
@@ -8,13 +8,13 @@ use crate::entropy::bottleneck::Latent;
 use crate::entropy::quantization_steps::PlaneSteps;
 use crate::planes::PlaneTensors;
 
-/// All planes `[M, H, W]` of a field minus their groups' centers, with their steps.
+/// All planes `[M, H, W]` of a field with their groups' centers subtracted, and their steps.
 ///
-/// For the planes that are coded before, these are the decoded ones, or the noisy ones that stand for them in training. Only a
-/// hyperprior looks at the plane that is being coded: it is transmitted.
+/// Planes that are coded before are given as decoded, or, in training, with noise. Only a hyperprior reads the plane
+/// that is being coded, since its latent is transmitted.
 #[derive(Clone, Debug)]
 pub struct CenteredPlanes {
-    /// `[M, H, W]`, original units minus the center.
+    /// `[M, H, W]`, original units, with the center subtracted.
     pub planes: PlaneTensors,
     /// One for each plane.
     pub steps: PlaneSteps,
@@ -26,23 +26,23 @@ impl CenteredPlanes {
         self.planes[plane].clone() / self.steps.broadcast(plane)
     }
 
-    /// Which planes there are.
+    /// The layout of the planes.
     pub fn layout(&self) -> &PlaneLayout {
         self.planes.layout()
     }
 
-    /// The plane over the same axes one scale below; none where there is none.
+    /// The plane over the same axes one scale below, if there is one.
     pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
         Some(self.planes[self.layout().one_scale_below(plane)?].clone())
     }
 
-    /// The plane over other axes in the same scale as `plane`; none where there is none.
+    /// The plane over other axes in the same scale as `plane`, if there is one.
     pub fn in_same_scale(&self, plane: usize, axes: PlaneAxes) -> Option<Tensor<3>> {
         Some(self.planes[self.layout().in_same_scale(plane, axes)?].clone())
     }
 }
 
-/// In which order the values of a plane are coded.
+/// The order in which the values of a plane are coded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Passes {
     /// All at once.
@@ -51,21 +51,21 @@ pub enum Passes {
     AnchorsFirst,
 }
 
-/// Where the Gaussian parameters of a plane come from. Absent tensors count as zeros.
+/// The input of the network that gives a plane's Gaussians. `None` means zeros.
 #[derive(Clone, Debug)]
 pub struct Prior {
     /// `[2 M, H, W]`.
     pub parameters: Option<Tensor<3>>,
-    /// `[2 M, H, W]`, in the place of the checkerboard's context; only with [`Passes::One`].
+    /// `[2 M, H, W]`, in place of the checkerboard's context; only with [`Passes::One`].
     pub context: Option<Tensor<3>>,
     /// How the values are coded.
     pub passes: Passes,
-    /// `[1]`: what is transmitted beside the values.
+    /// `[1]`: bits that are coded besides the values.
     pub latent_bits: Option<Tensor<1>>,
 }
 
 impl Prior {
-    /// Nothing is known but the network's biases.
+    /// No information: the distribution comes from the network's biases alone.
     pub fn constant() -> Self {
         Self { parameters: None, context: None, passes: Passes::AnchorsFirst, latent_bits: None }
     }
@@ -73,18 +73,18 @@ impl Prior {
 
 /// A part of the context model.
 ///
-/// A model is a list of parts. For each plane the first part that has something to say gives its prior, so an ablation is a
-/// shorter list, and a new part is one more entry.
+/// A model is a list of parts. For each plane, the first part that applies gives its prior. So an ablation is a shorter
+/// list, and a new part is one more entry.
 pub trait PriorPart {
-    /// The prior of a plane, or nothing where this part does not apply.
+    /// The prior of a plane, or `None` if this part does not apply.
     fn prior(&self, planes: &CenteredPlanes, plane: usize, latent: Latent) -> Option<Prior>;
 
-    /// The same for the codec's exact executor, with the same weights: what [`PriorPart::prior`] computes for a plane of such
-    /// a layout, in the same order. Both apply to the same planes.
+    /// The same for the codec's exact executor, with the same weights: the computation of [`PriorPart::prior`] for a
+    /// plane of such a layout, in the same order. Both must apply to the same planes.
     fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior>;
 }
 
-/// A [`Prior`] as networks. Absent ones count as zeros.
+/// A [`Prior`] as networks. `None` means zeros.
 #[derive(Clone, Debug)]
 pub struct DescribedPrior {
     /// Gives [`Prior::parameters`].
@@ -102,10 +102,10 @@ impl DescribedPrior {
     }
 }
 
-/// A network of one output and what it reads.
+/// A network with one output, and its inputs.
 #[derive(Clone, Debug)]
 pub struct DescribedCondition {
-    /// To `[2 M, H, W]`.
+    /// Its output is `[2 M, H, W]`.
     pub network: Network,
     /// One for each input of the network.
     pub sources: Vec<PlaneSource>,

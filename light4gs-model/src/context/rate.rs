@@ -1,4 +1,4 @@
-//! What planes cost under a context model, and planes as the codec leaves them.
+//! The bits of planes under a context model, and planes as the codec quantizes them.
 
 use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::PlaneAxes;
@@ -14,11 +14,11 @@ use crate::planes::PlaneTensors;
 /// Bits of a plane.
 #[derive(Clone, Debug)]
 pub struct PlaneRate {
-    /// Its place among all planes.
+    /// Its index among all planes.
     pub plane: usize,
     /// `[1]`: of its values.
     pub values_bits: Tensor<1>,
-    /// `[1]`: of its latent, where it has one.
+    /// `[1]`: of its latent, if it has one.
     pub latent_bits: Option<Tensor<1>>,
 }
 
@@ -32,24 +32,24 @@ impl PlaneRate {
     }
 }
 
-/// A plane as it comes out of the codec, but for rounding of floats.
+/// A plane as the codec decodes it, except for rounding of floats.
 #[derive(Clone, Debug)]
 pub struct QuantizedPlane {
-    /// What the decoder gets, `[M, H, W]`, original units.
+    /// The decoded plane, `[M, H, W]`, original units.
     pub decoded: Tensor<3>,
-    /// What is coded, `[M, H, W]`: integers.
+    /// The symbols, `[M, H, W]`: integers.
     pub symbols: Tensor<3>,
     /// The plane's bits.
     pub rate: PlaneRate,
 }
 
 impl ContextModel {
-    /// What is subtracted from planes over these axes before anything else.
+    /// The center that is subtracted from planes over these axes.
     pub fn center_of(&self, axes: PlaneAxes) -> f64 {
         if axes.is_space_time() { self.space_time_center } else { self.space_only_center }
     }
 
-    /// Planes in original units as the parts see them.
+    /// From planes in original units to the input of the parts.
     pub fn centered(&self, planes: &PlaneTensors, steps: &PlaneSteps) -> CenteredPlanes {
         let planes = planes.map(|place, plane| plane - self.center_of(planes.layout().planes()[place].axes));
         CenteredPlanes { planes, steps: steps.clone() }
@@ -93,7 +93,7 @@ impl ContextModel {
         value_bits(planes.in_steps(plane), gaussians).sum_dim(0).squeeze_dim(0)
     }
 
-    /// For each plane the symbols `[N, H / 4, W / 4]` of its latent, where it has one under a composition of parts.
+    /// For each plane that has a latent under a composition of parts, the latent's symbols `[N, H / 4, W / 4]`.
     pub fn latent_symbols_with(
         &self,
         parts: &[Box<dyn PriorPart + '_>],
@@ -127,7 +127,7 @@ impl ContextModel {
             let values = known.in_steps(plane);
             let round = |means: Tensor<3>| ((values.clone() - means.clone()).round() + means) * step.clone();
             if let (Some(_), Passes::AnchorsFirst) = (&self.checkerboard, prior.passes) {
-                // Only anchors are looked at by what follows.
+                // The checkerboard reads only anchors.
                 let [_, height, width] = values.dims();
                 let anchors = Prior { passes: Passes::One, ..prior.clone() };
                 let anchors = round(self.gaussians(anchors, &values).means);
@@ -146,9 +146,9 @@ impl ContextModel {
         quantized.into_iter().map(|plane| plane.expect("the coding order visits every plane")).collect()
     }
 
-    /// Starts the network at the statistics of these planes: each channel's mean and standard deviation over all
-    /// planes, in steps, as the biases of the last layer. To be called when the rate enters a training that has begun
-    /// without it; otherwise the values may lie so far in the Gaussians' tails that no gradient comes back.
+    /// Initializes the network with the statistics of these planes: each channel's mean and standard deviation over all
+    /// planes, in steps, become the biases of the last layer. Call it when the rate is added to a training that has
+    /// begun without it. Otherwise the values may lie so far in the Gaussians' tails that gradients vanish.
     pub fn start_from(&mut self, planes: &PlaneTensors, steps: &PlaneSteps) {
         let centered = self.centered(planes, steps);
         let channels = planes[0].dims()[0];
@@ -172,7 +172,7 @@ impl ContextModel {
         self.entropy_parameters.start_from(&means, &scales);
     }
 
-    /// Puts the hyperprior's quantiles where its densities have them; see
+    /// Sets the hyperprior's quantiles to those of its densities; see
     /// [`EntropyBottleneck::update_quantiles`](crate::EntropyBottleneck::update_quantiles).
     pub fn update_quantiles(&mut self) {
         if let Some(hyperprior) = &mut self.hyperprior {
@@ -190,7 +190,7 @@ impl ContextModel {
     }
 }
 
-/// A standard deviation, in steps, that a channel which does not vary at all starts with.
+/// Least initial standard deviation, in steps, for a channel that does not vary.
 const SMALLEST_START: f64 = 0.3;
 
 fn prior_of(parts: &[Box<dyn PriorPart + '_>], planes: &CenteredPlanes, plane: usize, latent: Latent) -> Prior {

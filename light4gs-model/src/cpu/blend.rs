@@ -1,8 +1,9 @@
-//! Front-to-back traversal of one tile's splats, eight pixels of a row at a time: what blending, its derivative and the
-//! significance scores have in common.
+//! Front-to-back traversal of one tile's splats, eight pixels of a row at a time, for blending, its derivative and the
+//! significance scores.
 //!
-//! Only the eight-pixel groups that the splat's alpha can reach and that still take splats are visited, and the walk
-//! ends where all pixels have stopped, so the cost follows the pixels that are blended. Per pixel, front to back:
+//! Only groups of eight pixels are visited that the splat's alpha can reach and that still take splats. The traversal
+//! ends when all pixels have stopped. So the cost is proportional to the pixels that are blended. For each pixel, front
+//! to back:
 //!
 //! ```text
 //! alpha = min(0.99, opacity · exp(-q)),  skipped below 1/255
@@ -21,7 +22,7 @@ use crate::kernels::splat::View;
 const ACROSS: usize = TILE / LANES;
 /// Groups in a tile: group `g` holds the pixels from column `g / TILE · LANES` on of row `g % TILE`.
 pub(crate) const GROUPS: usize = TILE * ACROSS;
-// Sets of groups are masks of 32 bits.
+// Sets of groups are 32-bit masks.
 const _: () = assert!(GROUPS <= u32::BITS as usize);
 
 /// One value for every pixel of a tile, by group.
@@ -32,7 +33,7 @@ pub(crate) fn group_and_lane(x: usize, y: usize) -> (usize, usize) {
     (x / LANES * TILE + y, x % LANES)
 }
 
-/// What one splat adds to eight pixels.
+/// The contribution of one splat to eight pixels.
 pub(crate) struct Contribution<L> {
     /// The pixels.
     pub(crate) group: usize,
@@ -51,9 +52,9 @@ pub(crate) struct Contribution<L> {
     pub(crate) free: L,
 }
 
-/// What is done on the way.
+/// What is computed during the traversal.
 pub(crate) trait TileVisitor<L: Lanes> {
-    /// What belongs to one splat. Apart from the visitor, so that it stays in the vector registers.
+    /// The values of one splat. They are separate from the visitor so that they stay in vector registers.
     type Splat;
 
     fn begin(&self, splat: &Splat) -> Self::Splat;
@@ -62,8 +63,8 @@ pub(crate) trait TileVisitor<L: Lanes> {
     fn end(&mut self, n: usize, splat: Self::Splat);
 }
 
-/// Shows the visitor all splats of a tile. Returns the transmittance that is left; its sign is set where a pixel has
-/// stopped and outside the image.
+/// Passes all splats of a tile to the visitor. Returns the remaining transmittance; its sign is set where a pixel has
+/// stopped, and outside the image.
 #[inline(always)]
 pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     lists: &TileLists,
@@ -76,7 +77,7 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     let pixels_x: [L; ACROSS] = consecutive(origin[0]);
     let rows_y: [L; ACROSS] = consecutive(origin[1]);
     let mut transmittance = initial_transmittance(view, column, row);
-    // A bit for every group that has a pixel which takes splats.
+    // A bit for every group with a pixel that still takes splats.
     let mut live = transmittance
         .iter()
         .enumerate()
@@ -116,7 +117,7 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     transmittance
 }
 
-/// The splat's exponent, with its values spread over the lanes.
+/// The splat's exponent, with each value in all lanes.
 struct Ellipse<L> {
     x: L,
     opacity: L,
@@ -131,7 +132,7 @@ struct Footprint<L> {
     dx: L,
     alpha: L,
     free: L,
-    /// Mask: the splat is not skipped for smallness.
+    /// Mask: alpha is not below the threshold.
     hit: L,
 }
 
@@ -164,8 +165,8 @@ impl<L: Lanes> Ellipse<L> {
 #[inline(always)]
 fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; ACROSS]) -> u32 {
     let [a, b, _] = splat.conic;
-    // In a row the form is least at dx = -b dy / a, and there it is dy² / variance. A little slack, since the pixels
-    // evaluate the form with other rounding.
+    // In a row, the form has its minimum at dx = -b dy / a, where it is dy² / variance. A small margin is added, since
+    // the pixels evaluate the form with other rounding.
     let (inverse_a, inverse_variance) = (L::splat(1.0 / a), L::splat(-1.0 / splat.variance[1]));
     let (reach, skew) = (L::splat(splat.reach * 1.002 + 1e-2), L::splat(b / a));
     let (x, y) = (L::splat(splat.x - origin_x), L::splat(splat.y));
@@ -198,7 +199,7 @@ fn consecutive<L: Lanes>(first: f32) -> [L; ACROSS] {
     vectors
 }
 
-/// Pixels outside the image have stopped from the start.
+/// Pixels outside the image have stopped from the beginning.
 fn initial_transmittance(view: &View, column: usize, row: usize) -> TilePlane {
     let width = view.camera.width as usize - column * TILE;
     let height = view.camera.height as usize - row * TILE;
@@ -233,7 +234,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the splat's shape, no pixel that it touches is left out.
+        /// For any shape of the splat, no pixel that it touches is left out.
         #[test]
         fn every_touched_pixel_is_in_a_reached_group(
             mean in prop::array::uniform3(-1.5f32..1.5),

@@ -1,8 +1,8 @@
-//! Eight float32 lanes: one thin type for AVX2 + FMA, one for every other processor.
+//! Eight float32 lanes: one thin type for AVX2 + FMA, one for all other processors.
 //!
-//! The rasterizer's inner loops are generic over [`Lanes`]; [`dispatch`] picks the implementation once a call, at run
-//! time, so one binary serves old and new processors. Results of the two differ in the last bits (fused against
-//! separate multiply-add), never between two runs on one machine.
+//! The rasterizer's inner loops are generic over [`Lanes`]. [`dispatch`] chooses the implementation at run time, once
+//! for each call, so one binary serves old and new processors. The results of the two differ in the last bits (fused
+//! and separate multiply-add), but never between two runs on one machine.
 
 /// Lanes in a vector.
 pub(crate) const LANES: usize = 8;
@@ -29,7 +29,7 @@ pub(crate) trait Lanes: Copy {
     fn and_not(self, other: Self) -> Self;
     /// Lanes of `yes` where the mask is set, else of `no`.
     fn select(self, yes: Self, no: Self) -> Self;
-    /// Bit i is the sign of lane i, so of a mask whether it is set.
+    /// Bit i is the sign of lane i; for a mask, whether lane i is set.
     fn signs(self) -> u32;
     /// 2^n for lanes that hold whole numbers in [-126, 127], plus their sum with the rounding constant removed.
     fn exp2_of_rounded(self) -> Self;
@@ -39,7 +39,7 @@ pub(crate) trait Lanes: Copy {
     /// error (1.9e-9 before rounding) on [-1/2, 1/2].
     #[inline(always)]
     fn exp2(self) -> Self {
-        // Adding 1.5 * 2^23 rounds to a whole number that stands in the low mantissa bits.
+        // Adding 1.5 * 2^23 rounds to an integer, which is then in the low mantissa bits.
         let magic = Self::splat(12_582_912.0);
         let x = self.max(Self::splat(-126.0));
         let shifted = x.add(magic);
@@ -71,7 +71,7 @@ pub(crate) fn dispatch<K: LaneKernel>(kernel: K) -> K::Output {
     kernel.run::<Portable>()
 }
 
-/// Plain arrays; the compiler makes of them what the target has.
+/// Plain arrays, which the compiler vectorizes for the target.
 #[derive(Clone, Copy)]
 pub(crate) struct Portable([f32; LANES]);
 
@@ -292,7 +292,7 @@ mod tests {
         }
     }
 
-    /// The outcome of every operation on some pairs and triples of values, as bits; of the fused one rounded.
+    /// The results of every operation on some pairs and triples of values, as bits; that of the fused one is rounded.
     struct EveryOperation;
     impl LaneKernel for EveryOperation {
         type Output = Vec<u32>;
@@ -314,7 +314,7 @@ mod tests {
             for vector in [mask, mask.and(y), mask.or(z), mask.and_not(x), mask.select(y, z), y.exp2_of_rounded()] {
                 keep(vector);
             }
-            // Products of few bits, so that fused and separate rounding agree.
+            // Products with few bits, so that fused and separate rounding agree.
             keep(L::splat(1.5).mul_add(L::load(&c), L::splat(0.25)));
             found.push(mask.signs());
             found.push(L::load(&c).sum().to_bits());

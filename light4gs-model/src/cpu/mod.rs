@@ -1,4 +1,4 @@
-//! Kernels of the CPU back ends, on plain slices: they know nothing of Burn.
+//! Kernels of the CPU back ends, on plain slices, without Burn.
 
 pub(crate) mod adam;
 pub(crate) mod blend;

@@ -1,15 +1,16 @@
 //! Bilinear queries of the planes of a scale and the product of the samples, forward and backward.
 //!
-//! Planes arrive as `[C, H, W]`. They are repacked to blocks of eight channels, `[C / 8][H · W][8]`, so that a sample is
-//! four vector loads; C is padded with zeros. The backward pass gives each block of channels to one task, which alone
-//! writes that block's gradients: no atomics, and the same sums whatever the number of threads.
+//! Planes are given as `[C, H, W]`. They are repacked into blocks of eight channels, `[C / 8][H · W][8]`, so that a
+//! sample is four vector loads; C is padded with zeros. The backward pass gives each block of channels to one task,
+//! which alone writes that block's gradients. So there are no atomics, and the sums are the same for any number of
+//! threads.
 
 use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
 use rayon::prelude::*;
 
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 
-/// Points a forward task handles.
+/// Points of a task in the forward pass.
 const CHUNK: usize = 1024;
 
 /// Planes that a scale may have.
@@ -32,14 +33,14 @@ pub(crate) struct PackedPlanes {
     channels: usize,
     /// Cells along x, y, z, t; 1 along an axis that no plane spans.
     resolution: [usize; AXIS_NAMES.len()],
-    /// Which planes there are.
+    /// Which planes exist.
     present: [bool; PLANES],
-    /// For each plane, `[blocks][H · W]`; nothing where there is no plane.
+    /// For each plane, `[blocks][H · W]`; empty where there is no plane.
     planes: [Vec<Block>; PLANES],
 }
 
 impl PackedPlanes {
-    /// Repacks planes over the axes of [`PlaneAxes::ALL`], none where there is no plane, of these shapes `[C, H, W]`.
+    /// Repacks planes over the axes of [`PlaneAxes::ALL`] with shapes `[C, H, W]`; `None` where there is no plane.
     pub(crate) fn new(planes: [Option<&[f32]>; PLANES], shapes: &[Option<[usize; 3]>; PLANES]) -> Self {
         let mut resolution = [1; AXIS_NAMES.len()];
         let mut channels = 0;
@@ -106,14 +107,14 @@ fn unpack(blocks: &[&[Block]], channels: usize) -> Vec<f32> {
     plane
 }
 
-/// Cells of the coarse grid that points are sorted by, along each spatial axis.
+/// Cells of the coarse grid by which points are sorted, along each spatial axis.
 const SORT_CELLS: usize = 16;
 
-/// Points sorted by a coarse grid, so that neighbors in the order touch the same cells of the planes.
+/// Points sorted by a coarse grid, so that successive points read the same cells of the planes.
 fn spatial_order(points: &[f32]) -> Vec<u32> {
     let key = |point: &[f32]| {
         point[..3].iter().fold(0, |key, &coordinate| {
-            // Saturating: NaN and what lies outside fall to the border.
+            // Saturating: NaN and coordinates outside go to the border.
             let cell = ((coordinate + 1.0) * 0.5 * SORT_CELLS as f32) as usize;
             key * SORT_CELLS + cell.min(SORT_CELLS - 1)
         })
@@ -134,24 +135,24 @@ fn spatial_order(points: &[f32]) -> Vec<u32> {
     order
 }
 
-/// Where a coordinate falls on an axis.
+/// The position of a coordinate on an axis.
 #[derive(Clone, Copy)]
 struct AxisSample {
     low: usize,
     high: usize,
     fraction: f32,
-    /// Cells a unit of the coordinate, 0 where it is clamped to the border.
+    /// Cells for each unit of the coordinate; 0 where it is clamped to the border.
     slope: f32,
 }
 
 impl AxisSample {
-    /// Align-corners: -1 is the first cell's center, 1 the last one's; border clamp.
+    /// Align-corners: -1 is the first cell's center, 1 the last one's; clamped to the border.
     #[inline(always)]
     fn new(coordinate: f32, cells: usize) -> Self {
         let last = (cells - 1) as f32;
         let position = (coordinate + 1.0) * 0.5 * last;
         let inside = position > 0.0 && position < last;
-        // `max` before `min`, so that NaN falls to 0 and cannot index.
+        // `max` before `min`, so that NaN becomes 0 and can be an index.
         let clamped = position.max(0.0).min(last);
         let low = (clamped as usize).min(cells.saturating_sub(2));
         Self {
@@ -210,7 +211,7 @@ impl Corners {
 /// A block of channels; the last one may be short.
 #[inline(always)]
 fn padded(channels: &[f32]) -> Block {
-    // A whole block apart: a copy of unknown length is a call.
+    // Full blocks are handled separately: a copy of unknown length is a function call.
     if let Some(block) = channels.first_chunk() {
         return *block;
     }
@@ -234,7 +235,7 @@ fn corners(axes: &[AxisSample; 4], resolution: [usize; AXIS_NAMES.len()]) -> [Co
     corners
 }
 
-/// Where all planes are there (`FULL`) this is known when the kernel is compiled, and no plane is asked for.
+/// With `FULL`, all planes exist. This is known at compile time, so that no plane is checked.
 struct Forward<'a, const FULL: bool> {
     points: &'a [f32],
     planes: &'a PackedPlanes,
@@ -293,7 +294,7 @@ pub(crate) struct QueryGradients {
     pub(crate) planes: [Vec<f32>; PLANES],
 }
 
-/// Points and their upstream gradients in the order of [`spatial_order`], so that the tasks read them from end to end.
+/// Points and their upstream gradients in the order of [`spatial_order`], so that the tasks read them sequentially.
 struct Sorted {
     order: Vec<u32>,
     /// `[N][4]`
@@ -337,10 +338,10 @@ struct Backward<'a, const FULL: bool> {
     with_points: bool,
 }
 
-/// What one block of channels adds to the gradients.
+/// The gradients from one block of channels.
 struct BlockGradients {
     planes: [Vec<Block>; PLANES],
-    /// In the order of [`Sorted`]; empty if not asked for.
+    /// In the order of [`Sorted`]; empty if not requested.
     points: Vec<[f32; 4]>,
 }
 
@@ -363,7 +364,7 @@ impl<const FULL: bool> LaneKernel for Backward<'_, FULL> {
             for axis in 0..4 {
                 fractions[axis] = L::splat(axes[axis].fraction);
             }
-            // Loops, not `array::from_fn`: a call that is not inlined leaves the vector registers.
+            // Loops, not `array::from_fn`: with a call that is not inlined, values leave the vector registers.
             let mut values = [L::splat(1.0); PLANES];
             let mut slopes = [[L::splat(0.0); 2]; PLANES];
             for plane in 0..PLANES {
@@ -375,7 +376,7 @@ impl<const FULL: bool> LaneKernel for Backward<'_, FULL> {
                     corners[plane].sample_with_slopes(cells[plane], fractions[across], fractions[down]);
             }
 
-            // Product of the others without dividing: upstream · prefix · suffix.
+            // The product of all other samples, without division: upstream · prefix · suffix.
             let mut prefix = [upstream; PLANES];
             for plane in 1..PLANES {
                 prefix[plane] = prefix[plane - 1].mul(values[plane - 1]);

@@ -8,7 +8,7 @@ use light4gs_data::Camera;
 use crate::kernels::splat::View;
 use crate::spherical_harmonics::{basis, basis_gradient, coefficient_count};
 
-/// Radius of a Gaussian that cannot be drawn: not finite, or without orientation.
+/// Radius of a Gaussian that cannot be drawn because it is not finite or has no orientation.
 pub(crate) const INVALID_RADIUS: i32 = -1;
 
 /// Borrowed attributes of N Gaussians, each array contiguous.
@@ -64,7 +64,7 @@ pub(crate) struct Splat {
     clamped: u8,
 }
 
-/// The steps of the projection that the backward pass needs again.
+/// Values of the projection that the backward pass needs again.
 struct Geometry {
     view_position: Vec3,
     quat: [f32; 4],
@@ -121,8 +121,8 @@ fn raw_color(gaussians: &GaussianSlices, i: usize, degree: usize, direction: Vec
     color
 }
 
-/// Projects Gaussian `i`. A Gaussian that is not finite or has no orientation comes back with [`INVALID_RADIUS`]; one
-/// that is behind the camera or outside the image with radius 0.
+/// Projects Gaussian `i`. The radius is [`INVALID_RADIUS`] if the Gaussian is not finite or has no orientation, and 0
+/// if it is behind the camera or outside the image.
 pub(crate) fn project(gaussians: &GaussianSlices, i: usize, view: &View) -> Splat {
     let invalid = Splat { radius: INVALID_RADIUS, ..Splat::default() };
     let mean = gaussians.mean(i);
@@ -216,7 +216,7 @@ impl Splat {
     }
 }
 
-/// Derivative of the loss by what [`project`] wrote of one Gaussian.
+/// Derivative of the loss with respect to the outputs of [`project`] for one Gaussian.
 #[derive(Clone, Copy, Default)]
 pub(crate) struct SplatGradient {
     pub(crate) position: [f32; 2],
@@ -226,7 +226,7 @@ pub(crate) struct SplatGradient {
     pub(crate) depth: f32,
 }
 
-/// Gradients of one Gaussian's attributes; SH gradients go straight to their arrays.
+/// Gradients of one Gaussian's attributes; SH gradients are written directly to their arrays.
 pub(crate) struct AttributeGradient {
     pub(crate) mean: Vec3,
     pub(crate) quat: [f32; 4],
@@ -247,7 +247,7 @@ pub(crate) fn project_backward(
     let camera = &view.camera;
     let g = geometry(gaussians, i, camera);
 
-    // Conic to covariance: d(inverse) = -Q dC Q.
+    // From the conic to the covariance: d(inverse) = -Q dC Q.
     let [qa, qb, qc] = splat.conic;
     let [ga, gb, gc] = gradient.conic;
     let half_gb = 0.5 * gb;
@@ -257,7 +257,7 @@ pub(crate) fn project_backward(
     let g_xy = -(qa * m01 + qb * m11) - (qb * m00 + qc * m10);
     let g_yy = -(qb * m01 + qc * m11);
 
-    // Covariance to its factor V = (J W) (R S), two rows.
+    // From the covariance to its factor V = (J W) (R S), two rows.
     let [u, v] = g.factor;
     let d_factor = [2.0 * g_xx * u + g_xy * v, g_xy * u + 2.0 * g_yy * v];
     let rows = g.jacobian_world;
@@ -270,7 +270,7 @@ pub(crate) fn project_backward(
     // d(J W) = dV (R S)^T
     let d_rows = d_factor.map(|d| g.rotation * (d * g.scale));
 
-    // J W to the view position, with J the projection's Jacobian at the clamped slope.
+    // From J W to the view position, with J the projection's Jacobian at the clamped slope.
     let inverse_z = 1.0 / g.view_position.z;
     let focal = [camera.fx, camera.fy];
     let world = camera.rotation.transpose();
@@ -284,7 +284,7 @@ pub(crate) fn project_backward(
             d_view[axis] += d_slope * inverse_z;
             d_view.z -= d_slope * g.view_position[axis] * inverse_z * inverse_z;
         }
-        // The center on the screen.
+        // From the center on the screen.
         let d_pixel = gradient.position[axis] * focal[axis] * inverse_z;
         d_view[axis] += d_pixel;
         d_view.z -= d_pixel * g.view_position[axis] * inverse_z;
@@ -297,7 +297,7 @@ pub(crate) fn project_backward(
     AttributeGradient { mean, quat, scale, screen_offset: Vec2::from_array(gradient.position) * half }
 }
 
-/// From the gradient of the rotation's columns to that of the quaternion as given (before normalization).
+/// From the gradient of the rotation's columns to that of the given quaternion (before normalization).
 fn rotation_backward(g: &Geometry, [dx, dy, dz]: [Vec3; 3]) -> [f32; 4] {
     let [w, x, y, z] = g.quat;
     let d = [

@@ -1,4 +1,4 @@
-//! Alpha blending of sorted splats, one task a tile: `color += T · alpha · color_i, depth += T · alpha · z_i`.
+//! Alpha blending of sorted splats, one task for each tile: `color += T · alpha · color_i, depth += T · alpha · z_i`.
 
 use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
@@ -9,7 +9,7 @@ use super::project::Splat;
 use super::tiles::TileLists;
 use crate::kernels::splat::View;
 
-/// Values a pixel of the output: red, green, blue, alpha, depth.
+/// Values of a pixel of the output: red, green, blue, alpha, depth.
 pub(crate) const CHANNELS: usize = 5;
 
 const EMPTY: TilePlane = [[0.0; LANES]; GROUPS];
@@ -29,7 +29,7 @@ impl<L: Lanes> TileVisitor<L> for TilePixels {
     #[inline(always)]
     fn begin(&self, splat: &Splat) -> [L; 4] {
         let [red, green, blue] = splat.color;
-        // Written out: a call that is not inlined leaves the vector registers.
+        // Written out: with a call that is not inlined, values leave the vector registers.
         [L::splat(red), L::splat(green), L::splat(blue), L::splat(splat.depth)]
     }
 
@@ -74,9 +74,10 @@ pub(crate) fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
         .collect()
 }
 
-/// Puts tiles together: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+/// Assembles the tiles: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
 ///
-/// One flat array with contiguous parts, since an operation on the tape has one output and contiguous slices are cheap.
+/// It is one flat array with contiguous parts, since an operation on the tape has one output and contiguous slices are
+/// cheap.
 pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let mut rendering = vec![0.0; width * height * CHANNELS];
@@ -102,7 +103,7 @@ pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
     rendering
 }
 
-/// Reads a tile of what [`assemble`] lays out into planes; pixels outside the image are zero.
+/// Reads a tile of the output of [`assemble`] into planes; pixels outside the image are zero.
 pub(crate) fn tile_of(rendering: &[f32], view: &View, column: usize, row: usize) -> [TilePlane; CHANNELS] {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let (image, rest) = rendering.split_at(3 * width * height);

@@ -1,11 +1,10 @@
-//! Derivative of the blending by every splat, front to back like the forward pass.
+//! Derivative of the blending with respect to every splat, front to back like the forward pass.
 //!
-//! With `v_i` the splat's color and depth weighed by the upstream gradient, the pixel's value is
-//! `S = sum_i w_i v_i + T_end · v_background`, and
-//! `dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i)`.
-//! `S` is known from the forward pass, so a running prefix is all that is needed: no second, reversed traversal and
-//! no division to recover the transmittance. Every (tile, Gaussian) pair writes its own sums; each Gaussian then adds
-//! up its tiles in a fixed order, so that the result does not depend on the threads.
+//! With `v_i` the splat's color and depth weighted by the upstream gradient, the pixel's value is `S = sum_i w_i v_i +
+//! T_end · v_background`, and `dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i)`. `S` is known from the
+//! forward pass, so a running prefix is enough: no second, reversed traversal is needed, and no division to recover the
+//! transmittance. Every (tile, Gaussian) pair writes its own sums. Each Gaussian then adds up its tiles in a fixed
+//! order, so that the result does not depend on the threads.
 
 use rayon::prelude::*;
 
@@ -45,7 +44,7 @@ impl LaneKernel for BackwardTile<'_> {
 
 struct Differentiate<'a> {
     upstream: [TilePlane; CHANNELS],
-    /// `S` less what the splats so far have added to it.
+    /// `S` minus the contributions of the splats so far.
     rest: TilePlane,
     sums: &'a mut [Sums],
 }
@@ -65,7 +64,7 @@ impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
     fn begin(&self, splat: &Splat) -> Accumulator<L> {
         let [red, green, blue] = splat.color;
         Accumulator {
-            // Written out: a call that is not inlined leaves the vector registers.
+            // Written out: with a call that is not inlined, values leave the vector registers.
             color: [L::splat(red), L::splat(green), L::splat(blue)],
             depth: L::splat(splat.depth),
             linear: [L::splat(0.0); 4],
@@ -110,7 +109,7 @@ impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
     }
 }
 
-/// A loop, not `array::from_fn`: a call that is not inlined leaves the vector registers.
+/// A loop, not `array::from_fn`: with a call that is not inlined, values leave the vector registers.
 #[inline(always)]
 fn load_all<L: Lanes>(planes: &[TilePlane; CHANNELS], at: usize) -> [L; 5] {
     let mut values = [L::splat(0.0); 5];
@@ -120,7 +119,7 @@ fn load_all<L: Lanes>(planes: &[TilePlane; CHANNELS], at: usize) -> [L; 5] {
     values
 }
 
-/// `S` of every pixel: the finished sums weighed by the upstream gradient.
+/// `S` of every pixel: the final sums weighted by the upstream gradient.
 #[inline(always)]
 fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; CHANNELS], background: [f32; 3]) -> TilePlane {
     let mut total = [[0.0; LANES]; GROUPS];
@@ -149,7 +148,7 @@ pub(crate) struct GaussianGradients {
     pub(crate) screen_offsets: Vec<f32>,
 }
 
-/// Chain rule from the image's gradient to the Gaussians.
+/// Chain rule from the image's gradient to those of the Gaussians.
 pub(crate) fn splat_backward(
     gaussians: &GaussianSlices,
     view: &View,
@@ -213,8 +212,8 @@ pub(crate) fn splat_backward(
     out
 }
 
-/// From moments of `p` to the gradient of the splat: `p` is the gradient of the exponent
-/// `-(a dx² + c dy²)/2 - b dx dy`, and `alpha` is proportional to the opacity.
+/// From moments of `p` to the gradient of the splat. `p` is the gradient of the exponent `-(a dx² + c dy²)/2 - b dx
+/// dy`, and `alpha` is proportional to the opacity.
 fn splat_gradient([a, b, c]: [f32; 3], opacity: f32, sums: Sums) -> SplatGradient {
     let [red, green, blue, depth, p, px, py, pxx, pxy, pyy] = sums;
     SplatGradient {

@@ -1,6 +1,6 @@
-//! What every splat contributes to one image, without its color: the sums behind significance pruning.
+//! The contributions of every splat to one image, without its color: the sums for significance pruning.
 //!
-//! The same traversal and the same decisions as the blending. Every (tile, Gaussian) pair writes its own sums and each
+//! The traversal and its decisions are those of the blending. Every (tile, Gaussian) pair writes its own sums, and each
 //! Gaussian adds up its tiles in a fixed order, so that the scores do not depend on the threads.
 
 use rayon::prelude::*;
@@ -13,7 +13,7 @@ use crate::kernels::splat::View;
 
 /// Sums over the pixels that blend a splat: pixels, `T · alpha`, `T`.
 type Sums = [f32; 3];
-/// Values a Gaussian of the output: pixels, sum of `T · alpha`, sum of `T · opacity`, sum of the opacity.
+/// Values of a Gaussian in the output: pixels, sum of `T · alpha`, sum of `T · opacity`, sum of the opacity.
 pub(crate) const SCORES: usize = 4;
 
 struct SignificanceTile<'a> {

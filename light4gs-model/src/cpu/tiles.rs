@@ -1,4 +1,4 @@
-//! Which splats touch which tile, front to back.
+//! Which splats touch which tile, sorted front to back.
 
 use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
@@ -6,7 +6,8 @@ use rayon::prelude::*;
 use super::project::{GaussianSlices, Splat, project};
 use crate::kernels::splat::View;
 
-/// Gaussians a parallel task projects: fixed, so that results do not depend on the number of threads.
+/// Gaussians that a parallel task projects. The number is fixed, so that results do not depend on the number of
+/// threads.
 const CHUNK: usize = 512;
 
 /// Projected Gaussians and their tiles.
@@ -17,18 +18,18 @@ const CHUNK: usize = 512;
 pub(crate) struct TileLists {
     /// `[N]`
     pub(crate) splats: Vec<Splat>,
-    /// `[N + 1]`: where the intersections of each Gaussian begin in the order by Gaussian.
+    /// `[N + 1]`: where the intersections of each Gaussian begin, numbered by Gaussian.
     pub(crate) gaussian_starts: Vec<u32>,
-    /// `[tiles + 1]`: where the intersections of each tile begin in the order by tile.
+    /// `[tiles + 1]`: where the intersections of each tile begin, numbered by tile.
     pub(crate) tile_starts: Vec<u32>,
-    /// Order by tile: the Gaussian.
+    /// Numbered by tile: the Gaussian of each intersection.
     pub(crate) gaussians: Vec<u32>,
-    /// Order by Gaussian: the number in the order by tile.
+    /// Numbered by Gaussian: the number by tile of each intersection.
     pub(crate) tile_order: Vec<u32>,
 }
 
-/// Whether the splat's alpha reaches the threshold anywhere in the tile: the smallest exponent over the tile's pixels'
-/// bounding rectangle, found on its edges unless the center is inside.
+/// Whether the splat's alpha reaches the threshold anywhere in the tile: compares the smallest exponent over the
+/// rectangle of the tile's pixels, which is found on its edges unless the center is inside.
 fn reaches(splat: &Splat, column: usize, row: usize) -> bool {
     let (x0, y0) = ((column * TILE) as f32 - splat.x, (row * TILE) as f32 - splat.y);
     let (x1, y1) = (x0 + (TILE - 1) as f32, y0 + (TILE - 1) as f32);
@@ -40,7 +41,7 @@ fn reaches(splat: &Splat, column: usize, row: usize) -> bool {
     let on_column = |x: f32| form(x, (-b * x / c).clamp(y0, y1));
     let on_row = |y: f32| form((-b * y / a).clamp(x0, x1), y);
     let smallest = on_column(x0).min(on_column(x1)).min(on_row(y0)).min(on_row(y1));
-    // A little slack, since the pixels evaluate the form with other rounding.
+    // A small margin, since the pixels evaluate the form with other rounding.
     smallest <= splat.reach * 1.001 + 1e-3
 }
 
@@ -82,7 +83,7 @@ impl TileLists {
 
         let mut by_depth: Vec<u64> = (0..count)
             .filter(|&i| gaussian_starts[i] < gaussian_starts[i + 1])
-            // Depths are positive, so their bits sort as they do; ties fall to the lower index.
+            // Depths are positive, so their bits have the same order; of equal depths, the lower index comes first.
             .map(|i| u64::from(splats[i].depth.to_bits()) << 32 | i as u64)
             .collect();
         by_depth.par_sort_unstable();
@@ -110,12 +111,12 @@ impl TileLists {
         Self { splats, gaussian_starts, tile_starts, gaussians: listed, tile_order }
     }
 
-    /// Range of a tile in the order by tile.
+    /// Range of a tile's intersections, numbered by tile.
     pub(crate) fn tile_range(&self, tile: usize) -> std::ops::Range<usize> {
         self.tile_starts[tile] as usize..self.tile_starts[tile + 1] as usize
     }
 
-    /// Cuts one value an intersection, in the order by tile, into one slice a tile.
+    /// Splits values that are numbered by tile, one for each intersection, into one slice for each tile.
     pub(crate) fn split_by_tile<'a, T>(&self, mut values: &'a mut [T]) -> Vec<&'a mut [T]> {
         let tiles = self.tile_starts.len() - 1;
         let mut by_tile = Vec::with_capacity(tiles);
@@ -127,8 +128,8 @@ impl TileLists {
         by_tile
     }
 
-    /// Sum of a Gaussian's values over its tiles, in a fixed order, from one value an intersection in the order by
-    /// tile; `None` if it is in no tile.
+    /// Sum of a Gaussian's values over its tiles, in a fixed order. There is one value for each intersection, numbered
+    /// by tile. `None` if the Gaussian is in no tile.
     pub(crate) fn sum_of<const K: usize>(&self, i: usize, values: &[[f32; K]]) -> Option<[f32; K]> {
         let intersections = self.gaussian_range(i);
         if intersections.is_empty() {
@@ -143,7 +144,7 @@ impl TileLists {
         Some(total)
     }
 
-    /// Range of a Gaussian in the order by Gaussian.
+    /// Range of a Gaussian's intersections, numbered by Gaussian.
     fn gaussian_range(&self, i: usize) -> std::ops::Range<usize> {
         self.gaussian_starts[i] as usize..self.gaussian_starts[i + 1] as usize
     }

@@ -22,7 +22,7 @@ pub struct AdaptiveQuantizationConfig {
 }
 
 impl AdaptiveQuantizationConfig {
-    /// Steps of some planes at their initial values.
+    /// Steps of a layout's planes at their initial values.
     ///
     /// # Panics
     /// If a step is not positive and finite.
@@ -42,8 +42,8 @@ impl AdaptiveQuantizationConfig {
 
 /// A learned step for the space-only planes and one for the space-time planes, optionally for each scale.
 ///
-/// The parameter is the logarithm, so a step is always positive and an optimizer's step changes it by a ratio: a step
-/// of 0.001 is learned as easily as one of 1.
+/// The parameter is the logarithm. So a step is always positive, and an optimizer changes it by a ratio: a step of
+/// 0.001 is learned as easily as one of 1.
 ///
 /// ```
 /// use burn::tensor::Device;
@@ -70,16 +70,16 @@ impl AdaptiveQuantization {
         self.steps_of(self.log_steps.val())
     }
 
-    /// The step of every plane, off the tape from the beginning: operations on the tape that no backward pass ever comes
-    /// to would stay there for good, and every later pass would look through them.
+    /// The step of every plane, computed without a tape. Operations on a tape that no backward pass reaches would stay
+    /// there, and every later pass would search them.
     pub fn steps_without_gradient(&self) -> PlaneSteps {
         self.steps_of(self.log_steps.val().set_require_grad(false))
     }
 
-    /// Brings steps that have become finer than the initial ones of `config` back to those.
+    /// Resets steps that have become finer than the initial ones of `config` to those.
     ///
     /// # Panics
-    /// If `config` is not the one that this was made with.
+    /// If this was not made with `config`.
     pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
         let log_steps = self.log_steps.val().inner();
         let initial = config.log_steps(self.layout.scales(), &log_steps.device());

@@ -10,15 +10,15 @@ use super::factorized_density::{FactorizedDensity, FactorizedDensityConfig};
 use super::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::ops::lower_bound::lower_bound;
 
-/// Probability that the outermost quantiles leave outside, both sides together.
+/// Probability outside of the outermost quantiles, both sides together.
 const TAIL_MASS: f64 = 1e-9;
 
-/// What stands for the latent that a decoder receives.
+/// Which approximation of the decoded latent is used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Latent {
-    /// Uniform noise of a symbol's width in place of rounding: for training.
+    /// With uniform noise of a symbol's width in place of rounding: for training.
     Noise,
-    /// Rounded around the channel's median: what is coded. Without gradient to what came before.
+    /// Rounded around the channel's median, as it is coded. Without gradient to the latent.
     Rounded,
     /// The latent itself: for tests of the derivatives.
     Exact,
@@ -62,12 +62,12 @@ impl EntropyBottleneckConfig {
 pub struct EntropyBottleneck {
     /// The channels' densities.
     pub density: FactorizedDensity,
-    /// `[C, 1, 3]`: where the lower tail ends, the median, where the upper tail begins.
+    /// `[C, 1, 3]`: end of the lower tail, median, beginning of the upper tail.
     pub quantiles: Param<Tensor<3>>,
 }
 
 impl EntropyBottleneck {
-    /// What the decoder receives for `latent [C, H, W]`, and the probability of each element; both `[C, H, W]`.
+    /// The decoded `latent [C, H, W]`, or its approximation, and the probability of each element; both `[C, H, W]`.
     pub fn forward(&self, latent: Tensor<3>, kind: Latent) -> (Tensor<3>, Tensor<3>) {
         let received = match kind {
             Latent::Exact => latent,
@@ -98,8 +98,8 @@ impl EntropyBottleneck {
         self.quantiles.val().set_require_grad(false).slice(s![.., .., 1..2])
     }
 
-    /// Puts the quantiles where the densities have them. To be called before symbols are made: training moves the
-    /// densities but not the quantiles.
+    /// Sets the quantiles to those of the densities. Call it before symbols are made: training changes the densities
+    /// but not the quantiles.
     pub fn update_quantiles(&mut self) {
         let density = self.density.to_plain();
         let values: Vec<f32> = (0..density.channels())
@@ -110,8 +110,9 @@ impl EntropyBottleneck {
         self.quantiles = Param::from_tensor(Tensor::<1>::from_floats(values.as_slice(), &device).reshape(shape));
     }
 
-    /// `[1]`: how far the densities at the quantiles are from what they should be there. Its gradient moves only the quantiles.
-    /// For those who train them, as CompressAI does; [`Self::update_quantiles`] finds them directly.
+    /// `[1]`: how far the densities at the quantiles are from the values that they should have. Its gradient changes
+    /// only the quantiles. For programs that train them, as CompressAI does; [`Self::update_quantiles`] computes them
+    /// directly.
     pub fn auxiliary_loss(&self) -> Tensor<1> {
         let channels = self.density.channels();
         let logits = self.density.logits_of_frozen(self.quantiles.val().reshape([channels, 3]));
@@ -131,7 +132,7 @@ impl EntropyBottleneck {
         ranges.collect()
     }
 
-    /// Probabilities of these symbols for each channel, in float64 on the host: what frequency tables are made of.
+    /// Probabilities of these symbols for each channel, in float64 on the host, from which frequency tables are made.
     pub fn pmf(&self, symbols: RangeInclusive<i32>) -> Vec<Vec<f64>> {
         let density = self.density.to_plain();
         let medians: Vec<f64> = self.medians().into_data().iter::<f64>().collect();

@@ -1,8 +1,8 @@
 //! Convolutions over planes `[C, H, W]`, in PyTorch's weight layouts.
 //!
-//! Written as one matrix product over shifted copies of the plane, with a shift for each tap. Burn's own convolutions compute the
-//! same; but on its CPU back ends the gradients of grouped ones run group by group, and a masked kernel computes what the
-//! mask then drops, while here it has fewer taps.
+//! Each is one matrix product over shifted copies of the plane, one for each tap. Burn's own convolutions compute the
+//! same. But on its CPU back ends the gradients of grouped convolutions run group by group, and a masked kernel also
+//! computes the masked taps, which are left out here.
 
 use burn::config::Config;
 use burn::module::{Module, Param};
@@ -11,25 +11,26 @@ use burn::tensor::ops::PadMode;
 use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::network::{Layer, LayerKind};
 
-/// Slope below zero of every leaky rectifier of the entropy models.
+/// Slope below zero of every leaky ReLU of the entropy models.
 pub const LEAKY_SLOPE: f64 = 0.01;
 
 /// Configuration of a [`PlaneConv`]; padding is half the kernel.
 #[derive(Config, Debug)]
 pub struct PlaneConvConfig {
-    /// Channels in.
+    /// Input channels.
     pub inputs: usize,
-    /// Channels out.
+    /// Output channels.
     pub outputs: usize,
     /// Length of the square kernel's side, odd.
     pub kernel: usize,
     /// Rows and columns between outputs.
     #[config(default = 1)]
     pub stride: usize,
-    /// Groups, each of which sees its own share of the inputs.
+    /// Groups, each of which reads its own share of the inputs.
     #[config(default = 1)]
     pub groups: usize,
-    /// Whether only taps with row + column odd count: what the checkerboard's non-anchors see of the anchors.
+    /// Whether only taps with row + column odd are used: those that lead from a non-anchor of the checkerboard to
+    /// anchors.
     #[config(default = false)]
     pub checkerboard: bool,
 }
@@ -97,7 +98,7 @@ impl PlaneConv {
         self.groups
     }
 
-    /// The same layer for the codec's exact executor. Strides are 1 and 2.
+    /// The same layer for the codec's exact executor. Strides may be 1 and 2.
     pub fn to_layer(&self) -> Layer {
         let [outputs, inputs, kernel, _] = self.weight.dims();
         let kind = match (self.checkerboard, self.stride) {
@@ -116,7 +117,7 @@ impl PlaneConv {
         }
     }
 
-    /// Row and column of the taps that count.
+    /// Row and column of the unmasked taps.
     fn taps(&self, kernel: usize) -> Vec<[usize; 2]> {
         let all = (0..kernel * kernel).map(|i| [i / kernel, i % kernel]);
         all.filter(|[row, column]| !self.checkerboard || (row + column) % 2 == 1).collect()
@@ -156,10 +157,10 @@ impl PlaneConv {
     }
 }
 
-/// For each tap of a kernel the plane moved by it, zero beyond the borders.
+/// For each tap of a kernel, the plane shifted by it, with zeros beyond the borders.
 ///
-/// Rows keep their padding, so that a tap is one contiguous run of a channel instead of a piece of each row; what was
-/// computed in the padding is cropped at the end.
+/// Rows keep their padding, so that a tap is one contiguous run of a channel instead of a piece of each row. The values
+/// in the padding are cropped at the end.
 struct ShiftedCopies {
     /// `[C, taps, rows · padded columns]`.
     copies: Tensor<3>,
@@ -181,13 +182,14 @@ impl ShiftedCopies {
             };
         }
         let before = kernel / 2;
-        // How far the last tap reaches, in strides. One more row, into which the last run reaches with its padding.
+        // How far the last tap extends, in strides. One more row is needed, since the last run extends into it by its
+        // padding.
         let reach = kernel.div_ceil(stride) - 1;
         let [padded_rows, padded_columns] = [rows + reach + 1, columns + reach];
         let after = |length: usize, padded: usize| (padded * stride).saturating_sub(length + before);
         let padding = [(before, after(height, padded_rows)), (before, after(width, padded_columns))];
         let padded = plane.pad(padding, PadMode::Constant(0.0));
-        // An image for each phase of the stride, within which a tap is a plain shift.
+        // One image for each phase of the stride; within it a tap is a plain shift.
         let phases = if stride == 1 {
             padded
         } else {
@@ -228,7 +230,7 @@ pub struct PlaneDeconvConfig {
 impl PlaneDeconvConfig {
     /// PyTorch's default initialization.
     pub fn init(&self, device: &Device) -> PlaneDeconv {
-        // PyTorch takes the second axis of the weight for the fan in, of transposed convolutions too.
+        // PyTorch takes the second axis of the weight as the fan in, also for transposed convolutions.
         let fan_in = self.outputs * DECONV_KERNEL * DECONV_KERNEL;
         PlaneDeconv {
             weight: pytorch_uniform([self.inputs, self.outputs, DECONV_KERNEL, DECONV_KERNEL], fan_in, device),
@@ -241,8 +243,8 @@ const DECONV_KERNEL: usize = 5;
 
 /// A transposed convolution with kernel 5, stride 2, padding 2 and output padding 1: `[I, H, W]` to `[O, 2 H, 2 W]`.
 ///
-/// An output row 2r + a (a = 0, 1) sees the kernel's rows 2m + a through the input's rows r + 1 - m, m = 0, 1, 2. So
-/// the four phases of the output are one ordinary 3×3 convolution with four times the channels.
+/// An output row 2r + a (a = 0, 1) is computed from the kernel's rows 2m + a and the input's rows r + 1 - m, m = 0, 1,
+/// 2. So the four phases of the output are one ordinary 3×3 convolution with four times the channels.
 #[derive(Module, Debug)]
 pub struct PlaneDeconv {
     /// `[I, O, 5, 5]`.
@@ -270,7 +272,7 @@ impl PlaneDeconv {
     pub fn forward(&self, plane: Tensor<3>) -> Tensor<3> {
         let [inputs, height, width] = plane.dims();
         let outputs = self.bias.dims()[0];
-        // In the order of m, that is from below to above.
+        // In the order of m, that is upwards.
         let neighbors: Vec<[usize; 2]> = (0..9).map(|i| [2 - i / 3, 2 - i % 3]).collect();
         let shifted = ShiftedCopies::of(plane, 3, 1, &neighbors);
         let copies = shifted.copies.clone().reshape([inputs * 9, shifted.places()]);

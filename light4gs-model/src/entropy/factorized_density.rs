@@ -17,7 +17,7 @@ pub struct FactorizedDensityConfig {
     /// The density is initially about this wide on either side of zero.
     #[config(default = 10.0)]
     pub initial_scale: f64,
-    /// Whether the last layer bends too. CompressAI's does not.
+    /// Whether the last layer has a nonlinearity too. CompressAI's has none.
     #[config(default = false)]
     pub bend_last_layer: bool,
 }
@@ -43,16 +43,16 @@ impl FactorizedDensityConfig {
     }
 }
 
-/// Densities of `C` channels: layer `i` is `l <- softplus(M_i) l + b_i`, then `l <- l + tanh(f_i) tanh(l)` where it has
-/// factors. All weights are positive and the bend is monotone, so the last `l` rises with x, and `sigmoid(l)` is a
-/// distribution function.
+/// Densities of `C` channels: layer `i` is `l <- softplus(M_i) l + b_i`, then `l <- l + tanh(f_i) tanh(l)` if it has
+/// factors. All weights are positive and the nonlinearity is monotone, so the last `l` increases with x, and
+/// `sigmoid(l)` is a distribution function.
 #[derive(Module, Debug)]
 pub struct FactorizedDensity {
-    /// `[C, out, in]` a layer, through softplus.
+    /// `[C, out, in]` for each layer, through softplus.
     pub matrices: Vec<Param<Tensor<3>>>,
-    /// `[C, out, 1]` a layer.
+    /// `[C, out, 1]` for each layer.
     pub biases: Vec<Param<Tensor<3>>>,
-    /// `[C, out, 1]` a layer, through tanh; the last layer may lack them.
+    /// `[C, out, 1]` for each layer, through tanh; the last layer may have none.
     pub factors: Vec<Param<Tensor<3>>>,
 }
 
@@ -67,7 +67,7 @@ impl FactorizedDensity {
         self.logits_with(x, |parameter| parameter.val())
     }
 
-    /// [`Self::logits`] that give no gradient to the density's own parameters.
+    /// [`Self::logits`] without gradients to the density's own parameters.
     pub fn logits_of_frozen(&self, x: Tensor<2>) -> Tensor<2> {
         self.logits_with(x, |parameter| parameter.val().set_require_grad(false))
     }
@@ -83,7 +83,7 @@ impl FactorizedDensity {
         logits.squeeze_dim(1)
     }
 
-    /// Probability of the interval of this width around each of `x [C, N]`: `[C, N]`, not bounded below.
+    /// Probability of the interval of this width around each of `x [C, N]`: `[C, N]`, without a lower bound.
     pub fn interval_likelihood(&self, x: Tensor<2>, width: f32) -> Tensor<2> {
         let count = x.dims()[1];
         let edges = Tensor::cat(vec![x.clone() - width / 2.0, x + width / 2.0], 1);
@@ -105,29 +105,30 @@ impl FactorizedDensity {
     }
 }
 
-/// `sigmoid(upper) - sigmoid(lower)`, taken on the side of zero where the sigmoids are small and keep their digits.
+/// `sigmoid(upper) - sigmoid(lower)`, computed on the side of zero where the sigmoids are small and so have full
+/// precision.
 pub(crate) fn logistic_interval<const D: usize>(lower: Tensor<D>, upper: Tensor<D>) -> Tensor<D> {
     let side = (lower.clone() + upper.clone()).detach().sign().neg();
-    // Exactly in the middle either side does.
+    // Exactly in the middle, either side will do.
     let side = side.clone() + (side.abs() - 1.0).neg();
     (sigmoid(upper * side.clone()) - sigmoid(lower * side)).abs()
 }
 
-/// The product `[C, O, N]` of `matrix [C, O, I]` and `x [C, I, N]` as a sum over I. With a handful of rows and columns
-/// and a very long N, that is several times as fast as a matrix product, whose blocks stay empty.
+/// The product `[C, O, N]` of `matrix [C, O, I]` and `x [C, I, N]` as a sum over I. With few rows and columns and a
+/// very long N, this is several times as fast as a matrix product, whose blocks would be nearly empty.
 fn mixed(matrix: Tensor<3>, x: Tensor<3>) -> Tensor<3> {
     let inputs = x.dims()[1];
     let term = |input| matrix.clone().narrow(2, input, 1) * x.clone().narrow(1, input, 1);
     (1..inputs).fold(term(0), |sum, input| sum + term(input))
 }
 
-/// The hyperbolic tangent to 1e-7, through the exponential, which the CPU back ends have in vector registers: five times as
-/// fast as their own. Beyond the clamp it is 1 in float32.
+/// The hyperbolic tangent to 1e-7, computed with the exponential, which the CPU back ends vectorize: five times as fast
+/// as their own function. Beyond the clamp it is 1 in float32.
 fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     ((x.clamp(-10.0, 10.0) * 2.0).exp() + 1.0).recip() * -2.0 + 1.0
 }
 
-/// The logistic function, through the exponential likewise. Beyond the clamp it is below 1e-26.
+/// The logistic function, also computed with the exponential. Beyond the clamp it is below 1e-26.
 fn sigmoid<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     (x.clamp_min(-60.0).neg().exp() + 1.0).recip()
 }
@@ -151,7 +152,7 @@ impl PlainParameter {
     }
 }
 
-/// A [`FactorizedDensity`] in float64, without a back end: what integer frequency tables are made of.
+/// A [`FactorizedDensity`] in float64, without a back end, from which integer frequency tables are made.
 #[derive(Clone, Debug)]
 pub struct PlainDensity {
     matrices: Vec<PlainParameter>,
@@ -188,10 +189,11 @@ impl PlainDensity {
         plain_logistic_interval(self.logit(channel, low), self.logit(channel, high))
     }
 
-    /// Where a channel's distribution function has this logit, by bisection, to about one part in 10^12.
+    /// The argument at which a channel's distribution function has this logit, by bisection, to about one part in
+    /// 10^12.
     pub fn quantile(&self, channel: usize, logit: f64) -> f64 {
         let (mut low, mut high) = (-1.0, 1.0);
-        // Far beyond anything that is coded; a flat end of the density must not run for ever.
+        // Far beyond anything that is coded. Without this bound, the search would not end where a density is flat.
         const FARTHEST: f64 = 1e9;
         while self.logit(channel, low) > logit && low > -FARTHEST {
             low *= 2.0;

@@ -7,23 +7,23 @@ use burn::tensor::Tensor;
 use crate::ops::lower_bound::lower_bound;
 use crate::ops::normal_cdf::normal_cdf;
 
-/// Standard deviations below this count as this.
+/// Standard deviations below this are raised to it.
 pub const SCALE_BOUND: f32 = 0.11;
-/// Likelihoods below this count as this: no symbol costs more than 29.9 bits.
+/// Likelihoods below this are raised to it: no symbol takes more than 29.9 bits.
 pub const LIKELIHOOD_BOUND: f32 = 1e-9;
 
-/// A normal distribution for each value, all of one shape and in y units.
+/// A normal distribution for each value, all tensors of the same shape and in y units.
 #[derive(Clone, Debug)]
 pub struct NormalParameters<const D: usize> {
     /// Means.
     pub means: Tensor<D>,
-    /// Standard deviations, raw: what is below [`SCALE_BOUND`] counts as that.
+    /// Standard deviations as given; values below [`SCALE_BOUND`] are raised to it when they are used.
     pub scales: Tensor<D>,
 }
 
 /// Probability of the unit interval around each value, at least [`LIKELIHOOD_BOUND`].
 ///
-/// `values` are in y units and in the shape of the parameters. Scales may be anything: they are bounded below by
+/// `values` are in y units and have the shape of the parameters. Scales may have any value: they are bounded below by
 /// [`SCALE_BOUND`], with the gradient of [`lower_bound`].
 ///
 /// ```
@@ -38,7 +38,7 @@ pub struct NormalParameters<const D: usize> {
 pub fn gaussian_likelihood<const D: usize>(values: Tensor<D>, parameters: NormalParameters<D>) -> Tensor<D> {
     let NormalParameters { means, scales } = parameters;
     let scales = lower_bound(scales, SCALE_BOUND);
-    // On the lower side of the mean, where the distribution function keeps its digits.
+    // On the lower side of the mean, where the distribution function is small and has full precision.
     let distance = (values - means).abs().neg();
     let upper = normal_cdf((distance.clone() + 0.5) / scales.clone());
     let lower = normal_cdf((distance - 0.5) / scales);

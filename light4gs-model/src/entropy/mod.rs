@@ -1,8 +1,8 @@
-//! Building blocks of entropy models: densities, what a symbol costs, quantization steps, convolutions over planes.
+//! Building blocks of entropy models: densities, bits of a symbol, quantization steps, convolutions over planes.
 //!
-//! [`FactorizedDensity`] and [`EntropyBottleneck`] learn a density for each channel; [`gaussian_conditional`] is the cost of a
-//! value whose mean and scale are predicted; [`PlaneSteps`] and [`AdaptiveQuantization`] (paper III-D) say how finely
-//! planes are rounded.
+//! [`FactorizedDensity`] and [`EntropyBottleneck`] learn a density for each channel. [`gaussian_conditional`] gives the
+//! bits of a value whose mean and scale are predicted. [`PlaneSteps`] and [`AdaptiveQuantization`] (paper III-D) say
+//! how finely planes are rounded.
 
 pub(crate) mod adaptive_quantization;
 pub(crate) mod bottleneck;

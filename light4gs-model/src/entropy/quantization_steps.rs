@@ -1,10 +1,10 @@
-//! Quantization steps of the planes, and what they do to them.
+//! Quantization steps of the planes, and quantization noise.
 
 use burn::tensor::{Device, Distribution, Tensor};
 
 use crate::planes::PlaneTensors;
 
-/// A step for each plane, in the order of the planes; they carry a gradient where they are learned.
+/// A step for each plane, in the order of the planes. Learned steps have a gradient.
 #[derive(Clone, Debug)]
 pub struct PlaneSteps(Vec<Tensor<1>>);
 
@@ -19,7 +19,7 @@ impl PlaneSteps {
         Self(steps.iter().map(|step| Tensor::from_floats([*step], device)).collect())
     }
 
-    /// The same steps as the beginning of a tape, if they are `learned`, or off any.
+    /// The same steps, detached: as leaves of a new tape if they are `learned`, otherwise without a tape.
     pub fn leaves(&self, learned: bool) -> Self {
         Self(self.0.iter().map(|step| step.clone().detach().set_require_grad(learned)).collect())
     }

@@ -1,4 +1,4 @@
-//! A device, its limits, and the way between Burn's tensors and plain buffers.
+//! A device, its limits, and the conversion between Burn's tensors and plain buffers.
 
 use burn::tensor::{DType, Shape};
 use burn_wgpu::CubeTensor;
@@ -10,7 +10,7 @@ use cubecl::server::Handle;
 use super::kernel::first_lines;
 use crate::gpu_error::GpuError;
 
-/// Tensors within a buffer begin at multiples of this many values: every adapter can bind there.
+/// Tensors within a buffer begin at multiples of this many values, where every adapter can bind them.
 pub(super) const PLACE_ALIGNMENT: usize = 64;
 
 /// A wgpu device.
@@ -29,12 +29,12 @@ impl Gpu {
         Ok(Self { client: tensor.client.clone(), device: tensor.device.clone() })
     }
 
-    /// Rounds that a loop may take. Mesa's software driver leaves any loop after 65535, without a word.
+    /// Iterations that a loop may have. Mesa's software driver ends any loop after 65535, without an error.
     pub(super) fn longest_loop(&self) -> usize {
         if self.client.properties().identity.physical.is_none() { 60_000 } else { u32::MAX as usize }
     }
 
-    /// Room for `count` values of four bytes, at least one.
+    /// A buffer for `count` values of four bytes, at least one.
     pub(super) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
         let bytes = 4 * count.max(PLACE_ALIGNMENT) as u64;
         let limit = self.client.properties().memory.max_page_size;
@@ -54,13 +54,13 @@ impl Gpu {
         CubeTensor::new_contiguous(self.client.clone(), self.device.clone(), shape, handle, DType::I32)
     }
 
-    /// Reads one word and waits for all that was launched before.
+    /// Reads one word, waiting for everything that was launched before.
     pub(super) fn read_word(&self, operation: &'static str, buffer: &Handle) -> Result<u32, GpuError> {
         let bytes = self.client.read_one(first_words(buffer, 1)).map_err(|error| failed(operation, &error))?;
         Ok(u32::from_le_bytes(bytes[..4].try_into().expect("a word has four bytes")))
     }
 
-    /// Says whether anything that was asked for so far and ends up in these buffers could not be done.
+    /// An error if anything that was launched so far, and that these buffers depend on, has failed.
     pub(super) fn check(&self, operation: &'static str, buffers: &[&Handle]) -> Result<(), GpuError> {
         self.client.check(buffers.iter().copied()).map_err(|error| failed(operation, &error))
     }
@@ -70,7 +70,7 @@ fn failed(operation: &'static str, error: &impl std::fmt::Display) -> GpuError {
     GpuError::Device { operation, reason: first_lines(&error.to_string()) }
 }
 
-/// A tensor's values in row-major order. An empty tensor becomes a buffer that may be bound but holds nothing.
+/// A tensor's values in row-major order. An empty tensor becomes a buffer that can be bound but holds nothing.
 pub(super) fn buffer_of(tensor: CubeTensor) -> Handle {
     assert_eq!(tensor.dtype, DType::F32, "the custom operations take float32 tensors");
     if tensor.meta.shape().num_elements() == 0 {
@@ -85,7 +85,7 @@ pub(super) fn first_words(buffer: &Handle, count: usize) -> Handle {
     buffer.clone().offset_end(unused)
 }
 
-/// Several arrays in one buffer, each beginning where it may be bound.
+/// Several arrays in one buffer, each beginning where it can be bound.
 pub(super) struct Places {
     pub(super) starts: Vec<usize>,
     lengths: Vec<usize>,

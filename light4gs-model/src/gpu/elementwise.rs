@@ -1,4 +1,4 @@
-//! Kernels that make one value of one: the distribution function and the bound of the entropy models.
+//! Elementwise kernels: the distribution function and the lower bound of the entropy models.
 
 use burn::backend::TensorMetadata;
 use burn_wgpu::CubeTensor;
@@ -8,7 +8,8 @@ use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Launch;
 use crate::gpu_error::GpuError;
 
-/// Launches a kernel that reads tensors of one shape and writes another one. Its uniform is their size, then `numbers`.
+/// Launches a kernel that reads tensors of one shape and writes another of the same shape. Its uniform is their size,
+/// then `numbers`.
 fn launch<const K: usize>(shader: Shader, inputs: [CubeTensor; K], numbers: &[f32]) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs[0])?;
     let shape = inputs[0].shape();
@@ -37,7 +38,7 @@ pub(crate) fn normal_cdf_backward_on_gpu(places: CubeTensor, upstream: CubeTenso
     raised(launch(NORMAL_CDF_BACKWARD, [places, upstream], &[]))
 }
 
-/// The upstream gradient where `values >= bound` or it is negative, else zero.
+/// The upstream gradient where `values >= bound` or the gradient is negative, else zero.
 pub(crate) fn lower_bound_backward_on_gpu(values: CubeTensor, upstream: CubeTensor, bound: f32) -> CubeTensor {
     raised(launch(LOWER_BOUND_BACKWARD, [values, upstream], &[bound]))
 }

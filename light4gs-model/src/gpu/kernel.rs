@@ -15,11 +15,11 @@ use light4gs_shaders::Shader;
 use crate::cpu::project::INVALID_RADIUS;
 use crate::gpu_error::GpuError;
 
-/// Invocations of a workgroup where nothing else is asked for.
+/// Default number of invocations of a workgroup.
 pub(super) const WORKGROUP: u32 = 64;
 /// Workgroups along one dimension of a dispatch: below WebGPU's limit of 65535.
 const MAX_GROUPS: u32 = 32768;
-/// Storage buffers that WebGPU promises to a kernel.
+/// Storage buffers that WebGPU guarantees to a kernel.
 const MAX_BUFFERS: usize = 8;
 
 type Constants = Vec<(&'static str, u32)>;
@@ -33,7 +33,7 @@ struct Kernel {
     constants: Constants,
 }
 
-/// The constants of rendering for WGSL. Widened to float64, a number has the same bits after a compiler has read it.
+/// The constants of rendering for WGSL. They are printed as float64, so that a compiler reads exactly the same float32.
 fn rendering_constants() -> String {
     let numbers = [
         ("NEAR", NEAR),
@@ -78,7 +78,7 @@ pub(super) struct Launch<'a> {
 /// A kernel on a device.
 type Launched = (DeviceId, &'static str, Constants);
 
-/// What has been launched before.
+/// Kernels that have been launched before.
 static LAUNCHED: LazyLock<Mutex<HashSet<Launched>>> = LazyLock::new(Mutex::default);
 
 impl<'a> Launch<'a> {
@@ -87,14 +87,14 @@ impl<'a> Launch<'a> {
         Self { client, kernel, arguments: KernelArguments::new(), written: Vec::new() }
     }
 
-    /// Another size of the workgroup.
+    /// Sets the size of the workgroup.
     pub(super) fn workgroup(mut self, workgroup: u32) -> Self {
         self.kernel.workgroup = workgroup;
         self.kernel.constants[0].1 = workgroup;
         self
     }
 
-    /// Makes the workgroup a team of that size, which meets as the included texts say.
+    /// Makes the workgroup a team of that size, whose members communicate as the included files say.
     pub(super) fn team(mut self, team: u32, includes: &'static [&'static str]) -> Self {
         self.kernel.team = includes;
         self.workgroup(team).constant("TEAM", team)
@@ -138,15 +138,15 @@ impl<'a> Launch<'a> {
         self
     }
 
-    /// Enough workgroups for as many invocations.
+    /// Enough workgroups for this many invocations.
     pub(super) fn invocations(self, count: usize) -> Result<(), GpuError> {
         let groups = count.div_ceil(self.kernel.workgroup as usize);
         self.groups(groups)
     }
 
-    /// Launches at least that many workgroups; those that are too many have to find that out.
+    /// Launches at least this many workgroups; kernels must ignore those that are too many.
     ///
-    /// The first launch of a kernel on a device waits until it is compiled, and says if that failed.
+    /// The first launch of a kernel on a device waits until it is compiled, and returns an error if that failed.
     pub(super) fn groups(self, groups: usize) -> Result<(), GpuError> {
         debug_assert!(self.arguments.resources.len() <= MAX_BUFFERS, "{}: too many buffers", self.kernel.shader.name);
         if groups == 0 {
@@ -176,7 +176,7 @@ impl<'a> Launch<'a> {
     }
 }
 
-/// The part of a driver's message that a reader wants: without the backtrace.
+/// The part of a driver's message that is useful to a reader, without the backtrace.
 pub(super) fn first_lines(message: &str) -> String {
     let end = message.find("Backtrace").or_else(|| message.find("BACKTRACE")).unwrap_or(message.len());
     message[..end].split_whitespace().collect::<Vec<_>>().join(" ")

@@ -1,4 +1,4 @@
-//! Kernels of the wgpu back end: the host's side of the WGSL in `shaders/`.
+//! Kernels of the wgpu back end: the host side of the WGSL in `shaders/`.
 
 mod adam;
 mod context;

@@ -23,7 +23,7 @@ const MOST_PLANES: usize = PlaneAxes::ALL.len();
 struct Layout {
     points: usize,
     channels: usize,
-    /// The planes that there are, with their shapes `[C, H, W]`.
+    /// The planes that exist, with their shapes `[C, H, W]`.
     planes: Vec<(PlaneAxes, Shape)>,
 }
 
@@ -134,7 +134,7 @@ fn backward(
     let mut firsts = places.starts.clone();
     firsts.resize(MOST_PLANES, places.total);
     let gradients = gpu.allocate("gradients of planes", places.total)?;
-    // No cell has more samples than there are points, and each takes a round of a loop a vector.
+    // No cell has more samples than there are points, and each takes one iteration of a loop for each vector.
     let at_most = (gpu.longest_loop() / layout.quads()).clamp(1, layout.points.max(1));
     for begin in (0..layout.points.max(1)).step_by(at_most) {
         let mut uniform = layout.uniform();

@@ -1,4 +1,4 @@
-//! The sums behind significance pruning on a GPU: the kernels of splatting without color.
+//! The sums for significance pruning on a GPU: the kernels of splatting without color.
 
 use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;

@@ -9,11 +9,11 @@ use crate::gpu_error::GpuError;
 
 /// Values of one workgroup of the prefix sum.
 const SUM_BLOCK: usize = 2048;
-/// Up to this many values one workgroup is as fast as three launches.
+/// Up to this many values, one workgroup is as fast as three launches.
 const SUM_ALONE: usize = 8 * SUM_BLOCK;
 /// Keys of one workgroup of the sort.
 const SORT_BLOCK: usize = 1024;
-/// Invocations of one, each with a counter for every digit: 16 KiB of workgroup memory.
+/// Invocations of such a workgroup, each with a counter for every digit: 16 KiB of workgroup memory.
 const SORT_GROUP: u32 = 32;
 const RADIX_BITS: u32 = 7;
 
@@ -41,7 +41,7 @@ pub(super) fn prefix_sum(gpu: &Gpu, values: &Handle, count: usize) -> Result<Han
     Ok(total)
 }
 
-/// Keys in ascending order, and the number that each had before.
+/// Keys in ascending order, and the index that each had before.
 #[derive(Clone)]
 pub(super) struct Sorted {
     pub(super) keys: Handle,
@@ -54,7 +54,7 @@ pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<
     let digits = 1usize << RADIX_BITS;
     let table = gpu.allocate("digits of a sort", digits * blocks)?;
     let passes = bits.div_ceil(RADIX_BITS).max(1) as usize;
-    // From one to the other and back.
+    // The passes alternate between two buffers.
     let buffers = (0..passes.min(2))
         .map(|_| Ok(Sorted { keys: gpu.allocate("sorted keys", count)?, order: gpu.allocate("sorted order", count)? }))
         .collect::<Result<Vec<_>, GpuError>>()?;
@@ -66,7 +66,7 @@ pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<
                 .constant("BLOCK", SORT_BLOCK as u32)
                 .constant("RADIX_BITS", RADIX_BITS)
         };
-        // The first pass reads no order: a key's number is its place.
+        // The first pass reads no order: the index of a key is its place.
         let (from_keys, from_order) = match pass {
             0 => (keys, keys),
             _ => (&buffers[(pass - 1) % 2].keys, &buffers[(pass - 1) % 2].order),
@@ -87,7 +87,7 @@ pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<
     Ok(buffers[(passes - 1) % 2].clone())
 }
 
-/// `[groups + 1]`: where each group's keys begin among sorted ones; the last entry is where keys of `groups` and above
+/// `[groups + 1]`: where each group's keys begin among sorted ones. The last entry is where keys of `groups` and above
 /// begin.
 pub(super) fn ranges(gpu: &Gpu, keys: &Handle, count: usize, groups: usize) -> Result<Handle, GpuError> {
     let starts = gpu.allocate("starts of ranges", groups + 1)?;
@@ -99,7 +99,7 @@ pub(super) fn ranges(gpu: &Gpu, keys: &Handle, count: usize, groups: usize) -> R
     Ok(starts)
 }
 
-/// Bits that hold every number up to `largest`.
+/// The number of bits that can hold every number up to `largest`.
 pub(super) fn bits_for(largest: usize) -> u32 {
     usize::BITS - largest.leading_zeros()
 }

@@ -19,13 +19,13 @@ use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView, 
 /// Values of an intersection's sums.
 const SUMS: usize = 10;
 
-/// What the kernels of one image have in common.
+/// Values that the kernels of one image share.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frame {
     view: View,
     pub(super) team: Team,
     pub(super) gaussians: usize,
-    /// Coefficients of `sh_rest` a Gaussian.
+    /// Coefficients of `sh_rest` for each Gaussian.
     rest: usize,
 }
 
@@ -42,7 +42,7 @@ impl Frame {
         self.size().iter().map(|side| side.div_ceil(self.team.cell) as usize).product()
     }
 
-    /// `View` of `shaders/include/view.wgsl`. `chunk` of the cells' lists, of `chunks`.
+    /// `View` of `shaders/include/view.wgsl`, for chunk `chunk` of `chunks` of the cells' lists.
     pub(super) fn uniform(&self, chunk: usize, chunks: usize) -> Vec<u32> {
         let camera = &self.view.camera;
         let [width, height] = self.size();
@@ -67,7 +67,7 @@ impl Frame {
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
 
-    /// Launches that the longest possible list takes: no Gaussian is in a cell's list twice.
+    /// The number of launches for the longest possible list: no Gaussian is in a cell's list twice.
     pub(super) fn chunks(&self, intersections: usize) -> usize {
         intersections.min(self.gaussians).div_ceil(CHUNK).max(1)
     }
@@ -85,7 +85,7 @@ struct InputBuffers {
     screen_offsets: Handle,
 }
 
-/// Gaussians on the screen, and which of them touches which cell.
+/// Gaussians on the screen, and the cells that each of them touches.
 #[derive(Clone, Debug)]
 pub(super) struct Intersections {
     pub(super) splats: Handle,
@@ -150,7 +150,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
         .uniform(&[gaussian_count as u32])
         .invocations(gaussian_count)?;
     let total = prefix_sum(gpu, &first_places, gaussian_count)?;
-    // The one read-back of an image: all further buffers are made to its measure.
+    // The only read-back of an image: all further buffers have the size that it gives.
     let count = match gaussian_count {
         0 => 0,
         _ => gpu.read_word("the number of intersections", &total)? as usize,
@@ -192,7 +192,7 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
     Ok(rendering)
 }
 
-/// A image's Gaussians on the screen, sorted into cells: what every pass over its pixels begins with.
+/// An image's Gaussians on the screen, sorted into cells: the beginning of every pass over its pixels.
 pub(super) struct Begun {
     pub(super) frame: Frame,
     shapes: [Shape; 7],
@@ -306,9 +306,9 @@ mod tests {
     const COUNT: usize = 300;
     const SIZE: [u32; 2] = [50, 37];
 
-    /// Image and gradients of one scene, blended by a team.
+    /// Image and gradients of a scene, blended by a team.
     fn run(gpu: &Gpu, team: Team) -> Vec<Vec<f32>> {
-        // Any numbers will do that look random.
+        // Any numbers that look random will do.
         let mut state = 1u32;
         let mut uniform = move |low: f32, high: f32| {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -355,7 +355,7 @@ mod tests {
             }
         }
         for (members, includes, cell) in teams {
-            // An invocation owns its pixels in fours.
+            // Each invocation has its pixels in groups of four.
             if cell * cell / members < 4 || members < cell {
                 continue;
             }

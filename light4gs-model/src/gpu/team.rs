@@ -1,4 +1,4 @@
-//! Who blends a cell of the image.
+//! Teams of invocations, each of which blends a cell of the image.
 
 use std::collections::HashMap;
 use std::sync::{LazyLock, Mutex};
@@ -11,30 +11,30 @@ use super::context::Gpu;
 use super::kernel::Launch;
 use crate::gpu_error::GpuError;
 
-/// Members of a team meet through subgroup operations; they are few.
+/// Members of a team communicate through subgroup operations; for small teams.
 pub(super) const TEAM_OF_FEW: &[&str] = &[TEAM_SUBGROUP, TEAM_SUM_OF_FEW];
-/// Members of a team meet through subgroup operations; they are many.
+/// Members of a team communicate through subgroup operations; for large teams.
 pub(super) const TEAM_OF_MANY: &[&str] = &[TEAM_SUBGROUP, TEAM_SUM_OF_MANY];
-/// Members of a team meet in workgroup memory.
+/// Members of a team communicate through workgroup memory.
 pub(super) const TEAM_WITHOUT_SUBGROUPS: &[&str] = &[TEAM_WORKGROUP];
 
-/// Intersections of a cell that one launch blends. Mesa's software driver leaves any loop after 65535 rounds, and a
+/// Intersections of a cell that one launch blends. Mesa's software driver ends any loop after 65535 iterations, and a
 /// graphics driver may stop a launch that runs for seconds.
 pub(super) const CHUNK: usize = 32768;
 
-/// Who blends a cell: a team of invocations, and how its members meet.
+/// The team of invocations that blends a cell, and how its members communicate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Team {
     pub(super) members: u32,
-    /// What of `shaders/include` says how they meet.
+    /// The files of `shaders/include` for their communication.
     pub(super) includes: &'static [&'static str],
     /// Side of the cell in pixels.
     pub(super) cell: u32,
 }
 
 impl Team {
-    /// A team is a subgroup where their size is known: eight lanes blend 8×8 pixels, 32 lanes 16×16, so that each has
-    /// eight pixels, which a fetched splat then serves.
+    /// A team is a subgroup if the size of subgroups is known: eight lanes blend 8×8 pixels, 32 lanes 16×16. So each
+    /// lane has eight pixels, which share the splat that it fetches.
     pub(super) fn choose(gpu: &Gpu, width: u32, height: u32) -> Result<Self, GpuError> {
         let smallest = gpu.client.properties().hardware.plane_size_min;
         let known = has_subgroups_of_one_size(gpu)?;
@@ -61,10 +61,10 @@ impl Team {
     }
 }
 
-/// What was found on each device.
+/// The result for each device.
 static FOUND: LazyLock<Mutex<HashMap<DeviceId, bool>>> = LazyLock::new(Mutex::default);
 
-/// Whether a workgroup of the subgroups' size is one subgroup, found by trying.
+/// Whether a workgroup of the subgroups' size is one subgroup; found by an experiment.
 fn has_subgroups_of_one_size(gpu: &Gpu) -> Result<bool, GpuError> {
     let mut found = FOUND.lock().unwrap_or_else(|poisoned| poisoned.into_inner());
     let device = gpu.client.service_id().device;

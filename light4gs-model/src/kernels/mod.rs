@@ -1,4 +1,5 @@
-//! What the kernels of every back end take and give: the seam between the operations of [`ops`](crate::ops) and `cpu/`, `gpu/`.
+//! Inputs and outputs of the kernels of every back end: the seam between the operations of [`ops`](crate::ops) and
+//! `cpu/`, `gpu/`.
 
 pub(crate) mod adam;
 pub(crate) mod plane_query;

@@ -5,22 +5,22 @@ use std::fmt::Debug;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, ExtensionType};
 
-/// Which of the planes xy, xz, xt, yz, yt, zt there are; one or more.
+/// Which of the planes xy, xz, xt, yz, yt, zt exist; at least one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PlaneSet(pub [bool; PLANES]);
 
 impl PlaneSet {
-    /// Whether all are there.
+    /// Whether all of them exist.
     pub fn is_full(self) -> bool {
         self.0 == [true; PLANES]
     }
 }
 
-/// Points and the planes of one scale; the planes agree about the cells along each axis. What stands in the place of a plane
-/// that is not there is not looked at.
+/// Points, and the planes of one scale, which have equal sizes along common axes. A placeholder for a plane that does
+/// not exist is not read.
 #[derive(ExtensionType)]
 pub struct PlaneQueryInputs<B: Backend> {
-    /// `[N, 4]`: x, y, z, t in [-1, 1]; what lies outside is clamped to the border.
+    /// `[N, 4]`: x, y, z, t in [-1, 1]; coordinates outside are clamped to the border.
     pub points: FloatTensor<B>,
     /// `[C, res y, res x]`.
     pub xy: FloatTensor<B>,
@@ -53,15 +53,15 @@ impl<B: Backend> PlaneQueryInputs<B> {
 
 /// Gradients of a query.
 pub struct PlaneQueryGradients<B: Backend> {
-    /// `[N, 4]`, absent if it was not asked for.
+    /// `[N, 4]`; `None` if not requested.
     pub points: Option<FloatTensor<B>>,
-    /// In the shapes of the planes; absent where there is no plane.
+    /// In the shapes of the planes; `None` where there is no plane.
     pub planes: [Option<FloatTensor<B>>; PLANES],
 }
 
 /// A back end's kernels. [`PlaneQueryOps`](crate::ops::plane_query::PlaneQueryOps) adds the dispatch and the tape.
 pub trait PlaneQueryKernels: Backend {
-    /// What the backward pass wants to see again.
+    /// What the backward pass needs from the forward pass.
     type Saved: Clone + Debug + Send + 'static;
 
     /// Features `[N, C]`.

@@ -7,7 +7,7 @@ use burn::backend::{Backend, ExtensionType};
 use light4gs_codec::rendering::TILE;
 use light4gs_data::Camera;
 
-/// The differentiable inputs, in the order that gradients are registered in.
+/// The differentiable inputs, in the order in which gradients are registered.
 #[derive(ExtensionType)]
 pub struct SplatInputs<B: Backend> {
     /// `[N, 3]`, world units.
@@ -52,7 +52,7 @@ pub struct SplatOutputs<B: Backend> {
 
 /// A back end's kernels. [`SplatOps`](crate::ops::splat::SplatOps) adds the dispatch and the tape.
 pub trait SplatKernels: Backend {
-    /// What the backward pass wants to see again.
+    /// What the backward pass needs from the forward pass.
     type Saved: Clone + Debug + Send + 'static;
 
     /// Draws the image.
@@ -74,7 +74,7 @@ impl SplatView {
     }
 }
 
-/// What is drawn, from where.
+/// Camera, background and active SH degree of one image.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
     pub(crate) camera: Camera,

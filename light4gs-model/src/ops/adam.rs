@@ -1,4 +1,4 @@
-//! One fused Adam step a tensor (Kingma and Ba, 2015), in place where the tensor is not shared.
+//! One fused Adam step for each tensor (Kingma and Ba, 2015), in place where the tensor is not shared.
 
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, TensorMetadata, backend_extension};

@@ -1,12 +1,12 @@
 //! Custom operations in a fusion stream.
 //!
 //! Burn's `fusion` feature, one of its defaults, wraps the back end of a GPU in [`Fusion`]: operations are queued, and
-//! neighbors are compiled into one kernel. A kernel of ours cannot be joined with others, and splatting reads a count back
-//! half-way. So our operations drain the queue, run on the tensors themselves, and put the results back into the stream as
-//! new leaves. Errors then arise in the caller's thread, as without fusion.
+//! successive ones are compiled into one kernel. Our kernels cannot be merged with others, and splatting has to read a
+//! count back half-way. So our operations drain the queue, run on the tensors themselves, and put the results back into
+//! the queue as new leaves. Errors then arise in the caller's thread, as without fusion.
 //!
-//! The implementations for `Fusion<B>` exist whether or not this crate's own feature `fusion` is on: another crate of the
-//! same program may have switched Burn's on.
+//! The implementations for `Fusion<B>` do not depend on this crate's own feature `fusion`: another crate of the same
+//! program may have switched Burn's on.
 
 use burn::backend::TensorMetadata;
 use burn::backend::tensor::{FloatTensor, IntTensor};
@@ -14,7 +14,7 @@ use burn::tensor::{DType, Shape};
 use burn_fusion::custom::{CustomOpIr, OperationIr, StreamId, TensorIr};
 use burn_fusion::{Fusion, FusionBackend, FusionTensor, NoOp, get_client};
 
-/// The tensor itself, once all that it depends on has been launched.
+/// The tensor itself, after everything that it depends on has been launched.
 pub(super) fn resolve<B: FusionBackend>(tensor: FloatTensor<Fusion<B>>) -> FloatTensor<B> {
     let client = tensor.client.clone();
     client.resolve_tensor_float::<B>(tensor)

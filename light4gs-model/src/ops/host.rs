@@ -35,7 +35,7 @@ impl HostTensor {
         }
     }
 
-    /// Row-major values for writing; copies only where somebody else holds the tensor.
+    /// Row-major values for writing; copies only if the tensor is shared.
     pub(crate) fn as_mut_slice(&mut self) -> &mut [f32] {
         match *self {
             #[cfg(feature = "ndarray")]
@@ -49,7 +49,7 @@ impl HostTensor {
     }
 }
 
-/// A back end whose float32 tensors lie in main memory.
+/// A back end whose float32 tensors are in main memory.
 pub(crate) trait HostBackend: Backend {
     fn to_host(tensor: FloatTensor<Self>) -> HostTensor;
     fn from_host(tensor: HostTensor) -> FloatTensor<Self>;

@@ -1,8 +1,8 @@
 //! `max(x, bound)` with a gradient below the bound too (Ballé et al. 2018, as in CompressAI).
 //!
-//! The derivative of a maximum is zero below the bound, so what has once fallen below would never come back. Here a
-//! gradient also passes there if a descent step along it increases x. That depends on the sign of the incoming
-//! gradient, which no composition of ordinary operations can see; hence an operation of its own.
+//! The derivative of a maximum is zero below the bound, so a value that has once fallen below would never rise again.
+//! Here the gradient also passes below the bound if a descent step increases x. That depends on the sign of the
+//! incoming gradient, which no composition of ordinary operations can express; so it is a custom operation.
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -23,7 +23,7 @@ use crate::gpu::lower_bound_backward_on_gpu;
 
 /// A back end's gradient. [`LowerBoundOps`] adds the dispatch and the tape.
 pub trait LowerBoundKernels: Backend {
-    /// The upstream gradient where `tensor >= bound` or it is negative, else zero.
+    /// The upstream gradient where `tensor >= bound` or the gradient is negative, else zero.
     fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self>;
 }
 
@@ -56,7 +56,7 @@ for_cpu_back_ends! {
     }
 }
 
-/// A stream of operations fuses these by itself.
+/// A fusion stream fuses these operations without our help.
 #[cfg(feature = "wgpu")]
 impl<B: FusionBackend> LowerBoundKernels for Fusion<B> {
     fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
@@ -105,7 +105,8 @@ impl<B: LowerBoundOps + LowerBoundKernels, C: CheckpointStrategy> LowerBoundOps 
     }
 }
 
-/// `max(tensor, bound)`; the gradient passes where `tensor >= bound`, and below it where it would increase the tensor.
+/// `max(tensor, bound)`. The gradient passes where `tensor >= bound`; below the bound it passes if a descent step
+/// increases the tensor.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};

@@ -1,9 +1,9 @@
 //! Custom operations as Burn backend extensions.
 //!
-//! Each has one trait with the operation (dispatched at run time to the device's back end and recorded by
-//! autodiff) and, where it is differentiable, one with the forward and backward kernels that a back end implements:
-//! `NdArray` and `Flex` with the kernels of `cpu/`, `CubeBackend` with those of `gpu/`, and `Fusion<B>` with those of the
-//! back end that it wraps.
+//! Each has a trait with the operation, which is dispatched at run time to the device's back end and recorded by
+//! autodiff. A differentiable one also has a trait with the forward and backward kernels that a back end implements:
+//! `NdArray` and `Flex` with the kernels of `cpu/`, `CubeBackend` with those of `gpu/`, and `Fusion<B>` with those of
+//! the back end that it wraps.
 
 // Burn 0.22 deprecates its `ndarray` back end in favor of `flex`; we serve both.
 #![allow(deprecated)]
@@ -18,7 +18,7 @@ pub mod plane_query;
 pub mod significance;
 pub mod splat;
 
-/// Implements a trait for each CPU back end of this build, with the same items.
+/// Implements a trait with the same items for each CPU back end of this build.
 macro_rules! for_cpu_back_ends {
     ($trait:ident { $($items:item)* }) => {
         #[cfg(feature = "ndarray")]
@@ -28,7 +28,7 @@ macro_rules! for_cpu_back_ends {
     };
 }
 
-/// Implements an operation for each back end of this build, with the same items, which may call `$kernels`.
+/// Implements an operation with the same items, which may call `$kernels`, for each back end of this build.
 macro_rules! for_all_back_ends {
     ($trait:ident with $kernels:ident { $($items:item)* }) => {
         $crate::ops::for_cpu_back_ends!($trait { $($items)* });

@@ -1,8 +1,8 @@
 //! The standard normal distribution function, with a relative error of about 1e-6 far into its lower tail.
 //!
-//! `(1 + erf(x / sqrt 2)) / 2` has no digit left below -5, where an entropy model still wants the probability of an
-//! interval and its logarithm. Chebyshev's fit of `erfc` (Press et al., Numerical Recipes, section 6.2) keeps a *relative*
-//! error of 1.2e-7 everywhere.
+//! `(1 + erf(x / sqrt 2)) / 2` has no correct digit below -5, where an entropy model still needs the probability of an
+//! interval and its logarithm. Chebyshev's fit of `erfc` (Press et al., Numerical Recipes, section 6.2) has a
+//! *relative* error of 1.2e-7 everywhere.
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
@@ -23,7 +23,8 @@ use super::fusion::{leaf, resolve};
 #[cfg(feature = "wgpu")]
 use crate::gpu::{normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
 
-/// Of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first. `shaders/elementwise/normal_cdf.wgsl` has them too.
+/// Coefficients of `ln(erfc(z) / t) + z²` in `t = 1 / (1 + z / 2)`, lowest power first.
+/// `shaders/elementwise/normal_cdf.wgsl` has the same.
 const COEFFICIENTS: [f64; 10] = [
     -1.26551223,
     1.00002368,

@@ -75,7 +75,7 @@ impl<B: PlaneQueryOps + PlaneQueryKernels, C: CheckpointStrategy> PlaneQueryOps 
 pub struct CpuSaved {
     points: HostTensor,
     planes: Arc<PackedPlanes>,
-    /// None where there is no plane.
+    /// `None` where there is no plane.
     shapes: [Option<[usize; 3]>; PLANES],
 }
 

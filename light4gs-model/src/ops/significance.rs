@@ -1,4 +1,4 @@
-//! What every Gaussian contributes to one image, as a Burn operation (paper III-B). Not differentiable.
+//! The contributions of every Gaussian to one image, as a Burn operation (paper III-B). Not differentiable.
 
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, TensorMetadata, backend_extension};

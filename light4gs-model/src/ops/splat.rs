@@ -1,4 +1,4 @@
-//! Gaussian splatting as a Burn operation: project, bin, sort, blend, and the derivative of it all.
+//! Gaussian splatting as a Burn operation: projection, binning, sorting, blending, and the derivative.
 
 use std::sync::Arc;
 
@@ -141,7 +141,7 @@ impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
     }
 }
 
-/// The tensors of a fusion stream themselves.
+/// The tensors inside of a fusion stream.
 #[cfg(feature = "wgpu")]
 pub(super) fn resolve_inputs<B: FusionBackend>(inputs: SplatInputs<Fusion<B>>) -> SplatInputs<B> {
     SplatInputs::from_array(inputs.into_array().map(resolve::<B>))

@@ -6,7 +6,7 @@ use light4gs_codec::plane_layout::PlaneLayout;
 
 use super::PlaneTensors;
 
-/// Learned planes. A query multiplies the bilinear samples of a scale's planes and puts the scales side by side.
+/// Trained planes. A query multiplies the bilinear samples of a scale's planes and concatenates the scales.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};

@@ -26,13 +26,13 @@ pub struct HexPlaneConfig {
     /// Cells along x, y, z and t at the lowest scale, each a multiple of 4.
     #[config(default = "[64, 64, 64, 24]")]
     pub resolution: [usize; 4],
-    /// One scale each: spatial resolutions are multiplied, time keeps its own.
+    /// One for each scale: spatial resolutions are multiplied by it, time keeps its own.
     #[config(default = "vec![1, 2]")]
     pub multipliers: Vec<usize>,
 }
 
 impl HexPlaneConfig {
-    /// The configuration that gives planes like these; none if they are no hexplane.
+    /// The configuration of given planes; `None` if they are no hexplane.
     pub fn of(planes: &FeaturePlanes) -> Option<Self> {
         let layout = planes.layout();
         let lowest = &layout.planes()[layout.scale(0)];
@@ -51,15 +51,15 @@ impl HexPlaneConfig {
         PlaneLayout::multiscale(&PlaneAxes::ALL, self.resolution, &self.multipliers)
     }
 
-    /// Whether there can be planes of this resolution: what the codec and the context model refuse is refused here.
+    /// Whether there can be planes of this resolution. Codec and context model have the same requirements.
     ///
     /// # Errors
-    /// The axis, and the nearest legal size.
+    /// Names the axis and the nearest legal size.
     pub fn check(&self) -> Result<(), IllegalSize> {
         check_resolution(self.resolution)
     }
 
-    /// Planes at their start; see [`FeaturePlanes::init`].
+    /// Planes with their initial values; see [`FeaturePlanes::init`].
     ///
     /// # Panics
     /// If [`Self::check`] refuses the resolution.

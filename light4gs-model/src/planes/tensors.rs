@@ -8,8 +8,8 @@ use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes, PlaneLayout, PlaneShap
 
 use crate::ops::plane_query::{PlaneQueryInputs, PlaneQueryOps, PlaneSet};
 
-/// Feature planes as tensors `[C, H, W]`: the values of parameters, planes that carry noise, decoded ones. A slice of them, in
-/// the order of their layout.
+/// Feature planes as tensors `[C, H, W]`, in the order of their layout: values of parameters, planes with noise,
+/// decoded planes, or slices of them.
 #[derive(Clone, Debug, Default)]
 pub struct PlaneTensors {
     layout: PlaneLayout,
@@ -28,7 +28,7 @@ impl PlaneTensors {
     /// Planes of a layout.
     ///
     /// # Panics
-    /// If a plane is missing, or has another size than its layout says, or other channels than the first.
+    /// If a plane is missing, differs from the layout in size, or differs from the first plane in channels.
     pub fn new(layout: PlaneLayout, planes: Vec<Tensor<3>>) -> Self {
         assert_eq!(planes.len(), layout.len(), "one tensor for each plane of the layout");
         let channels = planes.first().map_or(0, |plane| plane.dims()[0]);
@@ -39,8 +39,8 @@ impl PlaneTensors {
         Self { layout, planes }
     }
 
-    /// Planes over the same axes at every scale, which stand scale by scale, in each in the order of [`PlaneAxes::ALL`]. Sizes
-    /// are those of the tensors.
+    /// Planes over the same axes at every scale, given scale by scale, in each scale in the order of
+    /// [`PlaneAxes::ALL`]. Sizes are those of the tensors.
     ///
     /// # Panics
     /// If the number of tensors is no multiple of the number of axes, the axes are out of order, or channels differ.
@@ -54,7 +54,7 @@ impl PlaneTensors {
         Self::new(layout, planes)
     }
 
-    /// Which planes there are.
+    /// The layout of the planes.
     pub fn layout(&self) -> &PlaneLayout {
         &self.layout
     }
@@ -64,7 +64,7 @@ impl PlaneTensors {
         self.planes
     }
 
-    /// Each plane, by its place and value, replaced by one of the same shape.
+    /// Each plane replaced by another of the same shape, which `replace` makes from its index and value.
     pub fn map(&self, replace: impl Fn(usize, Tensor<3>) -> Tensor<3>) -> Self {
         let planes = self.planes.iter().enumerate().map(|(place, plane)| replace(place, plane.clone()));
         Self { layout: self.layout.clone(), planes: planes.collect() }
@@ -84,7 +84,7 @@ impl PlaneTensors {
         self.query_planes(points, |_| true)
     }
 
-    /// [`Self::query`] of the planes without time at positions `[N, 3]`. A scale that has none gives ones.
+    /// [`Self::query`] of the space-only planes at positions `[N, 3]`. A scale without such planes gives ones.
     ///
     /// # Panics
     /// As [`Self::query`].
@@ -108,7 +108,8 @@ impl PlaneTensors {
         if features.len() == 1 { features.remove(0) } else { Tensor::cat(features, 1) }
     }
 
-    /// Those of a scale's planes that count, in groups that agree about the cells along each axis, as one operation asks for.
+    /// The planes of a scale for which `counts` holds, in groups with equal sizes along each axis, as the operation
+    /// requires.
     fn together(&self, planes: Range<usize>, counts: impl Fn(PlaneAxes) -> bool) -> Vec<Vec<usize>> {
         let shapes = self.layout.planes();
         let agree = |a: usize, b: usize| {
@@ -133,7 +134,7 @@ impl PlaneTensors {
         let place = |axes: PlaneAxes| planes.iter().copied().find(|plane| self.layout.planes()[*plane].axes == axes);
         let set = PlaneSet(PlaneAxes::ALL.map(|axes| place(axes).is_some()));
         let [xy, xz, xt, yz, yt, zt] = PlaneAxes::ALL.map(|axes| {
-            // What stands where there is no plane is not looked at.
+            // Where there is no plane, the placeholder is not read.
             let plane =
                 place(axes).map_or_else(|| Tensor::zeros([1, 1, 1], &device), |plane| self.planes[plane].clone());
             plane.into_dispatch()

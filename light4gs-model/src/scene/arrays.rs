@@ -16,33 +16,34 @@ use super::further::FurtherTensor;
 use super::gaussians::{GaussianTensors, Gaussians};
 use crate::planes::{FeaturePlanes, PlaneTensors};
 
-/// Plain arrays that do not make a model.
+/// Plain arrays from which no model can be made.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ModelError {
-    /// The file moves its Gaussians in a way that this model does not know.
+    /// The file has a kind of motion that this model does not know.
     #[error("motion: the file's kind is `{found}`, this model is a `{expected}`")]
     MotionKind {
-        /// As the file says.
+        /// The kind in the file.
         found: String,
-        /// As the model says.
+        /// The kinds of the model.
         expected: String,
     },
-    /// A field whose author has not said how it is coded.
+    /// A field whose coding has not been implemented.
     #[error(
         "motion: a field of the kind `{kind}` cannot be {action} a file yet: implement `DeformationField::{method}` for it"
     )]
     NoStreamForm {
-        /// Of the field.
+        /// The field's kind.
         kind: &'static str,
         /// "written to" or "read from".
         action: &'static str,
         /// What must be implemented.
         method: &'static str,
     },
-    /// What moves the Gaussians is not what its kind consists of.
+    /// The motion does not have the structure of its kind.
     #[error("motion: {0}")]
     Motion(String),
-    /// The Gaussians have an attribute that the scene does not look right without, and nobody knows what it does.
+    /// The Gaussians have an attribute without which the scene looks wrong, and it is not known what the attribute
+    /// does.
     #[error("{0}")]
     UnknownAttribute(String),
     /// The planes contradict themselves, or are not those that the field needs.
@@ -51,9 +52,9 @@ pub enum ModelError {
 }
 
 impl ModelError {
-    /// That a file is not of one of these kinds.
+    /// The error for a file that is of none of these kinds.
     pub(crate) fn kind(found: &str, known: &[&str]) -> Self {
-        // Where nothing moves a file has no name for it.
+        // In a file, the kind of a scene without motion is empty.
         let named = |kind: &&str| if kind.is_empty() { "still".to_owned() } else { (*kind).to_owned() };
         let expected = known.iter().map(named).collect::<Vec<_>>().join("` or `");
         Self::MotionKind { found: named(&found), expected }
@@ -79,7 +80,7 @@ impl Gaussians {
         self.tensors().to_arrays()
     }
 
-    /// From plain arrays whose lengths belong together (the codec checks that on reading).
+    /// From plain arrays whose lengths fit together (the codec checks that on reading).
     pub fn from_arrays(arrays: &GaussianArrays, device: &Device) -> Self {
         let count = arrays.len();
         let rest = (usize::from(arrays.sh_degree) + 1).pow(2) - 1;
@@ -145,7 +146,7 @@ impl FeaturePlanes {
     /// From plain arrays.
     ///
     /// # Errors
-    /// Planes that make no layout, or are not as long as their sizes say.
+    /// Planes that are no layout, or whose length does not follow from their size.
     pub fn from_arrays(arrays: &FeaturePlaneArrays, device: &Device) -> Result<Self, ModelError> {
         let wrong = |problem: String| Err(ModelError::Planes(problem));
         if arrays.planes.is_empty() {
@@ -169,12 +170,12 @@ impl<F: DeformationField> DynamicScene<F> {
     /// Copies the model to what a `.l4gs` file holds.
     ///
     /// # Errors
-    /// A field that has no form in a stream.
+    /// A field whose coding has not been implemented.
     pub fn to_arrays(&self, meta: SceneMeta) -> Result<SceneData, ModelError> {
         Ok(SceneData { motion: self.field.to_arrays()?, ..self.to_arrays_at_rest(meta) })
     }
 
-    /// [`DynamicScene::to_arrays`] without the motion: planes, but nothing that reads them.
+    /// [`DynamicScene::to_arrays`] without the motion: the planes are there, but nothing reads them.
     pub fn to_arrays_at_rest(&self, meta: SceneMeta) -> SceneData {
         SceneData {
             meta,
@@ -188,8 +189,8 @@ impl<F: DeformationField> DynamicScene<F> {
     /// The model of a decoded file, on any device.
     ///
     /// # Errors
-    /// Planes or layers that do not belong together, or are not what this kind of field needs; an attribute without which the
-    /// scene would look wrong, and that nobody knows.
+    /// Planes or layers that do not fit together, or are not those that this kind of field needs; an attribute without
+    /// which the scene would look wrong, and of which it is not known what it does.
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
         data.check_attributes_are_known().map_err(|error| ModelError::UnknownAttribute(error.to_string()))?;
         if !F::KINDS.contains(&data.motion.kind.as_str()) {

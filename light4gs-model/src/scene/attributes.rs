@@ -1,9 +1,9 @@
-//! What a Gaussian has: one table, from which everything else follows.
+//! The attributes of a Gaussian: one table, from which everything else follows.
 //!
 //! [`BUILT_IN`] are the attributes of every scene, which the splatter needs. A scene may have further ones: give
-//! [`GaussiansConfig`] an [`Attribute`], and it is trained at its rate, copied where a Gaussian is cloned or split, kept in
-//! checkpoints, and coded with its step. What it does to the image is decided by a
-//! [`DeformationField`](crate::DeformationField), which gets everything that a Gaussian has.
+//! [`GaussiansConfig`] an [`Attribute`], and it is trained at its rate, copied where a Gaussian is cloned or split,
+//! kept in checkpoints, and coded with its step. A [`DeformationField`](crate::DeformationField), which gets all
+//! attributes of a Gaussian, decides what it does to the image.
 //!
 //! ```
 //! use burn::tensor::Device;
@@ -29,60 +29,61 @@ use super::gaussians::GaussiansConfig;
 /// One attribute of every Gaussian.
 #[derive(Clone, Debug)]
 pub struct Attribute {
-    /// The name of its field in [`Gaussians`](crate::Gaussians), or that of a further attribute; it stands in checkpoints and
-    /// files.
+    /// The name of its field in [`Gaussians`](crate::Gaussians), or of the further attribute. Checkpoints and files use
+    /// it.
     pub name: Cow<'static, str>,
-    /// Numbers a Gaussian.
+    /// Numbers for each Gaussian.
     pub width: Width,
     /// Values at the beginning of a training.
     pub start: Start,
-    /// What makes of the trained numbers those that are used.
+    /// The function from the trained numbers to those that are used.
     pub activation: Activation,
-    /// Its learning rate. A key is one below `train.learning_rate`.
+    /// Its learning rate. A key is relative to `train.learning_rate`.
     pub learning_rate: Setting,
     /// How a file stores it.
     pub coding: Coding,
-    /// Whether it keeps its canonical value: [`DynamicScene::at`](crate::DynamicScene::at) then takes no other values from a field.
+    /// Whether it always keeps its canonical value: [`DynamicScene::at`](crate::DynamicScene::at) then ignores the
+    /// field's values.
     pub constant: bool,
     /// Whether the scene looks right without it, so that a program that does not know it may show the scene.
     pub optional: bool,
 }
 
-/// How many numbers a Gaussian has of an attribute.
+/// The number of values of an attribute for each Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Width {
-    /// So many.
+    /// A fixed number.
     Fixed(usize),
-    /// As many as the scene's degree asks for: three for each spherical harmonic beyond degree 0.
+    /// A number that depends on the scene's degree: three for each spherical harmonic beyond degree 0.
     HigherHarmonics,
 }
 
-/// Where an attribute begins.
+/// The initial values of an attribute.
 #[derive(Clone, Debug)]
 pub enum Start {
-    /// At these numbers for every Gaussian.
+    /// These numbers for every Gaussian.
     Row(Cow<'static, [f32]>),
-    /// At zeros.
+    /// Zeros.
     Zeros,
-    /// At numbers `[N, width]`, row-major, that follow from the initial cloud of N points.
+    /// Numbers `[N, width]`, row-major, computed from the initial cloud of N points.
     Cloud(fn(&PointCloud, &GaussiansConfig) -> Vec<f32>),
 }
 
-/// What makes of trained numbers those that are used.
+/// The function from trained numbers to those that are used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Activation {
     /// Nothing.
     Identity,
-    /// The exponential, for what is positive.
+    /// The exponential, for positive values.
     Exponential,
-    /// The sigmoid, for what lies in [0, 1].
+    /// The sigmoid, for values in [0, 1].
     Sigmoid,
 }
 
-/// A number of an attribute.
+/// A number that belongs to an attribute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Setting {
-    /// It stands in the configuration of the training, under this key of the table in question.
+    /// The value of this key of a table in the training's configuration.
     Key(&'static str),
     /// This one.
     Number(f64),
@@ -91,17 +92,17 @@ pub enum Setting {
 /// How a file stores an attribute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coding {
-    /// In multiples of a step, where the file is quantized. A key is one below `compression.attributes`.
+    /// In multiples of a step, where the file is quantized. A key is relative to `compression.attributes`.
     Quantized(Setting),
     /// As float32, whatever else is quantized.
     Float32,
-    /// In a section of its own, under an entropy model of its own: the spherical harmonics beyond degree 0.
+    /// In a section of its own, with an entropy model of its own: the spherical harmonics beyond degree 0.
     Harmonics,
 }
 
 impl Activation {
-    /// Applies it. Logarithms are cut before the exponential, which then stays finite, so that the backward pass has no 0 ·
-    /// infinity.
+    /// Applies it. Logarithms are clamped before the exponential, which then stays finite, so that the backward pass
+    /// has no 0 · infinity.
     pub fn apply<const D: usize>(self, values: Tensor<D>) -> Tensor<D> {
         match self {
             Self::Identity => values,
@@ -130,7 +131,7 @@ pub static QUATS: &Attribute = &BUILT_IN[2];
 /// Opacities before the sigmoid.
 pub static OPACITY_LOGITS: &Attribute = &BUILT_IN[3];
 
-/// What every Gaussian of every scene has, in the order of [`Gaussians`](crate::Gaussians).
+/// The attributes of every Gaussian of every scene, in the order of [`Gaussians`](crate::Gaussians).
 pub static BUILT_IN: [Attribute; 6] = [
     built_in(
         ("means", Width::Fixed(3)),
@@ -191,7 +192,7 @@ const fn built_in(
 /// Refuses further attributes that no scene can have.
 ///
 /// # Errors
-/// In words: a name that no file can hold, one that stands twice, a width of 0.
+/// As text: a name that no file can hold, a name that occurs twice, a width of 0.
 pub fn check_further(attributes: &[Attribute]) -> Result<(), String> {
     for (index, attribute) in attributes.iter().enumerate() {
         let name = &attribute.name;
@@ -208,7 +209,7 @@ pub fn check_further(attributes: &[Attribute]) -> Result<(), String> {
     Ok(())
 }
 
-/// In front of the paths of attributes in a scene, and behind that of the further ones.
+/// Prefix of the paths of attributes in a scene, and what follows it for further attributes.
 const GAUSSIANS: &str = "gaussians.";
 const FURTHER: &str = "further.";
 
@@ -218,12 +219,12 @@ pub fn attribute_of_path(path: &str) -> Option<&str> {
     Some(name.strip_prefix(FURTHER).unwrap_or(name))
 }
 
-/// Learning rate of a further attribute that has none of its own: that of colors.
+/// Learning rate of a further attribute that does not set one: that of colors.
 const DEFAULT_LEARNING_RATE: f64 = 2.5e-3;
 
 impl Attribute {
-    /// A further attribute of so many numbers a Gaussian. It begins at zeros, is stored as float32, and a program that does not
-    /// know it refuses to show the scene.
+    /// A further attribute with `width` numbers for each Gaussian. It starts at zeros and is stored as float32, and a
+    /// program that does not know it refuses to show the scene.
     pub fn new(name: impl Into<String>, width: usize) -> Self {
         Self {
             name: Cow::Owned(name.into()),
@@ -237,17 +238,17 @@ impl Attribute {
         }
     }
 
-    /// With these numbers for every Gaussian at the beginning.
+    /// With these initial numbers for every Gaussian.
     pub fn with_start(self, row: Vec<f32>) -> Self {
         Self { start: Start::Row(Cow::Owned(row)), ..self }
     }
 
-    /// With numbers that follow from the initial cloud at the beginning: `[N, width]`, row-major.
+    /// With initial numbers that are computed from the initial cloud: `[N, width]`, row-major.
     pub fn with_start_of_cloud(self, start: fn(&PointCloud, &GaussiansConfig) -> Vec<f32>) -> Self {
         Self { start: Start::Cloud(start), ..self }
     }
 
-    /// Learning at this rate. It decays like those of colors, opacities, scales and rotations.
+    /// With this learning rate. It decays like those of colors, opacities, scales and rotations.
     pub fn with_learning_rate(self, rate: f64) -> Self {
         Self { learning_rate: Setting::Number(rate), ..self }
     }
@@ -262,12 +263,12 @@ impl Attribute {
         Self { activation, ..self }
     }
 
-    /// Keeping its canonical value at all times.
+    /// With its canonical value at all times.
     pub fn constant(self) -> Self {
         Self { constant: true, ..self }
     }
 
-    /// Not needed for the scene to look right.
+    /// Marked as not needed for the scene to look right.
     pub fn optional(self) -> Self {
         Self { optional: true, ..self }
     }
@@ -278,10 +279,10 @@ impl Attribute {
         format!("{GAUSSIANS}{further}{}", self.name)
     }
 
-    /// Values of N Gaussians at the beginning, `[N, width]` row-major.
+    /// Initial values of N Gaussians, `[N, width]` row-major.
     ///
     /// # Panics
-    /// If the attribute's own start has another length.
+    /// If the attribute's own initial values have another length.
     pub(super) fn start(&self, cloud: &PointCloud, config: &GaussiansConfig) -> Vec<f32> {
         let (count, width) = (cloud.positions.len(), self.width.of(config.sh_degree));
         let values = match &self.start {
@@ -300,7 +301,7 @@ mod tests {
 
     use super::*;
 
-    /// The codec has a small form of the table, since it knows nothing of this crate: the two agree.
+    /// The codec has a small form of the table, since it cannot depend on this crate. The two must agree.
     #[test]
     fn the_codec_has_the_same_table() {
         let steps = AttributeSteps::default();

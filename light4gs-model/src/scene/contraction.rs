@@ -11,7 +11,7 @@ use burn::tensor::Tensor;
 /// assert_eq!(inside, [0.5, 0.0, 0.0, 0.0, 1.75, 0.0]);
 /// ```
 pub fn contract(points: Tensor<2>) -> Tensor<2> {
-    // With r = max(|x|, 1) one formula serves both regions, and its derivative is right in both.
+    // With r = max(|x|, 1) one formula holds in both regions, and so does its derivative.
     let inverse = points.clone().powi_scalar(2).sum_dim(1).clamp_min(1.0).sqrt().recip();
     let factor = (inverse.clone().neg() + 2.0) * inverse;
     points * factor

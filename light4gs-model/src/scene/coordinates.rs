@@ -12,13 +12,13 @@ use super::contraction::contract;
 pub struct Pca {
     /// Mean of the points, world units.
     pub mean: [f32; 3],
-    /// Unit axes, by falling variance; the component of largest magnitude of each is positive.
+    /// Unit axes, by descending variance; the component of largest magnitude of each is positive.
     pub axes: [[f32; 3]; 3],
     /// Standard deviation along each axis, world units.
     pub std: [f32; 3],
 }
 
-/// Spread below this share of the largest one counts as this share, so that flat clouds can be standardized.
+/// A standard deviation below this share of the largest one is raised to it, so that flat clouds can be standardized.
 const MIN_RELATIVE_STD: f64 = 1e-4;
 
 impl Pca {
@@ -47,7 +47,7 @@ impl Pca {
         Self { mean, axes, std }
     }
 
-    /// The same mean, the world's axes, and the unbiased standard deviation along each of them.
+    /// The same mean, with the world's axes and the unbiased standard deviation along each of them.
     fn along_world_axes(points: &[[f32; 3]]) -> Self {
         let mean = Self::fit(points).mean;
         let count = (points.len() as f64 - 1.0).max(1.0);
@@ -73,14 +73,14 @@ impl Pca {
     }
 }
 
-/// What the coordinates of a scene are made of: both on is the paper's (III-A), each may be switched off to see what it
-/// is good for.
+/// How the coordinates of a scene are made. With both on they are the paper's (III-A); each may be switched off to
+/// study its effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CoordinatesConfig {
     /// Along the principal axes of the cloud. Off: along the world's axes, with the cloud's standard deviation along each.
     pub pca: bool,
     /// Contracted outside of one standard deviation. Off: the whole cloud is scaled into the ball that the contraction
-    /// leaves as it is, half as wide as the planes; what lies or moves outside of it is contracted all the same.
+    /// does not change, which is half as wide as the planes. Points outside of that ball are still contracted.
     pub contraction: bool,
 }
 
@@ -91,7 +91,7 @@ impl Default for CoordinatesConfig {
 }
 
 impl CoordinatesConfig {
-    /// The analysis of a cloud that stands for these coordinates.
+    /// The analysis of a cloud with these settings.
     pub fn fit(&self, points: &[[f32; 3]]) -> Pca {
         let mut pca = if self.pca { Pca::fit(points) } else { Pca::along_world_axes(points) };
         if !self.contraction {
@@ -104,7 +104,7 @@ impl CoordinatesConfig {
     }
 }
 
-/// Maps world points to the hexplane's coordinates. Fixed once made: none of its tensors is trained.
+/// Maps world points to the planes' coordinates. Fixed once it is made: none of its tensors is trained.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -131,7 +131,7 @@ pub struct SceneCoordinates {
 }
 
 impl SceneCoordinates {
-    /// The frame of an analysed cloud, with the paper's mapping.
+    /// The coordinates from an analysis, with the paper's mapping.
     pub fn new(pca: &Pca, device: &Device) -> Self {
         let columns: Vec<f32> = (0..9).map(|k| pca.axes[k % 3][k / 3]).collect();
         let constant = |values: Vec<f32>, rows: usize| {
@@ -146,7 +146,7 @@ impl SceneCoordinates {
         }
     }
 
-    /// The same with another mapping, for scenes that other programs have trained.
+    /// The same coordinates with another mapping, for scenes that other programs have trained.
     pub fn with_mapping(mut self, mapping: CoordinateMapping) -> Self {
         self.mapping = mapping;
         self
@@ -175,12 +175,12 @@ impl SceneCoordinates {
         points * row(scale) + row(offset)
     }
 
-    /// The field's time at a time of the scene, both in [0, 1].
+    /// The field's time for a time of the scene, both in [0, 1].
     pub fn field_time(&self, time: f32) -> f32 {
         self.mapping.time(time)
     }
 
-    /// The analysis that the frame was made from.
+    /// The analysis from which the coordinates were made.
     pub fn pca(&self) -> Pca {
         let values = |tensor: Tensor<2>| tensor.into_data().iter::<f32>().collect::<Vec<_>>();
         let triple = |v: Vec<f32>| [v[0], v[1], v[2]];

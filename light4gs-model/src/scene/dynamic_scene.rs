@@ -14,7 +14,7 @@ use crate::planes::FeaturePlanes;
 pub struct DynamicSceneConfig<F: DeformationField = BuiltInField> {
     /// The Gaussians.
     pub gaussians: GaussiansConfig,
-    /// What moves them.
+    /// The field that moves them.
     pub field: F::Config,
     /// From world coordinates to the field's.
     pub coordinates: CoordinatesConfig,
@@ -23,13 +23,13 @@ pub struct DynamicSceneConfig<F: DeformationField = BuiltInField> {
 }
 
 impl<F: DeformationField> DynamicSceneConfig<F> {
-    /// With gradients to the positions, and with the attributes that the field asks for.
+    /// With gradients to the positions, and with the attributes that the field needs.
     pub fn new(mut gaussians: GaussiansConfig, field: F::Config) -> Self {
         gaussians.further.extend(F::attributes(&field));
         Self { gaussians, field, coordinates: CoordinatesConfig::default(), differentiate_points: true }
     }
 
-    /// What the scene's coordinates are made of.
+    /// With these settings of the scene's coordinates.
     pub fn with_coordinates(mut self, coordinates: CoordinatesConfig) -> Self {
         self.coordinates = coordinates;
         self
@@ -68,11 +68,11 @@ impl<F: DeformationField> DynamicSceneConfig<F> {
 /// ```
 #[derive(Module, Debug)]
 pub struct DynamicScene<F: Module = BuiltInField> {
-    /// The canonical ones.
+    /// The canonical Gaussians.
     pub gaussians: Gaussians,
     /// From world coordinates to the field's.
     pub coordinates: SceneCoordinates,
-    /// What moves the Gaussians.
+    /// The field that moves the Gaussians.
     pub field: F,
     /// Whether the field's gradient reaches the positions.
     pub differentiate_points: bool,
@@ -83,7 +83,7 @@ impl<F: DeformationField> DynamicScene<F> {
     pub fn at(&self, time: f32) -> GaussianTensors {
         let canonical = self.gaussians.tensors();
         if self.gaussians.is_empty() {
-            // Dense layers of some back ends refuse a batch of none.
+            // Dense layers of some back ends refuse an empty batch.
             return canonical;
         }
         let means = canonical.means.clone();
@@ -93,12 +93,12 @@ impl<F: DeformationField> DynamicScene<F> {
         self.field.deform(canonical, points, time).with_constants_of(&constants)
     }
 
-    /// The field's planes, if it has some.
+    /// The field's planes, if it has any.
     pub fn planes(&self) -> Option<&FeaturePlanes> {
         self.field.planes()
     }
 
-    /// The field's planes, if it has some, to replace them.
+    /// The field's planes, if it has any, for replacing them.
     pub fn planes_mut(&mut self) -> Option<&mut FeaturePlanes> {
         self.field.planes_mut()
     }

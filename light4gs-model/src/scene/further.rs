@@ -1,4 +1,4 @@
-//! Attributes that Gaussians have beyond those of every scene, as parameters and as tensors.
+//! Further attributes of Gaussians, as parameters and as tensors.
 
 use std::sync::Arc;
 
@@ -10,20 +10,20 @@ use super::attributes::Attribute;
 /// A further attribute of N Gaussians: canonical or at a time.
 #[derive(Clone, Debug)]
 pub struct FurtherTensor {
-    /// What it is.
+    /// The attribute.
     pub attribute: Arc<Attribute>,
     /// `[N, width]`, before the activation.
     pub values: Tensor<2>,
 }
 
-/// The further attributes of [`Gaussians`](crate::Gaussians), which are trained. Each one's path ends in its name, as in
-/// `gaussians.further.lifetime`.
+/// The further attributes of [`Gaussians`](crate::Gaussians), which are trained. The path of each one ends in its name,
+/// as in `gaussians.further.lifetime`.
 #[derive(Clone, Debug, Default)]
 pub struct FurtherParameters {
     list: Vec<(Arc<Attribute>, Param<Tensor<2>>)>,
 }
 
-/// Says where in a module this is, as Burn's own containers do.
+/// The name that visitors of a module get for it, as for Burn's own containers.
 const CONTAINER: &str = "FurtherParameters";
 
 impl FurtherParameters {
@@ -40,7 +40,7 @@ impl FurtherParameters {
         self.list.iter().map(tensor).collect()
     }
 
-    /// What they are.
+    /// The attributes.
     pub fn attributes(&self) -> impl Iterator<Item = &Attribute> {
         self.list.iter().map(|(attribute, _)| &**attribute)
     }

@@ -17,7 +17,7 @@ pub struct GaussiansConfig {
     pub sh_degree: usize,
     /// Opacity at the start, in (0, 1).
     pub opacity: f32,
-    /// What the Gaussians have besides [`BUILT_IN`]; each name once, and none of theirs.
+    /// Attributes besides [`BUILT_IN`]; each name once, and no built-in name.
     pub further: Vec<Attribute>,
 }
 
@@ -43,17 +43,17 @@ impl GaussiansConfig {
         Self { opacity, ..self }
     }
 
-    /// With one more attribute.
+    /// With one further attribute.
     pub fn with_attribute(mut self, attribute: Attribute) -> Self {
         self.further.push(attribute);
         self
     }
 
-    /// One Gaussian a point: isotropic, as large as the root of the mean squared distance to the three nearest
+    /// One Gaussian for each point: isotropic, as large as the root of the mean squared distance to the three nearest
     /// neighbors, unrotated, in the point's color.
     ///
     /// # Panics
-    /// If the start of a further attribute has another length than its width asks for.
+    /// If the initial values of a further attribute do not have the length that follows from its width.
     pub fn init(&self, cloud: &PointCloud, device: &Device) -> Gaussians {
         let count = cloud.positions.len();
         let matrix = |attribute: &Attribute| {
@@ -95,18 +95,18 @@ pub struct GaussianTensors {
     pub sh_dc: Tensor<3>,
     /// `[N, (degree + 1)^2 - 1, 3]`.
     pub sh_rest: Tensor<3>,
-    /// What else they have, `[N, width]` each.
+    /// The further attributes, `[N, width]` each.
     pub further: Vec<FurtherTensor>,
 }
 
-/// Something that makes of every attribute another one, whatever its rank: a closure could not be generic.
+/// A function that replaces every attribute, whatever its rank; a closure could not be generic.
 pub trait AttributeMapper {
-    /// Called once an attribute; what it returns takes the place of `values`.
+    /// Called once for each attribute; the result replaces `values`.
     fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D>;
 }
 
 impl GaussianTensors {
-    /// Every attribute replaced by what the mapper makes of it, in the order of the fields.
+    /// Every attribute replaced by the mapper's result, in the order of the fields.
     pub fn map(self, mapper: &mut impl AttributeMapper) -> Self {
         let [means, log_scales, quats, opacity_logits, sh_dc, sh_rest] = BUILT_IN.each_ref();
         Self {
@@ -132,7 +132,7 @@ impl GaussianTensors {
         self.further.iter().find(|tensor| tensor.attribute.name == name).map(|tensor| &tensor.values)
     }
 
-    /// Gives the attributes that are [constant](Attribute::constant) their canonical values back.
+    /// Sets the attributes that are [constant](Attribute::constant) to their canonical values.
     pub(super) fn with_constants_of(mut self, rest: &[FurtherTensor]) -> Self {
         for constant in rest.iter().filter(|tensor| tensor.attribute.constant) {
             let same = |tensor: &&mut FurtherTensor| tensor.attribute.name == constant.attribute.name;
@@ -155,7 +155,8 @@ impl GaussianTensors {
     }
 }
 
-/// Attributes of N Gaussians as they are drawn: standard deviations and opacities in place of what is trained for them.
+/// Attributes of N Gaussians as they are drawn: standard deviations and opacities in place of the trained logarithms
+/// and logits.
 #[derive(Clone, Debug)]
 pub struct ActivatedGaussians {
     /// `[N, 3]`, world units.
@@ -173,7 +174,7 @@ pub struct ActivatedGaussians {
 }
 
 impl GaussianTensors {
-    /// The exponential of the logarithms, the sigmoid of the logits. Further attributes are not drawn.
+    /// Applies the exponential and the sigmoid. Further attributes are not drawn, so they are left out.
     pub fn activated(self) -> ActivatedGaussians {
         ActivatedGaussians {
             means: self.means,
@@ -212,12 +213,12 @@ pub struct Gaussians {
     pub sh_dc: Param<Tensor<3>>,
     /// `[N, (degree + 1)^2 - 1, 3]`.
     pub sh_rest: Param<Tensor<3>>,
-    /// What else they have, `[N, width]` each.
+    /// The further attributes, `[N, width]` each.
     pub further: FurtherParameters,
 }
 
 impl Gaussians {
-    /// Makes parameters of tensors.
+    /// Parameters with the values of tensors.
     pub fn from_tensors(tensors: GaussianTensors) -> Self {
         Self {
             means: Param::from_tensor(tensors.means),
@@ -243,7 +244,8 @@ impl Gaussians {
         }
     }
 
-    /// Gives the parameters other values, which may have another number of rows; an optimizer knows them as the same.
+    /// Replaces the parameters' values. The number of rows may change; the parameters keep their identities in an
+    /// optimizer.
     pub fn set_tensors(&mut self, tensors: GaussianTensors) {
         #[derive(Default)]
         struct Identities(Vec<ParamId>);
@@ -264,7 +266,7 @@ impl Gaussians {
         *self = map_parameters(Self::from_tensors(tensors), &mut Identify(identities.0.into_iter()));
     }
 
-    /// What every Gaussian has: [`BUILT_IN`], then the further attributes.
+    /// The attributes of every Gaussian: [`BUILT_IN`], then the further ones.
     pub fn attributes(&self) -> impl Iterator<Item = &Attribute> {
         BUILT_IN.iter().chain(self.further.attributes())
     }

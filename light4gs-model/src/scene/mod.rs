@@ -1,8 +1,8 @@
 //! The scene (paper III-A): canonical Gaussians, and the field that moves them.
 //!
-//! World points become the field's coordinates ([`SceneCoordinates`], [`contract`]); [`FeaturePlanes`](crate::FeaturePlanes) give a
-//! feature for a point and a time; [`Deformation`] turns the feature into changes of the Gaussians' attributes;
-//! [`DynamicScene`] is all of it together. [`regularizer`] keeps the planes smooth.
+//! World points are mapped to the field's coordinates ([`SceneCoordinates`], [`contract`]);
+//! [`FeaturePlanes`](crate::FeaturePlanes) give a feature for a point and a time; [`Deformation`] turns the feature
+//! into changes of the Gaussians' attributes; [`DynamicScene`] is the whole. [`regularizer`] keeps the planes smooth.
 
 mod arrays;
 pub mod attributes;

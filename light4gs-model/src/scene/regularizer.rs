@@ -4,7 +4,8 @@ use burn::tensor::{Tensor, s};
 
 use crate::planes::FeaturePlanes;
 
-/// Mean square of the second difference along the height of a plane `[C, H, W]`: `[1]`. Zero below three rows.
+/// Mean square of the second difference along the height of a plane `[C, H, W]`: `[1]`. Zero with fewer than three
+/// rows.
 pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {
     let height = plane.dims()[1];
     if height < 3 {
@@ -16,7 +17,7 @@ pub fn second_difference(plane: Tensor<3>) -> Tensor<1> {
     (above + below - middle * 2.0).powi_scalar(2).mean()
 }
 
-/// The sum of a term over the planes with time, or over those without; 0 where there are none.
+/// The sum of a term over the space-time planes, or over the space-only planes; 0 where there are none.
 fn sum_over(planes: &FeaturePlanes, space_time: bool, term: impl Fn(Tensor<3>) -> Tensor<1>) -> Tensor<1> {
     let shapes = planes.layout().planes().iter().zip(&planes.planes);
     let terms =
@@ -35,7 +36,7 @@ pub fn time_smoothness(planes: &FeaturePlanes) -> Tensor<1> {
     sum_over(planes, true, second_difference)
 }
 
-/// Departure of the space-time planes from 1, `[1]`: mean absolute difference, summed over planes and scales.
+/// Distance of the space-time planes from 1, `[1]`: mean absolute difference, summed over planes and scales.
 pub fn time_l1(planes: &FeaturePlanes) -> Tensor<1> {
     sum_over(planes, true, |plane| (plane - 1.0).abs().mean())
 }

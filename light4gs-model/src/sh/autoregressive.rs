@@ -22,7 +22,7 @@ pub struct ShAutoregressiveConfig {
     /// Width of the hidden layers.
     #[config(default = 32)]
     pub hidden: usize,
-    /// Standard deviations at the start, in steps.
+    /// Initial standard deviations, in steps.
     #[config(default = 4.0)]
     pub initial_scale: f32,
 }
@@ -35,8 +35,8 @@ impl ShAutoregressiveConfig {
     }
 }
 
-/// A network for each degree: from the color and all lower degrees of the same Gaussian to the Gaussian of each of the
-/// degree's channels.
+/// A network for each degree: from the color and all lower degrees of a Gaussian to the distributions of the degree's
+/// channels.
 #[derive(Module, Debug)]
 pub struct ShAutoregressive {
     /// `sh_ar.{degree - 1}`.
@@ -78,7 +78,7 @@ impl ShEntropy for ShAutoregressive {
         let (dc, values) = (dc_of(known), channels_first(values.detach()));
         let mut decoded: Vec<Tensor<2>> = Vec::new();
         for (degree, (start, channels)) in DEGREES.into_iter().enumerate() {
-            // A network looks only at what lies before its own channels.
+            // A network reads only channels before its own.
             let lower = if degree == 0 { values.clone() } else { Tensor::cat(decoded.clone(), 0) };
             let own = values.clone().narrow(0, start, channels);
             decoded.push(round_around(own, self.output(degree, &dc, &lower).detach(), self.step));

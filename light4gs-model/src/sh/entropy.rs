@@ -1,4 +1,4 @@
-//! What an entropy model of the spherical harmonics is, and what a decoder knows before it asks one.
+//! The interface of an entropy model of the spherical harmonics, and what a decoder knows before it evaluates one.
 
 use std::ops::RangeInclusive;
 
@@ -13,19 +13,19 @@ use crate::planes::PlaneTensors;
 /// Channels of the higher spherical harmonics.
 pub const SH_CHANNELS: usize = 45;
 
-/// What a decoder knows of the Gaussians before it decodes their spherical harmonics.
+/// Values of the Gaussians that are decoded before their spherical harmonics.
 #[derive(Clone, Debug)]
 pub struct ShKnown {
     /// Degree-0 spherical harmonics, `[N, 1, 3]`.
     pub sh_dc: Tensor<3>,
-    /// Positions in the scene's frame, `[N, 3]` in [-1, 1].
+    /// Positions in the scene's coordinates, `[N, 3]` in [-1, 1].
     pub positions: Tensor<2>,
     /// All feature planes; empty where there are none.
     pub planes: PlaneTensors,
 }
 
 impl ShKnown {
-    /// For models whose densities depend on nothing (see [`ShTables`]): no Gaussian, no plane.
+    /// For models whose densities do not depend on the Gaussian (see [`ShTables`]): no Gaussian, no plane.
     pub fn nothing(device: &Device) -> Self {
         Self {
             sh_dc: Tensor::zeros([0, 1, 3], device),
@@ -35,14 +35,14 @@ impl ShKnown {
     }
 }
 
-/// An entropy model of `sh_rest`. A model of one's own implements this; [`channels_first`], [`gaussian_bits`] and
-/// [`ShNetwork`](crate::ShNetwork) are what the built-in ones are made of.
+/// An entropy model of `sh_rest`. A model of your own implements this; the built-in ones are made with
+/// [`channels_first`], [`gaussian_bits`] and [`ShNetwork`](crate::ShNetwork).
 pub trait ShEntropy {
     /// Distance between the values of neighboring symbols.
     fn step(&self) -> f32;
 
     /// Bits of each value, `[N, 15, 3]`, of `values [N, 15, 3]`: noisy in training, quantized in an evaluation.
-    /// Differentiable in the values, in what is known and in the weights.
+    /// Differentiable in the values, in `known` and in the weights.
     fn bits(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3>;
 
     /// Values with uniform noise of the step's width, which stands for rounding in training.
@@ -52,28 +52,29 @@ pub trait ShEntropy {
         values + noise
     }
 
-    /// `values` as a decoder gets them. Without gradient. To the nearest multiples of the step, unless the model rounds
+    /// `values` as a decoder gets them, without gradient: the nearest multiples of the step, unless the model rounds
     /// around a prediction.
     fn quantize(&self, values: Tensor<3>, known: &ShKnown) -> Tensor<3> {
         let _ = known;
         (values.detach() / self.step()).round() * self.step()
     }
 
-    /// The model's frequency tables, if its densities depend on nothing; it then travels as such.
+    /// The model's frequency tables, if its densities do not depend on the Gaussian; the file then has the tables.
     fn tables(&self) -> Option<&dyn ShTables> {
         None
     }
 
-    /// The networks behind [`Self::bits`] for the codec's exact executor, with the same weights; none where the model
-    /// travels as tables.
+    /// The networks behind [`Self::bits`] for the codec's exact executor, with the same weights; empty for a model with
+    /// tables.
     fn priors(&self) -> Vec<ShPrior> {
         Vec::new()
     }
 
-    /// What a decoder needs to read `sh_rest`, `[N, 15, 3]` row-major. Tables go as far as these values do.
+    /// The coding with which a decoder can read `sh_rest`, `[N, 15, 3]` row-major. Tables extend as far as these
+    /// values.
     ///
     /// # Errors
-    /// Values that are not finite, or too many steps apart for a table.
+    /// Values that are not finite, or that span too many steps for a table.
     fn to_coding(&self, sh_rest: &[f32]) -> Result<ShCoding, CodecError> {
         let step = self.step();
         match self.tables() {
@@ -83,7 +84,7 @@ pub trait ShEntropy {
     }
 }
 
-/// An entropy model whose densities do not depend on anything: a frequency table for each channel.
+/// An entropy model whose densities do not depend on the Gaussian: a frequency table for each channel.
 pub trait ShTables {
     /// For each of the 45 channels the probabilities of these symbols (`value / step`), in float64 on the host.
     fn pmf(&self, symbols: RangeInclusive<i32>) -> Vec<Vec<f64>>;
@@ -101,7 +102,7 @@ pub fn channels_last(values: Tensor<2>) -> Tensor<3> {
     values.transpose().reshape([count, SH_CHANNELS / 3, 3])
 }
 
-/// Bits `[C, N]` of `values [C, N]`, given the output `[2 C, 1, N]` of a network: first scales, then means, in steps.
+/// Bits `[C, N]` of `values [C, N]`, given a network's output `[2 C, 1, N]`: first scales, then means, in steps.
 pub fn gaussian_bits(values: Tensor<2>, output: Tensor<3>, step: f32) -> Tensor<2> {
     bits(gaussian_likelihood(values / step, normal_parameters(output)))
 }

@@ -1,4 +1,4 @@
-//! Entropy model of the spherical harmonics that asks the feature planes (paper III-D, an alternative).
+//! Entropy model of the spherical harmonics that uses the feature planes (paper III-D, an alternative).
 
 use burn::config::Config;
 use burn::module::Module;
@@ -19,7 +19,7 @@ pub struct ShHexPlaneCoupledConfig {
     /// Width of the hidden layer.
     #[config(default = 32)]
     pub hidden: usize,
-    /// Standard deviations at the start, in steps.
+    /// Initial standard deviations, in steps.
     #[config(default = 4.0)]
     pub initial_scale: f32,
 }
@@ -32,7 +32,7 @@ impl ShHexPlaneCoupledConfig {
     }
 }
 
-/// A network from the space-only planes' feature at a Gaussian's position to the Gaussian of each of its channels.
+/// A network from the space-only planes' feature at a Gaussian's position to the distributions of its channels.
 #[derive(Module, Debug)]
 pub struct ShHexPlaneCoupled {
     /// `sh_hex`.

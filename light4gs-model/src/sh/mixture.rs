@@ -18,18 +18,18 @@ pub struct ShMixtureConfig {
     /// Distance between the values of neighboring symbols.
     #[config(default = 0.02)]
     pub step: f32,
-    /// Logistics in a channel, K.
+    /// Logistics for each channel, K.
     #[config(default = 3)]
     pub components: usize,
-    /// Scale of the narrowest logistic at the start, in the units of the values; each of the others is four times as wide as
-    /// the one before.
+    /// Initial scale of the narrowest logistic, in the units of the values; each other one is four times as wide as the
+    /// one before.
     #[config(default = 0.02)]
     pub narrowest: f64,
 }
 
 impl ShMixtureConfig {
-    /// Equal weights, means at zero, scales a factor of four apart: from values that barely leave zero to those of a
-    /// bright highlight.
+    /// Equal weights, means at zero, scales a factor of four apart: from values close to zero to those of a bright
+    /// highlight.
     pub fn init(&self, device: &Device) -> ShMixture {
         let shape = [SH_CHANNELS, self.components];
         let log_scales: Vec<f32> =

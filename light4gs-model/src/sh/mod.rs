@@ -1,13 +1,13 @@
 //! Entropy models of the higher spherical harmonics (paper III-D; docs/design.md): one interface, several of them.
 //!
-//! | model | a value's density comes from | travels as |
+//! | model | a value's density depends on | in the file |
 //! |---|---|---|
 //! | [`ShBottleneck`] | its channel: a learned monotone network | integer tables |
 //! | [`ShMixture`] | its channel: a few logistics | integer tables |
 //! | [`ShAutoregressive`] | the color and the lower degrees of the same Gaussian | layers |
 //! | [`ShHexPlaneCoupled`] | the space-only planes at the Gaussian's position | layers |
 //!
-//! Which models there are is said in this file and nowhere else: a new one is a file of its own and a row in the list here.
+//! The models are listed in this file and nowhere else: a new one is a file of its own and a row in the list here.
 //!
 //! A channel is `coefficient * 3 + rgb` of `sh_rest [N, 15, 3]`; there are 45.
 
@@ -38,13 +38,13 @@ use light4gs_codec::ShPrior;
 /// the rate needs hundreds of iterations to come down from there; our runs are shorter.
 const SH_INITIAL_SCALE: f64 = 0.3;
 
-/// Makes of a list of models their names, their configurations, and one type that is any of them.
+/// From a list of models, defines their names, their configurations, and one type that can hold any of them.
 macro_rules! built_in_models {
     ($(
         $(#[$about:meta])*
         $variant:ident = $name:literal: $model:ident, $config:ident: |$step:pat_param, $features:pat_param| $usual:expr;
     )+) => {
-        /// The built-in models by name: what a configuration chooses from.
+        /// The built-in models by name, from which a configuration chooses.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum ShKind {
             $($(#[$about])* $variant,)+
@@ -56,7 +56,7 @@ macro_rules! built_in_models {
             /// Their names, in the same order.
             pub const NAMES: &[&'static str] = &[$($name),+];
 
-            /// Its usual configuration, for planes with features of this length (0 without planes).
+            /// Its default configuration, for planes with features of this length (0 without planes).
             pub fn config(self, step: f32, feature_size: usize) -> ShEntropyConfig {
                 match self {
                     $(Self::$variant => {
@@ -67,7 +67,7 @@ macro_rules! built_in_models {
             }
         }
 
-        /// Which entropy model, with its configuration.
+        /// The choice of an entropy model, with its configuration.
         #[derive(Config, Debug)]
         pub enum ShEntropyConfig {
             $($(#[$about])* $variant($config),)+

@@ -1,4 +1,4 @@
-//! Two layers from what is known of a Gaussian to the Gaussians of its spherical harmonics.
+//! Two layers, from known values of a Gaussian to the distributions of its spherical harmonics.
 
 use burn::module::{Module, Param};
 use burn::tensor::activation::leaky_relu;
@@ -8,7 +8,8 @@ use light4gs_codec::network::Value;
 
 use crate::entropy::convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig};
 
-/// Features `[I, 1, N]` to scales and means `[2 C, 1, N]`: linear, rectifier, linear. Gaussians are the columns of a plane with one row.
+/// Features `[I, 1, N]` to scales and means `[2 C, 1, N]`: linear, ReLU, linear. The Gaussians of the scene are the
+/// columns of a plane with one row.
 #[derive(Module, Debug)]
 pub struct ShNetwork {
     /// I to hidden to 2 C, as 1×1 convolutions.
@@ -16,7 +17,7 @@ pub struct ShNetwork {
 }
 
 impl ShNetwork {
-    /// The last layer starts at scale `scale` and mean 0, with a tenth of PyTorch's weights.
+    /// The last layer starts at scale `scale` and mean 0, with weights of a tenth of PyTorch's.
     pub fn new(inputs: usize, hidden: usize, channels: usize, scale: f32, device: &Device) -> Self {
         let [first, mut last] = [(inputs, hidden), (hidden, 2 * channels)]
             .map(|(inputs, outputs)| PlaneConvConfig::new(inputs, outputs, 1).init(device));
@@ -32,7 +33,7 @@ impl ShNetwork {
         last.forward(leaky_relu(first.forward(features), LEAKY_SLOPE))
     }
 
-    /// [`Self::forward`] for the codec's exact executor.
+    /// The same computation as [`Self::forward`], for the codec's exact executor.
     pub fn describe(&self, network: &mut Network, features: Value) -> Value {
         let [first, last] = &self.layers;
         let hidden = network.layer(features, first.to_layer());

@@ -4,19 +4,19 @@ use std::ops::RangeInclusive;
 
 use light4gs_codec::{CodecError, FrequencyTable, ShCoding};
 
-/// A table goes no further than this many symbols on either side of 0; what lies beyond is escaped.
+/// A table has at most this many symbols on either side of 0; others are escaped.
 const TABLE_REACH: i32 = 8000;
 
-/// The symbol of a value, as far as a table reaches.
+/// The symbol of a value, clamped to the reach of a table.
 fn table_symbol(value: f32, step: f32) -> i32 {
     ((value / step).round() as i32).clamp(-TABLE_REACH, TABLE_REACH)
 }
 
-/// Coding of `sh_rest`, `[N, 15, 3]` row-major, with a table for each channel that goes as far as these values do. `pmf`
-/// gives each channel's probabilities of a range of symbols.
+/// Coding of `sh_rest`, `[N, 15, 3]` row-major, with a table for each channel that extends as far as these values.
+/// `pmf` gives each channel's probabilities of a range of symbols.
 ///
 /// # Errors
-/// Values that are not finite, or too many steps apart for a table.
+/// Values that are not finite, or that span too many steps for a table.
 pub(super) fn table_coding(
     sh_rest: &[f32],
     step: f32,
@@ -28,11 +28,11 @@ pub(super) fn table_coding(
     Ok(ShCoding::Tables { step, tables })
 }
 
-/// Coding of `sh_rest`, `[N, channels]` row-major, without a trained model: a table a channel, from how often each
-/// symbol occurs.
+/// Coding of `sh_rest`, `[N, channels]` row-major, without a trained model: a table for each channel, from the
+/// frequencies of its symbols.
 ///
 /// # Errors
-/// Values too many steps apart for a table.
+/// Values that span too many steps for a table.
 pub fn counted_sh_coding(sh_rest: &[f32], channels: usize, step: f32) -> Result<ShCoding, CodecError> {
     let table = |channel: usize| {
         let symbols: Vec<i32> =

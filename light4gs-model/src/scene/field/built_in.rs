@@ -1,4 +1,4 @@
-//! The built-in deformation fields as one type: what a configuration and a file choose from when a program runs.
+//! The built-in deformation fields as one type, from which a configuration or a file chooses when the program runs.
 
 use std::collections::BTreeMap;
 
@@ -12,10 +12,10 @@ use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
-/// Makes one field of several: whatever is asked of it is asked of the one that it is.
+/// Makes one field type from several. Each call is passed to the field that a value holds.
 macro_rules! built_in_fields {
     ($($(#[$about:meta])* $variant:ident($field:ident),)+) => {
-        /// One of the built-in deformation fields. Paths of its parameters are those of the field that it is.
+        /// One of the built-in deformation fields. Paths of its parameters are those of the field that it holds.
         ///
         /// ```
         /// use burn::tensor::Device;
@@ -25,20 +25,20 @@ macro_rules! built_in_fields {
         /// assert_eq!(field.kind(), "");
         /// assert!(field.planes().is_none());
         /// ```
-        // There is one of it in a scene, so its size does not matter.
+        // A scene has only one of these, so its size does not matter.
         #[allow(clippy::large_enum_variant)]
         #[derive(Module, Debug)]
         pub enum BuiltInField {
             $($(#[$about])* $variant($field),)+
         }
 
-        /// Which field, with its configuration.
+        /// The choice of a field, with its configuration.
         #[derive(Clone, Debug)]
         pub enum BuiltInFieldConfig {
             $($(#[$about])* $variant(<$field as DeformationField>::Config),)+
         }
 
-        /// Evaluates an expression with the field that it is.
+        /// Evaluates an expression with the field that a value holds.
         macro_rules! each {
             ($self:expr, $it:ident => $result:expr) => {
                 match $self {
@@ -115,7 +115,7 @@ macro_rules! built_in_fields {
 }
 
 built_in_fields! {
-    /// The paper's: multiscale hexplane and network.
+    /// The paper's field: multiscale hexplane and network.
     HexPlane(HexPlaneField),
     /// Nothing moves.
     Still(StillField),

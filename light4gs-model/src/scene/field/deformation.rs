@@ -14,12 +14,12 @@ use crate::scene::ModelError;
 /// Configuration of a [`Deformation`].
 #[derive(Config, Debug)]
 pub struct DeformationConfig {
-    /// Length of the incoming feature.
+    /// Length of the input feature.
     pub feature_size: usize,
     /// Width of every hidden layer.
     #[config(default = 64)]
     pub width: usize,
-    /// Layers of the trunk: 1 is a single linear layer (0 means the same), more add ReLU and a layer each.
+    /// Layers of the trunk: 1 is a single linear layer (0 means the same); each further one adds a ReLU and a layer.
     #[config(default = 1)]
     pub depth: usize,
     /// Whether positions change.
@@ -44,13 +44,13 @@ fn linear(inputs: usize, outputs: usize, device: &Device) -> Linear {
 }
 
 impl DeformationConfig {
-    /// Each attribute's channels, and whether it changes.
+    /// For each attribute, whether it changes, and its channels.
     fn outputs(&self) -> [(bool, usize); 5] {
         [(self.position, 3), (self.scale, 3), (self.rotation, 4), (self.opacity, 1), (self.sh, 48)]
     }
 
-    /// Refuses a network that no stream can hold, before it takes memory: the largest that `width` and `depth` allow by
-    /// themselves would take 17 GB.
+    /// Refuses a network that no stream can hold, before it takes memory: the largest one within the bounds of `width`
+    /// and `depth` would take 17 GB.
     ///
     /// # Errors
     /// More weights, or more channels of all values together, than a network may have.
@@ -69,7 +69,7 @@ impl DeformationConfig {
         let inner = layer(width, width);
         let heads = outputs.iter().map(|&channels| inner.saturating_add(layer(width, channels)));
         let weights = sum(&mut [layer(features, width), inner.saturating_mul(depth - 1)].into_iter().chain(heads));
-        // Every layer but the last of a head has a ReLU behind it.
+        // Every layer except the last one of each head is followed by a ReLU.
         let hidden = depth.saturating_add(outputs.len() as u64).saturating_mul(2).saturating_mul(width);
         let channels = sum(&mut [features, hidden].into_iter().chain(outputs.iter().copied()));
         (weights, channels)
@@ -106,7 +106,7 @@ impl DeformationHead {
         self.output.forward(relu(self.hidden.forward(rectified)))
     }
 
-    /// [`Self::forward`] for the codec's exact executor.
+    /// The same computation as [`Self::forward`], for the codec's exact executor.
     fn describe(&self, network: &mut Network, rectified: Value) -> Value {
         let hidden = network.layer(rectified, to_layer(&self.hidden));
         let rectified = network.relu(hidden);
@@ -174,7 +174,7 @@ impl Deformation {
         ]
     }
 
-    /// [`Self::forward`] for the stream and the codec's exact executor.
+    /// The same computation as [`Self::forward`], for the stream and the codec's exact executor.
     pub fn to_motion(&self) -> MotionNetwork {
         let [first, rest @ ..] = &self.trunk[..] else { unreachable!("a trunk has at least one layer") };
         let first = to_layer(first);
@@ -196,10 +196,10 @@ impl Deformation {
         MotionNetwork { network, sources: vec![MotionSource::Features], outputs }
     }
 
-    /// From a network that [`Self::to_motion`] makes, for features of a known length.
+    /// The inverse of [`Self::to_motion`], for features of a known length.
     ///
     /// # Errors
-    /// Another network.
+    /// A network of another structure.
     pub fn from_motion(motion: &MotionNetwork, feature_size: usize, device: &Device) -> Result<Self, ModelError> {
         let has = |output| motion.outputs.contains(&output);
         let layers: Vec<&Layer> = motion.network.layers().collect();
@@ -215,7 +215,7 @@ impl Deformation {
             sh: has(MotionOutput::Sh),
         };
         let other = |what: &str| ModelError::Motion(format!("{what} are not those of a trunk with heads"));
-        // Sizes first: nothing is made for sizes that nobody has numbers for.
+        // Sizes are checked first, so that no memory is taken for weights that are not there.
         let sizes = |layer: &&Layer| {
             layer.weight.len() as u64 == layer.weights() && layer.inputs as usize <= width.max(feature_size)
         };
@@ -240,7 +240,7 @@ impl Deformation {
     }
 }
 
-/// Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
+/// Burn has weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
 pub(super) fn to_layer(linear: &Linear) -> Layer {
     let [_, outputs] = linear.weight.dims();
     let bias = linear.bias.as_ref().map(|bias| bias.val().into_data().iter().collect());
@@ -252,7 +252,7 @@ pub(super) fn load(linear: &mut Linear, layer: &Layer, device: &Device) {
     let (inputs, outputs) = (layer.inputs as usize, layer.outputs as usize);
     let weight = Tensor::<2>::from_data(TensorData::new(layer.weight.clone(), [outputs, inputs]), device);
     let bias = Tensor::<1>::from_data(TensorData::new(layer.bias.clone(), [outputs]), device);
-    // Copied, since a transposed view would be copied anew in every product.
+    // Copied, since a transposed view would be copied again in every product.
     linear.weight = Param::from_tensor(Tensor::from_data(weight.transpose().into_data(), device));
     linear.bias = Some(Param::from_tensor(bias));
 }
@@ -266,7 +266,7 @@ mod tests {
         for depth in [0, 1, 3] {
             let config = DeformationConfig::new(5).with_width(7).with_depth(depth).with_rotation(false).with_sh(true);
             let motion = config.init(&Device::flex()).to_motion();
-            // All layers but the last of the heads for positions, scales and harmonics have a ReLU behind them.
+            // All layers except the last ones of the heads for positions, scales and harmonics are followed by a ReLU.
             let layers: u64 = motion.network.layers().map(|layer| u64::from(layer.outputs)).sum();
             let weights: usize = motion.network.layers().map(|layer| layer.weight.len() + layer.bias.len()).sum();
             assert_eq!(config.size(), (weights as u64, 5 + 2 * layers - (3 + 3 + 48)), "depth {depth}");

@@ -1,4 +1,4 @@
-//! The paper's motion: a feature of the multiscale hexplane, and a small network that turns it into changes (III-A).
+//! The paper's field: a feature of the multiscale hexplane, and a small network that turns it into changes (III-A).
 
 use burn::config::Config;
 use burn::module::Module;
@@ -19,7 +19,7 @@ pub struct HexPlaneFieldConfig {
     pub deformation: DeformationConfig,
 }
 
-/// Features over space and time, and what they change.
+/// Features over space and time, and the network that turns them into changes.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};

@@ -1,4 +1,4 @@
-//! No motion at all: plain Gaussians, for those who only want them small.
+//! No motion: plain Gaussians, for static scenes.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -25,7 +25,7 @@ pub struct StillField;
 impl DeformationField for StillField {
     type Config = ();
 
-    /// A stream in which nothing moves has no name for it.
+    /// In a stream, the kind of a scene without motion is empty.
     const KINDS: &'static [&'static str] = &[""];
 
     fn init((): &(), _: &Device) -> Self {
