@@ -10,33 +10,33 @@ use light4gs_data::{
 
 use crate::config::Config;
 
-/// Gives the images of frames. Asked by several threads at once.
+/// Gives the images of frames. Several threads call it at the same time.
 pub trait ImageSource: Send + Sync {
     /// The image of a frame, of the size of the frame's camera.
     ///
     /// # Errors
-    /// Where the frame has no image, or it cannot be read.
+    /// If the frame has no image, or it cannot be read.
     fn image(&self, frame: &Frame) -> Result<Arc<RgbImage8>, DataError>;
 
-    /// Which pixels of the frame's image may be trained on; `None` is all of them.
+    /// The pixels of the frame's image that may be trained on; `None` means all of them.
     ///
     /// # Errors
-    /// Where the mask cannot be read.
+    /// If the mask cannot be read.
     fn trained_pixels(&self, frame: &Frame) -> Result<Option<Arc<PixelMask>>, DataError> {
         let _ = frame;
         Ok(None)
     }
 
-    /// The pixels that masked measures look at; `None` where the frame has no mask.
+    /// The pixels of masked metrics; `None` if the frame has no mask.
     ///
     /// # Errors
-    /// Where the mask cannot be read.
+    /// If the mask cannot be read.
     fn measured_pixels(&self, frame: &Frame) -> Result<Option<PixelMask>, DataError> {
         let _ = frame;
         Ok(None)
     }
 
-    /// These frames will be asked for; a source may begin to read them.
+    /// Announces frames that will be needed, so that a source can begin to read them.
     fn prefetch(&self, frames: &[Frame]) {
         let _ = frames;
     }
@@ -60,7 +60,7 @@ impl ImageSource for ImageStore {
     }
 }
 
-/// Images in memory, by the name of their frame.
+/// Images in memory, by the names of their frames.
 #[derive(Clone, Debug, Default)]
 pub struct MemoryImages(HashMap<String, Arc<RgbImage8>>);
 
@@ -80,7 +80,7 @@ impl ImageSource for MemoryImages {
     }
 }
 
-/// How a dataset is opened for a configuration.
+/// The options with which a dataset is opened for a configuration.
 pub fn load_options(config: &Config) -> LoadOptions {
     LoadOptions {
         layout: config.data.layout.clone(),
@@ -98,7 +98,7 @@ pub fn image_store(config: &Config) -> ImageStore {
     ImageStore::new(&load_options(config), (config.data.memory_limit_mib << 20) as usize)
 }
 
-/// What the file says about the scene it was made from.
+/// The metadata for the file of a scene.
 pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
     let positions = &data.points.positions;
     let bound = |pick: fn(f32, f32) -> f32, start: f32| {
@@ -111,10 +111,10 @@ pub fn scene_meta(config: &Config, data: &Scene) -> SceneMeta {
     times.sort_by(f32::total_cmp);
     times.dedup();
     SceneMeta {
-        // A folder may be called anything.
+        // A folder may have any name.
         name: legal_name(&data.name),
         frame_count: times.len() as u32,
-        // Times are a share of the whole; nobody says how long it lasts.
+        // Times are shares of the whole, whose duration is not known.
         fps: 0.0,
         bounds,
         background: data.background,

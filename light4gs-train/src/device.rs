@@ -16,19 +16,19 @@ pub fn built_in() -> Vec<&'static str> {
     DEVICES.iter().copied().filter(is_built_in).collect()
 }
 
-/// The device for work of which every back end makes the same: `flex` where this build contains it, else the first that
-/// it contains.
+/// A device for work that gives the same result on every back end: `flex` if this build contains it, else the first
+/// back end that it contains.
 ///
 /// # Errors
-/// [`TrainError::Input`] where this build contains none.
+/// [`TrainError::Input`] if this build contains none.
 pub fn any() -> Result<Device, TrainError> {
     let names = built_in();
     let name = names.iter().find(|name| **name == "flex").or(names.first());
     device_by_name(name.ok_or_else(|| TrainError::Input("this program was built without a back end".into()))?)
 }
 
-/// The device that a name stands for, without autodiff: `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by
-/// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (a software driver).
+/// The device with a name, without autodiff: `ndarray`, `flex`, `wgpu` (the strongest adapter), `wgpu:0` (by number),
+/// `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (a software driver).
 ///
 /// # Errors
 /// [`TrainError::Input`] for any other name, and as [`open`].
@@ -36,7 +36,7 @@ pub fn device_by_name(name: &str) -> Result<Device, TrainError> {
     open(name.parse().map_err(|unknown: UnknownDevice| TrainError::Input(unknown.to_string()))?)
 }
 
-/// The device that a name stands for, without autodiff.
+/// The device with a name, without autodiff.
 ///
 /// # Errors
 /// [`TrainError::Input`] where this build does not contain the back end, or this machine has no such adapter.
@@ -104,7 +104,7 @@ mod wgpu {
     }
 }
 
-/// Whether a device's work is done by the processor's own threads, as the caller's is.
+/// Whether a device computes with the processor's own threads, as the caller does.
 pub fn computes_on_processor(device: &Device) -> bool {
     let processors: &[fn() -> Device] = &[
         #[cfg(feature = "ndarray")]
@@ -116,7 +116,7 @@ pub fn computes_on_processor(device: &Device) -> bool {
     processors.iter().any(|processor| device == processor())
 }
 
-/// The name that a wgpu device's adapter has for itself; none for the processor's back ends.
+/// The name that a wgpu device's adapter reports; `None` for the CPU back ends.
 pub fn adapter_name(name: DeviceName, device: &Device) -> Option<String> {
     match name {
         #[cfg(feature = "wgpu")]
@@ -128,7 +128,7 @@ pub fn adapter_name(name: DeviceName, device: &Device) -> Option<String> {
     }
 }
 
-/// What reports say of a device: its name, and for wgpu the adapter's own, as in `wgpu (llvmpipe)`.
+/// The text for a device in reports: its name, and for wgpu the adapter's, as in `wgpu (llvmpipe)`.
 pub fn describe(name: DeviceName, device: &Device) -> String {
     match adapter_name(name, device) {
         Some(adapter) => format!("{name} ({adapter})"),

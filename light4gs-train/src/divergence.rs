@@ -1,4 +1,4 @@
-//! Training that went wrong: numbers that are no longer finite, and renderings no better than an empty image.
+//! Signs that a training has failed: numbers that are no longer finite, and renderings no better than an empty image.
 
 use std::collections::VecDeque;
 use std::fmt;
@@ -14,7 +14,7 @@ use crate::config::{AttributeRate, Config};
 use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
 use crate::stage::Stage;
 
-/// Numbers of a training that are no longer finite, and how to go on.
+/// Numbers of a training that are no longer finite, and how to continue.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Divergence {
     /// The stage.
@@ -23,7 +23,7 @@ pub struct Divergence {
     pub iteration: usize,
     /// What is not finite.
     pub found: NotFinite,
-    /// The newest checkpoint: none that has such numbers is ever written.
+    /// The newest checkpoint. A checkpoint with such numbers is never written.
     pub checkpoint: Option<PathBuf>,
     /// Folder of the run, if it has one.
     pub run: Option<PathBuf>,
@@ -42,7 +42,7 @@ pub struct Remedy {
 
 impl fmt::Display for Remedy {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // As short as a float32: nobody needs more digits of a learning rate.
+        // With the digits of a float32: a learning rate needs no more.
         write!(formatter, "{}={:e}", self.key, self.value as f32)
     }
 }
@@ -91,7 +91,7 @@ fn attribute_rate(attribute: &Attribute, config: &Config) -> Option<(&'static st
     AttributeRate::of(attribute, &config.train.learning_rate)?.key
 }
 
-/// The learning rate of a parameter: its key and its value. None for an attribute whose rate is no key.
+/// The learning rate of a parameter: its key and its value. `None` for an attribute whose rate is not a key.
 fn learning_rate(path: &str, config: &Config) -> Option<(&'static str, f64)> {
     let group = ParameterGroup::of(path)?;
     if group == ParameterGroup::Attribute {
@@ -101,7 +101,7 @@ fn learning_rate(path: &str, config: &Config) -> Option<(&'static str, f64)> {
     group_rates(config).into_iter().find(|(other, ..)| *other == group).map(|(_, key, value)| (key, value))
 }
 
-/// The learning rates of all groups but the attributes: their keys and values.
+/// The learning rates of all groups except the attributes: their keys and values.
 fn group_rates(config: &Config) -> [(ParameterGroup, &'static str, f64); 5] {
     let (rates, compression) = (&config.train.learning_rate, &config.compression);
     let (context, sh) = (&compression.context, &compression.sh);
@@ -114,7 +114,8 @@ fn group_rates(config: &Config) -> [(ParameterGroup, &'static str, f64); 5] {
     ]
 }
 
-/// What else can drive a training apart: the rates at the end, and the weights of the loss besides the images'.
+/// What else can make a training diverge: the rates at the end, and the weights of terms of the loss other than the
+/// images'.
 fn other_keys(config: &Config) -> [(&'static str, f64); 7] {
     let (rates, weights) = (&config.train.learning_rate, &config.train.regularizer);
     [
@@ -128,25 +129,26 @@ fn other_keys(config: &Config) -> [(&'static str, f64); 7] {
     ]
 }
 
-/// A key this many times above its default is to blame before any other. Presets stay below.
+/// A key this many times above its default is taken for the cause before any other. Presets stay below.
 const SUSPICIOUS: f64 = 12.0;
 
-/// Of the learning rates and the weights of the loss the one that is furthest above its default, and that default. None
-/// where all are about as usual.
+/// Of the learning rates and the weights of the loss, the one that is furthest above its default, with that default.
+/// `None` if all are near their defaults.
 pub(super) fn unusual_key(config: &Config) -> Option<Remedy> {
     let keys = |config: &Config| -> Vec<(&'static str, f64)> {
         let attributes = BUILT_IN.iter().filter_map(|attribute| attribute_rate(attribute, config));
         let groups = group_rates(config).map(|(_, key, value)| (key, value));
         attributes.chain(groups).chain(other_keys(config)).collect()
     };
-    // Where the default is 0, a small weight.
+    // In place of a default of 0, a small weight.
     let usual = keys(&Config::default()).into_iter().map(|(_, value)| if value > 0.0 { value } else { 0.1 });
     let ratios = keys(config).into_iter().zip(usual).map(|((key, value), usual)| (key, usual, value / usual));
     let (key, value, ratio) = ratios.max_by(|a, b| a.2.total_cmp(&b.2))?;
     (ratio > SUSPICIOUS).then_some(Remedy { key, value })
 }
 
-/// What to change so that it does not happen again: an unusual key, or else the learning rate of what is not finite.
+/// What to change so that the training does not diverge again: an unusual key, or else the learning rate of what is not
+/// finite.
 pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
     if let Some(remedy) = unusual_key(config) {
         return remedy;
@@ -160,19 +162,19 @@ pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
     Remedy { key, value: value / 10.0 }
 }
 
-/// The path of the parameter that a tensor of a checkpoint is, or is a moment of.
+/// The path of the parameter that a tensor of a checkpoint holds, or whose moment it holds.
 fn path_of(name: &str) -> &str {
     ["scene.", "first.", "second."].iter().find_map(|prefix| name.strip_prefix(prefix)).unwrap_or(name)
 }
 
-/// The first parameter of a module that has a number which is not finite. `prefix` stands in front of its name.
+/// The first parameter of a module that has a number which is not finite. `prefix` is put before its name.
 pub(crate) fn not_finite_parameter<M: Module>(module: &M, prefix: &str) -> Option<NotFinite> {
     let mut sums = Sums::default();
     visit_parameters(module, &mut sums);
     if sums.0.is_empty() {
         return None;
     }
-    // One number is read back from the device where all is well.
+    // If all is well, only one number is read back from the device.
     let sum: f32 = Tensor::cat(sums.0, 0).sum().into_scalar();
     if sum.is_finite() {
         return None;
@@ -183,7 +185,7 @@ pub(crate) fn not_finite_parameter<M: Module>(module: &M, prefix: &str) -> Optio
     search.found
 }
 
-/// Of scene and entropy models.
+/// The same for a scene and its entropy models.
 pub(crate) fn not_finite_in<S: Module, C: Module>(scene: &S, compression: Option<&C>) -> Option<NotFinite> {
     not_finite_parameter(scene, "scene")
         .or_else(|| compression.and_then(|models| not_finite_parameter(models, COMPRESSION)))
@@ -226,7 +228,7 @@ impl ParameterVisitor for Search<'_> {
 /// Logged images over which renderings are compared with an empty image.
 const WINDOW: usize = 10;
 
-/// Notices when renderings are no better than an image that shows the background alone.
+/// Detects renderings that are no better than an image of the background alone.
 #[derive(Debug, Default)]
 pub(super) struct EmptyImageWatch {
     /// Mean squared errors of the rendering and of the empty image, the newest last.
@@ -237,8 +239,8 @@ pub(super) struct EmptyImageWatch {
 }
 
 impl EmptyImageWatch {
-    /// Takes an image that was logged: PSNR of the rendering and of the empty image, both against the training image.
-    /// Returns what to tell, where renderings have fallen to empty images, or where a stage ends with such.
+    /// Takes the PSNR of a rendering and of the empty image, both against the training image, when an image is logged.
+    /// Returns a warning if renderings have become empty images, or if a stage ends with such.
     pub(super) fn log(&mut self, psnr: f64, empty_psnr: f64, stage_ends: bool, training_ends: bool) -> Option<String> {
         if self.window.len() == WINDOW {
             self.window.pop_front();
@@ -261,7 +263,7 @@ impl EmptyImageWatch {
         ))
     }
 
-    /// Begins anew: another stage.
+    /// Starts again, for another stage.
     pub(super) fn reset(&mut self) {
         *self = Self::default();
     }
@@ -286,7 +288,7 @@ mod tests {
         let with = |value: f32| {
             Tensor::<2>::from_data(TensorData::new(vec![0.0, value, 0.0, f32::MAX, 0.0, f32::MAX], [2, 3]), &device)
         };
-        // The sum is infinite, but no number is.
+        // The sum is infinite, but each number is finite.
         scene.gaussians.means = Param::from_tensor(with(1.0));
         assert_eq!(not_finite_parameter(&scene, "scene"), None);
         scene.gaussians.means = Param::from_tensor(with(f32::INFINITY));
@@ -308,7 +310,7 @@ mod tests {
     #[test]
     fn renderings_that_fall_to_empty_images_are_noticed_once() {
         let mut watch = EmptyImageWatch::default();
-        // The first images are worse than nothing; that is no news.
+        // The first images are worse than empty ones; that needs no warning.
         assert!((0..5).all(|_| watch.log(8.0, 12.0, false, false).is_none()));
         assert!((0..30).all(|_| watch.log(20.0, 12.0, false, false).is_none()));
         let told: Vec<_> = (0..40).filter_map(|_| watch.log(12.0, 12.0, false, false)).collect();

@@ -1,4 +1,4 @@
-//! What can go wrong in a run.
+//! Errors of a run.
 
 use std::path::PathBuf;
 
@@ -21,24 +21,24 @@ pub enum TrainError {
     /// A `.l4gs` file.
     #[error(transparent)]
     Codec(#[from] CodecError),
-    /// A decoded file whose parts do not make a model.
+    /// A decoded file from whose parts no model can be made.
     #[error(transparent)]
     Model(#[from] ModelError),
     /// A GPU kernel, device or buffer.
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// The user asked for something that cannot be done; the text says what to do instead.
+    /// The user asked for something that is not possible; the text says what to do instead.
     #[error("{0}")]
     Input(String),
     /// A folder holds a run already.
     #[error("{} holds a run already; give --overwrite to replace it, or `light4gs resume` to continue it", .0.display())]
     RunExists(PathBuf),
-    /// Another process writes into a run's folder.
+    /// Another process writes into the folder of a run.
     #[error("{} is in use by {holder}: wait until that is over, or name another folder", root.display())]
     RunInUse {
         /// The folder.
         root: PathBuf,
-        /// Who holds it, as far as is known.
+        /// The process that writes there, as far as it is known.
         holder: String,
     },
     /// A checkpoint from which a run cannot continue.
@@ -61,7 +61,7 @@ pub enum TrainError {
 }
 
 impl TrainError {
-    /// Whether the program itself is at fault (exit code 1), rather than its input (exit code 2).
+    /// Whether it is a bug of the program (exit code 1), and not wrong input (exit code 2).
     pub fn is_internal(&self) -> bool {
         match self {
             Self::Codec(error) => error.is_internal(),
@@ -70,7 +70,7 @@ impl TrainError {
         }
     }
 
-    /// The exit code of a program that ends with this error: 2 for wrong input, 1 for our own fault, 75 (`EX_TEMPFAIL`: try
+    /// The exit code of a program that ends with this error: 2 for wrong input, 1 for a bug, 75 (`EX_TEMPFAIL`: try
     /// again) for a run that was asked to stop.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -1,5 +1,5 @@
-//! Everything random in training, drawn from the seed and the position in the schedule, so that a resumed run draws
-//! the same and a checkpoint holds no generator.
+//! All random numbers of training are drawn from the seed and the training position. So a resumed run draws the same,
+//! and a checkpoint holds no generator.
 
 use burn::tensor::Device;
 use rand::{Rng, SeedableRng};
@@ -7,26 +7,26 @@ use rand_chacha::ChaCha8Rng;
 
 use crate::stage::Stage;
 
-/// What a random number is drawn for.
+/// The purpose of a random number.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Purpose {
     /// The order in which frames are trained on.
     FrameOrder,
-    /// Where the halves of a split Gaussian go.
+    /// The positions of the two halves of a split Gaussian.
     Split,
-    /// The views that significance is measured on.
+    /// The views on which significance is measured.
     PruningViews,
     /// Quantization noise and the choice of planes and Gaussians for the rate.
     Rate,
-    /// What a deformation field draws.
+    /// Random numbers of a deformation field.
     Motion,
 }
 
-/// A generator for one purpose at one position, an iteration or a pass over the data.
+/// A generator for one purpose at one position, which is an iteration or a pass over the data.
 pub(crate) fn generator(seed: u64, purpose: Purpose, stage: Stage, position: usize) -> ChaCha8Rng {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     let stage = if stage == Stage::Coarse { 0 } else { 1 };
-    // Two bits for the first four purposes, and a third one for the others.
+    // Two bits for the first four purposes, and a third bit for the others.
     let (purpose, other) = (purpose as u64 % 4, purpose as u64 / 4);
     generator.set_stream(purpose << 62 | stage << 61 | other << 60 | position as u64);
     generator
@@ -37,7 +37,7 @@ pub(crate) fn seed_device(device: &Device, seed: u64, stage: Stage, iteration: u
     device.seed(generator(seed, Purpose::Rate, stage, iteration).random());
 }
 
-/// Box-Muller, one of the pair.
+/// Box-Muller; one number of the pair.
 pub(crate) fn standard_normal(generator: &mut impl Rng) -> f32 {
     let (u, v): (f64, f64) = (1.0 - generator.random::<f64>(), generator.random());
     ((-2.0 * u.ln()).sqrt() * (std::f64::consts::TAU * v).cos()) as f32

@@ -1,13 +1,13 @@
-//! Regularizers from outside: terms of the loss over the scene, whatever the views of an iteration are.
+//! Regularizers from other crates: terms of the loss over the scene, which do not depend on the views of an iteration.
 //!
-//! Those of the feature planes are built in (`train.regularizer`), and a deformation field brings its own.
+//! Regularizers of the feature planes are built in (`train.regularizer`), and a deformation field may have its own.
 
 use burn::tensor::Tensor;
 use light4gs_model::{DeformationField, DynamicScene};
 
 use crate::stage::Stage;
 
-/// The scene before a step, and where the run stands.
+/// The scene before a step, and the training position.
 #[derive(Debug)]
 pub struct RegularizerInput<'a, F: DeformationField> {
     /// Its parameters are on the tape, without quantization noise.
@@ -28,9 +28,9 @@ impl<F: DeformationField> Clone for RegularizerInput<'_, F> {
 
 impl<F: DeformationField> Copy for RegularizerInput<'_, F> {}
 
-/// A differentiable measure of what is wrong with a scene.
+/// A differentiable term of the loss over a scene.
 pub trait Regularizer<F: DeformationField>: Send {
-    /// `[1]`, with its weight, on the tape of the scene's parameters; none where it has nothing to say in this iteration.
+    /// `[1]`, weighted, on the tape of the scene's parameters; `None` to leave it out of this iteration.
     fn loss(&self, input: RegularizerInput<F>) -> Option<Tensor<1>>;
 }
 

@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 pub enum Stage {
     /// Static Gaussians.
     Coarse,
-    /// Everything.
+    /// Gaussians and deformation field.
     Fine,
 }
 
 impl Stage {
-    /// The name in files and on the screen.
+    /// The name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Stage::Coarse => "coarse",

@@ -1,14 +1,14 @@
-//! The time of day in words, for people. A crate for dates would take longer to compile than this to read.
+//! Date and time as text. Compiling a crate for dates would take longer than reading this.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-/// Such as `2026-11-23 08:47:05 UTC`.
+/// For example `2026-11-23 08:47:05 UTC`.
 pub(crate) fn now() -> String {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     at(since.as_secs())
 }
 
-/// Such as `2026-11-23 08:47 UTC`.
+/// For example `2026-11-23 08:47 UTC`.
 pub(crate) fn now_to_the_minute() -> String {
     to_the_minute(&now())
 }
@@ -17,7 +17,7 @@ fn to_the_minute(words: &str) -> String {
     format!("{} UTC", &words[..words.len() - ":05 UTC".len()])
 }
 
-/// Seconds since 1970 in words.
+/// Seconds since 1970 as text.
 fn at(seconds: u64) -> String {
     let (days, second) = (seconds / 86_400, seconds % 86_400);
     let (year, month, day) = date(days);
@@ -25,7 +25,7 @@ fn at(seconds: u64) -> String {
 }
 
 /// Year, month and day of a number of days since 1970. Years begin in March here, so that a leap day is the last of its
-/// year, and 400 years always have as many days (Hinnant, "chrono-compatible low-level date algorithms").
+/// year; 400 years always have the same number of days (Hinnant, "chrono-compatible low-level date algorithms").
 fn date(days: u64) -> (u64, u64, u64) {
     let days = days + 719_468;
     let (era, day_of_era) = (days / 146_097, days % 146_097);
@@ -41,7 +41,7 @@ fn date(days: u64) -> (u64, u64, u64) {
 mod tests {
     use super::*;
 
-    /// As `date -u -d @SECONDS` prints them.
+    /// As printed by `date -u -d @SECONDS`.
     #[test]
     fn known_moments() {
         for (seconds, words) in [

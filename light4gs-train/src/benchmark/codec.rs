@@ -20,13 +20,13 @@ use crate::config::Config;
 use crate::error::TrainError;
 use crate::report::table::{Align, Table};
 
-/// Gaussians of the scene: what the paper keeps of *bouncing balls*.
+/// Gaussians of the scene: as many as the paper keeps of *bouncing balls*.
 const GAUSSIANS: usize = 12_000;
 
 /// Best time of one part.
 #[derive(Clone, Debug, Serialize)]
 pub struct CoderTime {
-    /// What was timed.
+    /// Its name.
     pub part: &'static str,
     /// Numbers that were coded.
     pub symbols: usize,
@@ -59,7 +59,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
     scene
 }
 
-/// Times every coder: best of `repeats`.
+/// Times every coder; each time is the best of `repeats`.
 pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = crate::device::any()?;
     let config = Config::from_preset("dnerf")?;
@@ -114,7 +114,7 @@ pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     Ok(times)
 }
 
-/// One row a coder.
+/// One row for each coder.
 pub fn codec_table(times: &[CoderTime]) -> Table {
     let mut table = Table::new([
         ("coder", Align::Left),

@@ -1,4 +1,4 @@
-//! Timing of every part of a training step, on scenes that anybody can make again.
+//! Timing of every part of a training step, on scenes that anybody can make.
 
 pub mod codec;
 
@@ -60,7 +60,7 @@ impl BenchScene {
             opacity_logits: Vec::new(),
             sh: Vec::new(),
         };
-        // Total projected area stays the same as the count grows, as in trained scenes.
+        // The total projected area does not change with the count, as in trained scenes.
         let typical = -3.0 - 0.5 * (count as f32 / 5000.0).ln();
         for _ in 0..count {
             scene.means.extend((0..3).map(|_| symmetric(1.2)));
@@ -137,7 +137,7 @@ impl BenchScene {
         self.opacity_logits.len()
     }
 
-    /// Where it is seen from.
+    /// The camera.
     pub fn camera(&self) -> &Camera {
         &self.camera
     }
@@ -172,7 +172,7 @@ impl BenchScene {
         scene
     }
 
-    /// The camera turned a little about the vertical, so that a series of frames is not one frame.
+    /// The camera turned a little about the vertical, so that frames of a series differ.
     fn camera_at(&self, frame: usize) -> Camera {
         let turn = Mat3::from_quat(Quat::from_rotation_z(0.02 * frame as f32));
         Camera { rotation: self.camera.rotation * turn, ..self.camera }
@@ -182,7 +182,7 @@ impl BenchScene {
 /// Median milliseconds of one part.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
-    /// What was timed.
+    /// Its name.
     pub name: &'static str,
     /// Median over the repetitions.
     pub milliseconds: f64,
@@ -202,9 +202,9 @@ pub struct SceneTimes {
 pub struct DeviceTimes {
     /// Name of the back end.
     pub device: String,
-    /// What its graphics adapter calls itself, if it has one.
+    /// The name that its graphics adapter reports, if it has one.
     pub adapter: Option<String>,
-    /// Median of a 1024×1024 float32 product, to set machines side by side.
+    /// Median time of a 1024×1024 float32 product, for comparing machines.
     pub calibration_ms: f64,
     /// One entry a scene.
     pub scenes: Vec<SceneTimes>,
@@ -265,7 +265,7 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
             repeats,
             || still.tensors(),
             |g| {
-                // An image of one pixel: everything but the blending.
+                // An image of one pixel, so that almost nothing but blending is left out.
                 let camera = Camera { width: 1, height: 1, ..scene.camera };
                 splatter.render(g, &camera, None)
             },
@@ -309,7 +309,7 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
         l1(image, truth.clone()) + regularizer.loss(scene_model.planes().expect("the preset's field has planes"))
     };
     let mut adam = Adam::default();
-    // Rates so small that the scene stays what it is while it is timed.
+    // Rates so small that the scene does not change while it is timed.
     let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
         adam.step_module("", dynamic, &mut gradients, |_, _| Some(1e-12));
     };
@@ -377,7 +377,7 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
     out
 }
 
-/// One table: a row a part, a column a device and scene.
+/// One table: a row for each part, a column for each device and scene.
 pub fn table(results: &[DeviceTimes]) -> String {
     let mut columns = vec![("ms (median)".to_owned(), Align::Left)];
     for device in results {

@@ -1,26 +1,26 @@
 //! The coarsest steps of positions, scales, rotations, opacities and constant colors.
 //!
-//! The error that an attribute's step puts into the images grows with its square, and a halved step costs a bit for
-//! each number. So for a given error in total the file is smallest when every number of every attribute brings the
-//! same share of it. One rendering an attribute tells how sensitive the images are to it; the steps follow from that.
+//! The image error from an attribute's step grows with the square of the step, and halving a step takes one bit more
+//! for each number. So for a given total error, the file is smallest if every number of every attribute contributes the
+//! same share. One rendering for each attribute shows how sensitive the images are to it; the steps follow from that.
 
 use light4gs_codec::attributes::{AttributeSteps, quantized};
 use light4gs_codec::{AttributeValues, CodecError, SceneData};
 
-/// Other attributes are left almost exact, at this share of their given step, while one is looked at.
+/// While one attribute is measured, the others are nearly exact, at this share of their given steps.
 const ALMOST_EXACT: f32 = 1.0 / 64.0;
 /// A step grows by this factor at most: the squared-error model holds for small errors.
 const LARGEST_GROWTH: f64 = 4.0;
 /// A step shrinks to this share of itself at most.
 const LARGEST_SHRINKAGE: f64 = 1.0 / 64.0;
-/// Corrections of all steps together, after a look at what they really do.
+/// Corrections of all steps together, after their real effect has been measured.
 const CORRECTIONS: usize = 3;
 
-/// Steps that cost at most about `tolerance` dB on the images that `render` makes, starting from `given`.
+/// Steps that cost at most about `tolerance` dB on the images of `render`, starting from `given`.
 ///
-/// `render` gives the same views of any scene, as one list of pixel values; `error` is the mean squared error of those
-/// of the scene as it is. Spherical harmonics are left out: they have a step of their own, and hardly matter to how
-/// sensitive the images are to the rest.
+/// `render` renders the same views of any scene, as one list of pixel values; `error` is the mean squared error of
+/// those of the unquantized scene. Spherical harmonics are left out: they have a step of their own, and change the
+/// sensitivity to the other attributes little.
 pub(super) fn search(
     scene: &SceneData,
     given: &AttributeSteps,
@@ -38,10 +38,10 @@ pub(super) fn search(
         Ok(sum / exact.len().max(1) as f64)
     };
     let budget = error * (10f64.powf(tolerance / 10.0) - 1.0);
-    // Images do not tell how exact those must be that do not show.
+    // For attributes that do not show in images, images cannot tell how exact they must be.
     let searched = |attribute: &AttributeValues<'_>| !attribute.optional && given.of(attribute.name).is_some();
     let searched: Vec<AttributeValues<'_>> = scene.gaussians.attributes().filter(searched).collect();
-    // What the search tries must be something that the encoder takes.
+    // The search must try only steps that the encoder accepts.
     let steps_of = |steps: &[f32]| -> AttributeSteps {
         let pairs = searched.iter().zip(steps);
         pairs.fold(given.clone(), |all, (attribute, step)| all.with(attribute.name, *step)).clamped()
@@ -77,7 +77,7 @@ mod tests {
         let random = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
         let triple = |i: usize| [random(3 * i), random(3 * i + 1), random(3 * i + 2)];
         let gaussians = GaussianArrays {
-            // Along the diagonal, so that quantizing leaves the order as it is.
+            // Along the diagonal, so that quantization does not change the order.
             means: (0..500).map(|i| [i as f32; 3]).collect(),
             log_scales: (0..500).map(|i| triple(i).map(|v| v - 4.0)).collect(),
             quats: (0..500).map(|i| [1.0, random(i), random(i + 1), random(i + 2)]).collect(),
@@ -92,7 +92,8 @@ mod tests {
         AttributeSteps::default().with("means", 1e-4).with("opacity_logits", 0.02).with("sh_dc", 0.02)
     }
 
-    /// Attributes that the images do not show keep their steps; those that they do not need look like that too.
+    /// Attributes that do not show in the images keep their steps. For optional attributes the images cannot tell
+    /// either.
     #[test]
     fn further_attributes_are_searched_unless_they_are_optional() {
         let further = |name: &str, optional| FurtherAttribute {
@@ -122,7 +123,7 @@ mod tests {
         let given = given();
         let steps = search(&scene(), &given, 0.1, 1e-3, &images).unwrap();
         assert!(steps.of("opacity_logits") < steps.of("sh_dc").map(|step| 0.5 * step), "{steps:?}");
-        // The images do not see scales and rotations at all.
+        // The images do not depend on scales and rotations.
         let grown = |name| given.of(name).map(|step| step * LARGEST_GROWTH as f32);
         assert_eq!(steps.of("log_scales"), grown("log_scales"));
         assert_eq!(steps.of("quats"), grown("quats"));

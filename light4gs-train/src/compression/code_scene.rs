@@ -1,5 +1,5 @@
-//! From a trained scene to a file: models if there are none yet, training images for the step search, the bytes, and the
-//! record of what was expected and what came out.
+//! From a trained scene to a file: entropy models if there are none yet, training images for the step search, the
+//! bytes, and a record of expected and written bits.
 
 use std::time::Instant;
 
@@ -18,13 +18,15 @@ use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
 use crate::error::TrainError;
 
-/// Training views that the step search looks at.
+/// Training views for the step search.
 const SEARCH_VIEWS: usize = 8;
 
-/// PSNR in dB of a scene whose truth is not at hand: better than most are, so that the file is rather too good.
+/// PSNR in dB that is assumed for a scene without true images: higher than that of most scenes, so that too much
+/// quality is kept rather than too little.
 pub const ASSUMED_PSNR: f64 = 40.0;
 
-/// How a file was coded: what the models expected of it and what it took, `coding.json` in a run's folder.
+/// How a file was coded: the bits that the models expected and those that were written; `coding.json` in a run's
+/// folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CodingRecord {
     /// Profile of the file.
@@ -33,27 +35,27 @@ pub struct CodingRecord {
     pub fit_seconds: Option<f64>,
     /// Seconds of encoding, checking included.
     pub encode_seconds: f64,
-    /// Bits that the models of the training give.
+    /// Bits that the models of the training expect.
     pub estimated_bits: BitEstimate,
-    /// Bits in the file, models and tables aside.
+    /// Bits in the file, without models and tables.
     pub coded_bits: BitEstimate,
     /// Of every plane.
     pub planes: Vec<PlaneRecord>,
 }
 
-/// A part of a file with trained models: the bits expected of it, and those that it took.
+/// A part of a file with trained models: the expected and the written bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodedPart {
-    /// What it is.
+    /// Its name.
     pub name: &'static str,
-    /// Bits that the models of the training give.
+    /// Bits that the models of the training expect.
     pub expected: f64,
     /// Bits in the file.
     pub coded: f64,
 }
 
 impl CodedPart {
-    /// By how much the expectation was off, as a share of the real bits. Where there are none, no share can be given.
+    /// The difference as a share of the bits in the file. If there are none, there is no share.
     pub fn difference(&self) -> String {
         match (self.coded > 0.0, self.expected.round() > 0.0) {
             (true, _) => format!("{:+.2} %", (self.expected - self.coded) / self.coded * 100.0),
@@ -89,19 +91,19 @@ pub struct PlaneRecord {
     pub value_bytes: u64,
 }
 
-/// A scene as trained, and where its images are.
+/// A trained scene, and its images.
 pub struct TrainedScene<'a, F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
     /// The model.
     pub scene: &'a DynamicScene<F>,
     /// Its entropy models, if it was trained with them.
     pub compression: Option<&'a CompressionOf<E>>,
-    /// Makes them, if it was not.
+    /// Makes the entropy models if it was trained without them.
     pub models: &'a E,
-    /// The run's.
+    /// The run's configuration.
     pub config: &'a Config,
-    /// The dataset, or cameras around a scene that came without one.
+    /// The dataset, or cameras around a scene without a dataset.
     pub data: &'a Scene,
-    /// Its images, if it has some. Without them the scene counts as [`ASSUMED_PSNR`] from the truth.
+    /// Its images, if there are any. Without images the scene is assumed to be [`ASSUMED_PSNR`] from the true ones.
     pub images: Option<&'a dyn ImageSource>,
     /// With autodiff.
     pub device: &'a Device,
@@ -112,12 +114,12 @@ pub struct TrainedScene<'a, F: DeformationField = BuiltInField, E: EntropyModels
 pub struct CodedScene {
     /// The file.
     pub bytes: Vec<u8>,
-    /// How it was coded, and where its planes' bits are; not in the `float32` profile.
+    /// How it was coded, and the bit maps of its planes; `None` in the `float32` profile.
     pub coding: Option<(CodingRecord, Vec<BitMap>)>,
 }
 
-/// Encodes a trained scene in the profile of its configuration. Where the scene was trained without entropy models they are
-/// fitted first; `progress` is told the iterations done, and those that there are.
+/// Encodes a trained scene in the profile of its configuration. If the scene was trained without entropy models, they
+/// are fitted first; `progress` is called with the number of iterations done and their total.
 ///
 /// # Errors
 /// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
@@ -134,7 +136,7 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     };
     let views = search_views(dataset);
     let inner = (*device).clone().inner();
-    // Everything that is written is read again: a field that cannot be says so before anything is fitted.
+    // A field that cannot be decoded is refused here, before anything is fitted.
     DynamicScene::<F>::from_arrays(&data, &inner)?;
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
     let images =
@@ -175,7 +177,8 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
 }
 
-/// Whether renderings are needed to find steps. Those of planes and harmonics can change only before models are fitted.
+/// Whether the search for steps needs renderings. Steps of planes and harmonics can change only before models are
+/// fitted.
 fn searches(settings: &CompressionConfig, fits: bool) -> bool {
     let fitted = settings.steps.search_tolerance > 0.0 || settings.sh.search_tolerance > 0.0;
     settings.attributes.search_tolerance > 0.0 || (fits && fitted)

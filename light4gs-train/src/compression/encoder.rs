@@ -1,4 +1,4 @@
-//! A scene and its entropy models into the bytes of a file (paper III-E, docs/design.md).
+//! From a scene and its entropy models to the bytes of a file (paper III-E, docs/design.md).
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -20,20 +20,20 @@ use crate::error::TrainError;
 pub struct EncodedScene {
     /// The file.
     pub bytes: Vec<u8>,
-    /// What a decoder gives for it, bit for bit.
+    /// The scene that a decoder gets from it, bit for bit.
     pub decoded: SceneData,
-    /// Where the bytes went and what was expected.
+    /// The bytes of each part, and the expected bits.
     pub coded: CodedSizes,
 }
 
-/// Bytes by part, with the bits that the entropy models expected.
+/// Bytes by part, and the bits that the entropy models expected.
 #[derive(Clone, Debug)]
 pub struct CodedSizes {
-    /// As coded.
+    /// The written bytes.
     pub report: CompressionReport,
-    /// As the models of the training see the decoded scene.
+    /// The bits that the models of the training expect for the decoded scene.
     pub estimate: BitEstimate,
-    /// The same, place by place, for every plane.
+    /// The same for every place of every plane.
     pub bit_maps: Vec<BitMap>,
 }
 
@@ -42,16 +42,16 @@ pub struct CodedSizes {
 pub struct BitMap {
     /// Scale and axes, as in `0.xy`.
     pub name: String,
-    /// Along the first axis.
+    /// Size along the first axis.
     pub width: u32,
-    /// Along the second axis.
+    /// Size along the second axis.
     pub height: u32,
     /// `[height, width]` row-major.
     pub bits: Vec<f32>,
 }
 
 impl BitMap {
-    /// What keeps it from being drawn, if it comes from a file: as many numbers as places, none below 0.
+    /// Why a map from a file cannot be drawn: it must have as many numbers as places, and none below 0.
     pub fn problem(&self) -> Option<String> {
         let Self { name, width, height, bits } = self;
         let places = u64::from(*width) * u64::from(*height);
@@ -63,7 +63,7 @@ impl BitMap {
     }
 }
 
-/// Bits that the training's models give for a decoded scene, model weights and tables aside.
+/// Bits that the training's models expect for a decoded scene, without model weights and tables.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct BitEstimate {
     /// Of the feature planes' values and latents.
@@ -72,17 +72,16 @@ pub struct BitEstimate {
     pub sh: f64,
 }
 
-/// Images for the search of attribute steps: `render` gives some training views of Gaussians as pixel values, `error`
-/// is the mean squared error of the scene's own.
+/// Images for the search of attribute steps: `render` renders some training views as pixel values, `error` is the mean
+/// squared error of the unquantized scene's.
 pub struct SearchImages<'a> {
     /// Renders plain arrays; other parts of the scene are as decoded.
     pub render: &'a dyn Fn(&SceneData) -> Vec<f32>,
-    /// Against the truth.
+    /// Of the unquantized scene, against the training images.
     pub error: f64,
 }
 
-/// Encodes a scene in a profile. Everything that is coded is decoded again and
-/// compared before this returns.
+/// Encodes a scene in a profile. Before this returns, everything that was coded is decoded again and compared.
 pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
     compression: &Compression<C, S>,
@@ -100,8 +99,8 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
-        // The search tries steps much finer than those given. Values too far out for them, as a training that has gone
-        // wrong leaves them, may still fit the given ones.
+        // The search tries much finer steps than the given ones. Values that are too large for these, as in a training
+        // that has diverged, may still fit the given steps.
         let found = attribute_step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
         input.attributes = found.unwrap_or(input.attributes);
     }
@@ -112,18 +111,18 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
-/// Rounds in which [`freeze_planes`] looks for planes that stay as they are.
+/// Rounds in which [`freeze_planes`] looks for planes that no longer change.
 const FREEZING_ROUNDS: usize = 8;
 
-/// A scene's planes as a decoder of the `compact` profile gets them, so that encoding them again changes nothing: the
-/// latent is computed from the planes, so decoded planes may have another latent, and decode to other values in turn. So they
-/// are encoded and decoded again until they no longer change. For some hyperpriors that never happens, and each round would
-/// take the planes further from the trained ones: then the result is what was decoded first, and encoding that again rounds
-/// it once more.
+/// A scene's planes as a decoder of the `compact` profile gets them, such that encoding them again changes nothing. The
+/// latent is computed from the planes, so decoded planes may have another latent, and then decode to other values.
+/// Therefore they are encoded and decoded until they no longer change. With some hyperpriors that never happens, and
+/// each round would move the planes further from the trained ones. Then the result is the planes of the first round;
+/// encoding them again rounds them once more.
 ///
-/// None if there are no planes or no models of them. `device`, with autodiff, is where the result lives.
+/// `None` if there are no planes or no models for them. `device`, with autodiff, is the device of the result.
 ///
-/// Planes depend neither on Gaussians nor on what moves them, so the scene that is coded here for their sake has none of both.
+/// Planes depend neither on Gaussians nor on their motion, so the scene that is encoded here has neither.
 ///
 /// # Errors
 /// What the codec refuses: values that are not finite, or beyond its range of symbols.
@@ -157,8 +156,8 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     Ok(Some(FeaturePlanes::from_arrays(&first.unwrap_or(data.feature_planes), device)?))
 }
 
-/// What the codec needs to compress a scene, with the attribute steps of the configuration. `data` is the scene as plain
-/// arrays.
+/// The input for the codec to compress a scene, with the attribute steps of the configuration. `data` is the scene as
+/// plain arrays.
 pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     compression: &mut Compression<C, S>,
     scene: &DynamicScene<F>,
@@ -183,7 +182,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 }
 
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
-    /// What the codec needs to code the planes.
+    /// The input for the codec to code the planes.
     fn plane_coding<F: DeformationField>(&self, scene: &DynamicScene<F>) -> Result<Option<PlaneCoding>, TrainError> {
         let (Some(models), Some(planes)) = (&self.planes, scene.planes()) else { return Ok(None) };
         let steps = models.quantization.steps_without_gradient();
@@ -203,7 +202,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         }
     }
 
-    /// Bits that the models give for a decoded scene; `device` is the models' own.
+    /// Bits that the models expect for a decoded scene; `device` is that of the models.
     pub fn estimate<F: DeformationField>(
         &self,
         decoded: &SceneData,
@@ -227,7 +226,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         Ok(BitEstimate { planes: plane_bits, sh })
     }
 
-    /// Where the bits of a decoded scene's planes are.
+    /// The bit maps of a decoded scene's planes.
     fn bit_maps(&self, decoded: &SceneData, device: &Device) -> Result<Vec<BitMap>, TrainError> {
         let Some(models) = &self.planes else { return Ok(Vec::new()) };
         let planes = FeaturePlanes::from_arrays(&decoded.feature_planes, device)?.tensors();
@@ -247,7 +246,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 }
 
-/// Bits under the tables themselves, where no model was trained.
+/// Bits according to the frequency tables themselves, where no model was trained.
 fn counted_bits(gaussians: &GaussianArrays, coding: &ShCoding) -> f64 {
     let ShCoding::Tables { step, tables } = coding else { return 0.0 };
     let channels = tables.len().max(1);

@@ -1,4 +1,4 @@
-//! Entropy models for a scene that was trained without them: the planes stay as they are.
+//! Fitting entropy models to a scene that was trained without them. The planes do not change.
 
 use burn::tensor::Device;
 use light4gs_model::{DeformationField, DynamicScene};
@@ -15,8 +15,8 @@ use crate::optimization::schedule::ExponentialDecay;
 use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
 
-/// Trains fresh models on a frozen scene for `compression.context.fit_iterations` steps; `progress` is told the iterations
-/// done, and those that there are, after each.
+/// Trains new models on a frozen scene for `compression.context.fit_iterations` steps. After each step `progress` is
+/// called with the number of iterations done and their total.
 ///
 /// # Errors
 /// What `progress` returns; [`TrainError::Diverged`] if a model has numbers that are not finite.
@@ -36,7 +36,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
     let sh = decay(settings.sh.learning_rate_init, settings.sh.learning_rate_final);
     compression.start_from(scene.planes());
     if compression.planes.is_none() && compression.sh.is_none() {
-        // A field without planes, and spherical harmonics that are coded with their frequencies: no model is trained.
+        // Neither planes nor a model of the spherical harmonics: no model is trained.
         return Ok(compression);
     }
     let mut adam = Adam::default();
@@ -47,7 +47,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
         let rate = compression.rate(&noisy, settings.rate.fraction, true, &mut random);
         let mut gradients = GradientSums::default();
         gradients.add_module(&compression, &mut rate.megabytes().backward());
-        // The steps stay what they are: there is no distortion here to weigh them against.
+        // The steps do not change: there is no distortion here against which their rate could be weighed.
         adam.step_module(COMPRESSION, &mut compression, &mut gradients, |group, _| match group {
             ParameterGroup::Context => Some(context.at(iteration as f64)),
             ParameterGroup::ShModel => Some(sh.at(iteration as f64)),

@@ -1,11 +1,11 @@
-//! What a scene is compressed with, and the rate that this puts into the loss (paper III-C to III-E).
+//! The entropy models of a scene, and the rate in the loss that follows from them (paper III-C to III-E).
 //!
-//! - here: the entropy models and the quantization steps that are trained beside a scene
-//! - `models`: which entropy models there are
+//! - this file: the entropy models and the quantization steps that are trained beside a scene
+//! - `models`: the choice of entropy models
 //! - `rate`: noise in place of rounding, and the estimated size of the file
 //! - `fit`: models for a scene that was trained without them
-//! - `encoder`: a scene and its models into the bytes of a file
-//! - `code_scene`: from a trained scene to a file, with a record of what was expected and what came out
+//! - `encoder`: from a scene and its models to the bytes of a file
+//! - `code_scene`: from a trained scene to a file, with a record of expected and written bits
 //! - `attribute_step_search`: the coarsest steps of the other attributes
 //! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
 
@@ -37,27 +37,27 @@ use crate::error::TrainError;
 /// Entropy models and quantization steps of one scene.
 #[derive(Module, Debug)]
 pub struct Compression<C: Module = ContextModel, S: Module = ShEntropyModel> {
-    /// Of the feature planes, if the deformation field has some.
+    /// Those of the feature planes, if the deformation field has any.
     pub planes: Option<PlaneModels<C>>,
-    /// Of the spherical harmonics beyond degree 0; the models are made for degree 3. Lower degrees are coded with the
-    /// frequencies of their symbols, and have no part in the rate.
+    /// That of the spherical harmonics beyond degree 0; models are made for degree 3. Lower degrees are coded with the
+    /// frequencies of their symbols, and are not in the rate.
     pub sh: Option<S>,
 }
 
-/// What feature planes are coded with.
+/// The entropy model and the steps of feature planes.
 #[derive(Module, Debug)]
 pub struct PlaneModels<C: Module = ContextModel> {
-    /// What every value costs.
+    /// The bits of every value.
     pub context: C,
-    /// How coarsely they are rounded.
+    /// The quantization steps.
     pub quantization: AdaptiveQuantization,
 }
 
-/// The entropy models and quantization steps that a [`EntropyModels`] makes.
+/// The entropy models and quantization steps that an implementation of [`EntropyModels`] makes.
 pub type CompressionOf<E> = Compression<<E as EntropyModels>::Planes, <E as EntropyModels>::Sh>;
 
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
-    /// Untrained models, if the run trains them: if there is a rate in its loss.
+    /// Untrained models if the run trains them, that is, if its loss has a rate.
     ///
     /// # Errors
     /// As [`Compression::new`].
@@ -71,11 +71,11 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         if trains { Self::new(models, config, planes, device).map(Some) } else { Ok(None) }
     }
 
-    /// Untrained models for scenes of a configuration, whose deformation field has these planes.
+    /// Untrained models for scenes of a configuration whose deformation field has these planes.
     ///
     /// # Errors
-    /// [`TrainError::Input`] if there is no such model: if the model of the spherical harmonics looks at planes and there
-    /// are none, say.
+    /// [`TrainError::Input`] if there is no such model, for example if the model of the spherical harmonics reads
+    /// planes and there are none.
     pub fn new<E: EntropyModels<Planes = C, Sh = S>>(
         models: &E,
         config: &Config,
@@ -95,7 +95,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         Ok(Self { planes, sh })
     }
 
-    /// Lets the context model begin with the statistics of planes.
+    /// Initializes the context model with the statistics of planes.
     pub fn start_from(&mut self, planes: Option<&FeaturePlanes>) {
         if let (Some(models), Some(planes)) = (&mut self.planes, planes) {
             models.context.base_mut().start_from(&planes.tensors(), &models.quantization.steps_without_gradient());

@@ -1,4 +1,4 @@
-//! Which entropy models a run has: those that its configuration names, or models of one's own.
+//! The choice of a run's entropy models: those that its configuration names, or models from another crate.
 
 use std::fmt::Debug;
 
@@ -11,25 +11,25 @@ use crate::error::TrainError;
 
 /// Makes the entropy models that a run trains beside its scene, and codes it with.
 ///
-/// [`ConfiguredModels`] makes what the configuration describes. Models of one's own are given to a trainer by
-/// [`TrainerBuilder::entropy_models`](crate::trainer::TrainerBuilder::entropy_models); the rate in the loss, checkpoints
-/// and coding are then theirs. A model is made anew, with the same structure, whenever a checkpoint is read.
+/// [`ConfiguredModels`] makes what the configuration describes. Models of your own are given to a trainer by
+/// [`TrainerBuilder::entropy_models`](crate::trainer::TrainerBuilder::entropy_models), and are then used in the rate,
+/// in checkpoints and in coding. Whenever a checkpoint is read, a model is made again, with the same structure.
 pub trait EntropyModels: Debug + 'static {
     /// Of the feature planes.
     type Planes: PlaneEntropy;
     /// Of the spherical harmonics beyond degree 0.
     type Sh: ShModel;
 
-    /// An untrained model of planes with so many channels.
+    /// An untrained model of planes with this number of channels.
     ///
     /// # Errors
-    /// [`TrainError::Input`] where there is no such model.
+    /// [`TrainError::Input`] if there is no such model.
     fn planes(&self, settings: &ContextConfig, channels: usize, device: &Device) -> Result<Self::Planes, TrainError>;
 
     /// An untrained model of the spherical harmonics, beside planes with features of this length (0 without planes).
     ///
     /// # Errors
-    /// [`TrainError::Input`] where there is no such model, such as for want of planes.
+    /// [`TrainError::Input`] if there is no such model, for example because there are no planes.
     fn sh(&self, settings: &ShConfig, feature_size: usize, device: &Device) -> Result<Self::Sh, TrainError>;
 }
 
@@ -38,7 +38,7 @@ pub trait ShModel: ShEntropy + Module + ModuleDisplay + 'static {}
 
 impl<T: ShEntropy + Module + ModuleDisplay + 'static> ShModel for T {}
 
-/// The models that the configuration describes.
+/// The models that the configuration names.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ConfiguredModels;
 
@@ -61,7 +61,7 @@ impl EntropyModels for ConfiguredModels {
     }
 }
 
-/// The context model that a configuration describes, for planes with so many channels.
+/// The context model of a configuration, for planes with this number of channels.
 pub fn context_model(settings: &ContextConfig, channels: usize) -> ContextModelConfig {
     let sizes = match settings.architecture {
         // The composition is what the list of parts says; the reference's centers and start belong to its sizes.
@@ -93,7 +93,7 @@ mod tests {
         }
     }
 
-    /// Whatever is trained has a group, whatever has none is a constant.
+    /// Every trained parameter has a group; parameters without a group are constants.
     #[test]
     fn every_parameter_has_its_group() {
         let mut config = Config::default();

@@ -1,7 +1,7 @@
 //! The coarsest steps of planes and spherical harmonics that were trained without noise, for example by another program.
 //!
-//! A scene that is trained with the rate adapts to its steps. Another one may need finer ones, and renderings tell how fine:
-//! the error grows with the square of the step, so the error of one step says nearly which to take.
+//! A scene that is trained with the rate adapts to its steps. Another scene may need finer ones. Renderings show how
+//! fine: the error grows with the square of the step, so the error at one step nearly tells which step to take.
 
 use light4gs_codec::SceneData;
 
@@ -12,13 +12,13 @@ use crate::config::CompressionConfig;
 const LARGEST_GROWTH: f64 = 4.0;
 /// A step shrinks to this share of itself at most.
 const LARGEST_SHRINKAGE: f64 = 1.0 / 256.0;
-/// Looks at a step before it is taken.
+/// Renderings for each search.
 const LOOKS: usize = 5;
-/// Aimed at a little below the budget, since looks are few.
+/// The search aims a little below the budget, since it has few renderings.
 const MARGIN: f64 = 0.9;
 
-/// Sets the steps of planes and harmonics to what costs at most about their `search_tolerance` each, in dB on the images;
-/// 0 leaves them as they are.
+/// Sets the steps of planes and harmonics to values that cost at most about their `search_tolerance` each, in dB on the
+/// images; 0 leaves them unchanged.
 pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images: &SearchImages) {
     let exact = (images.render)(scene);
     let budget = |tolerance: f64| images.error * (10f64.powf(tolerance / 10.0) - 1.0);
@@ -49,7 +49,7 @@ pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images
     }
 }
 
-/// The largest factor, about, at which the distortion stays within a budget.
+/// The largest factor, approximately, at which the distortion stays within a budget.
 fn factor(budget: f64, distortion: impl Fn(f64) -> f64) -> f64 {
     let (mut factor, mut good) = (1.0, LARGEST_SHRINKAGE);
     for _ in 0..LOOKS {

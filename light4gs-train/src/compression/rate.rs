@@ -1,4 +1,4 @@
-//! Noise in place of rounding, and the size of the file that it stands for (paper III-C, IV-B).
+//! Noise in place of rounding, and the file size that the noisy values estimate (paper III-C, IV-B).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
@@ -11,14 +11,14 @@ use rand::seq::index;
 
 use super::{Compression, ShModel};
 
-/// A scene with the noise of quantization, which both the image and the rate see.
+/// A scene with quantization noise, from which both the image and the rate are computed.
 #[derive(Clone, Debug)]
 pub struct NoisyScene<F: DeformationField = BuiltInField> {
-    /// Its parameters begin a tape of their own. Gradients by its planes and spherical harmonics are gradients by the
-    /// scene's, since noise only adds to them; by the steps see [`NoisyScene::step_gradients`].
+    /// Its parameters begin a new tape. Gradients with respect to its planes and spherical harmonics are those of the
+    /// scene's, since noise is only added to them; for the steps see [`NoisyScene::step_gradients`].
     pub scene: DynamicScene<F>,
-    /// Of the planes; they begin a tape of their own where they are learned. None if there are no planes, or they are frozen:
-    /// as the file will have them, without noise, without gradient and without a part in the rate.
+    /// Steps of the planes; they begin a new tape where they are learned. `None` if there are no planes, or if they are
+    /// frozen: then they have the file's values, without noise, without gradient, and are not in the rate.
     pub steps: Option<PlaneSteps>,
 }
 
@@ -29,9 +29,9 @@ pub struct Rate {
     pub planes: Tensor<1>,
     /// Values of all planes.
     pub plane_symbols: usize,
-    /// `[1]`: of all spherical harmonics beyond degree 0, where they have a part in the rate.
+    /// `[1]`: of all spherical harmonics beyond degree 0, if they are in the rate.
     pub sh: Option<Tensor<1>>,
-    /// Values of those.
+    /// Number of those values.
     pub sh_symbols: usize,
 }
 
@@ -45,7 +45,7 @@ impl Rate {
         bits / 8e6
     }
 
-    /// `[1]`: bits per plane symbol plus bits per symbol of the spherical harmonics, as the paper weighs them.
+    /// `[1]`: bits per plane symbol plus bits per symbol of the spherical harmonics, as the paper weights them.
     pub fn bits_per_symbol(self) -> Tensor<1> {
         let planes = self.planes / self.plane_symbols.max(1) as f64;
         match self.sh {
@@ -56,8 +56,8 @@ impl Rate {
 }
 
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
-    /// The scene with uniform noise as wide as the steps. `learn_steps` asks for the steps' gradients; `with_sh` puts noise
-    /// on the spherical harmonics too.
+    /// The scene with uniform noise as wide as the steps. With `learn_steps` the steps get gradients; with `with_sh`
+    /// the spherical harmonics have noise too.
     pub fn noisy<F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
@@ -79,7 +79,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         NoisyScene { scene: self.with_noisy_sh(noisy, with_sh), steps }
     }
 
-    /// The same for a scene whose planes are frozen.
+    /// The same for a scene with frozen planes.
     pub fn noisy_beside_frozen_planes<F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
@@ -92,7 +92,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
     }
 
-    /// Begins a tape on the way.
+    /// Also begins a new tape.
     fn with_noisy_sh<F: DeformationField>(&self, scene: DynamicScene<F>, with_sh: bool) -> DynamicScene<F> {
         let device = scene.gaussians.means.device();
         let mut scene = scene.fork(&device);
@@ -103,8 +103,8 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         scene
     }
 
-    /// Estimates the rate on a random share of the planes and of the Gaussians. Unbiased: over many draws the mean is
-    /// the rate of everything.
+    /// Estimates the rate on a random share of the planes and of the Gaussians. It is unbiased: over many draws, the
+    /// mean is the rate of everything.
     pub fn rate<F: DeformationField>(
         &self,
         noisy: &NoisyScene<F>,
@@ -131,7 +131,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             let rows: Vec<i64> = chosen.iter().map(|row| *row as i64).collect();
             let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &sh_rest.device());
             let known = match sh.tables() {
-                // Tables look at nothing, and what is not computed does not stay on the tape.
+                // Models with tables need none of these, and what is not computed does not stay on the tape.
                 Some(_) => ShKnown::nothing(&rows.device()),
                 None => known(scene, planes, Some(rows.clone())),
             };
@@ -143,8 +143,8 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
 }
 
 impl<F: DeformationField> NoisyScene<F> {
-    /// The same scene with its planes, or its spherical harmonics, detached: the rate trains their entropy models and not
-    /// them.
+    /// The same scene with its planes, or its spherical harmonics, detached: the rate then trains only their entropy
+    /// models.
     pub fn with_detached(&self, planes: bool, sh: bool) -> Self {
         let mut apart = self.clone();
         if planes {
@@ -155,7 +155,7 @@ impl<F: DeformationField> NoisyScene<F> {
         }
         if sh {
             detach(&mut apart.scene.gaussians.sh_rest);
-            // Some models look at these.
+            // Some models read these.
             detach(&mut apart.scene.gaussians.sh_dc);
             detach(&mut apart.scene.gaussians.means);
         }
@@ -167,30 +167,30 @@ impl<F: DeformationField> NoisyScene<F> {
         self.steps.as_ref().is_some_and(|steps| steps.of(0).is_require_grad())
     }
 
-    /// What a backward pass found out about the steps, each `[1]`; none where they are not learned, or play no part in it.
-    /// That is without the part they play through the noise.
+    /// The gradients of a backward pass for the steps, each `[1]`; `None` for steps that are not learned, or that it
+    /// does not depend on. The part through the noise is not included.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
         let planes = 0..self.scene.planes().map_or(0, |planes| planes.planes.len());
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
     }
 }
 
-/// Gives a parameter the value as the beginning of a tape.
+/// Makes the value of a parameter a leaf of a new tape.
 fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
     *parameter = Param::initialized(parameter.id, value.require_grad());
 }
 
-/// Gives a parameter its own value as a constant.
+/// Makes the value of a parameter a constant.
 fn detach<const D: usize>(parameter: &mut Param<Tensor<D>>) {
     *parameter = Param::initialized(parameter.id, parameter.val().detach().set_require_grad(false));
 }
 
-/// The planes of a scene; none if its field has none.
+/// The planes of a scene; empty if its field has none.
 pub(super) fn plane_tensors<F: DeformationField>(scene: &DynamicScene<F>) -> PlaneTensors {
     scene.planes().map(FeaturePlanes::tensors).unwrap_or_default()
 }
 
-/// What a decoder knows of the Gaussians, or of some rows of them, before it comes to their spherical harmonics.
+/// Values of the Gaussians, or of some rows of them, that are decoded before their spherical harmonics.
 pub(super) fn known<F: DeformationField>(
     scene: &DynamicScene<F>,
     planes: &PlaneTensors,
@@ -204,7 +204,7 @@ pub(super) fn known<F: DeformationField>(
     ShKnown { sh_dc, positions: scene.coordinates.normalize(means), planes: planes.clone() }
 }
 
-/// A random share of `0..count` without repetition, at least one, in rising order.
+/// A random share of `0..count` without repetition, at least one, in ascending order.
 fn sample(generator: &mut impl Rng, count: usize, fraction: f64) -> Vec<usize> {
     let amount = ((count as f64 * fraction).round() as usize).clamp(1, count);
     let mut chosen = index::sample(generator, count, amount).into_vec();

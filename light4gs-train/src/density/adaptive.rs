@@ -70,7 +70,7 @@ impl DensityConfig for AdaptiveDensityConfig {
     }
 }
 
-/// Clones small Gaussians and splits large ones where the screen-space gradient is large, prunes transparent and
+/// Clones small Gaussians and splits large ones where the screen-space gradient is large, removes transparent and
 /// oversized ones, resets opacities. The default.
 #[derive(Debug)]
 pub struct AdaptiveDensityControl {
@@ -85,7 +85,7 @@ impl AdaptiveDensityControl {
         Self { config, statistics: None }
     }
 
-    /// The smallest gradient that densifies, and the smallest opacity that survives.
+    /// The smallest gradient at which Gaussians are cloned or split, and the smallest opacity that is kept.
     fn thresholds(&self, position: &TrainingPosition) -> (f32, f32) {
         let config = &self.config;
         let progress = position.iteration as f32 / config.until.max(1) as f32;
@@ -105,7 +105,7 @@ impl AdaptiveDensityControl {
         let size_limit = (interval > 0 && position.iteration > interval)
             .then_some(SizeLimit { max_radius: MAX_SCREEN_RADIUS, max_scale: MAX_EXTENT_SHARE * position.extent });
         let keep = survivors(gaussians.gaussians(), min_opacity, size_limit, &statistics.largest_radius);
-        // Never everything: an empty scene has no gradient to come back from.
+        // Never all Gaussians: an empty scene has no gradient and could not recover.
         if keep.contains(&true) && keep.contains(&false) {
             gaussians.keep(&keep);
             self.rows_kept(&keep);

@@ -1,5 +1,5 @@
-//! The edits of adaptive density control (3DGS, Kerbl et al. 2023, section 5.2): clone small Gaussians and split large ones where
-//! the screen-space gradient is large, drop transparent ones, reset opacities.
+//! The edits of adaptive density control (3DGS, Kerbl et al. 2023, section 5.2): clone small Gaussians and split large
+//! ones where the screen-space gradient is large, remove transparent ones, reset opacities.
 
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Tensor, TensorData, s};
@@ -8,9 +8,9 @@ use light4gs_model::{GaussianTensors, Gaussians};
 
 use super::GaussianEditor;
 
-/// Scales of a split Gaussian's two halves are the old ones over this.
+/// Scales of a split Gaussian's two halves are its own divided by this.
 const SPLIT_SHRINK: f32 = 1.6;
-/// Opacities are brought down to at most this by a reset.
+/// A reset lowers opacities to at most this.
 const RESET_OPACITY: f32 = 0.01;
 
 /// Which Gaussians are cloned and which are split. Disjoint.
@@ -23,7 +23,8 @@ pub struct DensifyMasks {
 }
 
 impl DensifyMasks {
-    /// Both need a mean gradient of at least `threshold`; what is larger than `size` (world units) is split.
+    /// Both need a mean gradient of at least `threshold`; of these, Gaussians larger than `size` (world units) are
+    /// split.
     pub fn new(mean_gradients: &[f32], largest_scales: &[f32], threshold: f32, size: f32) -> Self {
         let chosen = |large: bool| {
             mean_gradients
@@ -35,7 +36,7 @@ impl DensifyMasks {
         Self { clone: chosen(false), split: chosen(true) }
     }
 
-    /// Standard normals that [`densify`] wants: three for each half of each split Gaussian.
+    /// Standard normals that [`densify`] needs: three for each half of each split Gaussian.
     pub fn normals_needed(&self) -> usize {
         6 * self.split.iter().filter(|split| **split).count()
     }
@@ -46,8 +47,9 @@ pub fn largest_scales(gaussians: &Gaussians) -> Vec<f32> {
     values(gaussians.log_scales.val().inner().max_dim(1).exp())
 }
 
-/// Clones and splits. What is new is a copy of its source in everything but position and scale. The result is: the originals that were not split, the clones, the first halves, the second
-/// halves. Returns the source of each new row. Moments follow their rows; new rows start with none.
+/// Clones and splits. A new Gaussian is a copy of its source in everything but position and scale. The result is: the
+/// originals that were not split, the clones, the first halves, the second halves. Returns the source of each new row.
+/// Moments move with their rows; new rows start with none.
 ///
 /// `normals` are standard normal numbers, `[2 · splits, 3]` row-major: the first halves' offsets in units of the
 /// Gaussian's own standard deviations, then the second halves'.
@@ -64,7 +66,7 @@ pub fn densify(gaussians: &mut GaussianEditor, masks: &DensifyMasks, normals: &[
         return rows;
     }
 
-    // The halves are the last rows; their offsets and shrunken scales are added to what was copied.
+    // The halves are the last rows; their offsets and the change of their scales are added to the copies.
     let halves = 2 * splits.len();
     let before = rows.len() - halves;
     gaussians.update(|tensors| {
@@ -100,8 +102,8 @@ fn cross(a: Tensor<2>, b: Tensor<2>) -> Tensor<2> {
     Tensor::cat(vec![component(1, 2), component(2, 0), component(0, 1)], 1)
 }
 
-/// Which Gaussians survive: opacity at least `min_opacity`, and with a size limit a radius of at most
-/// `max_radius` pixels and a standard deviation of at most `max_scale` world units. `[N]`
+/// Which Gaussians are kept: opacity at least `min_opacity`, and with a size limit a radius of at most `max_radius`
+/// pixels and a standard deviation of at most `max_scale` world units. `[N]`
 pub fn survivors(
     gaussians: &Gaussians,
     min_opacity: f32,
@@ -119,7 +121,7 @@ pub fn survivors(
     keep
 }
 
-/// Above which size a Gaussian is dropped.
+/// The size above which a Gaussian is removed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SizeLimit {
     /// On the screen, pixels.
@@ -128,7 +130,7 @@ pub struct SizeLimit {
     pub max_scale: f32,
 }
 
-/// Brings opacities down to 0.01 at most and forgets their moments.
+/// Lowers opacities to at most 0.01 and sets their moments to zero.
 pub fn reset_opacity(gaussians: &mut GaussianEditor) {
     let highest = (RESET_OPACITY / (1.0 - RESET_OPACITY)).ln();
     gaussians.update(|tensors| {

@@ -1,11 +1,11 @@
-//! Changes to the set of Gaussians, with the optimizer's moments in step.
+//! Changes to the set of Gaussians, in which the optimizer's moments follow.
 
 use burn::tensor::{Int, Tensor, TensorData};
 use light4gs_model::{Attribute, AttributeMapper, GaussianTensors, Gaussians};
 
 use crate::optimization::adam::Adam;
 
-/// The Gaussians of a run while their number changes: every edit moves the optimizer's rows along.
+/// The Gaussians of a run while their number changes: every edit moves the optimizer's rows as well.
 #[derive(Debug)]
 pub struct GaussianEditor<'a> {
     gaussians: &'a mut Gaussians,
@@ -33,8 +33,8 @@ impl<'a> GaussianEditor<'a> {
         self.len() == 0
     }
 
-    /// Makes row `k` of the result a copy of row `rows[k]`. Moments are copied along for the first `first_new` rows; the
-    /// rows after them are new Gaussians, which begin without moments.
+    /// Makes row `k` of the result a copy of row `rows[k]`. Moments are copied for the first `first_new` rows; the rows
+    /// after them are new Gaussians, which begin without moments.
     ///
     /// # Panics
     /// If a row is not below [`len`](Self::len).
@@ -58,7 +58,7 @@ impl<'a> GaussianEditor<'a> {
         self.select_rows(&rows, rows.len());
     }
 
-    /// Changes values and keeps moments. `change` gets tensors off the tape and must return as many rows.
+    /// Changes values and keeps moments. `change` gets tensors without a tape and must return as many rows.
     ///
     /// # Panics
     /// If the number of rows changes.
@@ -79,7 +79,7 @@ impl<'a> GaussianEditor<'a> {
     }
 }
 
-/// The rows of a list, of every attribute.
+/// The rows of a list, for every attribute.
 struct SelectRows(Tensor<1, Int>);
 
 impl AttributeMapper for SelectRows {
@@ -88,7 +88,7 @@ impl AttributeMapper for SelectRows {
     }
 }
 
-/// Values that are trained further.
+/// Makes values parameters again.
 struct Trained;
 
 impl AttributeMapper for Trained {

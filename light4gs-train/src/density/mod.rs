@@ -1,10 +1,11 @@
-//! How many Gaussians there are: when they are cloned, split and pruned.
+//! Density strategies decide how many Gaussians there are: when they are cloned, split and pruned.
 //!
-//! - here: [`DensityStrategy`], what the trainer asks of a strategy, and [`DensityKind`], the built-in ones by name
+//! - this file: [`DensityStrategy`], the trainer's interface to a strategy, and [`DensityKind`], the built-in ones by
+//!   name
 //! - `adaptive`: the strategy of 3DGS, the default
-//! - `none`: the Gaussians of the cloud stay as many as they are
-//! - `clone_and_split`, `statistics`: its parts
-//! - `editor`: how a strategy changes the Gaussians, with the optimizer's moments in step
+//! - `none`: the number of Gaussians stays that of the cloud
+//! - `clone_and_split`, `statistics`: the parts of `adaptive`
+//! - `editor`: how a strategy changes the Gaussians, with the optimizer's moments
 //! - `significance`: scores by which Gaussians are pruned after densification (paper III-B)
 
 mod adaptive;
@@ -57,7 +58,7 @@ keys! {
 }
 
 impl DensifyConfig {
-    /// The strategy that is chosen, with its keys.
+    /// The chosen strategy, with its keys.
     pub fn chosen(&self) -> Box<dyn DensityConfig> {
         self.strategies.of(self.strategy)
     }
@@ -68,41 +69,41 @@ pub trait DensityConfig {
     /// The strategy that they describe.
     fn strategy(&self) -> Box<dyn DensityStrategy>;
 
-    /// The last iteration of the fine stage after which Gaussians come; 0 if they never do.
+    /// The last iteration of the fine stage after which Gaussians are added; 0 if they never are.
     fn end(&self) -> usize;
 
-    /// What is wrong with the keys together, if something is: one of them, and what about it.
+    /// What is wrong with the keys as a whole, if anything: one of the keys, and the problem.
     fn problem(&self) -> Option<(&'static str, String)> {
         None
     }
 }
 
-/// The position in the training at which a strategy is asked.
+/// The position in the training at which a strategy is called.
 #[derive(Clone, Copy, Debug)]
 pub struct TrainingPosition {
     /// The stage.
     pub stage: Stage,
     /// Iteration of the stage, from 1.
     pub iteration: usize,
-    /// Radius of the cameras' positions, world units: what "large" is measured by.
+    /// Extent of the scene, world units: 1.1 times the largest distance of a training camera from their mean.
     pub extent: f32,
     /// Of the run.
     pub(crate) seed: u64,
 }
 
 impl TrainingPosition {
-    /// A generator that depends on the run's seed, the stage and the iteration alone, so that a run that was resumed
-    /// draws the same numbers.
+    /// A generator that depends only on the run's seed, the stage and the iteration, so that a resumed run draws the
+    /// same numbers.
     pub fn generator(&self) -> impl Rng + use<> {
         generator(self.seed, Purpose::Split, self.stage, self.iteration)
     }
 }
 
-/// What a differentiated view says about the `N` Gaussians. All tensors are off the tape.
+/// Statistics of the `N` Gaussians from a differentiated view. No tensor is on a tape.
 #[derive(Clone, Debug)]
 pub struct ViewStatistics {
-    /// `[N, 2]`: gradient of the view's loss by the projected positions, in units of half the image. None where nothing
-    /// was on the screen.
+    /// `[N, 2]`: gradient of the view's loss with respect to the projected positions, in units of half the image.
+    /// `None` if nothing was on the screen.
     pub screen_gradient: Option<Tensor<2>>,
     /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the image; -1 for Gaussians that cannot be drawn.
     pub radii: Tensor<1, Int>,
@@ -111,32 +112,32 @@ pub struct ViewStatistics {
 /// Decides how many Gaussians there are. The trainer calls the hooks in this order in every iteration:
 /// [`after_backward`](Self::after_backward), the optimizer's step, [`after_step`](Self::after_step).
 ///
-/// A strategy has its statistics for itself. What must survive a checkpoint goes through [`state`](Self::state) and
-/// [`restore`](Self::restore), so that a resumed run is the same to the last bit.
+/// A strategy keeps its own statistics. State that must be in checkpoints is returned by [`state`](Self::state) and set
+/// by [`restore`](Self::restore), so that a resumed run is the same to the last bit.
 pub trait DensityStrategy: Send {
-    /// A stage begins with `count` Gaussians: statistics begin anew. `device` is without autodiff. Not called when a run
-    /// is resumed in the middle of a stage; [`restore`](Self::restore) is.
+    /// Called when a stage begins with `count` Gaussians: statistics start again. `device` is without autodiff. Not
+    /// called when a run is resumed in the middle of a stage; then [`restore`](Self::restore) is.
     fn begin_stage(&mut self, count: usize, device: &Device);
 
-    /// The views of an iteration have been differentiated: the place to gather statistics.
+    /// Called after the views of an iteration have been differentiated, for gathering statistics.
     fn after_backward(&mut self, views: &[ViewStatistics], position: &TrainingPosition);
 
-    /// The optimizer has made its step: the place to clone, split, prune and reset.
+    /// Called after the optimizer's step, for cloning, splitting, pruning and resetting.
     fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition);
 
-    /// Somebody else, such as pruning by significance, has kept the rows where `keep` is set. `[N]`
+    /// Called when other code, such as pruning by significance, has kept only the rows where `keep` is set. `[N]`
     fn rows_kept(&mut self, keep: &[bool]);
 
-    /// Whether the strategy is done with the stage: Gaussians neither come nor go any more after this iteration. From then
-    /// on spherical harmonics have a part in the rate.
+    /// Whether the number of Gaussians is final for the stage after this iteration. From then on the rate includes
+    /// spherical harmonics.
     fn is_over(&self, stage: Stage, iteration: usize) -> bool;
 
-    /// What a checkpoint must hold, by name: vectors off the tape.
+    /// The state for a checkpoint, by name: vectors without a tape.
     fn state(&self) -> BTreeMap<String, Tensor<1>>;
 
-    /// Takes back what [`state`](Self::state) gave.
+    /// Sets the state to what [`state`](Self::state) returned.
     ///
     /// # Errors
-    /// What is missing or of another size, in words.
+    /// As text: what is missing, or has another size.
     fn restore(&mut self, state: BTreeMap<String, Tensor<1>>, count: usize) -> Result<(), String>;
 }

@@ -61,13 +61,13 @@ choice! {
 }
 
 impl PruneConfig {
-    /// Whether a pass takes place after an iteration of the fine stage.
+    /// Whether there is a pass after an iteration of the fine stage.
     pub fn is_due(&self, iteration: usize) -> bool {
         self.fraction > 0.0 && self.iterations.contains(&iteration)
     }
 }
 
-/// What the training views say of each of `N` Gaussians, each at its time.
+/// The contributions of each of `N` Gaussians to the training views, each view at its time.
 #[derive(Clone, Debug, Default)]
 pub struct GaussianContributions {
     /// `[N]`: pixels that blend the Gaussian, over all views.
@@ -95,7 +95,7 @@ impl GaussianContributions {
     }
 }
 
-/// Says how much each Gaussian contributes to the training views; those with the smallest scores are pruned.
+/// Computes how much each Gaussian contributes to the training views; those with the smallest scores are pruned.
 pub trait SignificanceScore: Send {
     /// `[N]`: the larger, the more it contributes. Must be finite.
     fn scores(&self, contributions: &GaussianContributions) -> Vec<f64>;
@@ -104,14 +104,14 @@ pub trait SignificanceScore: Send {
 /// A sum over pixels times a factor of the Gaussian's volume: the paper's score, and its variants. The default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeWeightedScore {
-    /// What is summed.
+    /// The quantity that is summed.
     pub contribution: PruneScore,
-    /// The factor.
+    /// The factor of the volume.
     pub volume: VolumeWeight,
 }
 
 impl VolumeWeightedScore {
-    /// As a configuration says.
+    /// As configured.
     pub fn new(config: &PruneConfig) -> Self {
         let exponent = config.volume_exponent;
         let volume = match config.volume {

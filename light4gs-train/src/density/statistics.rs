@@ -1,8 +1,8 @@
-//! What the views say about each Gaussian.
+//! Statistics of each Gaussian over views.
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
-/// What the rendered views say about each Gaussian since the last densification.
+/// Statistics of each Gaussian over the rendered views since the last densification.
 #[derive(Clone, Debug)]
 pub struct DensityStatistics {
     /// `[N]`: sum of the norms of the screen-space gradients.

@@ -1,10 +1,10 @@
 //! Scenes that other programs have trained.
 //!
-//! - here: what an import gives, and how it becomes a run
+//! - this file: the result of an import, and how it becomes a run
 //! - [`mod@reference`]: checkpoints of 4DGaussians, and of the public code of Light4GS
 //! - [`still`]: plain Gaussians without motion, from a PLY file
 //! - `settings`: the switches in 4DGaussians' `cfg_args`
-//! - `views`: cameras around a scene that came without a dataset
+//! - `views`: cameras around a scene without a dataset
 
 pub mod reference;
 mod settings;
@@ -27,7 +27,7 @@ use crate::stage::Stage;
 /// A scene with motion, as another program has trained it.
 #[derive(Debug)]
 pub struct ImportedScene {
-    /// The model, which renders as the program's own did.
+    /// The model, which renders like that of the other program.
     pub scene: DynamicScene<HexPlaneField>,
     /// Color behind the Gaussians.
     pub background: [f32; 3],
@@ -36,7 +36,7 @@ pub struct ImportedScene {
 }
 
 impl ImportedScene {
-    /// The configuration of a run that has this model, over a base.
+    /// The configuration of a run with this model, starting from a base.
     ///
     /// # Errors
     /// Sizes that a run cannot have, such as planes whose resolution is no multiple of 4.
@@ -58,14 +58,14 @@ impl ImportedScene {
         network.sh = deformation.sh.is_some();
         network.differentiate_points = false;
         config.data.background = self.background;
-        // The models of the training are fitted when the scene is encoded.
+        // Entropy models are fitted when the scene is encoded.
         config.compression.rate.lambda = 0.0;
         config.train.prune.fraction = 0.0;
         config.validate()?;
         Ok(config)
     }
 
-    /// Writes a run that ends with this model: `encode` makes the file, and `eval` measures it.
+    /// Writes a run that ends with this model. `encode` then makes the file, and `eval` measures it.
     ///
     /// # Errors
     /// As [`ImportedScene::config`] and [`RunFolder::create`].

@@ -1,9 +1,9 @@
 //! Checkpoints of 4DGaussians (Wu et al. 2024), and of the public code of Light4GS, which descends from it.
 //!
-//! `point_cloud.ply` has the Gaussians, `deformation.pth` the planes and the network. The two programs differ in where a
-//! point falls on the planes, and the latter's file is known by its principal axes:
-//! - 4DGaussians maps a box linearly to [-1, 1], its far corner to -1, and the times 0 to 1 to themselves, so that half of
-//!   the planes' rows are never looked at; those are left out here;
+//! `point_cloud.ply` has the Gaussians, `deformation.pth` the planes and the network. The two programs map points to
+//! planes differently; checkpoints of Light4GS are recognized by their principal axes:
+//! - 4DGaussians maps a box linearly to [-1, 1], its far corner to -1, and uses the times 0 to 1 as plane coordinates,
+//!   so that half of the planes' rows are never read; those are left out here;
 //! - Light4GS standardizes along principal axes, maps a box to [-1, 1], contracts, and ends in [0, 1].
 
 use std::collections::BTreeMap;
@@ -29,10 +29,11 @@ const REMEDY: &str = "name a folder that 4DGaussians has saved, such as output/N
 /// Time is padded to a multiple of this, which the context model needs.
 const TIME_MULTIPLE: usize = 4;
 
-/// Reads a checkpoint: the folder of an iteration, or the folder of the whole model, whose last iteration is taken.
+/// Reads a checkpoint: the folder of an iteration, or the folder of the whole model, of which the last iteration is
+/// taken.
 ///
 /// # Errors
-/// A file that is missing or damaged, by name; a network of another make, by the tensor that tells.
+/// A file that is missing or damaged, by name; a network of another structure, by the name of the tensor that shows it.
 pub fn read(folder: &Path, device: &Device) -> Result<ImportedScene, TrainError> {
     let folder = iteration_folder(folder)?;
     let settings = match find_settings(&folder) {
@@ -48,7 +49,7 @@ pub fn read(folder: &Path, device: &Device) -> Result<ImportedScene, TrainError>
     Ok(ImportedScene { scene, background, source: folder })
 }
 
-/// The folder with the files, for one that has it somewhere below.
+/// The folder with the files: the given one, or one below it.
 fn iteration_folder(folder: &Path) -> Result<PathBuf, DataError> {
     let has_files = |folder: &Path| folder.join("deformation.pth").exists() || folder.join("point_cloud.ply").exists();
     if has_files(folder) {
@@ -73,8 +74,8 @@ fn find_settings(folder: &Path) -> Option<PathBuf> {
     folder.ancestors().take(3).map(|folder| folder.join("cfg_args")).find(|path| path.is_file())
 }
 
-/// The table says which Gaussians a past version moved. Today's program moves all of them, and so do we; it must be the
-/// table of these Gaussians.
+/// The table lists the Gaussians that an earlier version moved. The current version moves all of them, and so does the
+/// import. It must be the table of these Gaussians.
 fn check_table(folder: &Path, gaussians: &GaussianArrays) -> Result<(), DataError> {
     let path = folder.join("deformation_table.pth");
     if !path.exists() {
@@ -127,7 +128,7 @@ impl Weights<'_> {
         Ok([values[0], values[1], values[2]])
     }
 
-    /// A layer that reads `inputs` numbers, and writes `outputs` if that is known.
+    /// A layer with `inputs` inputs, and with `outputs` outputs if that is known.
     fn linear(&mut self, name: &str, inputs: usize, outputs: Option<usize>) -> Result<Linear, TrainError> {
         let key = format!("{name}.weight");
         let PlainTensor { shape, values } = self.take(&key)?;
@@ -137,7 +138,7 @@ impl Weights<'_> {
             return Err(self.wrong(&key, format!("shape {shape:?}, expected [{expected}, {inputs}]")));
         }
         let bias = self.take_shaped(&format!("{name}.bias"), &[rows])?;
-        // PyTorch keeps `[outputs, inputs]`, Burn the transpose.
+        // PyTorch has weights as `[outputs, inputs]`, Burn the transpose.
         let transposed = (0..rows * columns).map(|k| values[k % rows * columns + k / rows]).collect::<Vec<_>>();
         Ok(Linear {
             weight: Param::from_tensor(Tensor::from_data(TensorData::new(transposed, [columns, rows]), self.device)),
@@ -187,7 +188,7 @@ struct StoredPlane {
     values: Vec<f32>,
 }
 
-/// The planes of all scales, a hexplane, and their channels.
+/// The planes of all scales, which must be a hexplane, and their channels.
 fn planes(weights: &mut Weights) -> Result<(Vec<StoredPlane>, usize), TrainError> {
     let name = |scale: usize, plane: usize| format!("deformation_net.grid.grids.{scale}.{plane}");
     let mut planes: Vec<StoredPlane> = Vec::new();
@@ -232,11 +233,11 @@ fn planes(weights: &mut Weights) -> Result<(Vec<StoredPlane>, usize), TrainError
     Ok((planes, channels))
 }
 
-/// Where points and times fall on the planes.
+/// The mapping of points and times to the planes.
 fn coordinates(weights: &mut Weights) -> Result<(Pca, CoordinateMapping), TrainError> {
     const AABB: &str = "deformation_net.grid.aabb";
     let aabb = weights.take_shaped(AABB, &[2, 3])?;
-    // The far corner stands first.
+    // The far corner comes first.
     let center: [f32; 3] = std::array::from_fn(|axis| (aabb[axis] + aabb[3 + axis]) / 2.0);
     let half: [f32; 3] = std::array::from_fn(|axis| (aabb[axis] - aabb[3 + axis]) / 2.0);
     if half.contains(&0.0) {
@@ -263,7 +264,7 @@ fn coordinates(weights: &mut Weights) -> Result<(Pca, CoordinateMapping), TrainE
         let problem = format!("{rotation:?} with deviations {deviations:?} are no principal axes");
         return Err(weights.wrong("deformation_net.grid.rotation_matrix", problem));
     }
-    // The box stands in standardized coordinates: it moves the mean and stretches the deviations.
+    // The box is given in standardized coordinates: it shifts the mean and scales the deviations.
     let moved = std::array::from_fn(|k| {
         mean[k] + (0..3).map(|axis| center[axis] * deviations[axis] * axes[axis][k]).sum::<f32>()
     });
@@ -273,8 +274,8 @@ fn coordinates(weights: &mut Weights) -> Result<(Pca, CoordinateMapping), TrainE
     Ok((Pca { mean: moved, axes, std }, mapping))
 }
 
-/// Leaves out rows of the space-time planes before the first time, and repeats the last one up to a multiple of 4. The
-/// mapping of time follows, so that what is looked up stays the same.
+/// Removes rows of the space-time planes before the first time, and repeats the last row up to a multiple of 4. The
+/// mapping of time is changed so that queries give the same values.
 fn crop_and_pad_times(planes: &mut [StoredPlane], mapping: &mut CoordinateMapping) {
     let Some(times) = planes.iter().find_map(|plane| plane.shape.cells_along(TIME_AXIS)) else { return };
     let last = (times - 1) as f32;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use light4gs_data::DataError;
 
-/// What matters of the arguments.
+/// The arguments that are used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Settings {
     pub(super) no_dx: bool,
@@ -17,7 +17,7 @@ pub(super) struct Settings {
 }
 
 impl Default for Settings {
-    /// The program's own defaults.
+    /// The defaults of that program.
     fn default() -> Self {
         Self {
             no_dx: false,
@@ -32,7 +32,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Reads the file; what it does not mention keeps its default.
+    /// Reads the file; arguments that it does not mention keep their defaults.
     pub(super) fn read(path: &Path) -> Result<Self, DataError> {
         let text = std::fs::read_to_string(path).map_err(DataError::io("read", path))?;
         let mut settings = Self::default();

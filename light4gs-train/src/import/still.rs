@@ -10,11 +10,11 @@ use light4gs_model::{DynamicScene, Gaussians, Pca, SceneCoordinates, StillField}
 
 use crate::error::TrainError;
 
-/// Degree that a [`GaussianPly`] is padded to.
+/// Degree up to which a [`GaussianPly`] is padded.
 const FULL_DEGREE: u8 = 3;
 
-/// Reads Gaussians that do not move, with the highest degree of harmonics that any of them uses; and the names of properties
-/// that are left out, since 3DGS does not have them.
+/// Reads Gaussians that do not move, with the highest degree of harmonics that any of them uses; and the names of
+/// properties that are left out, since 3DGS does not have them.
 ///
 /// # Errors
 /// As [`GaussianPly::read`]; a file without Gaussians.
@@ -32,7 +32,7 @@ pub fn read(path: &Path, device: &Device) -> Result<(DynamicScene<StillField>, V
     Ok((scene, left_out))
 }
 
-/// Gaussians of degree 3; coefficients that the file lacks are 0. And the names of further properties.
+/// Gaussians of degree 3, in which coefficients that the file lacks are 0; and the names of further properties.
 pub(super) fn read_gaussians(path: &Path) -> Result<(GaussianArrays, Vec<String>), DataError> {
     let GaussianPly { means, sh_dc, sh_rest, opacity_logits, log_scales, quats, further } = GaussianPly::read(path)?;
     if means.is_empty() {
@@ -45,7 +45,7 @@ pub(super) fn read_gaussians(path: &Path) -> Result<(GaussianArrays, Vec<String>
     Ok((GaussianArrays { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further }, left_out))
 }
 
-/// Leaves out the degrees in which every coefficient of every Gaussian is 0.
+/// Removes the degrees in which every coefficient of every Gaussian is 0.
 fn with_used_degree(mut gaussians: GaussianArrays) -> GaussianArrays {
     let row = 3 * sh_rest_coefficients(FULL_DEGREE);
     let used = |coefficient: &usize| gaussians.sh_rest.iter().skip(*coefficient).step_by(row).any(|v| *v != 0.0);

@@ -1,12 +1,12 @@
-//! What a key may hold: it is checked before anything is made, `docs/configuration.md` shows it, and a test trains with the
-//! ends of every range.
+//! The values that a key may have. They are checked before a run begins, `docs/configuration.md` shows them, and a test
+//! trains with the ends of every range.
 
 use std::fmt;
 
 use light4gs_codec::checks::LEAST_STEP;
 use serde_json::Value;
 
-/// What a key may hold. What keys may not hold together is said in `config/validate.rs`.
+/// The values that a key may have. Conditions on several keys together are in `config/validate.rs`.
 #[derive(Clone, Copy, Debug)]
 pub enum Bounds {
     /// True or false.
@@ -15,12 +15,12 @@ pub enum Bounds {
     Text,
     /// One of these words.
     Word(&'static [&'static str]),
-    /// A part of the training by the name of its kind.
+    /// The name of a built-in kind of a part of the training.
     Kind {
         /// The names of the built-in kinds.
         names: &'static [&'static str],
-        /// The file of the repository that lists them, for `docs/configuration.md`: a new kind then changes its own file
-        /// and that one.
+        /// The file of the repository that lists them, for `docs/configuration.md`: adding a kind then changes only its
+        /// own file and that one.
         list: &'static str,
     },
     /// The name of a dataset's layout, or empty for none.
@@ -39,7 +39,7 @@ pub enum Bounds {
     },
     /// A whole number, or 0 for none.
     WholeOrNone {
-        /// The smallest but for 0.
+        /// The smallest value other than 0.
         least: u64,
         /// The largest.
         most: u64,
@@ -73,13 +73,13 @@ pub(crate) const INTERVAL: Bounds = Whole { least: 1, most: MOST_ITERATIONS };
 /// An iteration that may lie beyond the end.
 pub(crate) const ITERATION: Bounds = Whole { least: 0, most: MOST_INTEGER };
 pub(crate) const SHARE: Bounds = Number { least: 0.0, most: 1.0 };
-/// A learning rate: float32 holds it, also times a scene's extent.
+/// A learning rate: float32 can hold it, even multiplied by a scene's extent.
 pub(crate) const RATE: Bounds = Number { least: 1e-20, most: 1e3 };
 pub(crate) const THRESHOLD: Bounds = Number { least: 1e-30, most: 1e30 };
 pub(crate) const WEIGHT: Bounds = Number { least: 0.0, most: 1e6 };
-/// A quantization step that the encoder takes.
+/// A quantization step that the encoder accepts.
 pub(crate) const STEP: Bounds = Number { least: LEAST_STEP as f64, most: 1e3 };
-/// What a search for coarser steps may cost, dB.
+/// The loss that a search for coarser steps may cause, dB.
 pub(crate) const TOLERANCE: Bounds = Number { least: 0.0, most: 100.0 };
 
 impl fmt::Display for Bounds {
@@ -99,12 +99,12 @@ impl fmt::Display for Bounds {
     }
 }
 
-/// A number without rows of zeros.
+/// A number without long runs of zeros.
 struct Short(f64);
 
 impl fmt::Display for Short {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        // What came from a float32 is shown with a float32's digits.
+        // A value that was a float32 is shown with the digits of a float32.
         let (value, narrow) = (self.0, self.0 as f32);
         let exact = f64::from(narrow) == value;
         match (value == 0.0 || (1e-4..1e6).contains(&value.abs()), exact) {
@@ -117,7 +117,7 @@ impl fmt::Display for Short {
 }
 
 impl Bounds {
-    /// What is wrong with a value, if it is out of bounds. Types have been checked, words parsed.
+    /// What is wrong with a value, if it is out of bounds. Its type has been checked, and words have been parsed.
     pub(crate) fn problem(&self, value: &Value) -> Option<String> {
         let outside = |shown: &dyn fmt::Display| Some(format!("is {shown}; it must be {self}"));
         match (self, value) {
@@ -131,7 +131,8 @@ impl Bounds {
             }
             (Number { least, most }, Value::Number(number)) => {
                 let float = number.as_f64()?;
-                // As float32, which all numbers become: some keys hold no more, and their 1e-6 is a little below ours.
+                // Compared as float32, to which all numbers are converted: some keys are float32, and their 1e-6 is a
+                // little below that of f64.
                 let holds = (*least as f32..=*most as f32).contains(&(float as f32));
                 if holds { None } else { outside(&Short(float)) }
             }

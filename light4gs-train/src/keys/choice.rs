@@ -1,16 +1,16 @@
 //! Choices by name: enums whose variants have a name in TOML.
 
-/// A name that is none of those a key may have.
+/// A name that is none of the accepted ones.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("unknown {what} `{name}`; the nearest is `{nearest}` (it must be one of {})", known.join(", "))]
 pub struct UnknownChoice {
-    /// What is chosen.
+    /// The thing that is chosen.
     pub what: &'static str,
-    /// As given.
+    /// The given name.
     pub name: String,
-    /// The known name most like it.
+    /// The most similar accepted name.
     pub nearest: &'static str,
-    /// All of them.
+    /// All accepted names.
     pub known: &'static [&'static str],
 }
 
@@ -22,8 +22,8 @@ impl UnknownChoice {
     }
 }
 
-/// Declares an enum whose variants have names: `Display` and serde write the name, `FromStr` and serde read it, and a name
-/// that is not known is an [`UnknownChoice`] with the nearest one.
+/// Declares an enum whose variants have names: `Display` and serde write the name, `FromStr` and serde read it. An
+/// unknown name is an [`UnknownChoice`] with the nearest one.
 macro_rules! choice {
     (
         $(#[$attribute:meta])*
@@ -70,8 +70,8 @@ macro_rules! choice {
     };
 }
 
-/// Declares a configuration's view of an enum that another crate declares, with `NAMES`, `name` and `by_name`: `Display`,
-/// `FromStr` and serde as [`choice`] has them.
+/// Gives `Display`, `FromStr` and serde, as [`choice`] does, to an enum that another crate declares with `NAMES`,
+/// `name` and `by_name`.
 macro_rules! named {
     ($(#[$attribute:meta])* pub struct $named:ident(pub $kind:ty): $what:literal;) => {
         $(#[$attribute])*
@@ -97,7 +97,7 @@ macro_rules! named {
     };
 }
 
-/// Serde by `Display` and `FromStr`.
+/// Serde through `Display` and `FromStr`.
 macro_rules! serde_by_name {
     ($name:ident) => {
         impl serde::Serialize for $name {

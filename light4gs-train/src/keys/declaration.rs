@@ -1,50 +1,50 @@
-//! The macro `keys!`: one declaration from which a table of the configuration is a struct, has its defaults, and lists its
-//! keys.
+//! The macro `keys!`: from one declaration, a table of the configuration becomes a struct, with its defaults and a list
+//! of its keys.
 //!
-//! Other crates do parts of this. `confique` and `schematic` know defaults and documentation, `schemars` bounds as well,
-//! but none has bounds that are checked before the values are, sources, and defaults that are taken from another crate
-//! together, and each would bring crates of its own. What we need is these lines.
+//! Other crates do parts of this. `confique` and `schematic` know defaults and documentation, `schemars` bounds as
+//! well. But none of them has all of: bounds that are checked before values are used, sources, and defaults from
+//! another crate; and each would bring crates of its own.
 
 use super::Bounds;
 
 /// A table of the configuration.
 pub(crate) trait KeyTable {
-    /// What the table is about, in lines.
+    /// The description of the table, in lines.
     const ABOUT: &'static [&'static str];
-    /// What stands in it, in order.
+    /// Its entries, in order.
     const ENTRIES: &'static [Entry];
 }
 
-/// What stands in a table.
+/// An entry of a table.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Entry {
     /// A key.
     Key {
-        /// Without the tables around it.
+        /// Its name, without the tables around it.
         name: &'static str,
-        /// What it may hold.
+        /// The values that it may have.
         bounds: Bounds,
-        /// What it does, in lines.
+        /// Its documentation, in lines.
         meaning: &'static [&'static str],
-        /// Where it, or its default, comes from.
+        /// The source of the key or of its default.
         source: &'static str,
-        /// A few words beside it in `configs/base.toml`.
+        /// A short note beside it in `configs/base.toml`.
         note: Option<&'static str>,
     },
     /// A table in the table.
     Table {
-        /// Without the tables around it.
+        /// Its name, without the tables around it.
         name: &'static str,
         /// [`KeyTable::ABOUT`]
         about: &'static [&'static str],
         /// [`KeyTable::ENTRIES`]
         entries: &'static [Entry],
     },
-    /// The entries of another struct, which stand in this table as if they were its own.
+    /// The entries of another struct, which are in this table as if they were its own.
     Inlined(&'static [Entry]),
 }
 
-/// Whether nothing stands in a table, which is then not written.
+/// Whether a table has no keys and is therefore not written.
 pub(crate) fn has_no_keys<T: KeyTable>(_: &T) -> bool {
     T::ENTRIES.is_empty()
 }
@@ -63,8 +63,8 @@ pub(crate) fn has_no_keys<T: KeyTable>(_: &T) -> bool {
 /// }
 /// ```
 ///
-/// The note may be left out. A value that may be absent has `#[serde(with = "optional")]` before its name. The entries of a
-/// struct under `#[serde(flatten)]` stand in this table itself.
+/// The note may be left out. A value that may be absent has `#[serde(with = "optional")]` before its name. The entries
+/// of a struct with `#[serde(flatten)]` are in this table itself.
 macro_rules! keys {
     (
         $(#[doc = $about:literal])+
@@ -105,7 +105,7 @@ macro_rules! keys {
     };
 }
 
-/// A key's default; a table's is that of its type.
+/// The default of a key; for a table, that of its type.
 macro_rules! default_value {
     ($type:ty) => {
         <$type>::default()
@@ -115,7 +115,7 @@ macro_rules! default_value {
     };
 }
 
-/// What a field of a table stands for.
+/// The entry of a field.
 macro_rules! entry {
     ([(flatten)] $meaning:tt $name:ident: $type:ty) => {
         $crate::keys::Entry::Inlined(<$type as $crate::keys::KeyTable>::ENTRIES)

@@ -14,8 +14,8 @@
 /// }
 /// ```
 ///
-/// The types are declared by `keys!` and are a `Part` each. A kind's keys stand in a table of its name, beside the key that
-/// chooses the kind.
+/// The types are declared by `keys!`, and each implements `Part`. The keys of a kind are in a table of its name, beside
+/// the key that chooses the kind.
 macro_rules! kinds {
     (
         $(#[$attribute:meta])*
@@ -44,7 +44,7 @@ macro_rules! kinds {
         }
 
         impl $tables {
-            /// The kind of a name, with its keys.
+            /// The kind with a name, with its keys.
             pub fn of(&self, kind: $kind) -> Box<dyn $part> {
                 match kind {
                     $($kind::$variant => Box::new(self.$name.clone()),)+

@@ -1,14 +1,14 @@
 //! Configuration keys, declared once: type, default, bounds, documentation and source.
 //!
-//! - `declaration`: the macro `keys!`, which makes a struct and its table of keys of one declaration
-//! - `bounds`: what a key may hold
+//! - `declaration`: the macro `keys!`, which makes a struct and its table of keys from one declaration
+//! - `bounds`: the values that a key may have
 //! - `choice`: words, declared as enums
 //! - `kinds`: parts of the training that are chosen by name, each with its own keys
-//! - `optional`: values that may be absent, which TOML has no word for
+//! - `optional`: values that may be absent, although TOML has no null
 //! - `reference`: what follows from the declarations: the list of all keys, `configs/base.toml`, and the tables of
 //!   `docs/configuration.md`
 //!
-//! This room knows no key. The declarations stand near what they configure, and `config` puts them together.
+//! This room contains no key. The declarations are near the code that they configure, and `config` collects them.
 
 mod bounds;
 mod choice;

@@ -1,5 +1,5 @@
-//! TOML has no null: an optional whole number is written as 0 where it is absent, an optional word as an empty one. A file that is written out is
-//! complete that way, and a file can take back what the one that it extends has set.
+//! TOML has no null: an absent optional whole number is written as 0, an absent optional word as an empty text. So a
+//! written file is complete, and a file can undo what the one that it extends has set.
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 

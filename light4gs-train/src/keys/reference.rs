@@ -1,4 +1,4 @@
-//! What follows from the declarations: the list of all keys, `configs/base.toml`, and the tables of
+//! What is generated from the declarations: the list of all keys, `configs/base.toml`, and the tables of
 //! `docs/configuration.md`.
 
 use serde::Serialize;
@@ -8,13 +8,13 @@ use super::{Bounds, Entry, KeyTable};
 /// A key of the configuration.
 #[derive(Clone, Debug)]
 pub struct Key {
-    /// With the tables that it stands in, such as `train.prune.fraction`.
+    /// Its name with the tables around it, such as `train.prune.fraction`.
     pub path: String,
-    /// What it may hold.
+    /// The values that it may have.
     pub bounds: Bounds,
-    /// What it does.
+    /// Its documentation.
     pub meaning: String,
-    /// Where it, or its default, comes from.
+    /// The source of the key or of its default.
     pub source: &'static str,
 }
 
@@ -36,14 +36,14 @@ pub(crate) fn list<T: KeyTable>() -> Vec<Key> {
     keys
 }
 
-/// The lines of a comment as one.
+/// The lines of a comment, joined to one.
 fn joined(lines: &[&str]) -> String {
     lines.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
 }
 
 /// A table under its full name, without the tables in it.
 struct Section {
-    /// Empty for the keys that stand in no table.
+    /// Empty for keys that are in no table.
     path: String,
     about: String,
     /// Each with its default as TOML.
@@ -85,7 +85,7 @@ fn sections<T: KeyTable + Default + Serialize>() -> Vec<Section> {
 fn toml_value(value: &toml::Value) -> String {
     match value {
         toml::Value::Float(value) => {
-            // What came from a float32 is shown with a float32's digits.
+            // A value that was a float32 is shown with the digits of a float32.
             let narrow = *value as f32;
             let exact = f64::from(narrow) == *value;
             match (*value == 0.0 || (1e-3..1e6).contains(&value.abs()), exact) {
@@ -104,7 +104,7 @@ fn toml_value(value: &toml::Value) -> String {
 
 /// Every key with its default, as a TOML file.
 pub(crate) fn toml_text<T: KeyTable + Default + Serialize>() -> String {
-    /// Where notes begin.
+    /// The column in which notes begin.
     const COLUMN: usize = 43;
     let mut text = String::new();
     for Section { path, keys, .. } in sections::<T>() {

@@ -1,6 +1,6 @@
-//! Losses: what a rendered image should be like.
+//! Losses: how a rendered image is compared with the training image.
 //!
-//! - here: [`Loss`], what the trainer asks of a loss, and [`LossKind`], the built-in ones by name
+//! - this file: [`Loss`], the trainer's interface to a loss, and [`LossKind`], the built-in ones by name
 //! - `photometric`, `charbonnier`: one file each
 
 mod charbonnier;
@@ -25,7 +25,7 @@ kinds! {
     pub struct Losses: dyn Loss;
 }
 
-/// A rendered view beside the truth, and where the run stands.
+/// A rendered view, its training image, and the training position.
 #[derive(Clone, Debug)]
 pub struct LossInput<'a> {
     /// `[H, W, 3]`: as rendered over the background, on the tape; not clamped above.
@@ -44,8 +44,8 @@ pub struct LossInput<'a> {
     pub iteration: usize,
 }
 
-/// A differentiable measure of what is wrong with a rendered view. Views are differentiated side by side on several
-/// threads, so a loss must be `Sync`; what it remembers across iterations belongs behind a lock.
+/// A differentiable measure of the error of a rendered view. Views are differentiated side by side on several threads,
+/// so a loss must be `Sync`; state that it keeps between iterations belongs behind a lock.
 pub trait Loss: Send + Sync {
     /// `[1]`, on the tape of the rendered tensors.
     fn loss(&self, view: LossInput) -> Tensor<1>;

@@ -1,7 +1,7 @@
-//! `metrics.jsonl`: what a run measures while it trains, one JSON object a line.
+//! `metrics.jsonl`: measurements of a run while it trains, one JSON object for each line.
 //!
-//! Every line is written in one piece and leaves the process at once, so a run that is killed loses at most the line
-//! that it was writing. A run that resumes from a checkpoint first drops what came after it.
+//! Every line is written in one piece and passed to the system at once, so a run that is killed loses at most the line
+//! that it was writing. A run that resumes from a checkpoint first removes the lines after it.
 
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions};
@@ -15,7 +15,7 @@ use super::Observer;
 use crate::error::TrainError;
 use crate::stage::Stage;
 
-/// One line of `metrics.jsonl`. What was not measured is absent.
+/// One line of `metrics.jsonl`. Values that were not measured are absent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct MetricsRecord {
     /// Stage of the run.
@@ -38,13 +38,13 @@ pub struct MetricsRecord {
     /// Speed since the last line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub iterations_per_second: Option<f64>,
-    /// Anything else, by name: parts of the loss, learning rates.
+    /// Further values by name: parts of the loss, learning rates.
     #[serde(flatten)]
     pub extra: BTreeMap<String, f64>,
 }
 
 impl MetricsRecord {
-    /// A record of which only the place in the run is known.
+    /// A record that has only the training position.
     pub fn new(stage: Stage, iteration: usize, seconds: f64, gaussians: usize) -> Self {
         Self {
             stage,
@@ -59,7 +59,7 @@ impl MetricsRecord {
         }
     }
 
-    /// JSON has no infinity: a value that is not finite counts as not measured.
+    /// JSON has no infinity: a value that is not finite is left out.
     fn finite(&self) -> Self {
         let finite = |value: Option<f64>| value.filter(|value| value.is_finite());
         Self {
@@ -88,7 +88,7 @@ impl Observer for MetricsLog {
 }
 
 impl MetricsLog {
-    /// Opens the file to append to it; it is made if it does not exist. A half-written last line is dropped.
+    /// Opens the file for appending; it is made if it does not exist. A half-written last line is removed.
     ///
     /// # Errors
     /// [`DataError`] naming the file, and the line where one before the last is damaged.
@@ -99,7 +99,7 @@ impl MetricsLog {
         Ok(Self { path: path.to_path_buf(), file: open_to_append(path)? })
     }
 
-    /// Appends a record and hands it to the system.
+    /// Appends a record and passes it to the system.
     ///
     /// # Errors
     /// [`DataError::Io`] naming the file.
@@ -110,9 +110,9 @@ impl MetricsLog {
         self.file.write_all(line.as_bytes()).and_then(|()| self.file.flush()).map_err(failed("write", &self.path))
     }
 
-    /// Drops every record after this place in the run: for a run that resumes there.
+    /// Removes every record after this training position, for a run that resumes there.
     ///
-    /// The file is replaced in one step: a crash leaves the old one or the new one.
+    /// The file is replaced in one step: after a crash it is either the old one or the new one.
     ///
     /// # Errors
     /// As [`MetricsLog::open`].
@@ -123,7 +123,7 @@ impl MetricsLog {
     }
 }
 
-/// Reads all records. A last line that was not finished is passed over.
+/// Reads all records. An unfinished last line is ignored.
 ///
 /// # Errors
 /// [`DataError`] naming the file, and the line where another one is damaged.
@@ -131,15 +131,15 @@ pub fn read_metrics(path: &Path) -> Result<Vec<MetricsRecord>, DataError> {
     Ok(read_lines(path)?.lines.into_iter().map(|(_, record)| record).collect())
 }
 
-/// The records of a file beside their text.
+/// The records of a file, and their text.
 struct Lines {
     lines: Vec<(String, MetricsRecord)>,
-    /// Whether the file is more than these lines, each with its line feed.
+    /// Whether the file has anything besides these lines, each with its line feed.
     has_rest: bool,
 }
 
 fn read_lines(path: &Path) -> Result<Lines, DataError> {
-    // The unfinished line may end within a character.
+    // The unfinished line may end in the middle of a character.
     let bytes = read_regular_file(path, u64::MAX).map_err(failed("read", path))?;
     let text = String::from_utf8_lossy(&bytes);
     let finished = text.is_empty() || text.ends_with('\n');
@@ -166,7 +166,7 @@ fn read_lines(path: &Path) -> Result<Lines, DataError> {
     Ok(Lines { has_rest: length != bytes.len(), lines })
 }
 
-/// Replaces the file by the lines whose record `keep` accepts, if that changes it.
+/// Replaces the file by the lines whose records `keep` accepts, if that changes it.
 fn keep_lines(path: &Path, keep: impl Fn(&MetricsRecord) -> bool) -> Result<(), DataError> {
     let Lines { lines, has_rest } = read_lines(path)?;
     let kept: Vec<&String> = lines.iter().filter(|(_, record)| keep(record)).map(|(line, _)| line).collect();

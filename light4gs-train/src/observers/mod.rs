@@ -1,7 +1,7 @@
-//! What watches a run: progress, logs, viewers.
+//! Observers of a run: progress bars, logs, viewers.
 //!
-//! - here: [`Observer`], what the trainer tells
-//! - `metrics_log`, `tensorboard`: the logs that a run folder has
+//! - this file: [`Observer`], the calls that the trainer makes
+//! - `metrics_log`, `tensorboard`: the logs of a run folder
 //!
 //! The progress bars of the command line are an observer as well (`cli/progress.rs`).
 
@@ -17,7 +17,7 @@ use crate::error::TrainError;
 use crate::stage::Stage;
 use metrics_log::MetricsRecord;
 
-/// What happened in an iteration.
+/// The results of an iteration.
 #[derive(Clone, Debug)]
 pub struct StepReport {
     /// The stage.
@@ -38,17 +38,17 @@ pub struct StepReport {
     pub seconds: f64,
 }
 
-/// The scene of a run in progress, for those who draw it.
+/// The scene of a run in progress, for observers that draw it.
 pub trait SceneInTraining {
-    /// Raw attributes of the `N` Gaussians at a time in [0, 1], off the tape: as trained so far. In the coarse stage
+    /// Raw attributes of the `N` Gaussians at a time in [0, 1], without a tape, as trained so far. In the coarse stage
     /// nothing moves.
     fn gaussians_at(&self, time: f32) -> GaussianTensors;
 }
 
-/// Is told what happens in a run. Every method does nothing unless it is implemented; the trainer waits until it returns.
-/// An error ends the run.
+/// Is called when something happens in a run. By default every method does nothing. The trainer waits until it returns;
+/// an error ends the run.
 pub trait Observer: Send {
-    /// A stage begins, or goes on after `done` of its `iterations`.
+    /// A stage begins, or continues after `done` of its `iterations`.
     fn on_stage(&mut self, stage: Stage, done: usize, iterations: usize) -> Result<(), TrainError> {
         let _ = (stage, done, iterations);
         Ok(())
@@ -72,19 +72,20 @@ pub trait Observer: Send {
         Ok(())
     }
 
-    /// A stage has come to its end.
+    /// A stage has ended.
     fn on_stage_end(&mut self, stage: Stage) -> Result<(), TrainError> {
         let _ = stage;
         Ok(())
     }
 
-    /// Something that the user should know about the training, in words.
+    /// A warning about the training for the user.
     fn on_warning(&mut self, warning: &str) -> Result<(), TrainError> {
         let _ = warning;
         Ok(())
     }
 
-    /// Entropy models are fitted to a finished scene that was trained without them, and `done` of `iterations` are over.
+    /// Entropy models are being fitted to a finished scene that was trained without them; `done` of `iterations` are
+    /// over.
     fn on_fit(&mut self, done: usize, iterations: usize) -> Result<(), TrainError> {
         let _ = (done, iterations);
         Ok(())

@@ -1,10 +1,10 @@
-//! Event files that TensorBoard shows: scalars over the iterations of a run.
+//! Event files for TensorBoard: scalars over the iterations of a run.
 //!
-//! The crate `tensorboard-rs` is unmaintained, and the format is small: a file is a row of TFRecords (length, its
-//! checksum, bytes, their checksum), each a protobuf `Event` of a few fields, written here by hand.
+//! The crate `tensorboard-rs` is unmaintained, and the format is small: a file is a sequence of TFRecords (length, its
+//! checksum, bytes, their checksum), each a protobuf `Event` of a few fields, which are encoded here.
 //!
-//! Each session of a run opens a file of its own, as TensorBoard expects; a session that resumes says from which step,
-//! and TensorBoard then hides what earlier files hold from there on.
+//! Each session of a run writes a file of its own, as TensorBoard expects. A session that resumes writes the step from
+//! which it does, and TensorBoard then hides the data of earlier files from that step on.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{BufWriter, ErrorKind, Write};
@@ -27,7 +27,7 @@ pub struct TensorBoard {
 
 impl TensorBoard {
     /// Makes a new event file in `folder`, which is made if it does not exist. `resume_step` is the first step that
-    /// this session writes, if an earlier one may have written it already.
+    /// this session writes, if an earlier session may have written it already.
     ///
     /// # Errors
     /// [`DataError::Io`] naming the file.
@@ -48,7 +48,7 @@ impl TensorBoard {
         &self.path
     }
 
-    /// Writes values by tag (`loss/total`; what stands before the slash groups them) and hands them to the system.
+    /// Writes values by tag (`loss/total`; the part before the slash groups them) and passes them to the system.
     ///
     /// # Errors
     /// [`DataError::Io`] naming the file.
@@ -189,7 +189,7 @@ fn put_bytes(message: &mut Vec<u8>, field: u64, bytes: &[u8]) {
     message.extend(bytes);
 }
 
-/// Seven bits a byte, the lowest first; the top bit says that more follow.
+/// Seven bits in each byte, the lowest first; the top bit is set where more follow.
 fn put_varint(message: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {
         message.push(value as u8 | 0x80);
@@ -209,7 +209,7 @@ fn framed(message: &[u8]) -> Vec<u8> {
     record
 }
 
-/// CRC-32C, turned and shifted as TFRecord asks, so that the checksum of data that holds checksums stays good.
+/// CRC-32C, rotated and shifted as TFRecord requires, so that data which contains checksums has a good checksum too.
 fn masked_checksum(bytes: &[u8]) -> u32 {
     crc32c::crc32c(bytes).rotate_right(15).wrapping_add(0xa282_ead8)
 }
@@ -223,7 +223,7 @@ fn failed(action: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> D
 mod tests {
     use super::*;
 
-    /// A field of a message: number, then a number's bits or bytes.
+    /// A field of a message: its number, then the bits of a number, or bytes.
     #[derive(Debug, PartialEq)]
     enum Field<'a> {
         Number(u64, u64),

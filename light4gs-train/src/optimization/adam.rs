@@ -1,4 +1,4 @@
-//! Adam with a state by parameter path, and row surgery for parameters whose rows come and go.
+//! Adam with a state for each parameter path, which follows when rows are added and removed.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub struct AdamState {
     pub time: u32,
 }
 
-/// Adam with the betas of the field (0.9, 0.999) and epsilon 1e-15; the learning rate comes with every step.
+/// Adam with the usual betas (0.9, 0.999) and epsilon 1e-15; the learning rate is given with every step.
 #[derive(Clone, Debug, Default)]
 pub struct Adam {
     /// By parameter path.
@@ -29,8 +29,8 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// Steps every parameter of a module that has a gradient and a learning rate, which is asked for by group and path.
-    /// `prefix` stands in front of the module's paths, empty for none.
+    /// Steps every parameter of a module that has a gradient and a learning rate. `rate` gives the rate by group and
+    /// path. `prefix` is put before the module's paths; it may be empty.
     pub fn step_module<M: Module>(
         &mut self,
         prefix: &str,
@@ -41,7 +41,7 @@ impl Adam {
         update_parameters(module, &mut Step { adam: self, prefix, gradients, rate });
     }
 
-    /// Steps a parameter along its gradient, which has the parameter's shape and is off the tape.
+    /// Steps a parameter along its gradient, which has the parameter's shape and no tape.
     pub fn step<const D: usize>(
         &mut self,
         name: &str,
@@ -50,7 +50,7 @@ impl Adam {
         learning_rate: f64,
     ) {
         let id = parameter.id;
-        // Take the tensor out, so that nobody shares it and the step can be made in place.
+        // Takes the tensor out, so that it is not shared and the step can be made in place.
         let empty = Param::initialized(id, Tensor::empty([0; D], &gradient.device()));
         let value = std::mem::replace(parameter, empty).into_value().inner();
         let shape = value.dims();
@@ -68,8 +68,8 @@ impl Adam {
         *parameter = Param::initialized(id, Tensor::from_inner(value.reshape(shape)).require_grad());
     }
 
-    /// Lets the moments follow rows: row k of the result is row `rows[k]`, or zeros where `fresh[k]`.
-    /// `rows` and `fresh` are `[M]` tensors, `count` is the number of rows before.
+    /// Moves the moments with their rows: row k of the result is row `rows[k]`, or zeros where `fresh[k]`. `rows` and
+    /// `fresh` are `[M]` tensors, `count` is the number of rows before.
     pub fn select_rows(&mut self, name: &str, rows: &Tensor<1, Int>, fresh: &Tensor<1>, count: usize) {
         let Some(state) = self.states.get_mut(name) else { return };
         let keep = fresh.clone().neg().add_scalar(1.0).unsqueeze_dim::<2>(1);
@@ -101,7 +101,8 @@ impl<R: Fn(ParameterGroup, &str) -> Option<f64>> ParameterMapper for Step<'_, R>
         let joined = if self.prefix.is_empty() { path.to_owned() } else { format!("{}.{path}", self.prefix) };
         if let Some(rate) = ParameterGroup::of(&joined).and_then(|group| (self.rate)(group, &joined))
             && let Some(gradient) = self.gradients.remove(parameter.id)
-            // Spherical harmonics of degree 0 have no others: nothing to step, and no kernel takes nothing.
+            // With spherical harmonics of degree 0 alone, `sh_rest` is empty: there is nothing to step, and kernels
+            // refuse empty tensors.
             && parameter.shape().num_elements() > 0
         {
             let gradient = gradient.reshape(parameter.dims());

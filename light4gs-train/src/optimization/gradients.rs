@@ -1,4 +1,4 @@
-//! Gradients by parameter, added up over the parts of a loss that are differentiated apart from each other.
+//! Gradients by parameter, summed over the parts of a loss that are differentiated separately.
 
 use std::collections::HashMap;
 
@@ -8,16 +8,16 @@ use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
 /// Sums of gradients. Equal parts, added in the same order, give equal sums to the last bit.
 ///
-/// Copies of a module share the identities of its parameters, so what was found out about a copy with a tape of its own
-/// belongs to the original.
+/// Copies of a module share the identities of its parameters, so gradients of a copy with its own tape belong to the
+/// original.
 #[derive(Debug, Default)]
 pub struct GradientSums {
-    /// Flattened, off the tape.
+    /// Flattened, without a tape.
     sums: HashMap<ParamId, Tensor<1>>,
 }
 
 impl GradientSums {
-    /// Adds what a backward pass found out about the parameters of a module.
+    /// Adds the gradients of a backward pass for the parameters of a module.
     pub fn add_module<M: Module>(&mut self, module: &M, gradients: &mut Gradients) {
         visit_parameters(module, &mut Collect { sums: self, gradients });
     }
@@ -29,12 +29,12 @@ impl GradientSums {
         }
     }
 
-    /// A parameter's gradient, flattened. None if no part depends on it.
+    /// A parameter's gradient, flattened. `None` if no part depends on it.
     pub fn get(&self, parameter: ParamId) -> Option<Tensor<1>> {
         self.sums.get(&parameter).cloned()
     }
 
-    /// Takes a parameter's gradient out, flattened. None if no part depends on it.
+    /// Removes and returns a parameter's gradient, flattened. `None` if no part depends on it.
     pub fn remove(&mut self, parameter: ParamId) -> Option<Tensor<1>> {
         self.sums.remove(&parameter)
     }

@@ -1,14 +1,14 @@
-//! Learning-rate groups: which parameters share a rate, by their paths.
+//! Learning-rate groups: which parameters share a rate, determined by their paths.
 //!
-//! Paths are those of [`light4gs_model::parameters`], with [`COMPRESSION`] in front of those of the entropy models.
+//! Paths are those of [`light4gs_model::parameters`], with the prefix [`COMPRESSION`] for the entropy models.
 
-/// What stands in front of the paths of entropy models and quantization steps.
+/// Prefix of the paths of entropy models and quantization steps.
 pub const COMPRESSION: &str = "compression";
 
 /// Parameters that share a learning rate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ParameterGroup {
-    /// What every Gaussian has; each attribute has a rate of its own.
+    /// Attributes of the Gaussians; each has a rate of its own.
     Attribute,
     /// Feature planes of the deformation field.
     Planes,
@@ -22,8 +22,8 @@ pub enum ParameterGroup {
     Steps,
 }
 
-/// Beginning of a path, a name that must follow somewhere in it (or nothing), and the group. The first line that fits
-/// counts. What fits none, such as the scene's coordinates, is not trained.
+/// Beginning of a path, a name that must occur later in it (or nothing), and the group. The first matching line
+/// decides. Parameters without a match, such as the scene's coordinates, are not trained.
 const GROUPS: [(&str, &str, ParameterGroup); 6] = [
     ("gaussians", "", ParameterGroup::Attribute),
     // The planes of any field: `field.hexplane.planes.3` for the built-in one.
@@ -35,7 +35,7 @@ const GROUPS: [(&str, &str, ParameterGroup); 6] = [
 ];
 
 impl ParameterGroup {
-    /// The group of a parameter. None for constants.
+    /// The group of a parameter; `None` for constants.
     pub fn of(path: &str) -> Option<Self> {
         let fits = |(beginning, name, _): &&(&str, &str, Self)| {
             path.strip_prefix(beginning)

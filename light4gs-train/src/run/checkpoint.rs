@@ -1,7 +1,7 @@
-//! Everything that a run needs to go on: parameters, moments, density statistics, position in the schedule.
+//! Everything that a run needs to continue: parameters, moments, density statistics, training position.
 //!
-//! One safetensors file a checkpoint. Whatever is random in training is drawn from the seed and the iteration, so there
-//! is no generator state to keep.
+//! Each checkpoint is one safetensors file. All random numbers of training are drawn from the seed and the iteration,
+//! so there is no generator state to store.
 
 use std::collections::{BTreeMap, HashMap};
 use std::io::Write;
@@ -32,7 +32,7 @@ pub struct Checkpoint<F: DeformationField = BuiltInField, E: EntropyModels = Con
     pub compression: Option<CompressionOf<E>>,
     /// Optimizer state.
     pub adam: Adam,
-    /// What the density strategy keeps, by name: vectors off the tape.
+    /// The state of the density strategy, by name: vectors without a tape.
     pub density: BTreeMap<String, Tensor<1>>,
     /// The stage that the iteration belongs to.
     pub stage: Stage,
@@ -59,16 +59,17 @@ impl ParameterVisitor for Collect<'_> {
     }
 }
 
-/// Names of the scene's stored parameters begin like this; those of the entropy models with [`COMPRESSION`].
+/// Prefix of the names of the scene's stored parameters; that of the entropy models is [`COMPRESSION`].
 const SCENE: &str = "scene";
-/// In front of a parameter's name: the optimizer's first moment, its second one, and the steps it has taken.
+/// Prefixes before a parameter's name: for the optimizer's first moment, its second moment, and the number of its
+/// steps.
 const FIRST: &str = "first.";
 const SECOND: &str = "second.";
 const TIME: &str = "time.";
-/// In front of the names of the density strategy's statistics.
+/// Prefix of the names of the density strategy's statistics.
 const DENSITY: &str = "density.";
 
-/// Key of the mapping of coordinates, where it is not the paper's.
+/// Key of the coordinate mapping, which is stored if it is not the paper's.
 const MAPPING: &str = "coordinate_mapping";
 
 /// Contraction, scales, offsets, scale and offset of the time: nine numbers.
@@ -105,8 +106,8 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         entries
     }
 
-    /// Writes the file whole or not at all: a checkpoint whose numbers are not all finite, or of which [`Checkpoint::load`] would
-    /// refuse one as too large, is not written, so that the last one that was is one to go on from.
+    /// Writes the file whole or not at all. A checkpoint is not written if a number is not finite, or so large that
+    /// [`Checkpoint::load`] would refuse it. So a run can always continue from the last checkpoint.
     ///
     /// # Errors
     /// [`SaveError::NotFinite`] with the tensor; what the system refuses.
@@ -140,15 +141,15 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         Ok(write_atomically(path, |file| file.write_all(&bytes)).map_err(TrainError::from)?)
     }
 
-    /// Reads a checkpoint of a run with this configuration, this scene and these entropy models onto an autodiff device. The
-    /// scene is the run's before it was trained: its deformation field, and what its Gaussians have.
+    /// Reads a checkpoint of a run with this configuration, scene and entropy models onto an autodiff device. The scene
+    /// is that of the run before training: it gives the deformation field and the attributes of the Gaussians.
     ///
-    /// Nothing in the file is trusted: every tensor must be there, of the shape that the configuration and the number of
-    /// Gaussians give it, with finite values that training can have led to, and no other; the place in the run must be on
-    /// its schedule.
+    /// Nothing in the file is trusted: exactly the expected tensors must be there, with the shapes that follow from the
+    /// configuration and the number of Gaussians, and with finite values that training can have produced. The training
+    /// position must be within the schedule.
     ///
     /// # Errors
-    /// [`TrainError::Checkpoint`] naming the tensor or the entry, or the other kind of field.
+    /// [`TrainError::Checkpoint`] with the name of the tensor or the entry, or of the other kind of field.
     pub fn load(
         path: &Path,
         config: &Config,
@@ -165,7 +166,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             return Err(failed(format!("metadata `seconds` is {seconds}, expected a duration")));
         }
 
-        // A model of the right structure, whose tensors are then replaced.
+        // A model of the right structure, whose tensors are replaced afterwards.
         let cloud = PointCloud { positions: vec![[0.0; 3]], colors: vec![[0.5; 3]] };
         let mut scene = scene.init(&cloud, device);
         let (kind, expected) = (file.text("field").map_err(failed)?, scene.field.kind());
@@ -173,7 +174,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             return Err(failed(format!("it has a deformation field of the kind `{kind}`, not `{expected}`")));
         }
         if stage == Stage::Fine {
-            // Motion has begun, which may have changed the field's shapes.
+            // Motion has begun, so the shapes of the field may have changed.
             let shapes = file.shapes_after(&format!("{SCENE}.field."));
             scene.field.resize(&shapes).map_err(|error| failed(error.to_string()))?;
         }
@@ -211,7 +212,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
 /// Why a checkpoint was not written.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
-    /// A number is not finite, or beyond what the encoder takes.
+    /// A number is not finite, or beyond what the encoder accepts.
     #[error("tensor `{tensor}` has {value} at index {index}")]
     NotFinite {
         /// Its name in the file.
@@ -239,7 +240,7 @@ fn gaussian_count(file: &StoredTensors, gaussians: &Gaussians) -> usize {
     rows.iter().copied().max_by_key(|count| having(*count)).unwrap_or(0)
 }
 
-/// Where in its run a checkpoint is: on the schedule, and what the file's name says.
+/// The training position of a checkpoint; it must be within the schedule, and that of the file's name.
 fn place(file: &StoredTensors, path: &Path, config: &Config) -> Result<(Stage, usize), String> {
     let stage = match file.text("stage")? {
         "coarse" => Stage::Coarse,
@@ -262,7 +263,7 @@ fn place(file: &StoredTensors, path: &Path, config: &Config) -> Result<(Stage, u
     }
 }
 
-/// The optimizer's state. `sizes` are the numbers of values of all parameters.
+/// The optimizer's state. `sizes` are the lengths of all parameters.
 fn load_adam(
     file: &mut StoredTensors,
     sizes: &BTreeMap<String, usize>,
@@ -296,9 +297,9 @@ struct Load<'a, 'f> {
     count: usize,
     file: &'a mut StoredTensors<'f>,
     device: &'a Device,
-    /// Values of each parameter, by the name that its moments have.
+    /// Length of each parameter, by the name that its moments have.
     sizes: BTreeMap<String, usize>,
-    /// The first that was found.
+    /// The first one that was found.
     problem: Option<String>,
 }
 
@@ -307,7 +308,7 @@ impl ParameterMapper for Load<'_, '_> {
         if self.problem.is_some() {
             return parameter;
         }
-        // The shape is what the configuration says, but for the number of Gaussians.
+        // The shape follows from the configuration, except for the number of Gaussians.
         let mut shape = parameter.dims();
         if attribute_of_path(path).is_some() {
             shape[0] = self.count;
@@ -331,10 +332,10 @@ impl ParameterMapper for Load<'_, '_> {
     }
 }
 
-/// The largest position and the largest weight that the encoder takes (see `light4gs_codec::checks::positions`).
+/// The largest position and the largest weight that the encoder accepts (see `light4gs_codec::checks::positions`).
 const LARGEST_VALUE: f32 = 1e30;
 
-/// What finite values may not be, by the path of their parameter.
+/// Conditions on finite values, by the path of their parameter.
 fn check_range(path: &str, values: &[f32]) -> Result<(), String> {
     let bad = |unit: usize, holds: &dyn Fn(&[f32]) -> bool| values.chunks(unit).position(|row| !holds(row));
     let length = |row: &[f32]| row.iter().map(|v| f64::from(*v).powi(2)).sum::<f64>().sqrt();
@@ -344,7 +345,7 @@ fn check_range(path: &str, values: &[f32]) -> Result<(), String> {
         "coordinates.axes" => (bad(3, &|row| (length(row) - 1.0).abs() < 1e-3), "an axis of length 1"),
         _ => (None, ""),
     };
-    // Finite numbers that no stream takes: without this they would be found by the encoder, after the last iteration.
+    // Finite numbers that the encoder would refuse, but only after the last iteration.
     if let Some(index) = values.iter().position(|value| value.abs() > LARGEST_VALUE) {
         return Err(format!(
             "has {:e} at index {index}, expected at most {LARGEST_VALUE:e} on either side of 0",
@@ -359,7 +360,7 @@ pub fn checkpoint_name(stage: Stage, iteration: usize) -> String {
     format!("{}_{iteration:06}.safetensors", stage.name())
 }
 
-/// Stage and iteration, as a checkpoint's name has them.
+/// Stage and iteration from a checkpoint's name.
 fn place_by_name(path: &Path) -> Option<(Stage, usize)> {
     let (stage, iteration) = path.file_stem()?.to_str()?.split_once('_')?;
     let stage = [Stage::Coarse, Stage::Fine].into_iter().find(|known| known.name() == stage)?;
@@ -383,7 +384,7 @@ mod tests {
 
     use super::*;
 
-    /// A scene of two Gaussians with a further attribute of so many numbers, if any.
+    /// A scene of two Gaussians with a further attribute of this width, if any.
     fn scene(config: &Config, width: Option<usize>) -> DynamicSceneConfig<BuiltInField> {
         let mut scene = config.model.build();
         let start = |width| Attribute::new("age", width).with_start((0..width).map(|i| i as f32).collect());

@@ -1,4 +1,4 @@
-//! What differs between runs: where they come from, how they are configured, what came out.
+//! What differs between runs: program, machine and data, configuration, results.
 
 use std::path::{Path, PathBuf};
 
@@ -13,35 +13,35 @@ use crate::error::TrainError;
 /// Lists of an evaluation with an entry for each view or plane: too long to compare.
 const LONG_LISTS: [&str; 2] = ["views", "planes"];
 
-/// What a run's dataset was when it began, in the run's folder.
+/// The digest of a run's dataset when it began, in the run's folder.
 const DATASET: &str = "dataset.json";
-/// Those are far shorter.
+/// Such files are far shorter.
 const MAX_DATASET_BYTES: u64 = 1 << 28;
 
-/// Something that is not the same in all runs.
+/// A value that is not the same in all runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
     /// Full path, such as `train.batch_size` or `splits.test.psnr`.
     pub key: String,
-    /// One a run; none where a run does not have it.
+    /// One for each run; `None` if a run does not have it.
     pub values: Vec<Option<String>>,
 }
 
-/// What differs between some runs.
+/// Differences between runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
     /// Folders of the runs.
     pub runs: Vec<PathBuf>,
-    /// Of `run.json`: program, machine, data.
+    /// Differences of `run.json`: program, machine, data.
     pub provenance: Vec<Difference>,
-    /// Of `config.toml`.
+    /// Differences of `config.toml`.
     pub configuration: Vec<Difference>,
-    /// Of `eval.json`; runs that are not measured have none.
+    /// Differences of `eval.json`, which only measured runs have.
     pub results: Vec<Difference>,
 }
 
 impl Comparison {
-    /// Of at least one run.
+    /// Compares the runs, of which there must be at least one.
     ///
     /// # Errors
     /// A folder that holds no run, or a damaged one.
@@ -70,7 +70,7 @@ fn leaves_of(run: &Path) -> Result<RunLeaves, TrainError> {
     let to_json = |value: Result<Value, serde_json::Error>| value.expect("plain data has a JSON form");
     let evaluation: Option<Value> = folder.read_json("eval.json")?;
     let mut provenance = leaves(&to_json(serde_json::to_value(&record)));
-    // What the dataset was is long; that it was another one is short.
+    // The digest of a dataset is long; only whether it differs is shown.
     if let Ok(dataset) = read_regular_file(&folder.path(DATASET), MAX_DATASET_BYTES) {
         let digest: String = Sha256::digest(&dataset).iter().map(|byte| format!("{byte:02x}")).collect();
         provenance.push(("data".to_owned(), digest));
@@ -82,7 +82,7 @@ fn leaves_of(run: &Path) -> Result<RunLeaves, TrainError> {
     })
 }
 
-/// Every number, text and switch with its path. Entries of lists go by their `name` or `split`.
+/// Every number, text and switch with its path. Entries of lists are identified by their `name` or `split`.
 fn leaves(value: &Value) -> Leaves {
     let mut found = Vec::new();
     collect(value, String::new(), &mut found);

@@ -1,4 +1,4 @@
-//! What a folder holds that a run is to be made or opened in: after a kill at any moment it is one of these.
+//! The contents of a folder in which a run is to be made or opened. After a kill at any time it is one of these.
 
 use std::fs;
 use std::path::Path;
@@ -10,10 +10,10 @@ use super::lock::LOCK_FILE;
 use crate::config::{Config, MAX_CONFIG_BYTES};
 use crate::error::TrainError;
 
-/// Says where the run's scene is; a folder with this file holds a run.
+/// Names the run's scene. A folder with this file holds a run.
 pub(super) const RECORD: &str = "run.json";
 
-/// What the dataset was when the run began.
+/// The digest of the dataset when the run began.
 pub(super) const DATASET: &str = "dataset.json";
 
 /// Files of a run; `--overwrite` removes them, in this order.
@@ -32,8 +32,8 @@ pub(super) const FILES: [&str; 9] = [
 /// Folders of a run; `--overwrite` removes them.
 pub(super) const FOLDERS: [&str; 3] = ["events", "checkpoints", "renders"];
 
-/// Whether this is the path of a file by which a run goes on or is known: of its record or configuration, of a log, of a
-/// checkpoint. Its `scene.l4gs` is what commands write.
+/// Whether this is the path of a file that a run needs: its record or configuration, a log, a checkpoint. Commands may
+/// write its `scene.l4gs`.
 pub fn belongs_to_run(path: &Path) -> bool {
     let Some(name) = path.file_name().and_then(|name| name.to_str()) else { return false };
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -46,22 +46,23 @@ pub fn belongs_to_run(path: &Path) -> bool {
     in_run || is_checkpoint()
 }
 
-/// What a folder holds.
+/// The contents of a folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum Contents {
-    /// It is not there, or empty.
+    /// The folder does not exist, or is empty.
     Nothing,
-    /// A run that was stopped before it could train: nothing in it is worth anything.
+    /// A run that was stopped before it could train: nothing in it is needed.
     AbandonedStart,
     /// A run.
     Run,
-    /// Parts of a run without its record: `--overwrite` was stopped while it removed it, or the record was deleted.
+    /// Parts of a run without its record: `--overwrite` was stopped while it removed the run, or the record was
+    /// deleted.
     Remains,
-    /// Something else, such as this.
+    /// Something else; this is one of its entries.
     Foreign(String),
 }
 
-/// Looks into a folder.
+/// Examines a folder.
 ///
 /// # Errors
 /// If it cannot be read.
@@ -96,8 +97,8 @@ pub(super) fn of(root: &Path) -> Result<Contents, TrainError> {
     Ok(if worthless { Contents::AbandonedStart } else { Contents::Remains })
 }
 
-/// Whether a folder without our lock file looks like one of ours all the same: it has checkpoints, or a configuration
-/// with every key, as only this program writes it, or nothing but empty folders.
+/// Whether a folder without our lock file still looks like one of ours: it has checkpoints, or a configuration with
+/// every key, as only this program writes it, or only empty folders.
 fn made_by_us(root: &Path, names: &[String]) -> bool {
     let config = root.join("config.toml");
     let resolved = || {
@@ -109,13 +110,13 @@ fn made_by_us(root: &Path, names: &[String]) -> bool {
     only_folders || !list_checkpoints(&root.join("checkpoints")).is_empty() || resolved() == Some(true)
 }
 
-/// Whether a folder holds at most what is swept.
+/// Whether a folder is empty, except for temporary files that are swept.
 fn is_empty(folder: &Path) -> bool {
     fs::read_dir(folder)
         .is_ok_and(|entries| entries.flatten().all(|entry| entry.file_name().to_str().is_some_and(is_leftover)))
 }
 
-/// Whether a name is that of a file that was not finished: ours, or `.NAME.PID.part` as other programs have it.
+/// Whether this is the name of an unfinished file: one of ours, or `.NAME.PID.part` of other programs.
 fn is_leftover(name: &str) -> bool {
     let of_a_process = || {
         let (rest, process) = name.strip_prefix('.')?.strip_suffix(".part")?.rsplit_once('.')?;
@@ -156,7 +157,7 @@ mod tests {
         assert_eq!(state(), Contents::Nothing);
         fs::create_dir(root.join("checkpoints")).unwrap();
         assert_eq!(state(), Contents::AbandonedStart);
-        // A configuration that somebody wrote by hand is not ours to replace.
+        // A configuration written by hand must not be replaced.
         fs::write(root.join("config.toml"), "extends = \"dnerf\"").unwrap();
         assert_eq!(state(), Contents::Foreign("checkpoints".into()));
         fs::write(root.join("config.toml"), Config::default().to_toml()).unwrap();

@@ -1,4 +1,4 @@
-//! One process a run folder: a lock that ends with the process that holds it.
+//! Only one process writes into a run folder: it holds a lock, which ends with the process.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, Write};
@@ -10,23 +10,23 @@ use light4gs_data::DataError;
 use crate::error::TrainError;
 use crate::utc;
 
-/// The file that is locked. It stays where it is: its lock counts, not that it is there, and it says that the folder is one
-/// of ours.
+/// The file that is locked. It is never removed: what counts is its lock, not its existence. Its existence says that
+/// the folder is one of ours.
 pub(super) const LOCK_FILE: &str = ".light4gs-lock";
 
-/// Held while a process writes into a run folder. The system gives it back however the process ends.
+/// Held while a process writes into a run folder. The system releases it however the process ends.
 #[derive(Clone, Debug)]
 pub(super) struct RunLock(#[expect(dead_code, reason = "the open file is what holds the lock")] Arc<File>);
 
 impl RunLock {
-    /// Takes the lock of a folder that exists.
+    /// Takes the lock of an existing folder.
     ///
     /// # Errors
-    /// [`TrainError::RunInUse`] with what the holder says of itself.
+    /// [`TrainError::RunInUse`] with what the holder has written about itself.
     pub(super) fn take(root: &Path) -> Result<Self, TrainError> {
         let path = root.join(LOCK_FILE);
         let failed = |action| DataError::io(action, &path);
-        // A link or a pipe of this name is not ours: following or opening it could change or wait for something else.
+        // A link or a pipe of this name is not ours: following or opening it could change something else, or wait.
         if path.symlink_metadata().is_ok_and(|metadata| !metadata.is_file()) {
             return Err(TrainError::Input(format!("{} is no regular file; remove it", path.display())));
         }
@@ -35,7 +35,7 @@ impl RunLock {
         match file.try_lock() {
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Err(in_use(root, &mut file)),
-            // Some network file systems have no locks. Better a run without protection than none.
+            // Some network file systems have no locks. A run without this protection is better than none.
             Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {}
             Err(TryLockError::Error(error)) => return Err(failed("lock")(error).into()),
         }
@@ -46,7 +46,7 @@ impl RunLock {
     }
 }
 
-/// Says who holds the lock, as far as the file tells.
+/// The error that names the holder of the lock, as far as the file tells.
 fn in_use(root: &Path, file: &mut File) -> TrainError {
     let mut holder = String::new();
     let read = file.take(200).read_to_string(&mut holder);

@@ -1,8 +1,8 @@
 //! The folder of a run: `config.toml`, `run.json`, `dataset.json`, `metrics.jsonl`, `events/`, `checkpoints/`, `scene.l4gs`,
 //! `eval.json`, `renders/`, `report.html`.
 //!
-//! `run.json` is written last when a run is made, and removed first when it is replaced: where it is, the rest is whole.
-//! A run whose process was killed can be continued, or begun anew (see [`contents`](super::contents)).
+//! `run.json` is written last when a run is made, and removed first when it is replaced: if it exists, the rest is
+//! complete. A run whose process was killed can be continued, or begun again (see [`contents`](super::contents)).
 
 use std::fs;
 use std::io::Write;
@@ -21,7 +21,8 @@ use crate::utc;
 /// JSON files of a run are far shorter.
 const MAX_JSON_BYTES: u64 = 1 << 30;
 
-/// Where a run's scene is; kept beside the configuration so that `resume` and `eval` need no arguments.
+/// The path of a run's scene, kept beside the configuration so that `resume` and `eval` need no arguments, and the
+/// provenance of the run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RunRecord {
@@ -29,29 +30,29 @@ pub struct RunRecord {
     pub scene: Option<PathBuf>,
     /// Version of the program that began the run.
     pub version: String,
-    /// Commit that it was built from, with `-dirty` behind it where files had been changed; `unknown` outside of the
+    /// Commit from which it was built, with the suffix `-dirty` if files had been changed; `unknown` outside of the
     /// repository.
     #[serde(default)]
     pub commit: String,
-    /// Device that the run began on.
+    /// Device on which the run began.
     #[serde(default)]
     pub device: String,
-    /// Threads that it began with.
+    /// Threads with which it began.
     #[serde(default)]
     pub threads: usize,
     /// When it began, UTC.
     #[serde(default)]
     pub begun: String,
-    /// SHA-256 of the configuration that it began with.
+    /// SHA-256 of the configuration with which it began.
     #[serde(default)]
     pub configuration: String,
-    /// Where only the file was written by this run: what began its training.
+    /// If this run only wrote the file: the record of the run that trained it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trained_by: Option<Box<RunRecord>>,
 }
 
 impl RunRecord {
-    /// Of a dataset that is there, or of none.
+    /// A record for this dataset, or for none.
     ///
     /// # Errors
     /// [`TrainError::Input`] if the path is not Unicode, which JSON cannot hold.
@@ -81,7 +82,7 @@ impl RunRecord {
     }
 }
 
-/// A path that JSON can hold.
+/// The absolute path, which JSON must be able to hold.
 fn absolute(scene: &Path) -> Result<PathBuf, TrainError> {
     let scene = fs::canonicalize(scene).map_err(DataError::io("read", scene))?;
     if scene.to_str().is_none() {
@@ -93,7 +94,7 @@ fn absolute(scene: &Path) -> Result<PathBuf, TrainError> {
     Ok(scene)
 }
 
-/// Paths of a run. A folder that is written to is locked: by [`RunFolder::create`], or by [`RunFolder::lock`]. The lock is
+/// Paths of a run. A folder that is written to is locked, by [`RunFolder::create`] or [`RunFolder::lock`]. The lock is
 /// held until the last copy is dropped.
 #[derive(Clone, Debug)]
 pub struct RunFolder {
@@ -110,11 +111,11 @@ impl RunFolder {
     pub fn create(root: &Path, scene: Option<&Path>, config: &Config, overwrite: bool) -> Result<Self, TrainError> {
         let record = RunRecord::new(scene, config)?;
         let mut folder = Self { root: root.to_owned(), lock: None };
-        // Before the lock, whose file says that the folder is one of ours.
+        // Checked before the lock is taken, since its file marks the folder as one of ours.
         folder.allow_new_run(overwrite)?;
         fs::create_dir_all(root).map_err(DataError::io("create", root))?;
         folder.lock()?;
-        // Again behind the lock: meanwhile another process may have begun a run here.
+        // Checked again with the lock: meanwhile another process may have begun a run here.
         if folder.allow_new_run(overwrite)? != Contents::Nothing {
             folder.clear()?;
         }
@@ -125,7 +126,7 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// Whether a new run may be made here; returns what is there.
+    /// Refuses a folder in which no new run may be made; returns its contents.
     fn allow_new_run(&self, overwrite: bool) -> Result<Contents, TrainError> {
         let root = self.root.display();
         let found = contents::of(&self.root)?;
@@ -142,15 +143,15 @@ impl RunFolder {
         }
     }
 
-    /// Removes what a run consists of, and nothing else.
+    /// Removes the files of a run, and nothing else.
     fn clear(&self) -> Result<(), TrainError> {
         FILES.iter().chain(&FOLDERS).try_for_each(|name| remove(&self.path(name)))
     }
 
-    /// Opens the folder of a run to read it; see [`RunFolder::lock`].
+    /// Opens the folder of a run for reading; see [`RunFolder::lock`].
     ///
     /// # Errors
-    /// [`TrainError::Input`] if there is none, or what describes it is damaged.
+    /// [`TrainError::Input`] if there is no run, or if its record or configuration is damaged.
     pub fn open(root: &Path) -> Result<(Self, RunRecord, Config), TrainError> {
         let folder = Self { root: root.to_owned(), lock: None };
         let path = folder.path(RECORD);
@@ -184,11 +185,11 @@ impl RunFolder {
         Ok((folder, record, config))
     }
 
-    /// Makes sure that this process is the only one that writes into the folder, and removes what killed processes left
-    /// in it. Nothing happens where the folder is locked by this value already.
+    /// Makes sure that only this process writes into the folder, and removes temporary files of killed processes. Does
+    /// nothing if this value has locked the folder already.
     ///
     /// # Errors
-    /// [`TrainError::RunInUse`] with the process that holds it.
+    /// [`TrainError::RunInUse`] with the process that holds the lock.
     pub fn lock(&mut self) -> Result<(), TrainError> {
         if self.lock.is_none() {
             self.lock = Some(RunLock::take(&self.root)?);
@@ -212,11 +213,11 @@ impl RunFolder {
         self.path("checkpoints")
     }
 
-    /// Takes over the newest checkpoint and the log of another run, to go on from there, and records what trained it.
-    /// Nothing happens where that run's dataset was not what it is now.
+    /// Copies the newest checkpoint and the log of another run, to continue from there, and records which run trained
+    /// it. Does nothing if that run's dataset differs from this one.
     ///
     /// # Errors
-    /// Another folder that holds no run; a file that cannot be read or written.
+    /// If the other folder holds no run; a file that cannot be read or written.
     pub fn adopt(&self, other: &Path, data: &Scene) -> Result<(), TrainError> {
         let (other, trained_by, _) = Self::open(other)?;
         let dataset: Option<DatasetDigest> = other.read_json(DATASET)?;
@@ -233,7 +234,7 @@ impl RunFolder {
         });
         let log = (other.path("metrics.jsonl"), self.path("metrics.jsonl"));
         for (from, to) in checkpoint.into_iter().chain([log]) {
-            // Whole or not at all: half a checkpoint would stop the run from being resumed.
+            // Whole or not at all: with half a checkpoint the run could not be resumed.
             let bytes = read_regular_file(&from, u64::MAX).map_err(DataError::io("read", &from))?;
             write_atomically(&to, |file| file.write_all(&bytes))?;
         }
@@ -256,11 +257,11 @@ impl RunFolder {
         Ok(write_atomically(&path, |file| file.write_all(bytes))?)
     }
 
-    /// Compares a dataset with the one that the run was begun with, and keeps what it is: the first time, and where it
+    /// Compares the dataset with the one with which the run began, and stores its digest: the first time, and when it
     /// may have changed.
     ///
     /// # Errors
-    /// [`TrainError::Input`] with what has changed, unless `accept` is set; an image file that cannot be read.
+    /// [`TrainError::Input`] with the changes, unless `accept` is set; an image file that cannot be read.
     pub fn check_dataset(&self, data: &Scene, accept: bool) -> Result<(), TrainError> {
         let now = DatasetDigest::of(data)?;
         let remedy = "remove the file to go on with the dataset as it is";
@@ -280,7 +281,7 @@ impl RunFolder {
         self.write_json(DATASET, &now)
     }
 
-    /// Reads a JSON file of the run that `resume` writes; nothing if it is not there.
+    /// Reads a JSON file of the run that `resume` writes; `None` if it does not exist.
     pub fn read_json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<Option<T>, TrainError> {
         self.read_described(name, &format!("`light4gs resume {}` writes it anew", self.root.display()))
     }
@@ -316,7 +317,7 @@ fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, DataError
 
 /// Removes a file or a folder, if it is there.
 fn remove(path: &Path) -> Result<(), TrainError> {
-    // A link is removed, not what it leads to; one that leads nowhere as well.
+    // A link is removed itself, not its target, even if the target does not exist.
     let removed = match path.symlink_metadata() {
         Ok(metadata) if metadata.is_dir() => fs::remove_dir_all(path),
         Ok(_) => fs::remove_file(path),

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
-/// Key of the checksum over all other entries of the metadata. Files of older versions have none.
+/// Key of the checksum over all other entries of the metadata.
 const CHECKSUM: &str = "checksum";
-/// What stands in front of a tensor's name in the key of its checksum.
+/// Prefix before a tensor's name in the key of its checksum.
 const TENSOR_CHECKSUM: &str = "checksum.";
 
 /// A tensor to store: shape and little-endian float32 bytes.
@@ -49,7 +49,7 @@ fn metadata_checksum(metadata: &HashMap<String, String>) -> String {
     checksum_text(text.as_bytes())
 }
 
-/// A checkpoint's file, read.
+/// The contents of a checkpoint's file.
 pub(super) struct StoredTensors<'a> {
     tensors: BTreeMap<String, TensorView<'a>>,
     metadata: HashMap<String, String>,
@@ -60,7 +60,7 @@ impl<'a> StoredTensors<'a> {
     /// Finds the tensors in a file's bytes.
     ///
     /// # Errors
-    /// In words, what keeps it from being such a file.
+    /// As text: why the bytes are not such a file.
     pub(super) fn new(bytes: &'a [u8]) -> Result<Self, String> {
         let unreadable = |error: safetensors::SafeTensorError| format!("it is not a whole safetensors file ({error})");
         let file = SafeTensors::deserialize(bytes).map_err(unreadable)?;
@@ -72,26 +72,26 @@ impl<'a> StoredTensors<'a> {
     /// An entry of the metadata.
     ///
     /// # Errors
-    /// That it is missing.
+    /// If it is missing.
     pub(super) fn text(&self, key: &str) -> Result<&str, String> {
         self.metadata.get(key).map(String::as_str).ok_or_else(|| format!("metadata `{key}` is missing"))
     }
 
-    /// The same as a number.
+    /// An entry of the metadata as a number.
     ///
     /// # Errors
-    /// That it is missing, or none.
+    /// If it is missing, or is not a number.
     pub(super) fn number<T: std::str::FromStr>(&self, key: &str) -> Result<T, String> {
         let text = self.text(key)?;
         text.parse().map_err(|_| format!("metadata `{key}` is `{}`, expected a number", shorten(text)))
     }
 
-    /// What follows `prefix` in the names of tensors that begin with it.
+    /// The rest of the names of tensors that begin with `prefix`.
     pub(super) fn names_after(&self, prefix: &str) -> Vec<String> {
         self.tensors.keys().filter_map(|name| name.strip_prefix(prefix)).map(str::to_owned).collect()
     }
 
-    /// What follows `prefix` in the keys of the metadata that begin with it, sorted.
+    /// The rest of the keys of the metadata that begin with `prefix`, sorted.
     pub(super) fn keys_after(&self, prefix: &str) -> Vec<String> {
         let keys: BTreeSet<_> = self.metadata.keys().filter_map(|key| key.strip_prefix(prefix)).collect();
         keys.into_iter().map(str::to_owned).collect()
@@ -102,8 +102,8 @@ impl<'a> StoredTensors<'a> {
         self.tensors.get(name)?.shape().first().copied()
     }
 
-    /// Shapes of the tensors whose names begin with `prefix`, by what follows it: those that [`Self::take`] may give, each of
-    /// as many numbers as it says, and at least one.
+    /// Shapes of the tensors whose names begin with `prefix`, by the rest of the name: those that [`Self::take`]
+    /// accepts. Each agrees with the number of values, which is at least one.
     pub(super) fn shapes_after(&self, prefix: &str) -> BTreeMap<String, Vec<usize>> {
         let numbers = self.tensors.iter().filter(|(_, view)| view.dtype() == Dtype::F32 && !view.shape().contains(&0));
         let shape =
@@ -114,7 +114,7 @@ impl<'a> StoredTensors<'a> {
     /// The values of a tensor of this shape.
     ///
     /// # Errors
-    /// What is wrong with it: missing, another type, another shape, or not finite.
+    /// Why it cannot be used: missing, another type, another shape, or not finite.
     pub(super) fn take(&mut self, name: &str, shape: &[usize]) -> Result<Vec<f32>, String> {
         let wrong = |what: String| format!("tensor `{name}` {what}");
         let Some(view) = self.tensors.get(name) else { return Err(wrong("is missing".to_owned())) };
@@ -132,10 +132,10 @@ impl<'a> StoredTensors<'a> {
         Ok(values)
     }
 
-    /// That nothing is left over, and that every checksum is right.
+    /// Checks that no tensor is left over, and that every checksum is right.
     ///
     /// # Errors
-    /// The tensor or the entry that is not as it was written.
+    /// The tensor or entry that was not expected or has changed.
     pub(super) fn finish(self) -> Result<(), String> {
         if let Some(name) = self.tensors.keys().find(|name| !self.taken.contains(*name)) {
             return Err(format!("tensor `{}` belongs to no part of the run", shorten(name)));

@@ -1,4 +1,4 @@
-//! The training frames that a stage may see.
+//! The training frames that a stage may use.
 
 use std::collections::BTreeMap;
 
@@ -6,12 +6,12 @@ use light4gs_data::Frame;
 
 use crate::stage::Stage;
 
-/// The training frames that a stage may see, by their places in the training split.
+/// The training frames that a stage may use, by their indices in the training split.
 #[derive(Clone, Debug, Default)]
 pub struct CandidateFrames {
     /// In the order of the dataset.
     pub frames: Vec<usize>,
-    /// The same by time, the earliest first: several for a time where there are several cameras.
+    /// The same by time, the earliest first: several for each time where there are several cameras.
     pub times: Vec<Vec<usize>>,
 }
 
@@ -20,11 +20,11 @@ pub struct CandidateFrames {
 pub(crate) struct StageFrames([CandidateFrames; 2]);
 
 impl StageFrames {
-    /// Of the training split. The coarse stage sees the first `coarse_times` times; all if that is not given.
+    /// From the training split. The coarse stage uses only the first `coarse_times` times, if that is given.
     pub(crate) fn new(coarse_times: Option<usize>, frames: &[Frame]) -> Self {
         let mut times: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
         for (index, frame) in frames.iter().enumerate() {
-            // Times are not negative, and so their bits are in their order.
+            // Times are not negative, so their bits have the same order.
             times.entry(frame.time.max(0.0).to_bits()).or_default().push(index);
         }
         let all: Vec<Vec<usize>> = times.into_values().collect();

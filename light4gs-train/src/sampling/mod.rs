@@ -1,8 +1,8 @@
-//! Samplers: which training frames an iteration looks at.
+//! Samplers choose the training frames of an iteration.
 //!
-//! - here: [`FrameSampler`], what the trainer asks of a sampler, and [`SamplerKind`], the built-in ones by name
+//! - this file: [`FrameSampler`], the trainer's interface to a sampler, and [`SamplerKind`], the built-in ones by name
 //! - `shuffled`, `same_time`: one file each
-//! - `candidates`: the frames that a stage may see
+//! - `candidates`: the frames that a stage may use
 
 mod candidates;
 mod same_time;
@@ -30,18 +30,18 @@ kinds! {
     pub struct Samplers: dyn FrameSampler;
 }
 
-/// What a sampler is asked for: the frames of one iteration.
+/// The request to a sampler for the frames of one iteration.
 #[derive(Clone, Copy, Debug)]
 pub struct BatchRequest<'a> {
     /// The training split, with cameras and times.
     pub frames: &'a [Frame],
-    /// Those of them that the stage may see; not empty.
+    /// Those of them that the stage may use; not empty.
     pub candidates: &'a CandidateFrames,
-    /// Frames that an iteration should have, from 1.
+    /// Frames that an iteration should have, at least 1.
     pub batch_size: usize,
     /// The stage.
     pub stage: Stage,
-    /// Iteration of the stage, from 1. It may lie beyond the end of the stage, since images are decoded ahead.
+    /// Iteration of the stage, from 1. It may be beyond the end of the stage, since images are decoded ahead.
     pub iteration: usize,
     /// Iterations of the stage.
     pub iterations: usize,
@@ -50,18 +50,18 @@ pub struct BatchRequest<'a> {
 }
 
 impl BatchRequest<'_> {
-    /// A generator that depends on the run's seed, the stage and `position` alone: the iteration, say, or the number of the
-    /// pass over the frames. No other part of the training draws the same numbers.
+    /// A generator that depends only on the run's seed, the stage and `position`, for example the iteration, or the
+    /// number of the pass over the frames. No other part of the training draws the same numbers.
     pub fn generator(&self, position: usize) -> impl Rng + use<> {
         generator(self.seed, Purpose::FrameOrder, self.stage, position)
     }
 }
 
-/// Chooses the frames of an iteration. It is asked for iterations ahead as well, so that their images are decoded in time, and
-/// a resumed run asks for the rest only: the answer follows from the request alone, and what is random in it is drawn from
-/// [`BatchRequest::generator`].
+/// Chooses the frames of an iteration. It is called for later iterations ahead of time, so that their images are
+/// decoded early, and a resumed run calls it only for the remaining ones. So the result must depend on the request
+/// alone, and random numbers must be drawn from [`BatchRequest::generator`].
 pub trait FrameSampler: Send + Sync {
-    /// Places in [`BatchRequest::frames`], at least one. The loss is the mean over them.
+    /// Indices into [`BatchRequest::frames`], at least one. The loss is the mean over them.
     fn batch(&self, request: &BatchRequest) -> Vec<usize>;
 }
 
@@ -90,7 +90,7 @@ mod tests {
         (0..cameras * times).map(frame).collect()
     }
 
-    /// What a kind answers for a stage and an iteration.
+    /// The sampler of a kind, for a stage and an iteration.
     fn sampler<'a>(
         kind: SamplerKind,
         batch_size: usize,
@@ -121,7 +121,7 @@ mod tests {
         }
     }
 
-    /// The frames that runs have been trained on: what draws them must not change.
+    /// The frames on which existing runs have been trained: these draws must not change.
     #[test]
     fn batches_are_what_they_always_were() {
         let frames = frames(3, 4);

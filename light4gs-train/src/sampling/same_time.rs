@@ -34,8 +34,8 @@ pub(super) fn batches_a_pass(times: &[Vec<usize>], batch: usize) -> usize {
     }
 }
 
-/// Batches in which all frames have one time; each frame is in one at least. Where some times have fewer frames than a batch
-/// needs, a batch goes on with the next time in the order, so that a single moving camera works too.
+/// Batches in which all frames have one time; each frame is in at least one. If a time has fewer frames than a batch
+/// needs, the batch continues with the next time in the order, so that a single moving camera works too.
 fn batches_of_one_time(times: &[Vec<usize>], batch: usize, random: &mut impl Rng) -> Vec<Vec<usize>> {
     let mut times = times.to_vec();
     times.shuffle(random);

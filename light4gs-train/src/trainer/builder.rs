@@ -1,4 +1,4 @@
-//! What a trainer is made of.
+//! The parts of a trainer.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ use crate::run::{Checkpoint, RunFolder};
 use crate::sampling::{FrameSampler, StageFrames};
 use crate::stage::Stage;
 
-/// The parts of a [`Trainer`]: those that are not given are the ones that the configuration describes.
+/// The parts of a [`Trainer`]. Parts that are not given are made as the configuration says.
 pub struct TrainerBuilder<F: DeformationField = BuiltInField, E: EntropyModels = ConfiguredModels> {
     config: Config,
     data: Scene,
@@ -75,7 +75,7 @@ impl<F: DeformationField> TrainerBuilder<F> {
 }
 
 impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
-    /// Entropy models of one's own, instead of those that the configuration describes.
+    /// Entropy models of your own, instead of those that the configuration describes.
     pub fn entropy_models<O: EntropyModels>(self, models: O) -> TrainerBuilder<F, O> {
         let Self {
             config,
@@ -121,7 +121,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self
     }
 
-    /// Where images come from; from the files of the frames if not given.
+    /// The source of images; without it, they are read from the files of the frames.
     pub fn images(mut self, images: impl ImageSource + 'static) -> Self {
         self.images = Some(Box::new(images));
         self
@@ -133,58 +133,59 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self
     }
 
-    /// What the rendered views are compared by, instead of the configured loss.
+    /// The loss that compares rendered views with training images, instead of the configured one.
     pub fn loss(mut self, loss: impl Loss + 'static) -> Self {
         self.loss = Box::new(loss);
         self
     }
 
-    /// Which frames an iteration looks at, instead of the configured sampler.
+    /// The frame sampler, instead of the configured one.
     pub fn sampler(mut self, sampler: impl FrameSampler + 'static) -> Self {
         self.sampler = Box::new(sampler);
         self
     }
 
-    /// One more term of the loss, over the scene instead of a view. The regularizers of the planes stay as they are.
+    /// One more term of the loss, over the scene instead of a view. It is added to the regularizers of the planes.
     pub fn regularizer(mut self, regularizer: impl Regularizer<F> + 'static) -> Self {
         self.regularizers.push(Box::new(regularizer));
         self
     }
 
-    /// How Gaussians come and go, instead of the configured strategy.
+    /// The density strategy, instead of the configured one.
     pub fn density(mut self, strategy: impl DensityStrategy + 'static) -> Self {
         self.density = Box::new(strategy);
         self
     }
 
-    /// By which score Gaussians are pruned after densification, instead of
+    /// The score by which Gaussians are pruned after densification, instead of
     /// [`VolumeWeightedScore`](crate::density::VolumeWeightedScore).
     pub fn significance(mut self, score: impl SignificanceScore + 'static) -> Self {
         self.significance = Box::new(score);
         self
     }
 
-    /// One more observer. They are told in the order in which they were added, after the logs of the run folder.
+    /// One more observer. Observers are called in the order in which they were added, after the logs of the run folder.
     pub fn observer(mut self, observer: impl Observer + 'static) -> Self {
         self.observers.push(Box::new(observer));
         self
     }
 
-    /// Goes on with a run although its dataset is not what it was when the run began.
+    /// Continues a run even if its dataset has changed since the run began.
     pub fn accept_changed_dataset(mut self) -> Self {
         self.accept_changed_dataset = true;
         self
     }
 
-    /// A request to stop, which anyone may set at any time: before its next iteration the trainer then writes a checkpoint
-    /// and returns [`TrainError::Stopped`]. [`TrainerBuilder::resume`] goes on from there to the same result.
+    /// A request to stop, which may be set at any time from anywhere: before its next iteration the trainer then writes
+    /// a checkpoint and returns [`TrainError::Stopped`]. [`TrainerBuilder::resume`] continues from there to the same
+    /// result.
     pub fn stop_flag(mut self, stop: Arc<AtomicBool>) -> Self {
         self.stop = stop;
         self
     }
 
-    /// One more attribute of every Gaussian, beyond those that the deformation field asks for: trained at its rate, copied
-    /// where Gaussians are cloned and split, kept in checkpoints, stored with its step.
+    /// One more attribute of every Gaussian, besides those that the deformation field needs: trained at its rate,
+    /// copied where Gaussians are cloned and split, kept in checkpoints, stored with its step.
     pub fn attribute(mut self, attribute: Attribute) -> Self {
         self.attributes.push(attribute);
         self
@@ -193,19 +194,19 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
     /// Begins a run.
     ///
     /// # Errors
-    /// A configuration out of range; a device that there is not; a dataset without frames; logs that cannot be opened; a
-    /// folder that another process writes into.
+    /// A configuration out of range; a device that does not exist; a dataset without frames; logs that cannot be
+    /// opened; a folder into which another process writes.
     pub fn build(mut self) -> Result<Trainer<F, E>, TrainError> {
         let device = self.open_device()?;
         self.begin(device)
     }
 
-    /// Continues the run of the folder from its newest checkpoint, or begins it if it has none, to the same result as if
-    /// it had never been interrupted: bit-identical on a CPU.
+    /// Continues the run of the folder from its newest checkpoint, or begins it if there is none. The result is the
+    /// same as if it had never been interrupted: bit-identical on a CPU.
     ///
     /// # Errors
     /// As [`TrainerBuilder::build`]; [`TrainError::Checkpoint`] if the checkpoint does not fit the configuration;
-    /// [`TrainError::Input`] with what has changed if the dataset is not what it was when the run began.
+    /// [`TrainError::Input`] with the changes if the dataset has changed since the run began.
     pub fn resume(mut self) -> Result<Trainer<F, E>, TrainError> {
         let device = self.open_device()?;
         match self.folder.as_ref().and_then(RunFolder::last_checkpoint) {
@@ -221,7 +222,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self.config.validate()?;
         if let Some(folder) = &mut self.folder {
             folder.lock()?;
-            // Images from elsewhere have no files to compare.
+            // Images from another source have no files to compare.
             if self.images.is_none() {
                 folder.check_dataset(&self.data, self.accept_changed_dataset)?;
             }
@@ -241,7 +242,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
                 )));
             }
         }
-        // What the encoder would refuse in the end is refused now.
+        // Refused now, since the encoder would refuse it at the end.
         light4gs_codec::checks::positions(&self.data.points.positions).map_err(|error| {
             TrainError::Input(format!("the point cloud of the dataset {}: {error}", self.data.root.display()))
         })?;
@@ -252,11 +253,10 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         Ok(device.autodiff())
     }
 
-    /// Whether a run can begin: answers what [`TrainerBuilder::build`] would, before there is a folder for it, or one is
-    /// emptied.
+    /// Whether a run can begin: does the checks of [`TrainerBuilder::build`] before a folder is made or emptied for it.
     ///
     /// # Errors
-    /// As [`TrainerBuilder::build`], but for what concerns the folder.
+    /// As [`TrainerBuilder::build`], except for those about the folder.
     pub fn check(mut self) -> Result<(), TrainError> {
         self.folder = None;
         let device = self.open_device()?;
@@ -268,14 +268,14 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self.assemble(device, state, None)
     }
 
-    /// What the scene is made from.
+    /// The configuration of the scene.
     fn scene(&self) -> DynamicSceneConfig<F> {
         let mut scene = self.config.model.scene::<F>(self.field.clone());
         scene.gaussians.further.extend(self.attributes.iter().cloned());
         scene
     }
 
-    /// What training begins with.
+    /// The state at the beginning of training.
     fn first_state(&self, device: &Device) -> Result<Checkpoint<F, E>, TrainError> {
         device.seed(self.config.seed);
         let scene = self.scene().init(&self.data.points, device);
@@ -292,11 +292,11 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         Ok(state)
     }
 
-    /// Refuses now what the encoder would refuse in the end: it is asked about the scene and the models to start from.
+    /// Refuses what the encoder would refuse at the end, by checking the initial scene and models.
     fn check_encodable(&self, state: &Checkpoint<F, E>) -> Result<(), TrainError> {
         let scene = state.scene.valid();
         let meta = scene_meta(&self.config, &self.data);
-        // A field whose author has not said how it is coded trains all the same.
+        // A field whose coding is not implemented can be trained all the same.
         let arrays = match scene.to_arrays(meta.clone()) {
             Err(ModelError::NoStreamForm { .. }) => scene.to_arrays_at_rest(meta),
             arrays => {
@@ -319,7 +319,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         Ok(())
     }
 
-    /// `checkpoint` is the file that `state` is from.
+    /// `checkpoint` is the file from which `state` was read.
     fn assemble(
         self,
         device: Device,
@@ -347,7 +347,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             all.push(Box::new(events));
         }
         all.extend(observers);
-        // A graphics card is kept busy by one view at a time.
+        // A graphics card is busy with a single view.
         let side_by_side = match &self.device {
             Some(device) => device::computes_on_processor(device),
             None => config.device.computes_on_processor(),

@@ -12,20 +12,21 @@ use crate::stage::Stage;
 /// Learning rates of one iteration, by parameter group.
 #[derive(Clone, Debug)]
 pub(super) struct GroupRates {
-    /// By the path of their parameters.
+    /// By the paths of their parameters.
     attributes: BTreeMap<String, f64>,
     planes: f64,
     deformation: LearningRate,
     context: f64,
     sh_model: f64,
     steps: f64,
-    /// Iterations over which rates decay.
+    /// Iterations over which the rates decay.
     steps_of_schedule: usize,
     iteration: usize,
 }
 
 impl GroupRates {
-    /// Of Gaussians that have these attributes. `iteration` counts from 1 in its stage; `extent` is the scene's, world units.
+    /// For Gaussians with these attributes. `iteration` counts from 1 in its stage; `extent` is that of the scene,
+    /// world units.
     pub(super) fn new<'a>(
         config: &Config,
         attributes: impl Iterator<Item = &'a Attribute>,
@@ -64,12 +65,12 @@ impl GroupRates {
         }
     }
 
-    /// From beginning to end of the stage: what a deformation field is trained with unless it says otherwise.
+    /// The default rate of a deformation field's parameters, from the beginning of the stage to its end.
     pub(super) fn deformation(&self) -> LearningRate {
         self.deformation
     }
 
-    /// Another rate at this iteration.
+    /// The value of another rate at this iteration.
     pub(super) fn at(&self, LearningRate { initial, last }: LearningRate) -> f64 {
         if initial == 0.0 || last == 0.0 {
             return 0.0;
@@ -77,7 +78,7 @@ impl GroupRates {
         ExponentialDecay::new(initial, last, self.steps_of_schedule).at(self.iteration as f64)
     }
 
-    /// The rate of a parameter of a group; none for an attribute whose rate nobody knows.
+    /// The rate of a parameter in a group; `None` for an attribute without a known rate.
     pub(super) fn of(&self, group: ParameterGroup, path: &str) -> Option<f64> {
         match group {
             ParameterGroup::Attribute => self.attributes.get(path).copied(),

@@ -1,16 +1,16 @@
 //! The training loop: a coarse stage without motion, then a fine stage with the deformation field (paper IV-B).
 //!
-//! - here: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
-//! - `builder`: what a trainer is made of
+//! - this file: [`Trainer`], with [`Trainer::step`] and [`Trainer::run`]
+//! - `builder`: the parts of a trainer
 //! - `step`: one iteration
-//! - `motion`: what the deformation field is asked besides moving the Gaussians
-//! - `views`: the views of an iteration, each with a tape of its own
-//! - `learning_rates`: what each parameter group learns with
+//! - `motion`: calls to the deformation field other than moving the Gaussians
+//! - `views`: the views of an iteration, each with its own tape
+//! - `learning_rates`: the rate of each parameter group
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `pruning`: pruning by significance
 //!
-//! What a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`], [`DensityStrategy`],
-//! [`SignificanceScore`], [`Observer`] and [`ImageSource`].
+//! The parts that a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`],
+//! [`DensityStrategy`], [`SignificanceScore`], [`Observer`] and [`ImageSource`].
 
 mod builder;
 mod learning_rates;
@@ -52,8 +52,8 @@ use views::ViewPools;
 
 /// A run in progress.
 ///
-/// Without a run folder everything stays in memory: there are no checkpoints and no logs then. Ten iterations with a loss
-/// of one's own, on images in memory:
+/// Without a run folder everything stays in memory, and there are no checkpoints or logs. Ten iterations with a custom
+/// loss, on images in memory:
 ///
 /// ```
 /// use std::path::Path;
@@ -121,7 +121,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     empty_images: EmptyImageWatch,
 }
 
-/// Since when the speed is measured; there is none before a stage has begun.
+/// When the measurement of the speed began; `None` before a stage has begun.
 #[derive(Clone, Copy)]
 struct Lap {
     begin: Instant,
@@ -129,7 +129,7 @@ struct Lap {
 }
 
 impl Trainer {
-    /// What a run of `config` on `data` is made of. The parts that `config` names are the defaults.
+    /// A builder for a run of `config` on `data`. The defaults are the parts that `config` names.
     pub fn builder(config: Config, data: Scene) -> TrainerBuilder {
         let field = config.model.field();
         Self::builder_with_field(config, data, field)
@@ -137,22 +137,23 @@ impl Trainer {
 }
 
 impl<F: DeformationField> Trainer<F> {
-    /// The same with a deformation field of one's own: `field` takes the place of `model.hexplane` and
-    /// `model.deformation` in the configuration.
+    /// The same with a deformation field of your own: `field` replaces `model.hexplane` and `model.deformation` of the
+    /// configuration.
     pub fn builder_with_field(config: Config, data: Scene, field: F::Config) -> TrainerBuilder<F> {
         TrainerBuilder::new(config, data, field)
     }
 }
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// From now on measures the parts of every iteration. The run gets slower, since each part is waited for.
+    /// Measures the parts of every iteration from now on. The run becomes slower, since it waits for the end of each
+    /// part.
     pub fn measure_stages(&mut self) {
         self.profile = Profile::on(&self.device);
-        // Parts can only be measured one after the other.
+        // Parts can be measured only one after the other.
         self.view_pools = ViewPools::none();
     }
 
-    /// What [`Trainer::measure_stages`] led to.
+    /// The times since [`Trainer::measure_stages`].
     pub fn profile(&self) -> &Profile {
         &self.profile
     }
@@ -187,8 +188,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.state.seconds
     }
 
-    /// Trains to the end. With a run folder, also writes `scene.l4gs` and how it was coded; returns the file's size in
-    /// bytes then.
+    /// Trains to the end. With a run folder, also writes `scene.l4gs` and the record of its coding, and returns the
+    /// file's size in bytes.
     ///
     /// # Errors
     /// As [`Trainer::step`] and [`Trainer::encode`].
@@ -204,8 +205,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(Some(coded.bytes.len() as u64))
     }
 
-    /// The scene as it is now as the bytes of a `.l4gs` file, in the profile of the configuration. Entropy models are fitted
-    /// first if the run trains none.
+    /// The current scene as the bytes of a `.l4gs` file, in the profile of the configuration. If the run trains no
+    /// entropy models, they are fitted first.
     ///
     /// # Errors
     /// What the codec refuses, such as values that are not finite; an image that cannot be read.
@@ -225,19 +226,19 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             false => observers.iter_mut().try_for_each(|observer| observer.on_fit(done, iterations)),
         });
         coded.map_err(|error| match error {
-            // The run to go on with is known here only.
+            // Only here is it known from which run to continue.
             TrainError::Diverged(fit) => self.diverged(fit.stage, fit.iteration, fit.found),
             other => other,
         })
     }
 
-    /// One iteration: forward and backward through a batch of views, the optimizer's step, then cloning, splitting and
-    /// pruning where they are due. Metrics, checkpoints and the change of stages happen here too. Returns what happened;
-    /// nothing once training is over.
+    /// One iteration: forward and backward passes over a batch of views, the optimizer's step, then cloning, splitting
+    /// and pruning where they are due. It also writes metrics and checkpoints, and changes the stage. Returns a report,
+    /// or `None` once training is over.
     ///
     /// # Errors
-    /// [`TrainError::Diverged`] if the loss or a parameter is not finite; an image that cannot be read; a log or a checkpoint that cannot be
-    /// written; an observer's own; [`TrainError::Stopped`] where that was asked for.
+    /// [`TrainError::Diverged`] if the loss or a parameter is not finite; an image that cannot be read; a log or a
+    /// checkpoint that cannot be written; the error of an observer; [`TrainError::Stopped`] if that was requested.
     pub fn step(&mut self) -> Result<Option<StepReport>, TrainError> {
         let Some(iterations) = self.begin_iteration()? else { return Ok(None) };
         if self.stop.load(Ordering::Relaxed) {
@@ -270,7 +271,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(Some(report))
     }
 
-    /// The length of the current stage, after changing to the next one where one is over. None at the end of training.
+    /// The length of the current stage; if a stage is over, that of the next one, to which it changes. `None` at the
+    /// end of training.
     fn begin_iteration(&mut self) -> Result<Option<usize>, TrainError> {
         if self.state.stage == Stage::Coarse && self.state.iteration >= self.config.train.coarse_iterations {
             self.begin_fine_stage();
@@ -287,11 +289,11 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(Some(iterations))
     }
 
-    /// Makes sure that nothing is lost, and returns the error that says where training has stopped.
+    /// Makes sure that the state is saved, and returns the error that says where training has stopped.
     fn stop(&mut self) -> Result<TrainError, TrainError> {
         let (stage, iteration) = self.position();
         let saved = |folder: &RunFolder| folder.checkpoints().join(checkpoint_name(stage, iteration)).exists();
-        // At the beginning of a stage there is nothing that the last checkpoint, or the dataset, does not have.
+        // At the beginning of a stage everything is in the last checkpoint, or follows from the dataset.
         if iteration > 0 && !self.folder.as_ref().is_some_and(saved) {
             self.save_checkpoint()?;
         }
@@ -353,7 +355,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         })?;
         let all = list_checkpoints(&folder.checkpoints());
         for old in &all[..all.len().saturating_sub(self.config.train.keep_checkpoints.max(1))] {
-            // A checkpoint too many does no harm.
+            // If an old checkpoint cannot be removed, it does no harm.
             let _ = std::fs::remove_file(old);
         }
         self.restart_lap();
@@ -378,7 +380,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Splatter::new(self.data.background, degree)
     }
 
-    /// PSNR of a few test views by the model in memory, when it is due.
+    /// PSNR of a few test views, rendered from the model in memory, if it is due.
     fn test_psnr(&self, stage: Stage, iteration: usize, is_last: bool) -> Result<Option<f64>, TrainError> {
         let eval = &self.config.eval;
         let frames = self.data.frames(Split::Test);
@@ -390,8 +392,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.mean_psnr(frames.iter().step_by(stride), stage, iteration).map(Some)
     }
 
-    /// Mean PSNR in dB over all views of a split, by the model in memory: without coding, which also costs some quality. NaN for
-    /// a split without views.
+    /// Mean PSNR in dB over all views of a split, rendered from the model in memory: without coding, which takes away
+    /// some quality. NaN for a split without views.
     ///
     /// # Errors
     /// An image that cannot be read.

@@ -1,4 +1,4 @@
-//! What the deformation field is asked besides moving the Gaussians: its hooks, its regularizer, its learning rates.
+//! Calls to the deformation field other than moving the Gaussians: its hooks, its regularizer, its learning rates.
 
 use std::collections::BTreeMap;
 
@@ -16,25 +16,26 @@ use crate::optimization::parameters::ParameterGroup;
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
 
-/// In front of the paths of a field's parameters in the scene.
+/// Prefix of the paths of a field's parameters in the scene.
 const FIELD: &str = "field";
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// Where the fine stage stands. Random numbers that a field draws on the device are those of the iteration as well.
+    /// The position in the fine stage. The device's generator is seeded for the iteration as well, for a field that
+    /// draws random numbers there.
     fn fine_position(&self, iteration: usize) -> FinePosition {
         let seed = generator(self.config.seed, Purpose::Motion, Stage::Fine, iteration).random();
         self.device.seed(seed);
         FinePosition { iteration, iterations: self.config.train.iterations(Stage::Fine), seed }
     }
 
-    /// The field may look at the Gaussians that it is going to move.
+    /// Lets the field make parameters from the Gaussians that it is going to move.
     pub(super) fn begin_motion(&mut self) {
         let position = self.fine_position(0);
         let (field, scene) = parts(&mut self.state.scene, self.data.extent);
         field.begin_motion(&scene, &position);
     }
 
-    /// An iteration of the fine stage begins.
+    /// Calls the field before an iteration of the fine stage.
     pub(super) fn begin_motion_step(&mut self, iteration: usize) {
         let position = self.fine_position(iteration);
         let (field, scene) = parts(&mut self.state.scene, self.data.extent);
@@ -66,7 +67,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Some(value)
     }
 
-    /// Learning rates of the field's parameters at an iteration, by their path in the scene, where they are not the usual one.
+    /// Learning rates of the field's parameters at an iteration, by their paths in the scene, for those that differ
+    /// from the default.
     pub(super) fn field_rates(&self, rates: &GroupRates) -> BTreeMap<String, f64> {
         let mut own = OwnRates { field: &self.state.scene.field, rates, found: BTreeMap::new() };
         visit_parameters(&self.state.scene.field, &mut own);
@@ -74,7 +76,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 }
 
-/// A field, and what it moves.
+/// A field, and the scene that it moves.
 fn parts<F: DeformationField>(scene: &mut DynamicScene<F>, extent: f32) -> (&mut F, SceneAtRest<'_>) {
     let DynamicScene { gaussians, coordinates, field, .. } = scene;
     (field, SceneAtRest { gaussians, coordinates, extent })
@@ -116,17 +118,16 @@ mod tests {
     use crate::run::RunFolder;
     use crate::trainer::TrainerBuilder;
 
-    /// Shifts that are made when motion begins, as many as there are Gaussians then, and shared by all. It has no form in a
-    /// stream.
+    /// Shifts that are made when motion begins, one for each Gaussian at that time. Its coding is not implemented.
     #[derive(Module, Debug)]
     struct Shifts {
         /// `[1, 3]` before motion begins, then `[N, 3]`.
         shifts: Param<Tensor<2>>,
         /// Trained ten times as fast.
         fast: Param<Tensor<1>>,
-        /// Not trained at all, by its rate.
+        /// Not trained, since its rate is 0.
         slow: Param<Tensor<1>>,
-        /// `[2]`, a constant: how often motion began, how many steps.
+        /// `[2]`, a constant: how often motion began, and the number of steps.
         calls: Param<Tensor<1>>,
     }
 
@@ -260,7 +261,7 @@ mod tests {
         assert!(message.contains("`shifts` cannot be written to a file") && message.contains("to_arrays"), "{message}");
     }
 
-    /// A resumed run takes over what was made when motion began, and makes it only once.
+    /// A resumed run reads what was made when motion began, and makes it only once.
     #[test]
     fn motion_begins_once_in_a_run_that_is_resumed() {
         let mut whole = builder(6).build().unwrap();
@@ -280,7 +281,7 @@ mod tests {
             while second.step().unwrap().is_some() {}
             assert_eq!(parameters(&second), parameters(&whole));
             assert_eq!(second.scene().gaussians.means.val().slice(s![0..1, ..]).dims(), [1, 3]);
-            // The end of a run is resumed without another call.
+            // Resuming at the end of a run makes no further call.
             let third = builder(6).run_folder(run).resume().unwrap();
             assert_eq!(parameters(&third), parameters(&whole));
         }

@@ -1,4 +1,4 @@
-//! `--profile`: where the time of a training step goes, on any back end.
+//! `--profile`: the time of each part of a training step, on any back end.
 
 use std::cell::RefCell;
 use std::time::Instant;
@@ -7,7 +7,7 @@ use burn::tensor::Device;
 
 use crate::report::table::{Align, Table};
 
-/// Steps that compile kernels and fill caches, and are not counted.
+/// Steps that are not counted, since they compile kernels and fill caches.
 const WARM_UP: usize = 3;
 
 /// A stopwatch with a total for every part. Switched off, it costs nothing and never waits for the device.
@@ -21,7 +21,7 @@ struct Laps {
     device: Device,
     last: Instant,
     steps: usize,
-    /// Seconds, in the order in which the parts came first.
+    /// Seconds, in the order in which the parts first occurred.
     parts: Vec<(&'static str, f64)>,
 }
 
@@ -31,13 +31,13 @@ impl Profile {
         Self { laps: None }
     }
 
-    /// One that waits for the device at the end of every part, so that the part's time is its own.
+    /// A stopwatch that waits for the device at the end of every part, so that each part's time is its own.
     pub fn on(device: &Device) -> Self {
         let laps = Laps { device: device.clone(), last: Instant::now(), steps: 0, parts: Vec::new() };
         Self { laps: Some(RefCell::new(laps)) }
     }
 
-    /// A step begins.
+    /// Begins a step.
     pub fn begin_step(&self) {
         let Some(laps) = &self.laps else { return };
         let mut laps = laps.borrow_mut();
@@ -46,7 +46,7 @@ impl Profile {
         laps.last = Instant::now();
     }
 
-    /// A part ends, and the next one begins.
+    /// Ends a part and begins the next one.
     pub fn lap(&self, part: &'static str) {
         let Some(laps) = &self.laps else { return };
         let mut laps = laps.borrow_mut();
@@ -63,7 +63,7 @@ impl Profile {
         }
     }
 
-    /// Milliseconds a step by part; nothing if switched off or too short.
+    /// Milliseconds of each part of a step; `None` if switched off, or with too few steps.
     pub fn table(&self) -> Option<String> {
         let laps = self.laps.as_ref()?.borrow();
         let steps = laps.steps.checked_sub(WARM_UP).filter(|steps| *steps > 0)?;

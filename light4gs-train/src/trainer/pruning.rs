@@ -16,7 +16,7 @@ use crate::stage::Stage;
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// Drops the Gaussians that contribute least to the training views at their times.
     pub(super) fn prune_insignificant(&mut self, iteration: usize) {
-        // Off the tape, which would hold on to every view's tensors until the next backward pass.
+        // Without a tape, which would keep every view's tensors until the next backward pass.
         let scene = self.state.scene.valid();
         let splatter = self.splatter(Stage::Fine, iteration);
         let mut sums = Significance::new(scene.gaussians.len());
@@ -27,14 +27,14 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let scores = self.significance.scores(&GaussianContributions::new(&sums, volumes));
         let drop = least_significant(&scores, self.config.train.prune.fraction);
         let keep: Vec<bool> = drop.iter().map(|drop| !drop).collect();
-        // Never everything: an empty scene has no gradient to come back from.
+        // Never all Gaussians: an empty scene has no gradient and could not recover.
         if keep.contains(&true) && keep.contains(&false) {
             GaussianEditor::new(&mut self.state.scene.gaussians, &mut self.state.adam).keep(&keep);
             self.density.rows_kept(&keep);
         }
     }
 
-    /// Every training view, or one random view a time.
+    /// Every training view, or one random view for each time.
     fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
         if !self.config.train.prune.one_camera_per_time {
             return self.data.train.iter().collect();

@@ -13,7 +13,7 @@ use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// The scene as it will roughly be decoded, once the rate has entered the training.
+    /// The scene roughly as it will be decoded, from the iteration on at which the rate counts.
     pub(super) fn quantization_noise(
         &mut self,
         stage: Stage,
@@ -45,19 +45,20 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         }))
     }
 
-    /// Whether the planes have the values that the file will have: nothing changes them, nor what codes them, any more.
+    /// Whether the planes are frozen: they have the values that the file will have, and neither they nor their entropy
+    /// models change any more.
     pub(super) fn planes_are_frozen(&self, stage: Stage, iteration: usize) -> bool {
         let until = self.config.compression.rate.planes_until;
         stage == Stage::Fine && until > 0 && iteration > until && self.state.compression.is_some()
     }
 
-    /// Whether the rate includes the spherical harmonics: from the end of densification on.
+    /// Whether the rate includes the spherical harmonics, as it does after the end of densification.
     fn sh_rate_is_active(&self, iteration: usize) -> bool {
         self.density.is_over(Stage::Fine, iteration.saturating_sub(1))
     }
 
-    /// Adds what the rate asks for, in the iterations in which it is due, and what the noise asks of the steps. Returns the
-    /// weighted rate, `[1]`. `gradients` are those of the views.
+    /// Adds the gradients of the rate, in the iterations in which it is due, and the gradients of the steps through the
+    /// noise. Returns the weighted rate, `[1]`. `gradients` are those of the views.
     pub(super) fn add_rate(
         &mut self,
         noisy: &NoisyScene<F>,
@@ -69,7 +70,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
         let mut steps = vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())];
-        // With frozen planes, or none, and without the spherical harmonics there is no rate: one of constants has no gradient.
+        // With frozen planes, or none, and without the spherical harmonics there is no rate: constants have no
+        // gradient.
         let anything = noisy.steps.is_some() || (with_sh && compression.sh.is_some());
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
@@ -77,7 +79,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_sh, &mut generator);
             let term = match config.weighting {
                 RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
-                // Once in `interval` iterations, so that many times as much: lambda does not depend on the interval.
+                // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
+                // on the interval.
                 RateWeighting::Megabytes => rate.megabytes() * (config.lambda * config.interval as f64),
             };
             value = Some(term.clone().inner());
@@ -94,8 +97,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 }
 
-/// A term with the steps' whole gradient: what the rate says of them (`direct`, by plane), and what the noisy planes pass
-/// on, which is the noise, in steps, times the gradient of what carries it. None where no step is learned.
+/// A term whose gradient is the whole gradient of the steps: that of the rate (`direct`, by plane), and that through
+/// the noisy planes, which is the noise, in steps, times the gradient of the noisy planes. `None` where no step is
+/// learned.
 fn steps_term<F: DeformationField, C: Module, S: Module>(
     noisy: &NoisyScene<F>,
     scene: &DynamicScene<F>,
@@ -114,7 +118,7 @@ fn steps_term<F: DeformationField, C: Module, S: Module>(
             let noise = (noisy.val().inner() - plane.val().inner()).flatten::<1>(0, 2);
             (noise * gradient).sum() / step.clone().inner()
         });
-        // Every plane's step is on the tape, so every plane has a term: see `steps_without_gradient`.
+        // Every plane's step is on the tape, so every plane must have a term: see `steps_without_gradient`.
         let gradient = [direct, through_noise].into_iter().flatten().reduce(|sum, part| sum + part);
         step.clone() * Tensor::from_inner(gradient.unwrap_or_else(|| step.inner().zeros_like()))
     });
@@ -130,7 +134,7 @@ mod tests {
     use crate::compression::ConfiguredModels;
     use crate::config::Config;
 
-    /// Steps learn from planes on a tape of their own what they would learn on one and the same.
+    /// With planes on a separate tape, the steps get the same gradients as on a common one.
     #[test]
     fn the_noise_passes_gradients_on_to_the_steps() {
         let device = Device::flex().autodiff();
@@ -142,7 +146,7 @@ mod tests {
         let scene = config.model.build().init(&cloud, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let noisy = compression.noisy(&scene, true, false);
-        // Something that planes and steps both have a part in, another one in each plane.
+        // A term that depends on both planes and steps, different in each plane.
         let loss = |planes: &[Tensor<3>], steps: &dyn Fn(usize) -> Tensor<1>| {
             let terms = planes.iter().enumerate().map(|(i, plane)| {
                 let divided = plane.clone() / steps(i).unsqueeze::<3>();

@@ -18,7 +18,7 @@ use crate::regularizer::RegularizerInput;
 use crate::sampling::BatchRequest;
 use crate::stage::Stage;
 
-/// How many iterations ahead images are decoded.
+/// Iterations ahead for which images are decoded.
 const PREFETCHED_ITERATIONS: usize = 8;
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
@@ -56,7 +56,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let regularizers = regularizer.into_iter().chain(own).chain(others);
         let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
         let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
-        // What an iteration reads back from the device: this number.
+        // This number is all that an iteration reads back from the device.
         let loss: f32 = loss.into_scalar();
         if !loss.is_finite() {
             let parameter = not_finite_in(&self.state.scene, self.state.compression.as_ref());
@@ -84,8 +84,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
     }
 
-    /// Has the images of the next iterations decoded in the background. An iteration asks for as many as it uses, so that
-    /// those before it are there already.
+    /// Starts to decode the images of later iterations in the background. Each call is for as many images as one
+    /// iteration uses; those of earlier iterations are there already.
     fn prefetch(&mut self, stage: Stage, iteration: usize) -> Result<(), TrainError> {
         let indices = self.batch(stage, iteration + PREFETCHED_ITERATIONS)?;
         let frames: Vec<Frame> = indices.into_iter().map(|frame| self.data.train[frame].clone()).collect();
@@ -93,7 +93,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(())
     }
 
-    /// The frames of an iteration, by their places in the training split.
+    /// The frames of an iteration, by their indices in the training split.
     fn batch(&self, stage: Stage, iteration: usize) -> Result<Vec<usize>, TrainError> {
         let train = &self.config.train;
         let frames = &self.data.train;
@@ -117,7 +117,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         )))
     }
 
-    /// Adds the gradients of what keeps the planes smooth, and returns its value, `[1]`.
+    /// Adds the gradients of the planes' regularizers, and returns their value, `[1]`.
     fn add_plane_regularizer(
         &mut self,
         stage: Stage,
@@ -135,7 +135,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Some(value)
     }
 
-    /// Adds the gradients of the regularizers from outside, and returns the values of those that have one, `[1]` each.
+    /// Adds the gradients of further regularizers, and returns the values of those that apply, `[1]` each.
     fn add_regularizers(&self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Vec<Tensor<1>> {
         let scene = &self.state.scene;
         let input = RegularizerInput { scene, stage, iteration, iterations: self.config.train.iterations(stage) };

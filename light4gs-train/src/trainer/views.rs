@@ -1,4 +1,4 @@
-//! The views of a training step. Each has a tape of its own, so that they can be rendered and differentiated side by side.
+//! The views of a training step. Each has its own tape, so that they can be rendered and differentiated side by side.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -15,7 +15,7 @@ use crate::metrics::{image_tensor, mask_tensor};
 use crate::optimization::gradients::GradientSums;
 use crate::stage::Stage;
 
-/// What the views of a step have in common.
+/// Data that the views of a step share.
 pub(super) struct ViewPass<'a> {
     pub(super) stage: Stage,
     pub(super) iteration: usize,
@@ -23,17 +23,17 @@ pub(super) struct ViewPass<'a> {
     pub(super) images: &'a dyn ImageSource,
     pub(super) device: &'a Device,
     pub(super) loss: &'a dyn Loss,
-    /// Views an iteration. The loss is their mean.
+    /// Views of an iteration. The loss is their mean.
     pub(super) batch: usize,
 }
 
-/// What a view adds to a step. All tensors are off the tape.
+/// The results of a view in a step. No tensor is on a tape.
 pub(super) struct View {
     /// `[1]`: its weighted part of the loss.
     pub(super) loss: Tensor<1>,
-    /// Of that part by the scene's parameters.
+    /// Gradients of that part of the loss with respect to the scene's parameters.
     pub(super) gradients: GradientSums,
-    /// What it says about the Gaussians.
+    /// Statistics of the Gaussians.
     pub(super) statistics: ViewStatistics,
     /// `[H, W, 3]`
     pub(super) image: Tensor<3>,
@@ -41,32 +41,32 @@ pub(super) struct View {
     pub(super) truth: Tensor<3>,
 }
 
-/// The processor's threads, shared out among the views of a step: a pool for each view that runs beside others.
+/// The processor's threads, divided among the views of a step: a pool for each view that runs beside others.
 ///
 /// With one pool for all, views would wait for each other at every small parallel loop, and a worker that waits inside
-/// one view would begin another meanwhile.
+/// one view would meanwhile begin another.
 pub(super) struct ViewPools(Vec<ThreadPool>);
 
 impl ViewPools {
-    /// Pools for `views` views a step, which together have all threads.
+    /// Pools for `views` views of a step, which together have all threads.
     pub(super) fn new(views: usize) -> Self {
         let threads = rayon::current_num_threads();
         let share = views.div_ceil(threads).max(1);
         let pools = views.div_ceil(share);
         let pool = |i| ThreadPoolBuilder::new().num_threads((threads + i) / pools).build();
-        // One pool would be what there is already.
+        // One pool would be the same as the global one.
         let pools = if pools > 1 { (0..pools).map(pool).collect() } else { Ok(Vec::new()) };
         Self(pools.expect("threads can be started"))
     }
 
-    /// None: one view after the other.
+    /// No pools: one view after the other.
     pub(super) fn none() -> Self {
         Self(Vec::new())
     }
 }
 
 impl ViewPass<'_> {
-    /// Renders and differentiates every frame. The outcome, in the order of the frames, does not depend on the pools.
+    /// Renders and differentiates every frame. The results, in the order of the frames, do not depend on the pools.
     pub(super) fn run<'f, F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
@@ -74,7 +74,7 @@ impl ViewPass<'_> {
         pools: &ViewPools,
         profile: &Profile,
     ) -> Result<Vec<View>, TrainError> {
-        // Copies share the scene's memory; each begins a tape of its own.
+        // Copies share the scene's memory; each begins its own tape.
         let with_copies = |frames: &[&'f Frame]| -> Vec<_> {
             frames.iter().map(|frame| (scene.clone().fork(self.device), *frame)).collect()
         };
@@ -121,7 +121,7 @@ impl ViewPass<'_> {
         let mut truth = image_tensor(&*self.images.image(frame)?, self.device);
         let mut image = rendering.image;
         if let Some(mask) = self.images.trained_pixels(frame)? {
-            // Black in both: such pixels are alike, whatever the loss.
+            // Black in both images, so that these pixels are equal for any loss.
             let mask = mask_tensor(&mask, self.device).unsqueeze_dim::<3>(2);
             image = image * mask.clone();
             truth = truth * mask;
@@ -146,7 +146,7 @@ impl ViewPass<'_> {
         Ok(View {
             loss: value,
             gradients,
-            // The loss is a mean over the batch; thresholds are meant for one view.
+            // The loss is a mean over the batch; thresholds are those for a single view.
             statistics: ViewStatistics {
                 screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),
                 radii: rendering.radii,

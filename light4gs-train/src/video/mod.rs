@@ -1,6 +1,7 @@
 //! Frames over time: an animated GIF, an MP4 through the program `ffmpeg`, or numbered PNG files.
 //!
-//! Frames are taken one by one from an iterator, which may render them; none is kept. Files are complete or absent.
+//! Frames are taken one by one from an iterator, which may render them; none is kept. Files are either complete or
+//! absent.
 
 mod mp4;
 
@@ -24,8 +25,8 @@ pub enum Looping {
     Once,
 }
 
-/// Rates above this are shown slowly: a GIF counts in hundredths of a second, and players take less than two of them
-/// for a mistake.
+/// GIFs with a higher rate play slowly: a GIF counts in hundredths of a second, and players take a delay of less than
+/// two of them for a mistake.
 pub const MAX_GIF_FPS: f32 = 50.0;
 
 /// Effort of the color quantizer, 1 (best) to 30 (fast).
@@ -33,7 +34,7 @@ const GIF_SPEED: i32 = 10;
 
 /// Writes frames as an animated GIF and returns their number. All frames must be of one size.
 ///
-/// The first error of `frames` ends the work and is returned; so `E` is whatever makes the frames fails with.
+/// The first error of `frames` ends the work and is returned; `E` is its type.
 ///
 /// # Errors
 /// [`DataError`] naming the file, if `fps` is not above 0 and at most [`MAX_GIF_FPS`], if there is no frame, if sizes
@@ -104,7 +105,7 @@ pub fn write_png_sequence<E: From<DataError>>(
     Ok(files)
 }
 
-/// A frame must have as many bytes as its size says, and the size of those before it.
+/// A frame must have the number of bytes that follows from its size, and the size of the frames before it.
 fn check(path: &Path, frame: &RgbImage8, size: &mut Option<(u32, u32)>) -> Result<(), DataError> {
     let wrong = |problem: String| DataError::Image {
         path: path.to_path_buf(),
@@ -132,7 +133,7 @@ fn with_alpha(frame: RgbImage8) -> io::Result<RgbaImage> {
     RgbaImage::from_raw(frame.width, frame.height, pixels).ok_or_else(|| io::Error::other("a frame lacks pixels"))
 }
 
-/// How long frame `index` stays, in whole hundredths of a second that add up to the rate.
+/// How long frame `index` is shown, in whole hundredths of a second that on average give the rate.
 fn delay(index: usize, fps: f32) -> Delay {
     let end = |count: usize| (count as f64 * 100.0 / f64::from(fps)).round() as u32;
     Delay::from_numer_denom_ms((end(index + 1) - end(index)) * 10, 1)

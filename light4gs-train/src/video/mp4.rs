@@ -8,11 +8,11 @@ use light4gs_data::{DataError, RgbImage8};
 
 use super::check;
 
-/// Quality of H.264, 0 (lossless) to 51; 18 is about where the eye sees no difference.
+/// Quality of H.264, 0 (lossless) to 51; at 18 the eye sees almost no difference.
 const QUALITY: &str = "18";
 
-/// Writes frames as an H.264 video in MP4 and returns their number. All frames must be of one size; an odd side gets a line of
-/// black more, which the format needs.
+/// Writes frames as an H.264 video in MP4 and returns their number. All frames must be of one size. An odd side gets
+/// one more line of black, since the format needs even sides.
 ///
 /// The first error of `frames` ends the work and is returned. The file is complete or absent.
 ///
@@ -28,13 +28,14 @@ pub fn write_mp4<E: From<DataError>>(
     if !(fps > 0.0 && fps.is_finite()) {
         return Err(wrong("fps", format!("{fps} frames a second"), "choose a positive rate").into());
     }
-    // Beside the file, so that renaming it stays on one file system; ffmpeg is told the format, which the name does not say.
+    // Beside the file, so that renaming it stays on one file system. ffmpeg is told the format, since it cannot tell
+    // from the name.
     let partial = path.with_extension(format!("mp4.{}.part", std::process::id()));
     let written = encode(path, &partial, frames, fps);
     if written.is_ok() {
         std::fs::rename(&partial, path).map_err(DataError::io("write", path))?;
     } else {
-        // It may not even have been made.
+        // The file may not even exist.
         let _ = std::fs::remove_file(&partial);
     }
     written
@@ -57,7 +58,7 @@ fn encode<E: From<DataError>>(
                 none => none.insert(start(path, partial, frame.width, frame.height, fps)?),
             };
             let input = program.stdin.as_mut().expect("its input is a pipe");
-            // A program that has ended says why itself.
+            // If the program has ended, its output says why.
             let _ = input.write_all(&frame.pixels);
             Ok(())
         });

@@ -1,4 +1,4 @@
-//! Looking at a scene in the browser: the page, its data, and the server of `light4gs view`.
+//! Viewing a scene in the browser: the page, its data, and the server of `light4gs view`.
 
 mod cameras;
 mod server;

@@ -1,7 +1,7 @@
-//! A server for one page on this machine: GET and HEAD, a few paths, nothing else.
+//! A server for one page on this machine: GET and HEAD, and a few paths.
 //!
-//! It listens on 127.0.0.1 only, and answers only those who call it by the name of this machine, so that a page from elsewhere
-//! cannot read the scene by a domain name that leads here.
+//! It listens on 127.0.0.1 only, and answers only requests that name this machine as their host. So a page from
+//! elsewhere cannot read the scene by a domain name that resolves to this machine.
 
 use std::borrow::Cow;
 use std::io::{BufRead, BufReader, Read, Result, Write};
@@ -9,11 +9,11 @@ use std::net::{Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// More than a browser sends for a request's head.
+/// More than the head of a browser's request takes.
 const LONGEST_HEAD: u64 = 32 << 10;
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// What a path leads to.
+/// The answer for a path.
 #[derive(Clone, Debug)]
 pub struct Answer {
     /// Such as `text/html; charset=utf-8`.
@@ -37,7 +37,7 @@ impl Server {
         Ok(Self { listener: TcpListener::bind((Ipv4Addr::LOCALHOST, port))? })
     }
 
-    /// Where it listens.
+    /// Its address.
     ///
     /// # Errors
     /// What the system refuses.
@@ -45,12 +45,12 @@ impl Server {
         self.listener.local_addr()
     }
 
-    /// Answers requests until the process ends, each on a thread of its own. `respond` gets the path without its query.
+    /// Answers requests until the process ends, each on its own thread. `respond` gets the path without its query.
     pub fn run(&self, respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static) {
         let respond = Arc::new(respond);
         for stream in self.listener.incoming().flatten() {
             let respond = Arc::clone(&respond);
-            // A browser that went away is no concern of ours; nor is one that a thread cannot be had for.
+            // Errors are ignored: a browser that has gone away, or a thread that cannot be started.
             let _ = std::thread::Builder::new().spawn(move || answer(&stream, &*respond));
         }
     }
@@ -90,7 +90,7 @@ enum Request {
     Get {
         path: String,
     },
-    /// The answer is what GET would get, without its body.
+    /// Answered like GET, but without the body.
     Head {
         path: String,
     },
@@ -145,7 +145,7 @@ mod tests {
             assert_eq!(parse(other), Request::Other);
         }
         assert!(request(&[0xff, 0xfe, b'\n'][..]).is_err());
-        // A head without an end is cut off.
+        // A head that does not end is cut off.
         let endless = format!("GET / HTTP/1.1\r\nHost: localhost\r\n{}", "x: y\r\n".repeat(100_000));
         assert_eq!(parse(&endless), get("/"));
     }

@@ -1,4 +1,4 @@
-//! What is looked at: a file, or the newest state of a run.
+//! What is shown: a file, or the newest state of a run.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -14,11 +14,11 @@ use crate::device;
 use crate::error::TrainError;
 use crate::run::{Checkpoint, RunFolder};
 
-/// A scene that may change while it is looked at.
+/// A scene that may change while it is shown.
 #[derive(Debug)]
 pub struct ViewSource {
     kind: Kind,
-    /// The file that `bytes` were made of, and when it was written.
+    /// The file from which `bytes` were made, and its time of modification.
     shown: Option<(PathBuf, SystemTime)>,
     /// A `.l4gs` stream.
     bytes: Vec<u8>,
@@ -51,10 +51,10 @@ impl ViewSource {
         Self::new(Kind::File(path.to_owned()))
     }
 
-    /// A run: its newest checkpoint while it trains, its file when that is written.
+    /// A run: its newest checkpoint while it trains, and its file when that has been written.
     ///
     /// # Errors
-    /// A folder without a run; a dataset that is not there.
+    /// A folder without a run; a dataset that does not exist.
     pub fn run(root: &Path, device: Option<DeviceName>) -> Result<Self, TrainError> {
         let (folder, record, config) = RunFolder::open(root)?;
         let device = device::open(device.unwrap_or(config.device))?.autodiff();
@@ -68,10 +68,10 @@ impl ViewSource {
         Ok(source)
     }
 
-    /// Looks whether there is something newer, and takes it.
+    /// Looks for a newer state, and reads it.
     ///
     /// # Errors
-    /// A file or checkpoint that cannot be read; what was shown before stays.
+    /// A file or checkpoint that cannot be read; the state shown before is kept.
     pub fn refresh(&mut self) -> Result<(), TrainError> {
         let newest = match &self.kind {
             Kind::File(path) => Some(path.clone()),
@@ -101,17 +101,17 @@ impl ViewSource {
         &self.bytes
     }
 
-    /// How often the scene has changed: 0 before there is one.
+    /// How often the scene has changed; 0 as long as there is none.
     pub fn version(&self) -> u64 {
         self.version
     }
 
-    /// Where the training is; empty where nothing is trained any more.
+    /// The training position; empty if nothing is being trained.
     pub fn status(&self) -> &str {
         &self.status
     }
 
-    /// The dataset, where it is known.
+    /// The dataset, if it is known.
     pub fn dataset(&self) -> Option<&Scene> {
         match &self.kind {
             Kind::File(_) => None,
@@ -142,7 +142,7 @@ impl Run {
         }
     }
 
-    /// A checkpoint as a stream without loss, and where in the training it was written.
+    /// A checkpoint as a stream without loss, and its training position as text.
     fn encode(&self, path: &Path) -> Result<(Vec<u8>, String), TrainError> {
         let checkpoint: Checkpoint =
             Checkpoint::load(path, &self.config, &self.config.model.build(), &ConfiguredModels, &self.device)?;
