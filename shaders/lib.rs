@@ -6,8 +6,8 @@
 #![no_std]
 
 use include::{
-    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, PIXELS, PLANES, QUATERNION, SPHERICAL_HARMONICS, SPLAT,
-    VIEW,
+    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, PIXELS, PLANES, POSE, QUATERNION, SPHERICAL_HARMONICS,
+    SPLAT, VIEW,
 };
 
 /// One kernel: a file of a folder here, with what it includes.
@@ -79,6 +79,14 @@ shaders! {
     SIGNIFICANCE = "splatting" / "significance" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Adds up every Gaussian's sums over its cells.
     SIGNIFICANCE_GATHER = "splatting" / "significance_gather" [];
+    /// Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
+    SKINNING = "skinning" / "skinning" [EXPONENTIAL, QUATERNION, POSE];
+    /// First of three parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
+    SKINNING_BACKWARD = "skinning" / "skinning_backward" [QUATERNION, POSE];
+    /// Last of three parts of skinning's derivative: adds up the slices, in their order.
+    SKINNING_GATHER = "skinning" / "skinning_gather" [];
+    /// Second of three parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
+    SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE];
     /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
     SUBGROUPS = "elementwise" / "subgroups" [];
 }
@@ -108,7 +116,9 @@ pub mod include {
         /// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows
         /// to a vector.
         PIXELS = "include/pixels";
-        /// Rotations from unit quaternions (w, x, y, z).
+        /// The pose of a node, or the blended one of a Gaussian.
+        POSE = "include/pose";
+        /// Quaternions (w, x, y, z): rotations from unit ones, and Hamilton's product.
         QUATERNION = "include/quaternion";
         /// Real spherical harmonics up to degree 3 and their derivatives, with the signs of the original 3DGS
         /// code.

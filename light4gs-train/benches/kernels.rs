@@ -4,8 +4,9 @@ use burn::module::Module;
 use burn::tensor::{Device, Distribution, Tensor};
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
+use light4gs_model::ops::skinning::skin;
 use light4gs_model::{HexPlaneConfig, Splatter};
-use light4gs_train::benchmark::BenchScene;
+use light4gs_train::benchmark::{BenchScene, skinning_inputs};
 use light4gs_train::device::{built_in, device_by_name};
 
 const GAUSSIANS: usize = 20_000;
@@ -57,6 +58,24 @@ fn hexplane(criterion: &mut Criterion) {
     group.finish();
 }
 
+fn skinning(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("skinning 10k Gaussians");
+    group.sample_size(10);
+    for (name, nodes) in built_in().into_iter().flat_map(|name| [32, 128].map(|nodes| (name, nodes))) {
+        let device = device_by_name(name).expect("a built-in device");
+        let still = skinning_inputs(10_000, nodes, &device);
+        group.bench_function(BenchmarkId::new(format!("{nodes} nodes, forward"), name), |bencher| {
+            bencher.iter(|| finished(&device, skin(still.clone())));
+        });
+        let trained = skinning_inputs(10_000, nodes, &device.clone().autodiff());
+        let loss = || finished(&device, skin(trained.clone()).sum());
+        group.bench_function(BenchmarkId::new(format!("{nodes} nodes, backward"), name), |bencher| {
+            bencher.iter_batched(loss, |loss| finished(&device, loss.backward()), BatchSize::PerIteration);
+        });
+    }
+    group.finish();
+}
+
 fn adam(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("Adam, a million values");
     let step = AdamStep { learning_rate: 1e-3, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 10 };
@@ -76,5 +95,5 @@ fn adam(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(kernels, splatting, hexplane, adam);
+criterion_group!(kernels, splatting, hexplane, skinning, adam);
 criterion_main!(kernels);

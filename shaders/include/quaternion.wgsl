@@ -1,4 +1,4 @@
-// Rotations from unit quaternions (w, x, y, z).
+// Quaternions (w, x, y, z): rotations from unit ones, and Hamilton's product.
 
 struct Rotation {
     axis_x: vec3<f32>,
@@ -35,4 +35,13 @@ fn rotation_backward(q: vec4<f32>, norm: f32, dx: vec3<f32>, dy: vec3<f32>, dz: 
         2.0 * (x * (dx.z + dz.x) + y * (dy.z + dz.y) + w * (dx.y - dy.x)) - 4.0 * z * (dx.x + dy.y),
     );
     return (d - sum_of_products(d, q) * q) / norm;
+}
+
+fn hamilton_product(a: vec4<f32>, b: vec4<f32>) -> vec4<f32> {
+    return vec4<f32>(
+        a.x * b.x - a.y * b.y - a.z * b.z - a.w * b.w,
+        a.x * b.y + a.y * b.x + a.z * b.w - a.w * b.z,
+        a.x * b.z - a.y * b.w + a.z * b.x + a.w * b.y,
+        a.x * b.w + a.y * b.z - a.z * b.y + a.w * b.x,
+    );
 }

@@ -8,4 +8,6 @@ pub(crate) mod project;
 pub(crate) mod rasterize;
 pub(crate) mod rasterize_backward;
 pub(crate) mod significance;
+pub(crate) mod skinning;
+pub(crate) mod skinning_backward;
 pub(crate) mod tiles;

@@ -6,6 +6,7 @@ mod elementwise;
 mod kernel;
 mod planes;
 mod significance;
+mod skinning;
 mod sort;
 mod splat;
 mod team;

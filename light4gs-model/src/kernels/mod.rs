@@ -3,4 +3,5 @@
 
 pub(crate) mod adam;
 pub(crate) mod plane_query;
+pub(crate) mod skinning;
 pub(crate) mod splat;

@@ -16,6 +16,7 @@ pub mod lower_bound;
 pub mod normal_cdf;
 pub mod plane_query;
 pub mod significance;
+pub mod skinning;
 pub mod splat;
 
 /// Implements a trait with the same items for each CPU back end of this build.

@@ -8,6 +8,7 @@ use std::time::Instant;
 use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError, PointCloud};
+use light4gs_model::ops::skinning::{SkinningInputs, skin};
 use light4gs_model::{
     DeformationConfig, DynamicScene, DynamicSceneConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter,
 };
@@ -27,6 +28,8 @@ use crate::report::table::{Align, Table};
 
 /// Untimed repetitions before the timed ones.
 const WARM_UP: usize = 2;
+/// Nodes that the Gaussians follow in the rows on skinning.
+const SKINNING_NODES: usize = 32;
 /// Side of the calibration product's matrices.
 const CALIBRATION: usize = 1024;
 
@@ -229,6 +232,22 @@ fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T,
     times[times.len() / 2]
 }
 
+/// Gaussians and nodes in a box, a node's radius 0.6 times what would fill it, all of them on the tape.
+pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningInputs {
+    let random = |rows: usize, columns: usize| {
+        Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device).require_grad()
+    };
+    let radius = 0.6 * 2.0 / (nodes as f32).cbrt();
+    SkinningInputs {
+        means: random(count, 3),
+        quats: random(count, 4),
+        stillness: random(count, 1),
+        anchors: random(nodes, 3),
+        precisions: Tensor::full([nodes, 1], 0.5 / (radius * radius), device).require_grad(),
+        poses: random(nodes, 16),
+    }
+}
+
 /// Times every part on every scene.
 pub fn benchmark(
     name: DeviceName,
@@ -289,6 +308,14 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
     add("hexplane backward", median(device, repeats, || query(points.clone()), |loss| loss.backward()));
     let both = median(device, repeats, || points.clone(), |points| query(points).backward());
     add("hexplane forward + backward", both);
+
+    let inputs = skinning_inputs(count, SKINNING_NODES, autodiff);
+    let upstream = Tensor::<2>::random([count, 7], Distribution::Default, autodiff);
+    add("skinning forward", median(device, repeats, || inputs.clone(), skin));
+    let skinned = |inputs: SkinningInputs| (skin(inputs) * upstream.clone()).sum();
+    add("skinning backward", median(device, repeats, || skinned(inputs.clone()), |loss| loss.backward()));
+    let both = median(device, repeats, || inputs.clone(), |inputs| skinned(inputs).backward());
+    add("skinning forward + backward", both);
 
     let network = DeformationConfig::new(64).init(autodiff);
     let features = Tensor::<2>::random([count, 64], Distribution::Default, autodiff).require_grad();

@@ -14,3 +14,4 @@ mod plane_query;
 mod poisoned_scenes;
 mod rooms;
 mod sh_entropy;
+mod skinning;

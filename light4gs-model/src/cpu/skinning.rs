@@ -1,0 +1,242 @@
+//! Linear blend skinning, eight Gaussians at a time, forward.
+//!
+//! Eight Gaussians meet all nodes in turn, whose numbers are spread over the lanes: first for the exponents and their maximum,
+//! then for the weights, then twice for half of the blended pose each, since sixteen sums and a weight do not fit into the
+//! sixteen vector registers of AVX2.
+
+use rayon::prelude::*;
+
+use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
+use crate::kernels::skinning::{MOVED, POSE};
+
+/// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.
+pub(crate) const CHUNK: usize = 256;
+
+/// Exponent of 2, relative to the largest, below which a weight is 0. Such a weight is 12 digits below rounding, and times a small
+/// gradient it would be a denormal number, on which processors are slow.
+const SMALLEST_EXPONENT: f32 = -64.0;
+
+/// One value for each Gaussian of a group of eight.
+pub(crate) type Block = [f32; LANES];
+
+/// Gaussians and nodes, row by row.
+#[derive(Clone, Copy)]
+pub(crate) struct SkinningSlices<'a> {
+    /// `[N, 3]`
+    pub(crate) means: &'a [f32],
+    /// `[N, 4]`
+    pub(crate) quats: &'a [f32],
+    /// `[N, 1]`
+    pub(crate) stillness: &'a [f32],
+    /// `[B, 3]`
+    pub(crate) anchors: &'a [f32],
+    /// `[B, 1]`
+    pub(crate) precisions: &'a [f32],
+    /// `[B, 16]`
+    pub(crate) poses: &'a [f32],
+}
+
+impl SkinningSlices<'_> {
+    /// The nodes, each with its numbers next to each other.
+    pub(crate) fn nodes(&self) -> Vec<Node> {
+        let rows = self.anchors.as_chunks::<3>().0.iter().zip(self.poses.as_chunks::<POSE>().0);
+        let nodes = rows.zip(self.precisions).map(|((anchor, pose), precision)| Node {
+            anchor: *anchor,
+            sharpness: -precision * std::f32::consts::LOG2_E,
+            pose: *pose,
+        });
+        nodes.collect()
+    }
+}
+
+/// A node at one time.
+pub(crate) struct Node {
+    anchor: [f32; 3],
+    /// Exponent of 2 a unit of squared distance.
+    sharpness: f32,
+    pub(crate) pose: [f32; POSE],
+}
+
+impl Node {
+    /// Offsets from the anchor, their squared length, and the exponent of 2 of the weight before the softmax.
+    #[inline(always)]
+    pub(crate) fn reach<L: Lanes>(&self, mean: &[L; 3]) -> ([L; 3], L, L) {
+        let x = mean[0].sub(L::splat(self.anchor[0]));
+        let y = mean[1].sub(L::splat(self.anchor[1]));
+        let z = mean[2].sub(L::splat(self.anchor[2]));
+        let squared = x.mul_add(x, y.mul_add(y, z.mul(z)));
+        ([x, y, z], squared, squared.mul(L::splat(self.sharpness)))
+    }
+}
+
+/// What eight Gaussians make of the nodes.
+#[derive(Clone, Debug)]
+pub(crate) struct BlendedGroup {
+    /// `A`, `t` and `q` of [`skin`](crate::ops::skinning::skin).
+    pub(crate) pose: [Block; POSE],
+    /// The largest exponent of 2.
+    pub(crate) largest: Block,
+    /// Sum of the weights before the softmax divides by it, inverted.
+    pub(crate) inverse_sum: Block,
+    /// Weight of the node that stands still.
+    pub(crate) still: Block,
+}
+
+impl Default for BlendedGroup {
+    fn default() -> Self {
+        let zeros = [0.0; LANES];
+        Self { pose: [zeros; POSE], largest: zeros, inverse_sum: zeros, still: zeros }
+    }
+}
+
+/// The weight of an exponent before the softmax divides.
+#[inline(always)]
+pub(crate) fn weight<L: Lanes>(exponent: L, largest: L) -> L {
+    let relative = exponent.sub(largest);
+    relative.at_least(L::splat(SMALLEST_EXPONENT)).and(relative.exp2())
+}
+
+/// Columns of up to eight rows, zeros where there is none.
+#[inline(always)]
+pub(crate) fn columns<L: Lanes, const C: usize>(rows: &[f32]) -> [L; C] {
+    let mut blocks = [[0.0; LANES]; C];
+    for (lane, row) in rows.as_chunks::<C>().0.iter().enumerate().take(LANES) {
+        for c in 0..C {
+            blocks[c][lane] = row[c];
+        }
+    }
+    // Loops, not `array::map`: a call that is not inlined leaves the vector registers.
+    let mut columns = [L::splat(0.0); C];
+    for c in 0..C {
+        columns[c] = L::load(&blocks[c]);
+    }
+    columns
+}
+
+/// Writes columns to as many rows as there are.
+#[inline(always)]
+pub(crate) fn to_rows<L: Lanes, const C: usize>(columns: &[L; C], rows: &mut [f32]) {
+    let mut blocks = [[0.0; LANES]; C];
+    for c in 0..C {
+        columns[c].store(&mut blocks[c]);
+    }
+    for (lane, row) in rows.as_chunks_mut::<C>().0.iter_mut().enumerate().take(LANES) {
+        for c in 0..C {
+            row[c] = blocks[c][lane];
+        }
+    }
+}
+
+/// Hamilton's product.
+#[inline(always)]
+pub(crate) fn product<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> [L; 4] {
+    [
+        a[0].mul(b[0]).sub(a[1].mul(b[1])).sub(a[2].mul(b[2])).sub(a[3].mul(b[3])),
+        a[0].mul(b[1]).add(a[1].mul(b[0])).add(a[2].mul(b[3])).sub(a[3].mul(b[2])),
+        a[0].mul(b[2]).sub(a[1].mul(b[3])).add(a[2].mul(b[0])).add(a[3].mul(b[1])),
+        a[0].mul(b[3]).add(a[1].mul(b[2])).sub(a[2].mul(b[1])).add(a[3].mul(b[0])),
+    ]
+}
+
+/// `A mean + t` of a blended pose.
+#[inline(always)]
+pub(crate) fn position<L: Lanes>(pose: &[L; POSE], mean: &[L; 3]) -> [L; 3] {
+    let mut position = [pose[9], pose[10], pose[11]];
+    for i in 0..3 {
+        for j in 0..3 {
+            position[i] = pose[3 * i + j].mul_add(mean[j], position[i]);
+        }
+    }
+    position
+}
+
+/// Sums over the nodes of weight times the eight numbers of the pose from `first` on.
+#[inline(always)]
+fn half_of_pose<L: Lanes>(weights: &[Block], nodes: &[Node], first: usize) -> [L; POSE / 2] {
+    let mut sums = [L::splat(0.0); POSE / 2];
+    for (weight, node) in weights.iter().zip(nodes) {
+        let weight = L::load(weight);
+        for k in 0..POSE / 2 {
+            sums[k] = weight.mul_add(L::splat(node.pose[first + k]), sums[k]);
+        }
+    }
+    sums
+}
+
+/// Pose of the node that stands still.
+pub(crate) const STILL: [f32; POSE] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+
+struct Forward<'a> {
+    nodes: &'a [Node],
+    means: &'a [f32],
+    quats: &'a [f32],
+    stillness: &'a [f32],
+    moved: &'a mut [f32],
+    blended: &'a mut [BlendedGroup],
+}
+
+impl LaneKernel for Forward<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let mut weights = vec![[0.0; LANES]; self.nodes.len()];
+        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES)).zip(self.stillness.chunks(LANES));
+        let outputs = self.moved.chunks_mut(MOVED * LANES).zip(self.blended);
+        for (((means, quats), stillness), (moved, blended)) in inputs.zip(outputs) {
+            let mean = columns::<L, 3>(means);
+            let [stillness] = columns::<L, 1>(stillness);
+            let still_exponent = stillness.mul(L::splat(std::f32::consts::LOG2_E));
+            let mut largest = still_exponent;
+            for (node, weight) in self.nodes.iter().zip(&mut weights) {
+                let (_, _, exponent) = node.reach(&mean);
+                largest = largest.max(exponent);
+                exponent.store(weight);
+            }
+            let still = weight(still_exponent, largest);
+            let mut sum = still;
+            for place in &mut weights {
+                let weight = weight(L::load(place), largest);
+                sum = sum.add(weight);
+                weight.store(place);
+            }
+            let inverse_sum = L::splat(1.0).div(sum);
+            let mut pose = [L::splat(0.0); POSE];
+            for first in [0, POSE / 2] {
+                let half = half_of_pose::<L>(&weights, self.nodes, first);
+                for k in 0..POSE / 2 {
+                    let with_still = still.mul_add(L::splat(STILL[first + k]), half[k]);
+                    pose[first + k] = with_still.mul(inverse_sum);
+                }
+            }
+            let at = position(&pose, &mean);
+            let turned = product(&[pose[12], pose[13], pose[14], pose[15]], &columns::<L, 4>(quats));
+            to_rows(&[at[0], at[1], at[2], turned[0], turned[1], turned[2], turned[3]], moved);
+            for k in 0..POSE {
+                pose[k].store(&mut blended.pose[k]);
+            }
+            largest.store(&mut blended.largest);
+            inverse_sum.store(&mut blended.inverse_sum);
+            still.mul(inverse_sum).store(&mut blended.still);
+        }
+    }
+}
+
+/// Positions and quaternions `[N, 7]`, and what the backward pass wants to see again.
+pub(crate) fn skin(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
+    let nodes = inputs.nodes();
+    let count = inputs.stillness.len();
+    let mut moved = vec![0.0; MOVED * count];
+    let mut blended = vec![BlendedGroup::default(); count.div_ceil(LANES)];
+    let chunks = (
+        inputs.means.par_chunks(3 * CHUNK),
+        inputs.quats.par_chunks(4 * CHUNK),
+        inputs.stillness.par_chunks(CHUNK),
+        moved.par_chunks_mut(MOVED * CHUNK),
+        blended.par_chunks_mut(CHUNK / LANES),
+    );
+    chunks.into_par_iter().for_each(|(means, quats, stillness, moved, blended)| {
+        dispatch(Forward { nodes: &nodes, means, quats, stillness, moved, blended });
+    });
+    (moved, blended)
+}

@@ -1,0 +1,259 @@
+//! Linear blend skinning, eight Gaussians at a time, backward.
+//!
+//! Forward, a Gaussian is moved by the product of its blended pose `P = Σ w_b P_b` with factors that depend on nothing else. So the
+//! derivative by `P` is the same sixteen numbers `F` for all nodes of a Gaussian, and
+//!
+//! ```text
+//! gradient of P_b = Σ over the Gaussians of w_b F
+//! gradient of w_b = F · P_b,   of its logit  w_b (F · P_b - F · P)
+//! ```
+//!
+//! A task has a range of Gaussians. Chunk by chunk it works out `F`; then each node in turn meets all Gaussians of the chunk, with
+//! weights worked out anew, which is faster than fetching them. What a task adds to the gradients of the nodes has its own place, and
+//! the places are added up in order: the same sums whatever the number of threads.
+
+use rayon::prelude::*;
+
+use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
+use super::skinning::{BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, columns, product, to_rows, weight};
+use crate::kernels::skinning::{MOVED, POSE};
+
+/// Tasks at most, so that their sums take no more memory than some thousand Gaussians.
+const MOST_TASKS: usize = 64;
+
+/// Gradients of [`skin`](super::skinning::skin), row by row.
+pub(crate) struct SkinningGradients {
+    /// `[N, 3]`
+    pub(crate) means: Vec<f32>,
+    /// `[N, 4]`
+    pub(crate) quats: Vec<f32>,
+    /// `[N, 1]`
+    pub(crate) stillness: Vec<f32>,
+    /// `[B, 3]`
+    pub(crate) anchors: Vec<f32>,
+    /// `[B, 1]`
+    pub(crate) precisions: Vec<f32>,
+    /// `[B, 16]`
+    pub(crate) poses: Vec<f32>,
+}
+
+/// What eight Gaussians hand to all nodes.
+struct Handed {
+    mean: [Block; 3],
+    /// `F`: derivatives by the blended pose.
+    by_pose: [Block; POSE],
+    /// `F · P`
+    product: Block,
+    largest: Block,
+    inverse_sum: Block,
+}
+
+/// Sums over Gaussians for one node.
+#[derive(Clone, Copy)]
+struct NodeSums {
+    pose: [f32; POSE],
+    /// Of the logit's gradient times the offset from the anchor.
+    offset: [f32; 3],
+    /// Of the logit's gradient times the squared distance.
+    squared: f32,
+}
+
+impl NodeSums {
+    const ZERO: Self = Self { pose: [0.0; POSE], offset: [0.0; 3], squared: 0.0 };
+
+    fn add(&mut self, other: &Self) {
+        let add = |to: &mut [f32], from: &[f32]| to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
+        add(&mut self.pose, &other.pose);
+        add(&mut self.offset, &other.offset);
+        self.squared += other.squared;
+    }
+}
+
+/// `F · P`. Where one weight is 1, the blended pose is that node's own, and the same order of sums makes the difference of their
+/// products exactly 0, as it should be: Adam would take a step along any rounding error.
+#[inline(always)]
+fn inner_product<L: Lanes>(by_pose: &[Block; POSE], pose: &[L; POSE]) -> L {
+    // Four sums next to each other, since each waits for its own last step.
+    let mut sums = [L::splat(0.0); 4];
+    for k in 0..POSE {
+        sums[k % 4] = L::load(&by_pose[k]).mul_add(pose[k], sums[k % 4]);
+    }
+    sums[0].add(sums[1]).add(sums[2].add(sums[3]))
+}
+
+/// One task: a range of Gaussians.
+struct Backward<'a> {
+    nodes: &'a [Node],
+    means: &'a [f32],
+    quats: &'a [f32],
+    blended: &'a [BlendedGroup],
+    /// `[N, 7]`
+    upstream: &'a [f32],
+    of_means: &'a mut [f32],
+    of_quats: &'a mut [f32],
+    of_stillness: &'a mut [f32],
+}
+
+/// The gradients of eight Gaussians, and what they hand to the nodes.
+#[inline(always)]
+fn hand<L: Lanes>(
+    [means, quats, upstream]: [&[f32]; 3],
+    blended: &BlendedGroup,
+    [of_means, of_quats, of_stillness]: [&mut [f32]; 3],
+) -> Handed {
+    let mean = columns::<L, 3>(means);
+    let quat = columns::<L, 4>(quats);
+    let upstream = columns::<L, MOVED>(upstream);
+    let by_position = [upstream[0], upstream[1], upstream[2]];
+    let by_turned = [upstream[3], upstream[4], upstream[5], upstream[6]];
+    let mut pose = [L::splat(0.0); POSE];
+    for k in 0..POSE {
+        pose[k] = L::load(&blended.pose[k]);
+    }
+    let zero = L::splat(0.0);
+    let conjugate = |q: [L; 4]| [q[0], zero.sub(q[1]), zero.sub(q[2]), zero.sub(q[3])];
+    let blended_quat = [pose[12], pose[13], pose[14], pose[15]];
+    let by_blended_quat = product(&by_turned, &conjugate(quat));
+
+    let mut of_mean = [zero; 3];
+    for j in 0..3 {
+        for i in 0..3 {
+            of_mean[j] = pose[3 * i + j].mul_add(by_position[i], of_mean[j]);
+        }
+    }
+    to_rows(&of_mean, of_means);
+    to_rows(&product(&conjugate(blended_quat), &by_turned), of_quats);
+
+    let mut by_pose = [zero; POSE];
+    for i in 0..3 {
+        for j in 0..3 {
+            by_pose[3 * i + j] = by_position[i].mul(mean[j]);
+        }
+        by_pose[9 + i] = by_position[i];
+    }
+    by_pose[12..].copy_from_slice(&by_blended_quat);
+    let mut handed = Handed {
+        mean: [[0.0; LANES]; 3],
+        by_pose: [[0.0; LANES]; POSE],
+        product: [0.0; LANES],
+        largest: blended.largest,
+        inverse_sum: blended.inverse_sum,
+    };
+    for i in 0..3 {
+        mean[i].store(&mut handed.mean[i]);
+    }
+    for k in 0..POSE {
+        by_pose[k].store(&mut handed.by_pose[k]);
+    }
+    let product = inner_product(&handed.by_pose, &pose);
+    product.store(&mut handed.product);
+    let mut still = [zero; POSE];
+    for k in 0..POSE {
+        still[k] = L::splat(STILL[k]);
+    }
+    let of_still = inner_product(&handed.by_pose, &still).sub(product);
+    to_rows(&[L::load(&blended.still).mul(of_still)], of_stillness);
+    handed
+}
+
+/// What a chunk of Gaussians adds to the gradients of a node. `weights` is room for one block a group.
+#[inline(always)]
+fn sums<L: Lanes>(node: &Node, handed: &[Handed], weights: &mut [Block]) -> NodeSums {
+    let mut offset_sums = [L::splat(0.0); 3];
+    let mut squared_sum = L::splat(0.0);
+    for (group, place) in handed.iter().zip(weights.iter_mut()) {
+        let mean = [L::load(&group.mean[0]), L::load(&group.mean[1]), L::load(&group.mean[2])];
+        let (offset, squared, exponent) = node.reach(&mean);
+        let weight = weight(exponent, L::load(&group.largest)).mul(L::load(&group.inverse_sum));
+        weight.store(place);
+        let mut pose = [L::splat(0.0); POSE];
+        for k in 0..POSE {
+            pose[k] = L::splat(node.pose[k]);
+        }
+        let by_logit = weight.mul(inner_product(&group.by_pose, &pose).sub(L::load(&group.product)));
+        for i in 0..3 {
+            offset_sums[i] = by_logit.mul_add(offset[i], offset_sums[i]);
+        }
+        squared_sum = by_logit.mul_add(squared, squared_sum);
+    }
+    let mut sums = NodeSums::ZERO;
+    // In two halves, as forward.
+    for first in [0, POSE / 2] {
+        let mut pose_sums = [L::splat(0.0); POSE / 2];
+        for (group, weight) in handed.iter().zip(weights.iter()) {
+            let weight = L::load(weight);
+            for k in 0..POSE / 2 {
+                pose_sums[k] = weight.mul_add(L::load(&group.by_pose[first + k]), pose_sums[k]);
+            }
+        }
+        for k in 0..POSE / 2 {
+            sums.pose[first + k] = pose_sums[k].sum();
+        }
+    }
+    for i in 0..3 {
+        sums.offset[i] = offset_sums[i].sum();
+    }
+    sums.squared = squared_sum.sum();
+    sums
+}
+
+impl LaneKernel for Backward<'_> {
+    type Output = Vec<NodeSums>;
+
+    #[inline(always)]
+    fn run<L: Lanes>(self) -> Self::Output {
+        let mut totals = vec![NodeSums::ZERO; self.nodes.len()];
+        let mut handed = Vec::with_capacity(CHUNK / LANES);
+        let mut weights = vec![[0.0; LANES]; CHUNK / LANES];
+        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
+        let inputs = inputs.zip(self.upstream.chunks(MOVED * LANES)).zip(self.blended);
+        let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_quats.chunks_mut(4 * LANES));
+        let outputs = outputs.zip(self.of_stillness.chunks_mut(LANES));
+        let last = self.blended.len() - 1;
+        for (group, (input, output)) in inputs.zip(outputs).enumerate() {
+            let ((((means, quats), upstream), blended), ((of_means, of_quats), of_stillness)) = (input, output);
+            handed.push(hand::<L>([means, quats, upstream], blended, [of_means, of_quats, of_stillness]));
+            if handed.len() == CHUNK / LANES || group == last {
+                for (node, total) in self.nodes.iter().zip(&mut totals) {
+                    total.add(&sums::<L>(node, &handed, &mut weights));
+                }
+                handed.clear();
+            }
+        }
+        totals
+    }
+}
+
+/// Gradients of all inputs from `upstream [N, 7]`.
+pub(crate) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
+    let nodes = inputs.nodes();
+    let count = inputs.stillness.len();
+    let task = count.div_ceil(MOST_TASKS).next_multiple_of(CHUNK);
+    let (mut means, mut quats, mut stillness) = (vec![0.0; 3 * count], vec![0.0; 4 * count], vec![0.0; count]);
+    let tasks = (
+        inputs.means.par_chunks(3 * task),
+        inputs.quats.par_chunks(4 * task),
+        blended.par_chunks(task / LANES),
+        upstream.par_chunks(MOVED * task),
+        means.par_chunks_mut(3 * task),
+        quats.par_chunks_mut(4 * task),
+        stillness.par_chunks_mut(task),
+    );
+    let parts = tasks.into_par_iter().map(|(means, quats, blended, upstream, of_means, of_quats, of_stillness)| {
+        dispatch(Backward { nodes: &nodes, means, quats, blended, upstream, of_means, of_quats, of_stillness })
+    });
+    let parts: Vec<Vec<NodeSums>> = parts.collect();
+    let mut totals = vec![NodeSums::ZERO; nodes.len()];
+    for part in &parts {
+        totals.iter_mut().zip(part).for_each(|(total, part)| total.add(part));
+    }
+    let of_anchors = totals.iter().zip(inputs.precisions).flat_map(|(sums, p)| sums.offset.map(|sum| 2.0 * p * sum));
+    SkinningGradients {
+        means,
+        quats,
+        stillness,
+        anchors: of_anchors.collect(),
+        precisions: totals.iter().map(|sums| -sums.squared).collect(),
+        poses: totals.iter().flat_map(|sums| sums.pose).collect(),
+    }
+}

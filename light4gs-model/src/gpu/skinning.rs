@@ -1,0 +1,127 @@
+//! Linear blend skinning on a GPU.
+
+use burn::backend::TensorMetadata;
+use burn::tensor::Shape;
+use burn_wgpu::CubeBackend;
+use burn_wgpu::CubeTensor;
+use cubecl::server::Handle;
+use light4gs_shaders::{SKINNING, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES};
+
+use super::context::{Gpu, Places, buffer_of, first_words};
+use super::kernel::Launch;
+use crate::gpu_error::GpuError;
+use crate::kernels::skinning::{MOVED, POSE, SkinningKernels, SkinningTensors};
+
+/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five and four vectors.
+const BLENDED: usize = 20;
+const HANDED: usize = 16;
+/// Sums that a node has of each slice of the Gaussians.
+const SUMS: usize = POSE + 3 + 1;
+
+/// Gaussians of a slice, unless there are so many slices then that their sums take more memory than they are worth.
+const SLICE: usize = 64;
+const MOST_SLICES: usize = 256;
+
+/// State between forward and backward.
+#[derive(Clone, Debug)]
+pub struct GpuSaved {
+    count: usize,
+    nodes: usize,
+    means: Handle,
+    quats: Handle,
+    anchors: Handle,
+    precisions: Handle,
+    poses: Handle,
+    blended: Handle,
+}
+
+fn words(values: &[usize]) -> Vec<u32> {
+    values.iter().map(|value| *value as u32).collect()
+}
+
+fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
+    let gpu = Gpu::of(&tensors.means)?;
+    let (count, nodes) = (tensors.means.shape()[0], tensors.anchors.shape()[0]);
+    let [means, quats, stillness, anchors, precisions, poses] = tensors.into_array().map(buffer_of);
+    let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
+    let blended = gpu.allocate("blended poses", BLENDED * count)?;
+    Launch::new(&gpu.client, SKINNING)
+        .reads(&means)
+        .reads(&quats)
+        .reads(&stillness)
+        .reads(&anchors)
+        .reads(&precisions)
+        .reads(&poses)
+        .writes(&moved)
+        .writes(&blended)
+        .uniform(&words(&[count, nodes]))
+        .invocations(count)?;
+    let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
+    Ok((output, GpuSaved { count, nodes, means, quats, anchors, precisions, poses, blended }))
+}
+
+fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
+    let gpu = Gpu::of(&upstream)?;
+    let GpuSaved { count, nodes, means, quats, anchors, precisions, poses, blended } = saved;
+    let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
+    let of_means = gpu.allocate("gradients of means", 3 * count)?;
+    let of_quats = gpu.allocate("gradients of quats", 4 * count)?;
+    let of_stillness = gpu.allocate("gradients of stillness", count)?;
+    Launch::new(&gpu.client, SKINNING_BACKWARD)
+        .reads(&means)
+        .reads(&quats)
+        .reads(&blended)
+        .reads(&buffer_of(upstream))
+        .writes(&handed)
+        .writes(&of_means)
+        .writes(&of_quats)
+        .writes(&of_stillness)
+        .uniform(&words(&[count]))
+        .invocations(count)?;
+
+    let slice = count.div_ceil(MOST_SLICES).clamp(SLICE, gpu.longest_loop());
+    let slices = count.div_ceil(slice);
+    let sums = gpu.allocate("sums of slices", SUMS * nodes * slices)?;
+    Launch::new(&gpu.client, SKINNING_NODES)
+        .reads(&handed)
+        .reads(&anchors)
+        .reads(&precisions)
+        .reads(&poses)
+        .writes(&sums)
+        .uniform(&words(&[count, nodes, slice]))
+        .invocations(slices * nodes)?;
+
+    let places = Places::new(&[3 * nodes, nodes, POSE * nodes]);
+    let of_nodes = gpu.allocate("gradients of nodes", places.total)?;
+    let uniform = [&[nodes, slices], places.starts.as_slice()].concat();
+    Launch::new(&gpu.client, SKINNING_GATHER)
+        .reads(&sums)
+        .writes(&of_nodes)
+        .uniform(&words(&uniform))
+        .invocations(SUMS * nodes)?;
+
+    let of_gaussians = |handle: &Handle, columns: usize| {
+        gpu.tensor(first_words(handle, columns * count), Shape::from([count, columns]))
+    };
+    let of_nodes = |k: usize, columns: usize| gpu.tensor(places.of(&of_nodes, k), Shape::from([nodes, columns]));
+    Ok(SkinningTensors {
+        means: of_gaussians(&of_means, 3),
+        quats: of_gaussians(&of_quats, 4),
+        stillness: of_gaussians(&of_stillness, 1),
+        anchors: of_nodes(0, 3),
+        precisions: of_nodes(1, 1),
+        poses: of_nodes(2, POSE),
+    })
+}
+
+impl SkinningKernels for CubeBackend {
+    type Saved = GpuSaved;
+
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (CubeTensor, GpuSaved) {
+        forward(tensors).unwrap_or_else(|error| error.raise())
+    }
+
+    fn skinning_backward(saved: GpuSaved, gradient: CubeTensor) -> SkinningTensors<Self> {
+        backward(saved, gradient).unwrap_or_else(|error| error.raise())
+    }
+}

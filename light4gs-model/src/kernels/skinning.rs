@@ -1,0 +1,53 @@
+//! Linear blend skinning: Gaussians and nodes, moved Gaussians, gradients.
+
+use std::fmt::Debug;
+
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, ExtensionType};
+
+/// Numbers of a node's pose: rotation matrix row by row (9), offset (3), quaternion (4).
+pub(crate) const POSE: usize = 16;
+/// Numbers of a moved Gaussian: position (3), quaternion (4).
+pub(crate) const MOVED: usize = 7;
+
+/// The differentiable inputs, or their gradients, in the order that gradients are registered in.
+#[derive(ExtensionType)]
+pub struct SkinningTensors<B: Backend> {
+    /// `[N, 3]`, world units.
+    pub means: FloatTensor<B>,
+    /// `[N, 4]` as (w, x, y, z), of any length.
+    pub quats: FloatTensor<B>,
+    /// `[N, 1]`, logits of the node that stands still.
+    pub stillness: FloatTensor<B>,
+    /// `[B, 3]`, world units.
+    pub anchors: FloatTensor<B>,
+    /// `[B, 1]`, `1 / (2 r²)` of the nodes' radii r.
+    pub precisions: FloatTensor<B>,
+    /// `[B, 16]`: rotation matrix row by row (9), offset (3), quaternion (4).
+    pub poses: FloatTensor<B>,
+}
+
+/// Tensors of [`SkinningTensors`].
+pub(crate) const INPUTS: usize = 6;
+
+impl<B: Backend> SkinningTensors<B> {
+    pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.means, self.quats, self.stillness, self.anchors, self.precisions, self.poses]
+    }
+
+    pub(crate) fn from_array([means, quats, stillness, anchors, precisions, poses]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { means, quats, stillness, anchors, precisions, poses }
+    }
+}
+
+/// A back end's kernels. [`SkinningOps`](crate::ops::skinning::SkinningOps) adds the dispatch and the tape.
+pub trait SkinningKernels: Backend {
+    /// What the backward pass wants to see again.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Positions and quaternions `[N, 7]`.
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
+
+    /// Gradients of all inputs from that of the output `[N, 7]`.
+    fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
+}

@@ -1,0 +1,43 @@
+// Last of three parts of skinning's derivative: adds up the slices, in their order.
+//
+// One invocation owns one of the twenty numbers of a node. Reads the sums of `skinning_nodes.wgsl`. Writes the gradients of anchors
+// [B, 3], precisions [B, 1] and poses [B, 16], each from its place in `gradients`.
+
+struct Parameters {
+    nodes: u32,
+    slices: u32,
+    // Where the gradients begin.
+    anchors: u32,
+    precisions: u32,
+    poses: u32,
+}
+
+@group(0) @binding(0) var<storage, read_write> sums: array<f32>;
+@group(0) @binding(1) var<storage, read_write> gradients: array<f32>;
+@group(0) @binding(2) var<uniform> parameters: Parameters;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let own = flat_group(group, groups) * WORKGROUP + lane;
+    let stride = 20u * parameters.nodes;
+    if (own >= stride) {
+        return;
+    }
+    var sum = 0.0;
+    for (var slice = 0u; slice < parameters.slices; slice++) {
+        sum += sums[slice * stride + own];
+    }
+    let node = own / 20u;
+    let k = own % 20u;
+    var at = parameters.anchors + 3u * node + k;
+    if (k == 3u) {
+        at = parameters.precisions + node;
+    } else if (k > 3u) {
+        at = parameters.poses + 16u * node + k - 4u;
+    }
+    gradients[at] = sum;
+}

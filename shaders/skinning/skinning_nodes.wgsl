@@ -1,0 +1,71 @@
+// Second of three parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
+//
+// One invocation owns one node and one slice, and adds up the Gaussians of the slice in their order; neighbors have the same slice, so
+// that they read the same Gaussian at the same time. Reads what Gaussians hand over (see `skinning_backward.wgsl`) and the nodes.
+// Writes `sums`, twenty a node and slice: anchor (3), precision (1), pose (16).
+
+struct Parameters {
+    count: u32,
+    nodes: u32,
+    // Gaussians of a slice.
+    slice: u32,
+}
+
+@group(0) @binding(0) var<storage, read_write> handed: array<vec4<f32>>;
+@group(0) @binding(1) var<storage, read_write> anchors: array<f32>;
+@group(0) @binding(2) var<storage, read_write> precisions: array<f32>;
+@group(0) @binding(3) var<storage, read_write> poses: array<f32>;
+@group(0) @binding(4) var<storage, read_write> sums: array<vec4<f32>>;
+@group(0) @binding(5) var<uniform> parameters: Parameters;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let own = flat_group(group, groups) * WORKGROUP + lane;
+    let slice = own / parameters.nodes;
+    let begin = slice * parameters.slice;
+    if (begin >= parameters.count) {
+        return;
+    }
+    let end = min(begin + parameters.slice, parameters.count);
+    let node = own % parameters.nodes;
+    let anchor = vec3<f32>(anchors[3u * node], anchors[3u * node + 1u], anchors[3u * node + 2u]);
+    let sharpness = precisions[node];
+    let at = 16u * node;
+    let pose = Pose(
+        vec4<f32>(poses[at], poses[at + 1u], poses[at + 2u], poses[at + 9u]),
+        vec4<f32>(poses[at + 3u], poses[at + 4u], poses[at + 5u], poses[at + 10u]),
+        vec4<f32>(poses[at + 6u], poses[at + 7u], poses[at + 8u], poses[at + 11u]),
+        vec4<f32>(poses[at + 12u], poses[at + 13u], poses[at + 14u], poses[at + 15u]),
+    );
+
+    // Of the logit's gradient times the offset from the anchor, and times the squared distance.
+    var of_place = vec4<f32>(0.0);
+    var of_row_x = vec4<f32>(0.0);
+    var of_row_y = vec4<f32>(0.0);
+    var of_row_z = vec4<f32>(0.0);
+    var of_turn = vec4<f32>(0.0);
+    for (var i = begin; i < end; i++) {
+        let by_position = handed[4u * i];
+        let by_turn = handed[4u * i + 1u];
+        let mean = handed[4u * i + 2u];
+        let offset = mean.xyz - anchor;
+        let squared = dot(offset, offset);
+        let weight = exponential(-sharpness * squared - mean.w) * handed[4u * i + 3u].x;
+        let place = vec4<f32>(mean.xyz, 1.0);
+        let by_logit = weight * (inner_product(pose, mean.xyz, by_position.xyz, by_turn) - by_position.w);
+        of_place += by_logit * vec4<f32>(offset, squared);
+        of_row_x += weight * by_position.x * place;
+        of_row_y += weight * by_position.y * place;
+        of_row_z += weight * by_position.z * place;
+        of_turn += weight * by_turn;
+    }
+    sums[5u * own] = of_place * vec4<f32>(vec3<f32>(2.0 * sharpness), -1.0);
+    sums[5u * own + 1u] = vec4<f32>(of_row_x.xyz, of_row_y.x);
+    sums[5u * own + 2u] = vec4<f32>(of_row_y.yz, of_row_z.xy);
+    sums[5u * own + 3u] = vec4<f32>(of_row_z.z, of_row_x.w, of_row_y.w, of_row_z.w);
+    sums[5u * own + 4u] = of_turn;
+}
