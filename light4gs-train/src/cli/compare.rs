@@ -11,7 +11,7 @@ use crate::run::{Comparison, Difference};
 
 #[derive(Debug, Args)]
 pub(super) struct Compare {
-    /// Folders of two or more runs.
+    /// Folders of at least two runs.
     #[arg(required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
     /// Print as JSON.

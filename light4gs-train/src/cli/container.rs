@@ -40,14 +40,14 @@ pub(super) struct Encode {
     /// The file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Changes one key below `compression` for this file; may be given more than once. What concerns the entropy models
-    /// (`context`, `steps`, `sh`) has them fitted anew to the scene as it is.
+    /// Changes one key below `compression` for this file; may be given more than once. Where keys of `context`, `steps`
+    /// or `sh` change, the entropy models are fitted again to the finished scene.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Print what was written as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -89,7 +89,7 @@ impl Encode {
             device: &device,
         };
         let coded = code_to_file(&trained, &self.out, self.json).map_err(|error| match error {
-            // What the encoder refuses came from this file.
+            // The checkpoint is the input here, so the error names it.
             TrainError::Codec(problem) if !problem.is_internal() => {
                 TrainError::Input(format!("checkpoint {}: {problem}", path.display()))
             }
@@ -105,7 +105,7 @@ impl Encode {
     }
 }
 
-/// Codes a scene, with a progress bar for what is fitted, writes the file, and prints what it holds.
+/// Encodes a scene, with a progress bar if models are fitted, writes the file, and prints a summary.
 pub(super) fn code_to_file<F: DeformationField, E: EntropyModels>(
     trained: &TrainedScene<F, E>,
     out: &Path,
@@ -121,7 +121,7 @@ pub(super) fn code_to_file<F: DeformationField, E: EntropyModels>(
     Ok(coded)
 }
 
-/// Whether an output lies in a run's folder, where only one process may write. Its own folder exists.
+/// Whether an output is inside the folder of a run, into which only one process may write. The output's folder exists.
 fn is_inside(out: &Path, root: &Path) -> bool {
     let absolute = |path: &Path| std::fs::canonicalize(path).ok();
     let folder = out.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -18,30 +18,30 @@ use crate::device;
 use crate::error::TrainError;
 use crate::evaluation::DecodedScene;
 
-/// Cameras of each split that a page holds: enough to choose from, few enough to send.
+/// Most cameras of each split in a page: enough to choose from, few enough to send.
 const MOST_CAMERAS: usize = 60;
 
 #[derive(Debug, Args)]
 pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
-    /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or a folder that is
-    /// there), or a file: one moment as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs.
+    /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or an existing
+    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
-    /// One file that plays the scene in a browser and needs nothing else.
+    /// One file that plays the scene in a browser without any other file.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["out", "frames", "device", "time", "fps", "z_up"])]
     html: Option<PathBuf>,
-    /// Dataset whose cameras the page offers; those of the run that the file lies in if not given.
+    /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
     #[arg(long, requires = "html")]
     scene: Option<PathBuf>,
-    /// Number of frames over time 0 to 1; as many as the file was made from if not given.
+    /// Number of frames over time 0 to 1; by default as many as the file was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
-    /// The moment of a .ply or .glb file, in [0, 1].
+    /// The time of a .ply or .glb file, in [0, 1].
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     time: f32,
-    /// Frames a second of a .4dgs file; the source's, or 30, if not given.
+    /// Frames a second of a .4dgs file; by default those of the source, or 30.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
     /// In a .glb: the scene's z axis points up, as in Blender. glTF's y axis does.
@@ -54,7 +54,7 @@ pub(super) struct Export {
     limits: LimitsArgument,
 }
 
-/// What is written.
+/// The kind of output.
 #[derive(Clone, Copy, Debug)]
 enum Target {
     PlySequence,
@@ -64,7 +64,7 @@ enum Target {
 }
 
 impl Target {
-    /// What a path asks for: a folder that is there, a slash at the end or no suffix mean a folder.
+    /// The kind of output for a path: a folder if it exists as one, ends with a slash or has no suffix.
     fn of(path: &Path) -> Result<Self, TrainError> {
         let asks_for_folder = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         let Some(suffix) = path.extension().filter(|_| !asks_for_folder && !path.is_dir()) else {
@@ -152,13 +152,14 @@ impl Export {
     }
 }
 
-/// Says which attributes a file of another program has no place for.
+/// A text with the attributes that a file of another program cannot hold.
 fn left_out(gaussians: &GaussianArrays) -> String {
     let names: Vec<&str> = gaussians.further.iter().map(|attribute| attribute.name.as_str()).collect();
     if names.is_empty() { String::new() } else { format!(", without the attributes {}", names.join(", ")) }
 }
 
-/// For files of other programs, whose harmonics have degree 3. A further attribute becomes properties `NAME_0`, `NAME_1`...
+/// Gaussians for files of other programs, with harmonics of degree 3. A further attribute becomes properties `NAME_0`,
+/// `NAME_1`...
 fn plain_gaussians(arrays: GaussianArrays) -> GaussianPly {
     let per_gaussian = if arrays.is_empty() { 0 } else { arrays.sh_rest.len() / (3 * arrays.len()) };
     let rest = |i: usize| {

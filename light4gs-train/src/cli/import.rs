@@ -18,7 +18,7 @@ use crate::import::{reference, scene_around, still};
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Source {
     /// A checkpoint of 4DGaussians, or of the public code of Light4GS: the folder with `point_cloud.ply` and
-    /// `deformation.pth`, or one above it. Makes a run, which `encode` and `eval` take.
+    /// `deformation.pth`, or one above it. Makes a run, for `encode` and `eval`.
     #[value(name = "4dgaussians")]
     FourDGaussians,
     /// A PLY file of 3DGS: Gaussians without motion. Makes a .l4gs file.
@@ -29,17 +29,17 @@ enum Source {
 pub(super) struct Import {
     /// The folder or the file.
     source: PathBuf,
-    /// What it is.
+    /// The kind of source.
     #[arg(long, value_enum)]
     from: Source,
     /// Folder of the new run; for a PLY the .l4gs file to write.
     #[arg(long)]
     out: PathBuf,
-    /// Folder of the dataset that the scene was trained on. With it the coding looks at the training images; without, at
-    /// views around the scene.
+    /// Folder of the dataset on which the scene was trained. With it the steps are searched on training images; without
+    /// it, on views around the scene.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// A preset or a TOML file: how the scene will be coded. The model itself follows from the source.
+    /// A preset or a TOML file: how the scene will be coded. The model itself is given by the source.
     #[arg(long, default_value = "imported", value_name = "PRESET|FILE")]
     config: String,
     /// Changes one key of the configuration; may be given more than once.
@@ -48,10 +48,10 @@ pub(super) struct Import {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Replace a run that is there already.
+    /// Replace an existing run.
     #[arg(long)]
     overwrite: bool,
-    /// Print what was written as JSON.
+    /// Print the result as JSON.
     #[arg(long)]
     json: bool,
 }
@@ -70,7 +70,7 @@ impl Import {
     fn import_reference(&self, config: &Config) -> Result<(), TrainError> {
         let imported = reference::read(&self.source, &device::open(config.device)?)?;
         if let Some(dataset) = &self.scene {
-            // Before the run's folder is made, so that a wrong path leaves nothing behind.
+            // Opened before the run's folder is made, so that a wrong path leaves nothing behind.
             Scene::open(dataset, &load_options(&imported.config(config)?))?;
         }
         let (count, source) = (imported.scene.gaussians.len(), imported.source.clone());

@@ -1,4 +1,4 @@
-//! The command line: one file a command.
+//! The command line: one file for each command.
 
 mod bench;
 mod compare;
@@ -41,7 +41,7 @@ enum Command {
     /// Make a small synthetic scene, train on it, write the file and the report.
     #[command(after_help = "Example:\n  light4gs quickstart --out runs/quickstart")]
     Quickstart(quickstart::Quickstart),
-    /// Make a dataset of one or several videos: frames by ffmpeg, poses by colmap.
+    /// Make a dataset from one or several videos: frames by ffmpeg, poses by colmap.
     #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
@@ -73,11 +73,11 @@ enum Command {
     /// Unpack a .l4gs file to plain arrays (safetensors).
     #[command(after_help = "Example:\n  light4gs decode bouncing.l4gs --out bouncing.safetensors")]
     Decode(container::Decode),
-    /// Print what a .l4gs file holds, with sizes by section.
+    /// Print the contents of a .l4gs file, with sizes by section.
     #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
     Info(container::Info),
-    /// Write the Gaussians for other programs: PLY files at successive times, one moment as .ply or .glb, the motion as .4dgs;
-    /// or the scene as a page that plays it.
+    /// Write the Gaussians for other programs: PLY files at successive times, a single time as .ply or .glb, the motion
+    /// as .4dgs; or the scene as a page that plays it.
     #[command(
         after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
     )]
@@ -85,12 +85,12 @@ enum Command {
     /// Write the procedural scene of the quickstart as a D-NeRF dataset.
     #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
     Synth(synth::Synth),
-    /// Make a table or a figure of the paper: train a scene several times, and show what varies.
+    /// Make a table or a figure of the paper: train a scene several times with variants, and compare them.
     #[command(
         after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-cpu --seeds 3 --out runs/context"
     )]
     Study(study::Study),
-    /// Write a study's tables and report anew from the runs that are finished, and say which are missing.
+    /// Write a study's tables and report again from the runs that are finished, and name those that are missing.
     #[command(after_help = "Example:\n  light4gs gather runs/context")]
     Gather(study::Gather),
     /// One task of a study, as its launcher starts it.
@@ -99,7 +99,7 @@ enum Command {
     /// Print what differs between runs: program and machine, configuration, results.
     #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
     Compare(compare::Compare),
-    /// Time every stage of training on one or more devices.
+    /// Time every part of a training step on one or more devices.
     #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
     Bench(bench::Bench),
 }
@@ -131,7 +131,7 @@ impl Cli {
 }
 
 /// Parses the arguments of this process, runs the command, and reports an error on stderr. Exit codes: 0 done, 2 wrong
-/// input, 1 our fault, 75 stopped on request (SIGUSR1).
+/// input, 1 a bug, 75 stopped on request (SIGUSR1).
 pub fn main() -> ExitCode {
     let wanted = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
     let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
@@ -147,8 +147,8 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// Refuses, before any work is done, an output path whose folder does not exist, that is a pipe or a device, or that would
-/// replace the file that the command reads or one that belongs to a run.
+/// Refuses an output path before any work is done: if its folder does not exist, if it is a pipe or a device, or if it
+/// would replace the file that the command reads or a file of a run.
 fn check_output(path: &Path, source: &Path) -> Result<(), TrainError> {
     let refuse = |problem: String| Err(TrainError::Input(format!("cannot write {}: {problem}", path.display())));
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));

@@ -17,13 +17,13 @@ pub(super) struct Prepare {
     /// Folder to make; a folder that was begun with the same videos and options is continued.
     #[arg(long)]
     out: PathBuf,
-    /// Frames to take of each video, spread evenly over it.
+    /// Frames to take from each video, spread evenly over it.
     #[arg(long, default_value_t = 200)]
     frames: usize,
     /// Wider frames are scaled down to this width, in pixels.
     #[arg(long, default_value_t = 1600, value_name = "PIXELS")]
     max_width: u32,
-    /// The cameras of a rig move: every frame gets a pose of its own. Without it they stand still.
+    /// The cameras of a rig move, so every frame gets a pose of its own. Without this option they stand still.
     #[arg(long)]
     moving: bool,
     /// No progress bars.

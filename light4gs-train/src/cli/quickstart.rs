@@ -11,13 +11,13 @@ use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Quickstart {
-    /// Folder of the run; the scene is made beside it, in a folder of the same name with `-scene` at its end.
+    /// Folder of the run. The scene is made beside it, in a folder with the same name and the suffix `-scene`.
     #[arg(long, default_value = "runs/quickstart")]
     out: PathBuf,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long, default_value_t = DeviceName::Flex)]
     device: DeviceName,
-    /// Replace a run that is there already.
+    /// Replace an existing run.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]

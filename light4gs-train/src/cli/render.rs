@@ -16,7 +16,7 @@ use crate::error::TrainError;
 use crate::evaluation::DecodedScene;
 use crate::video::{Looping, write_gif, write_mp4, write_png_sequence};
 
-/// Radius in world units and elevation in degrees of the orbit, as the D-NeRF video path has them.
+/// Radius in world units and elevation in degrees of the orbit, those of the D-NeRF video path.
 const ORBIT: (f32, f32) = (4.0, 30.0);
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -25,7 +25,7 @@ enum Path {
     Orbit,
     /// The orbit's first camera stands still while time runs.
     Fixed,
-    /// The orbit at one moment (see --time).
+    /// The orbit at a single time (see --time).
     Frozen,
 }
 
@@ -45,10 +45,10 @@ pub(super) struct Render {
     /// Number of frames.
     #[arg(long, default_value_t = 60, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: u32,
-    /// The moment of a frozen path, in [0, 1].
+    /// The time of a frozen path, in [0, 1].
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     time: f32,
-    /// Width in pixels; the training images' if not given.
+    /// Width in pixels; by default that of the training images.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_SIDE)), allow_negative_numbers = true)]
     width: Option<u32>,
     /// Distance of the orbit from the origin, world units.

@@ -1,9 +1,9 @@
-//! SIGUSR1: a checkpoint is written, and the program ends with exit code 75.
+//! SIGUSR1: the program writes a checkpoint and ends with exit code 75.
 
 use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, OnceLock};
 
-/// Set once the process has been asked to stop. The first call begins to listen.
+/// Set when the process has been asked to stop. The first call installs the handler.
 pub(super) fn stop_flag() -> Arc<AtomicBool> {
     static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
     FLAG.get_or_init(|| {

@@ -24,7 +24,7 @@ use crate::report::table::{Align, Table};
 use crate::run::{RunFolder, RunRecord};
 use crate::trainer::{Trainer, TrainerBuilder};
 
-/// What a run prints.
+/// Options for the output of a run.
 #[derive(Debug, Args)]
 pub(super) struct RunOutput {
     /// Print the result as JSON.
@@ -33,7 +33,8 @@ pub(super) struct RunOutput {
     /// No progress bars.
     #[arg(long)]
     pub(super) quiet: bool,
-    /// Print the time of every part of a training step. The run gets slower, since it waits for the device after each part.
+    /// Print the time of every part of a training step. The run becomes slower, since it waits for the device after
+    /// each part.
     #[arg(long)]
     pub(super) profile: bool,
 }
@@ -58,7 +59,7 @@ pub(super) struct Train {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Replace a run that is there already.
+    /// Replace an existing run.
     #[arg(long)]
     overwrite: bool,
     #[command(flatten)]
@@ -80,7 +81,7 @@ impl Train {
     }
 }
 
-/// A new run from beginning to report.
+/// Trains a new run and measures it, up to the report.
 pub(super) fn train(
     config: Config,
     scene: &Path,
@@ -88,13 +89,14 @@ pub(super) fn train(
     overwrite: bool,
     output: &RunOutput,
 ) -> Result<(), TrainError> {
-    // From here on a request to stop is heard.
+    // From here on requests to stop are noticed.
     stop_flag();
     let data = check_inputs(&config, scene)?;
     for note in &data.notes {
         tell(format_args!("note: {note}"));
     }
-    // What the encoder would refuse, such as a point at 3e38, must not cost the run that --overwrite replaces.
+    // If the encoder would refuse the scene, for example for a point at 3e38, the run that --overwrite replaces must
+    // not be lost.
     Trainer::builder(config.clone(), data).check()?;
     let folder = RunFolder::create(out, Some(scene), &config, overwrite)?;
     let (_, record, config) = RunFolder::open(folder.root())?;
@@ -102,8 +104,8 @@ pub(super) fn train(
     finish(trainer, &folder, &config, output)
 }
 
-/// Trains into a folder, or goes on with the run that is there already, and measures the file. A new run takes over what
-/// was trained in `like`, if that is a run which differs only in how the file is written.
+/// Trains in a folder, or continues the run that it holds, and measures the file. A new run takes over the training of
+/// `like`, if that is a run which differs only in how the file is written.
 ///
 /// # Errors
 /// [`TrainError::Input`] if the folder holds a run of another configuration or another scene.
@@ -122,7 +124,7 @@ pub(super) fn train_to_evaluation(
         if let Some(like) = like {
             folder.adopt(like, &Scene::open(scene, &load_options(&config))?)?;
         }
-        // Dropped here: the folder is locked again below.
+        // Dropped here, since the folder is locked again below.
     }
     let (mut folder, record, found) = RunFolder::open(out)?;
     folder.lock()?;
@@ -133,7 +135,7 @@ pub(super) fn train_to_evaluation(
         )));
     }
     let coded = config.compression.profile.coded().is_some();
-    // `bit_maps.json` is the last of what encoding writes.
+    // `bit_maps.json` is the last file that encoding writes.
     if !folder.stream().exists() || (coded && !folder.path("bit_maps.json").exists()) {
         run(&mut trainer(&config, &folder, &record, output)?.resume()?, output)?;
     }
@@ -141,15 +143,15 @@ pub(super) fn train_to_evaluation(
     evaluate_run::<BuiltInField>(&folder, &config, &scene)
 }
 
-/// Checks what a run needs from its first iteration to its evaluation, before its folder is made or emptied, so that a
-/// wrong path leaves nothing behind and nothing is lost: the device, the dataset, files that metrics need.
+/// Checks what a run needs from its first iteration to its evaluation: the device, the dataset, files for metrics. It
+/// does so before the run's folder is made or emptied, so that a wrong path leaves nothing behind and nothing is lost.
 fn check_inputs(config: &Config, scene: &Path) -> Result<Scene, TrainError> {
     let device = device::open(config.device)?;
     Lpips::load(&config.eval.lpips, &device)?;
     Ok(Scene::open(scene, &load_options(config))?)
 }
 
-/// A trainer of a run's folder, with progress bars.
+/// A trainer for the folder of a run, with progress bars.
 fn trainer(
     config: &Config,
     folder: &RunFolder,
@@ -161,14 +163,14 @@ fn trainer(
     Ok(Trainer::builder(config.clone(), data).run_folder(folder.clone()).observer(bars).stop_flag(stop_flag()))
 }
 
-/// Trains to the end, and prints what the parts took if that is asked for.
+/// Trains to the end, and prints the times of the parts if requested.
 fn run(trainer: &mut Trainer, output: &RunOutput) -> Result<(), TrainError> {
     if output.profile {
         trainer.measure_stages();
     }
     trainer.run()?;
     if let Some(table) = trainer.profile().table() {
-        // On stderr, so that stdout stays JSON where it is asked for.
+        // On stderr, so that stdout is only JSON where that is requested.
         tell(format_args!("{table}\n"));
     }
     Ok(())
@@ -188,14 +190,14 @@ fn finish(mut trainer: Trainer, folder: &RunFolder, config: &Config, output: &Ru
 pub(super) struct Resume {
     /// Folder of the run.
     run: PathBuf,
-    /// Changes one key of the run's configuration from here on, such as a learning rate that was too high; may be given
-    /// more than once. What has been trained must still fit.
+    /// Changes one key of the run's configuration from now on, for example a learning rate that was too high; may be
+    /// given more than once. The changed configuration must fit what has been trained.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Another back end than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// A back end other than the run's: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Continue although the dataset has changed since the run began.
+    /// Continue even if the dataset has changed since the run began.
     #[arg(long)]
     accept_changed_dataset: bool,
     #[command(flatten)]
@@ -217,7 +219,7 @@ impl Resume {
         }
         let trainer = builder.resume()?;
         if changed != found {
-            // Only now that the checkpoint has been found to fit. The next `resume` goes on with it as well.
+            // Written only after the checkpoint has been found to fit. The next `resume` uses it as well.
             folder.write("config.toml", changed.to_toml().as_bytes())?;
         }
         finish(trainer, &folder, &config, &self.output)
@@ -228,7 +230,7 @@ impl Resume {
 pub(super) struct Eval {
     /// Folder of a run, or a .l4gs file (then --scene is needed).
     run: PathBuf,
-    /// Folder of the dataset, where it is not the run's own.
+    /// Folder of the dataset, if it is not the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
@@ -240,7 +242,7 @@ pub(super) struct Eval {
     /// Print as JSON.
     #[arg(long)]
     json: bool,
-    /// Where a file is measured and not a run.
+    /// The dataset, if a file is measured and not a run.
     #[command(flatten)]
     limits: LimitsArgument,
 }
@@ -318,7 +320,7 @@ fn quality_table(evaluation: &Evaluation) -> Table {
     table
 }
 
-/// Expected and real bits of what is entropy coded with trained models.
+/// Expected and written bits of the parts that are coded with trained models.
 pub(super) fn coding_table(record: &CodingRecord) -> Table {
     let mut table = Table::new([
         ("entropy coded", Align::Left),

@@ -16,7 +16,7 @@ use crate::dataset::load_options;
 use crate::error::TrainError;
 use crate::view::{Answer, Server, ViewSource, cameras_json, run_around};
 
-/// Cameras of each split that the player lists.
+/// Most cameras of each split that the player lists.
 const MOST_CAMERAS: usize = 500;
 
 #[derive(Debug, Args)]
@@ -24,7 +24,7 @@ pub(super) struct View {
     /// A .l4gs file, or the folder of a run: while it trains, the page follows its newest checkpoint.
     #[arg(value_name = "FILE|RUN")]
     what: PathBuf,
-    /// Dataset whose cameras the player offers; for a run its own.
+    /// Dataset whose cameras the player offers; by default the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
     /// Port on this machine; 0 is any free one.
@@ -33,7 +33,7 @@ pub(super) struct View {
     /// Open the page in the browser.
     #[arg(long)]
     open: bool,
-    /// Back end that reads checkpoints: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    /// Back end for reading checkpoints: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
 }
@@ -89,7 +89,8 @@ impl View {
     }
 }
 
-/// The cameras for a file as JSON: those of a named dataset, else those of the run that the file lies in, else none.
+/// The cameras for a file as JSON: those of a named dataset, else those of the run whose folder holds the file, else
+/// none.
 ///
 /// # Errors
 /// A named dataset that cannot be read.
@@ -97,13 +98,13 @@ pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) ->
     if let Some(folder) = named {
         return Ok(cameras_json(&Scene::open(folder, &load_options(&Config::default()))?, most));
     }
-    // The dataset of a run may be gone; its file plays all the same.
+    // If the dataset of a run no longer exists, its file can be played all the same.
     let dataset = run_around(file)
         .and_then(|(_, record, config)| Scene::open(record.dataset().ok()?, &load_options(&config)).ok());
     Ok(dataset.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
 }
 
-/// Asks the system to show a page. The address is printed already, so a system without a browser is no error.
+/// Asks the system to show a page. The address has been printed already, so a system without a browser is no error.
 fn open_browser(address: &str) {
     let (program, arguments): (&str, &[&str]) = if cfg!(target_os = "macos") {
         ("open", &[])

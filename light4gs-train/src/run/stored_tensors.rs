@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
-/// Key of the checksum over all other entries of the metadata.
+/// Key of the checksum over all other entries of the metadata. A file without it is accepted unchecked.
 const CHECKSUM: &str = "checksum";
 /// Prefix before a tensor's name in the key of its checksum.
 const TENSOR_CHECKSUM: &str = "checksum.";

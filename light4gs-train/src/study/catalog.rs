@@ -1,8 +1,8 @@
-//! The studies of `configs/studies/`, embedded so that the program alone is enough.
+//! The studies of `configs/studies/`, which are embedded in the program.
 
 macro_rules! studies {
     ($($name:literal),* $(,)?) => {
-        /// Names of the program's studies, in the paper's order.
+        /// Names of the built-in studies, in the paper's order.
         pub const NAMES: &[&str] = &[$($name),*];
 
         const TEXTS: &[&str] = &[$(include_str!(concat!("../../configs/studies/", $name, ".toml"))),*];

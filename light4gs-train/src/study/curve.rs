@@ -1,8 +1,8 @@
 //! Rate-distortion curves: the convex hull of measured points, and Bjøntegaard's difference between two curves.
 //!
-//! Sources: G. Bjøntegaard, *Calculation of average PSNR differences between RD-curves*, VCEG-M33, 2001. The curve between
-//! the points is the piecewise cubic Hermite interpolation (Fritsch and Carlson 1980) of the JCT-VC's sheets, which cannot
-//! overshoot, in place of one cubic polynomial through everything.
+//! Sources: G. Bjøntegaard, *Calculation of average PSNR differences between RD-curves*, VCEG-M33, 2001. Between the
+//! points, the curve is the piecewise cubic Hermite interpolation (Fritsch and Carlson 1980) of the JCT-VC's sheets,
+//! which cannot overshoot, instead of one cubic polynomial through all points.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,21 +15,23 @@ pub struct RatePoint {
     pub psnr: f64,
 }
 
-/// What one curve differs from another by, over the range that both cover.
+/// The difference between two curves, over the range that both cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BjontegaardDelta {
-    /// Mean difference in size at equal quality, percent; negative is smaller. None where the curves share no quality.
+    /// Mean difference in size at equal quality, percent; negative is smaller. `None` if the curves share no range of
+    /// quality.
     pub rate_percent: Option<f64>,
-    /// Mean difference in quality at equal size, dB; positive is better. None where the curves share no size.
+    /// Mean difference in quality at equal size, dB; positive is better. `None` if the curves share no range of size.
     pub psnr: Option<f64>,
 }
 
-/// Those points that no mixture of others beats, by rising size: the upper left of the convex hull, over the logarithm of
-/// the size. Sizes and qualities rise strictly along it. Points that are not finite, or without size, are left out.
+/// The points that no mixture of two others surpasses, by ascending size: the upper left of the convex hull, over the
+/// logarithm of the size. Along it, sizes and qualities are strictly ascending. Points that are not finite, or without
+/// size, are left out.
 pub fn convex_hull(points: &[RatePoint]) -> Vec<RatePoint> {
     let mut sorted: Vec<RatePoint> =
         points.iter().copied().filter(|p| p.bytes > 0.0 && p.bytes.is_finite() && p.psnr.is_finite()).collect();
-    // Of points of one size the best comes first.
+    // Of points with equal size, the best comes first.
     sorted.sort_by(|a, b| a.bytes.total_cmp(&b.bytes).then(b.psnr.total_cmp(&a.psnr)));
     let mut hull: Vec<RatePoint> = Vec::new();
     for point in sorted {
@@ -51,8 +53,8 @@ fn slope(a: RatePoint, b: RatePoint) -> f64 {
     (b.psnr - a.psnr) / (b.bytes.ln() - a.bytes.ln())
 }
 
-/// How `curve` differs from `anchor`. Each needs two points or more with sizes and qualities that rise together, as those of
-/// [`convex_hull`] do; None if one has less.
+/// The difference of `curve` from `anchor`. Each needs at least two points, with sizes and qualities that ascend
+/// together, as on a [`convex_hull`]; `None` if one has fewer.
 pub fn bjontegaard(anchor: &[RatePoint], curve: &[RatePoint]) -> Option<BjontegaardDelta> {
     let [anchor, curve] = [anchor, curve].map(rising);
     let (anchor, curve) = (anchor?, curve?);
@@ -65,7 +67,7 @@ pub fn bjontegaard(anchor: &[RatePoint], curve: &[RatePoint]) -> Option<Bjontega
     })
 }
 
-/// The points by rising size; None if there are less than two, or quality does not rise with size.
+/// The points by ascending size; `None` if there are fewer than two, or if quality does not ascend with size.
 fn rising(points: &[RatePoint]) -> Option<Vec<RatePoint>> {
     let mut points = points.to_vec();
     points.sort_by(|a, b| a.bytes.total_cmp(&b.bytes));
@@ -80,7 +82,7 @@ fn mean_difference(anchor: &Hermite, curve: &Hermite) -> Option<f64> {
     (low < high).then(|| (curve.integral(low, high) - anchor.integral(low, high)) / (high - low))
 }
 
-/// A monotone piecewise cubic through points of rising x.
+/// A monotone piecewise cubic through points of ascending x.
 struct Hermite {
     points: Vec<(f64, f64)>,
     /// Derivative at each point.
@@ -112,7 +114,7 @@ impl Hermite {
         self.points[self.points.len() - 1].0
     }
 
-    /// Between two x inside of the range.
+    /// The integral between two x inside of the range.
     fn integral(&self, low: f64, high: f64) -> f64 {
         let pieces = self.points.windows(2).zip(self.slopes.windows(2));
         pieces
@@ -218,9 +220,9 @@ mod tests {
         let one = points(&[(5.0, 20.0)]);
         assert_eq!(convex_hull(&one), one);
         assert_eq!(convex_hull(&points(&[(5.0, 20.0), (5.0, 20.0), (5.0, 19.0)])), one);
-        // More bytes and no better: not on it.
+        // A point with more bytes and no better quality is not on the hull.
         assert_eq!(convex_hull(&points(&[(5.0, 20.0), (6.0, 20.0), (9.0, 3.0)])), one);
-        // On a line, only the ends are needed.
+        // Of points on a line, only the ends are needed.
         let e = std::f64::consts::E;
         let line = points(&[(1.0, 1.0), (e, 2.0), (e * e, 3.0)]);
         assert_eq!(convex_hull(&line), [line[0], line[2]]);
@@ -228,7 +230,7 @@ mod tests {
 
     #[test]
     fn a_hull_is_above_every_point() {
-        // A fixed sequence without pattern.
+        // A fixed sequence of irregular numbers.
         let mut state = 12345u32;
         let mut random = || {
             state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -31,43 +31,43 @@ use crate::config::{MAX_CONFIG_BYTES, UnknownChoice};
 use crate::error::TrainError;
 use crate::keys::choice;
 
-/// More runs than this are a mistake.
+/// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;
 
-/// What varies, and what is shown of it.
+/// What varies, and what is shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
     /// Heading of the report.
     pub title: String,
-    /// Which table or figure it stands for.
+    /// The table or figure of the paper that it reproduces.
     pub reproduces: String,
-    /// How it differs from that, and what to look at; may be empty.
+    /// How it differs from that, and what to look for; may be empty.
     #[serde(default)]
     pub notes: String,
-    /// Presets that are laid over the base configuration in every run, before those of the axes.
+    /// Presets that are laid on top of the base configuration in every run, before those of the axes.
     #[serde(default)]
     pub presets: Vec<String>,
-    /// The variant that differences are to; the first one if not given.
+    /// The variant with which others are compared; by default the first one.
     #[serde(default)]
     pub reference: Option<String>,
-    /// What is made of the runs.
+    /// The outputs that are made from the runs.
     pub outputs: Vec<Output>,
     /// Columns of the table.
     #[serde(default = "default_columns")]
     pub columns: Vec<Column>,
-    /// What the curves run along; needed for [`Output::Curves`].
+    /// The axis of the curves; needed for [`Output::Curves`].
     #[serde(default)]
     pub curves: Option<Curves>,
-    /// What varies. Variants are the product of all axes, the last one turning fastest.
+    /// The axes that vary. Variants are all combinations of their values; the last axis varies fastest.
     pub axis: Vec<Axis>,
-    /// Figures of the paper, for data that is the same.
+    /// Published figures for the same data.
     #[serde(default)]
     pub published: Vec<Published>,
 }
 
 choice! {
-    /// Something that is made of a study's runs.
+    /// An output that is made from a study's runs.
     pub enum Output: "output" {
         /// Means, spreads, differences to the reference.
         Table = "table",
@@ -75,18 +75,18 @@ choice! {
         Curves = "curves",
         /// Shares of the file's sections.
         Composition = "composition",
-        /// Where the planes' bits are.
+        /// Maps of the planes' bits.
         BitMaps = "bit_maps",
         /// Histograms of the decoded planes' values.
         PlaneValues = "plane_values",
-        /// Time of coding and rendering, frame by frame.
+        /// Time of coding and rendering for each frame.
         Latency = "latency",
         /// First and last frame, and the primitives that draw them.
         Primitives = "primitives",
     }
 }
 
-/// One thing that varies.
+/// Something that varies.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Axis {
@@ -105,19 +105,19 @@ pub struct AxisValue {
     /// For tables and plots; the name if not given.
     #[serde(default)]
     pub label: Option<String>,
-    /// Presets or files, laid on top in this order.
+    /// Presets or files, which are laid on top in this order.
     #[serde(default)]
     pub presets: Vec<String>,
-    /// Overrides, as `--set` has them.
+    /// Overrides, as for `--set`.
     #[serde(default)]
     pub set: Vec<String>,
-    /// What it is to the curves.
+    /// Its role in curves.
     #[serde(default)]
     pub role: Role,
 }
 
 choice! {
-    /// What a value of the axis along which curves run is to them.
+    /// The role in curves of a value of the axis along which they run.
     #[derive(Default)]
     pub enum Role: "role" {
         /// A point of the curve of the other axes' values.
@@ -125,12 +125,12 @@ choice! {
         Point = "point",
         /// A bound on the quality: a line across the plot.
         Bound = "bound",
-        /// A point of a curve of its own, which runs along the other axes.
+        /// A point of a separate curve, which runs along the other axes.
         Apart = "apart",
     }
 }
 
-/// How runs make curves.
+/// How curves are made from runs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Curves {
@@ -138,13 +138,13 @@ pub struct Curves {
     pub along: String,
 }
 
-/// Published results on known data. They are shown only where the scenes and the size of the images are these.
+/// Published results on known data. They are shown only if the study has the same scenes and image sizes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
     /// For tables and plots.
     pub name: String,
-    /// Where the figures stand.
+    /// The source of the figures.
     pub source: String,
     /// Names of the scenes over which they are means.
     pub scenes: Vec<String>,
@@ -157,11 +157,11 @@ pub struct Published {
 }
 
 impl Study {
-    /// The study of this name, or the one in this file: a name without a folder and without `.toml` is one of the
-    /// program's.
+    /// The study with this name, or in this file: a name without a folder and without `.toml` is that of a built-in
+    /// study.
     ///
     /// # Errors
-    /// [`TrainError::Input`] that says what is wrong where.
+    /// [`TrainError::Input`] that says what is wrong, and where.
     pub fn load(name_or_path: &str) -> Result<Self, TrainError> {
         let plain = !name_or_path.ends_with(".toml") && !name_or_path.contains(['/', '\\']);
         if plain {
@@ -179,7 +179,7 @@ impl Study {
     /// Reads a study from text; `origin` names it in errors.
     ///
     /// # Errors
-    /// [`TrainError::Input`] that says what is wrong where.
+    /// [`TrainError::Input`] that says what is wrong, and where.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, TrainError> {
         let study: Self = toml::from_str(text).map_err(|error| {
             let line = error.span().map(|span| 1 + text.bytes().take(span.start).filter(|byte| *byte == b'\n').count());
@@ -193,7 +193,7 @@ impl Study {
         }
     }
 
-    /// The first thing that the types alone let through.
+    /// The first problem that the types do not exclude.
     fn problem(&self) -> Option<String> {
         if self.axis.is_empty() {
             return Some("`axis` is empty: nothing varies; give at least one [[axis]]".to_owned());
@@ -269,7 +269,7 @@ impl Study {
         None
     }
 
-    /// Whether something is to be made of the runs.
+    /// Whether an output is to be made.
     pub fn shows(&self, output: Output) -> bool {
         self.outputs.contains(&output)
     }

@@ -1,5 +1,5 @@
-//! `study.json`: what a study's folder is to hold. Tasks and tables read it alone, so that a study continues as it was begun,
-//! on any machine.
+//! `study.json`: the plan of a study's folder. Tasks and tables read only this, so that a study continues as it was
+//! begun, on any machine.
 
 use std::fs;
 use std::io::Write;
@@ -17,12 +17,12 @@ use crate::error::TrainError;
 pub const MANIFEST: &str = "study.json";
 /// The folder with the runs' configurations, in a study's folder. No scene can have this name.
 const CONFIGURATIONS: &str = ".configurations";
-/// The folder with what tasks say, in a study's folder.
+/// The folder with messages and logs of tasks, in a study's folder.
 const LOGS: &str = ".logs";
 /// Manifests are far shorter.
 const MAX_BYTES: u64 = 1 << 28;
 
-/// What a study's folder is to hold.
+/// The plan of a study's folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Manifest {
@@ -36,7 +36,7 @@ pub struct Manifest {
     pub seeds: u64,
     /// Every run.
     pub runs: Vec<ManifestRun>,
-    /// Absolute paths of other studies: what they have trained alike is not trained again.
+    /// Absolute paths of other studies, whose equal trainings are not repeated.
     #[serde(default)]
     pub reuse: Vec<PathBuf>,
 }
@@ -76,7 +76,7 @@ pub struct StudyFolder {
 }
 
 impl Manifest {
-    /// Of a plan.
+    /// From a plan.
     pub fn new(plan: &Plan) -> Self {
         let run = |run: &super::plan::PlannedRun| ManifestRun {
             name: run.name.clone(),
@@ -98,12 +98,12 @@ impl Manifest {
         }
     }
 
-    /// The variants, which runs name by their index.
+    /// The variants, to which runs refer by index.
     pub fn variants(&self) -> Vec<Variant> {
         variants(&self.study.axis)
     }
 
-    /// How many tasks there are.
+    /// Number of tasks.
     pub fn tasks(&self) -> usize {
         self.runs.iter().map(|run| run.task + 1).max().unwrap_or(0)
     }
@@ -113,7 +113,7 @@ impl Manifest {
         self.runs.iter().filter(move |run| run.task == task)
     }
 
-    /// Whether every index and name is one that a plan could have: the file may come from anywhere.
+    /// Whether every index and name is one that a plan could have. The file may come from anywhere.
     fn is_sound(&self) -> bool {
         let variants = self.variants();
         self.runs.iter().all(|run| {
@@ -129,8 +129,8 @@ impl Manifest {
 }
 
 impl StudyFolder {
-    /// Makes the folder for a plan, or goes on with one that holds the same study: with the same runs, or with more or
-    /// fewer scenes and seeds of them.
+    /// Makes the folder for a plan, or continues one that holds the same study: with the same runs, or with more or
+    /// fewer scenes and seeds.
     ///
     /// # Errors
     /// [`TrainError::Input`] if the folder holds something else.
@@ -157,7 +157,7 @@ impl StudyFolder {
     /// Opens a study's folder.
     ///
     /// # Errors
-    /// [`TrainError::Input`] if it is none, or its manifest is damaged.
+    /// [`TrainError::Input`] if it is not the folder of a study, or its manifest is damaged.
     pub fn open(root: &Path) -> Result<(Self, Manifest), TrainError> {
         let folder = Self { root: root.to_owned() };
         let manifest = folder.manifest()?;
@@ -189,7 +189,7 @@ impl StudyFolder {
         let ours = |name: &str| name == CONFIGURATIONS || name == LOGS;
         let foreign = names.flatten().map(|entry| entry.file_name()).find(|name| !name.to_str().is_some_and(ours));
         match foreign {
-            // Without its manifest, a study's folder of before: its runs have configurations that are compared later.
+            // The folder of an earlier study without its manifest: the configurations of its runs are compared later.
             Some(_) if self.path(CONFIGURATIONS).is_dir() => Ok(()),
             Some(name) => Err(TrainError::Input(format!(
                 "{} holds files but no study, among them `{}`; name another folder",
@@ -200,7 +200,7 @@ impl StudyFolder {
         }
     }
 
-    /// Runs of one name must have one configuration.
+    /// Runs with the same name must have the same configuration.
     fn check_same(&self, found: &Manifest, wanted: &Manifest) -> Result<(), TrainError> {
         let root = self.root.display();
         for run in &wanted.runs {
@@ -231,7 +231,7 @@ impl StudyFolder {
         self.path(CONFIGURATIONS).join(format!("{run}.toml"))
     }
 
-    /// The configuration that a run is to have.
+    /// The configuration that was planned for a run.
     ///
     /// # Errors
     /// If it cannot be read, or is not the one that the study was planned with.
@@ -248,12 +248,12 @@ impl StudyFolder {
         )))
     }
 
-    /// Where a task's output goes.
+    /// The file for a task's output.
     pub fn log(&self, task: usize) -> PathBuf {
         self.path(LOGS).join(format!("task-{task}.log"))
     }
 
-    /// Where a task says why it failed.
+    /// The file for the message of a task that failed.
     pub fn failure(&self, task: usize) -> PathBuf {
         self.path(LOGS).join(format!("task-{task}.failed"))
     }

@@ -1,4 +1,4 @@
-//! What can be measured of a run, and the columns of tables.
+//! The measures of a run, and the columns of tables.
 
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -7,7 +7,7 @@ use super::results::RunResult;
 use crate::keys::choice;
 
 choice! {
-    /// Something measured of a finished run.
+    /// A quantity that is measured on a finished run.
     #[derive(PartialOrd, Ord)]
     pub enum Measure: "measure" {
         /// Mean PSNR of the test split (the first measured one where there is none), dB.
@@ -18,11 +18,11 @@ choice! {
         ValPsnr = "val_psnr",
         /// Size of the file.
         Bytes = "bytes",
-        /// Size of what the Gaussians take: their attributes and spherical harmonics.
+        /// Size of the Gaussians: their attributes and spherical harmonics.
         GaussianBytes = "gaussian_bytes",
         /// Size of the spherical harmonics beyond degree 0, with their model.
         ShBytes = "sh_bytes",
-        /// Size of what the feature planes take: values and context model.
+        /// Size of the feature planes: values and context model.
         PlaneBytes = "plane_bytes",
         /// Size of the context model alone.
         ContextBytes = "context_bytes",
@@ -125,7 +125,7 @@ impl Measure {
         }
     }
 
-    /// Whether it is a time, which is another in every run.
+    /// Whether it is a time, which differs in every run.
     pub fn is_time(self) -> bool {
         matches!(
             self,
@@ -141,7 +141,7 @@ impl Measure {
         )
     }
 
-    /// Its value in a run; none where it was not measured, or is not finite.
+    /// Its value in a run; `None` if it was not measured, or is not finite.
     pub fn of(self, run: &RunResult) -> Option<f64> {
         let section = |names: &[&str]| -> Option<f64> {
             let bytes = run.sections.iter().filter(|(name, _)| names.contains(&name.as_str())).map(|(_, bytes)| *bytes);
@@ -178,10 +178,10 @@ impl Measure {
     }
 }
 
-/// How a column shows its measure.
+/// How a column shows a measure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
-    /// As it is.
+    /// The value itself.
     Value,
     /// As the difference to the reference.
     Difference,
@@ -192,13 +192,13 @@ pub enum Form {
 /// A column of a table: `psnr`, `psnr:difference`, `bytes:percent`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Column {
-    /// What is shown.
+    /// The measure.
     pub measure: Measure,
-    /// How.
+    /// How it is shown.
     pub form: Form,
 }
 
-/// The columns of a study that names none.
+/// The columns of a study that does not choose any.
 pub(super) fn default_columns() -> Vec<Column> {
     let value = |measure| Column { measure, form: Form::Value };
     let percent = |measure| Column { measure, form: Form::Percent };

@@ -1,13 +1,14 @@
 //! Studies: the paper's tables and figures, each a TOML file that says what varies and what is shown of it.
 //!
 //! - [`definition`]: such a file; [`catalog`]: those of the paper, embedded in the program
-//! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs that train alike are trained once
-//! - [`manifest`]: `study.json`, which says what a study's folder is to hold
-//! - [`measure`]: what can be measured of a run, and the columns of tables
-//! - [`results`]: what the runs have come to so far, `results.json` and the CSV files; [`reuse`]: trainings of other studies
+//! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs with equal training are trained once
+//! - [`manifest`]: `study.json`, the plan of a study's folder
+//! - [`measure`]: the measures of a run, and the columns of tables
+//! - [`results`]: the results of the runs so far, `results.json` and the CSV files; [`reuse`]: trainings of other
+//!   studies
 //! - [`table`]: means, spreads and differences to the reference
 //! - [`rate_curves`]: runs as curves of quality over size
-//! - `plots`, `figures`: what is drawn, and the study's `report.html` (feature `cli`)
+//! - `plots`, `figures`: plots and images, and the study's `report.html` (feature `cli`)
 //! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
 
 pub mod catalog;

@@ -9,19 +9,19 @@ use super::definition::{Axis, Study};
 use crate::config::Config;
 use crate::error::TrainError;
 
-/// In the name of a configuration, the name of the scene.
+/// In the name of a configuration, it stands for the name of the scene.
 const SCENE_PLACE: &str = "{scene}";
 
-/// What a study is run with.
+/// The options of a study.
 #[derive(Clone, Debug, Default)]
 pub struct PlanOptions {
-    /// The preset or file that every variant is laid over; `{scene}` in it stands for the scene's name.
+    /// The preset or file that every variant starts from; `{scene}` in it stands for the scene's name.
     pub config: String,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
     /// Overrides of every run.
     pub overrides: Vec<String>,
-    /// Runs of each variant on each scene, which differ in their seed. At least 1.
+    /// Runs of each variant on each scene, with different seeds. At least 1.
     pub seeds: u64,
     /// Folders of other studies, whose trainings are reused.
     pub reuse: Vec<PathBuf>,
@@ -58,16 +58,16 @@ pub struct PlannedRun {
     pub variant: usize,
     /// Counted from 0.
     pub seed: u64,
-    /// Complete.
+    /// The complete configuration.
     pub config: Config,
-    /// Runs of one task are trained once, by its first run: they differ only in how the file is written.
+    /// Runs of one task differ only in how the file is written. They are trained once, by the first of them.
     pub task: usize,
 }
 
 /// All runs of a study.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// What is to be shown.
+    /// The definition of the study.
     pub study: Study,
     /// In the order of the tables' rows.
     pub variants: Vec<Variant>,
@@ -85,8 +85,8 @@ impl Plan {
     /// The runs of a study. Every configuration is made and checked; datasets are not opened.
     ///
     /// # Errors
-    /// A configuration that is wrong, with its variant; two variants or scenes that would be the same; a scene that is not
-    /// there.
+    /// A configuration that is wrong, with its variant; two variants or scenes that would be the same; a scene that
+    /// does not exist.
     pub fn new(study: Study, options: &PlanOptions) -> Result<Self, TrainError> {
         if options.seeds == 0 {
             return Err(TrainError::Input("--seeds is 0; at least one run of each variant is needed".into()));
@@ -121,13 +121,13 @@ impl Plan {
         Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse })
     }
 
-    /// How many tasks there are.
+    /// Number of tasks.
     pub fn tasks(&self) -> usize {
         self.runs.iter().map(|run| run.task + 1).max().unwrap_or(0)
     }
 }
 
-/// The product of the axes, the last one turning fastest.
+/// All combinations of the axes' values; the last axis varies fastest.
 pub fn variants(axes: &[Axis]) -> Vec<Variant> {
     let mut indices = vec![Vec::new()];
     for axis in axes {
@@ -170,7 +170,7 @@ fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOption
         .map_err(|error| TrainError::Input(format!("variant \"{}\" of \"{}\": {error}", variant.name, study.title)))
 }
 
-/// Variants that an override has made alike would fill a table with nothing.
+/// Refuses variants that an override has made equal, since nothing would vary between them.
 fn check_different(variants: &[Variant], configs: &[Config]) -> Result<(), TrainError> {
     for (later, config) in configs.iter().enumerate() {
         if let Some(earlier) = configs[..later].iter().position(|earlier| earlier == config) {
@@ -205,7 +205,7 @@ fn scenes(paths: &[PathBuf]) -> Result<Vec<StudyScene>, TrainError> {
 
 fn scene_name(path: &Path) -> Result<String, TrainError> {
     let name = path.file_name().and_then(|name| name.to_str());
-    // Names with a point in front are the study's own.
+    // Names that begin with a point are reserved for the study's own files.
     name.filter(|name| path.to_str().is_some() && !name.starts_with('.')).map(str::to_owned).ok_or_else(|| {
         TrainError::Input(format!(
             "{} has no name that a folder of the study could have (in Unicode, no point in front); rename it",

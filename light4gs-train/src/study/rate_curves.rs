@@ -14,29 +14,29 @@ use super::table::over_seeds;
 pub struct RateCurves {
     /// Name of the scene, or that it is a mean over scenes.
     pub heading: String,
-    /// One for each combination of the axes along which curves do not run, then those of values that stand apart.
+    /// One for each combination of the axes along which curves do not run, then those of values with the role `apart`.
     pub series: Vec<RateSeries>,
     /// Bounds on the quality: label and PSNR, dB.
     pub bounds: Vec<(String, f64)>,
-    /// Of all points of all curves, those apart left out.
+    /// Over all points of all curves, except those with the role `apart`.
     pub hull: Vec<RatePoint>,
 }
 
 /// One curve.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RateSeries {
-    /// What its runs have in common.
+    /// The values that its runs share.
     pub label: String,
-    /// Means over seeds, by rising size.
+    /// Means over seeds, by ascending size.
     pub points: Vec<RatePoint>,
-    /// Those that no mixture of others beats.
+    /// The points that no mixture of two others surpasses.
     pub hull: Vec<RatePoint>,
-    /// Of the hull to the first curve's hull; none for the first, and where there is no curve.
+    /// Difference of its hull from the first curve's; `None` for the first curve, and where there is no curve.
     pub to_first: Option<BjontegaardDelta>,
 }
 
-/// The curves of each scene; with more than one scene, before them those of means over all scenes. None where the study has
-/// no curves.
+/// The curves of each scene; with more than one scene, before them the curves of means over all scenes. Empty if the
+/// study has no curves.
 pub fn rate_curves(manifest: &Manifest, results: &Results) -> Vec<RateCurves> {
     let Some(curves) = &manifest.study.curves else { return Vec::new() };
     let Some(along) = manifest.study.axis.iter().position(|axis| axis.name == curves.along) else { return Vec::new() };
@@ -87,7 +87,7 @@ fn push(series: &mut Vec<RateSeries>, label: String, point: RatePoint) {
 }
 
 impl RateCurves {
-    /// Bjøntegaard's differences in Markdown; nothing where there is one curve.
+    /// Bjøntegaard's differences in Markdown; empty if there is only one curve.
     pub fn to_markdown(&self) -> String {
         let [first, others @ ..] = &self.series[..] else { return String::new() };
         if others.is_empty() {

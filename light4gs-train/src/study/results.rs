@@ -1,7 +1,7 @@
 //! The results of the runs so far.
 //!
-//! `results.json` and `results.csv` hold what every repetition of the study must give again, `times.csv` what depends on the
-//! machine and its load.
+//! `results.json` and `results.csv` hold what is the same in every repetition of the study, `times.csv` what depends on
+//! the machine and its load.
 
 use std::path::Path;
 
@@ -41,9 +41,9 @@ pub struct RunResult {
     pub gaussians: usize,
     /// Width and height of the measured images.
     pub resolution: [u32; 2],
-    /// Times in the training frames; none where the file does not say.
+    /// Times in the training frames; `None` if the file does not say.
     pub frames: Option<u32>,
-    /// Quantization step of every plane; none where planes are not coded.
+    /// Quantization step of every plane; empty if planes are not coded.
     pub steps: Vec<f64>,
     /// Seconds of training.
     #[serde(skip)]
@@ -60,23 +60,23 @@ pub struct RunResult {
     /// Frames a second.
     #[serde(skip)]
     pub fps: f64,
-    /// What it was measured on.
+    /// The device on which it was measured.
     #[serde(skip)]
     pub device: String,
 }
 
-/// A run that has no result.
+/// A run without a result.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct MissingRun {
     /// Its folder below the study's.
     pub run: String,
     /// Its task.
     pub task: usize,
-    /// How far it is, and what its task said if that failed.
+    /// Its state, and the message of its task if that failed.
     pub state: String,
 }
 
-/// All that is known of a study's runs.
+/// The results of a study's runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Results {
     /// In the order of the manifest.
@@ -115,13 +115,13 @@ struct SplitFile {
     ssim: Option<f64>,
 }
 
-/// Whether a run in a folder has nothing left to do. `report.html` is what is written last.
+/// Whether a run in a folder is finished: `report.html` is written last.
 pub fn is_finished(run: &Path) -> bool {
     ["scene.l4gs", "eval.json", "report.html"].iter().all(|name| run.join(name).is_file())
 }
 
 impl Results {
-    /// Reads what there is.
+    /// Reads the existing results.
     ///
     /// # Errors
     /// A run whose files are damaged.
@@ -156,12 +156,12 @@ impl Results {
         self.runs.iter().find(|run| (run.scene, run.variant, run.seed) == (scene, variant, seed))
     }
 
-    /// The finished runs of a variant on a scene, one a seed.
+    /// The finished runs of a variant on a scene, one for each seed.
     pub fn of_variant(&self, scene: usize, variant: usize) -> impl Iterator<Item = &RunResult> {
         self.runs.iter().filter(move |run| (run.scene, run.variant) == (scene, variant))
     }
 
-    /// `results.csv` (times left out) or `times.csv` (nothing else).
+    /// `results.csv` (without times) or `times.csv` (only times).
     pub fn to_csv(&self, manifest: &Manifest, times: bool) -> String {
         let variants = manifest.variants();
         let measures: Vec<Measure> = Measure::ALL.into_iter().filter(|measure| measure.is_time() == times).collect();
@@ -219,7 +219,7 @@ fn result(run: &ManifestRun, evaluation: EvaluationFile, frames: Option<u32>) ->
     }
 }
 
-/// How far a run is that is not finished.
+/// The state of a run that is not finished.
 fn state(folder: &StudyFolder, run: &ManifestRun) -> String {
     let path = folder.path(&run.name);
     let last = read_metrics(&path.join("metrics.jsonl")).ok().and_then(|records| records.last().cloned());

@@ -8,8 +8,9 @@ use crate::config::Config;
 use crate::error::TrainError;
 use crate::run::RunFolder;
 
-/// A finished run of other studies whose training a run with this configuration can take over: begun by this version of the
-/// program on the same dataset, not changed on the way, and different at most in how its file is written.
+/// A finished run of other studies whose training a run with this configuration can take over: begun by this version of
+/// the program on the same dataset, without changes during training, and with a configuration that differs at most in
+/// how the file is written.
 ///
 /// # Errors
 /// A folder that holds no study; a finished run that is damaged.

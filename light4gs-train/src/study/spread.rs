@@ -1,20 +1,20 @@
-//! Mean and spread over runs that differ in their seed alone.
+//! Mean and standard deviation over runs that differ only in their seed.
 
 use serde::Serialize;
 
-/// Of some measurements of one thing.
+/// Mean and standard deviation of repeated measurements.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Spread {
-    /// How many.
+    /// Number of measurements.
     pub count: usize,
-    /// Mean; NaN of none.
+    /// Mean; NaN if there are none.
     pub mean: f64,
-    /// Sample standard deviation (divided by `count - 1`); None of less than two.
+    /// Sample standard deviation (divided by `count - 1`); `None` for fewer than two.
     pub deviation: Option<f64>,
 }
 
 impl Spread {
-    /// Of finite values.
+    /// From finite values.
     pub fn of(values: &[f64]) -> Self {
         let count = values.len();
         let mean = values.iter().sum::<f64>() / count as f64;
@@ -25,12 +25,12 @@ impl Spread {
         Self { count, mean, deviation }
     }
 
-    /// Whether the mean is as near to 0 as the values are to each other. None of less than two.
+    /// Whether the magnitude of the mean is at most the standard deviation. `None` for fewer than two.
     pub fn is_within_deviation(&self) -> Option<bool> {
         self.deviation.map(|deviation| self.mean.abs() <= deviation)
     }
 
-    /// `12.34 ± 0.05`, with so many digits after the point.
+    /// `12.34 ± 0.05`, with this many digits after the point.
     pub fn to_text(&self, digits: usize) -> String {
         match self.deviation {
             Some(deviation) => format!("{:.digits$} ± {deviation:.digits$}", self.mean),

@@ -1,4 +1,4 @@
-//! A study's tables: a row for each variant, means and spreads over seeds, differences to the reference.
+//! A study's tables: a row for each variant, means and standard deviations over seeds, differences to the reference.
 
 use serde::Serialize;
 
@@ -9,7 +9,7 @@ use super::results::Results;
 use super::spread::Spread;
 use crate::report::table::{Align, Table};
 
-/// Marks a difference that is smaller than what seeds alone make.
+/// Marks a difference that is no larger than its standard deviation over seeds.
 pub const WITHIN_SPREAD: &str = "≈";
 
 /// One table.
@@ -19,7 +19,7 @@ pub struct StudyTable {
     pub heading: String,
     /// Headings of the columns after the first.
     pub columns: Vec<String>,
-    /// One a variant.
+    /// One for each variant.
     pub rows: Vec<StudyRow>,
     /// Published figures on the same data.
     pub published: Vec<PublishedRow>,
@@ -30,9 +30,9 @@ pub struct StudyTable {
 pub struct StudyRow {
     /// The variant.
     pub label: String,
-    /// Runs behind it that are finished, and those that are planned.
+    /// Its finished runs, and its planned runs.
     pub runs: [usize; 2],
-    /// One a column; none where nothing was measured.
+    /// One for each column; `None` where nothing was measured.
     pub cells: Vec<Option<Cell>>,
 }
 
@@ -41,11 +41,12 @@ pub struct StudyRow {
 pub struct Cell {
     /// Mean over seeds, or the difference of such means.
     pub value: f64,
-    /// Sample standard deviation over seeds, in the unit of the cell; none for one seed.
+    /// Sample standard deviation over seeds, in the unit of the cell; `None` for one seed.
     pub deviation: Option<f64>,
-    /// For differences, whether the spread over seeds is as large. None where there is no spread, or no difference.
+    /// For differences, whether the standard deviation over seeds is as large. `None` if there is none, or for other
+    /// cells.
     pub within_spread: Option<bool>,
-    /// As it is shown.
+    /// The text that is shown.
     pub text: String,
 }
 
@@ -58,7 +59,7 @@ pub struct PublishedRow {
     pub psnr: f64,
     /// Size, bytes.
     pub bytes: f64,
-    /// Where it stands.
+    /// Its source.
     pub source: String,
 }
 
@@ -108,7 +109,7 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     }
 }
 
-/// The values of a measure by seed, each the mean over the scenes; None for seeds that lack a scene.
+/// The values of a measure by seed, each the mean over the scenes; `None` for seeds that lack a scene.
 fn by_seed(
     manifest: &Manifest,
     results: &Results,
@@ -124,7 +125,7 @@ fn by_seed(
     (0..manifest.seeds).map(of_seed).collect()
 }
 
-/// Mean and deviation of a measure over the seeds that have all scenes.
+/// Mean and standard deviation of a measure over the seeds that have all scenes.
 pub(super) fn over_seeds(
     manifest: &Manifest,
     results: &Results,
@@ -146,7 +147,7 @@ fn value_cell(by_seed: &[Option<f64>], column: &Column) -> Option<Cell> {
     Some(Cell { value: spread.mean, deviation: spread.deviation, within_spread: None, text })
 }
 
-/// Runs of one seed begin alike and see the same frames in the same order, so they are compared with each other.
+/// Runs of the same seed begin alike and see the same frames in the same order, so they are compared with each other.
 fn difference_cell(own: &[Option<f64>], reference: &[Option<f64>], column: &Column) -> Option<Cell> {
     let percent = column.form == Form::Percent;
     let digits = if percent { 1.max(column.measure.digits()) } else { column.measure.digits() };
@@ -170,7 +171,7 @@ fn difference_cell(own: &[Option<f64>], reference: &[Option<f64>], column: &Colu
     Some(Cell { value, deviation: spread.deviation, within_spread, text })
 }
 
-/// Published figures whose scenes and image size are those of the runs.
+/// Published figures for the scenes and image size of the runs.
 fn published(manifest: &Manifest, results: &Results, scenes: &[usize]) -> Vec<PublishedRow> {
     let mut names: Vec<&str> = scenes.iter().map(|scene| manifest.scenes[*scene].name.as_str()).collect();
     names.sort_unstable();
@@ -190,7 +191,7 @@ fn published(manifest: &Manifest, results: &Results, scenes: &[usize]) -> Vec<Pu
 }
 
 impl StudyTable {
-    /// Every cell as text, the labels in front. Rows that lack runs say so.
+    /// Every cell as text, with the labels first. Rows that lack runs say so.
     pub fn lines(&self) -> Vec<Vec<String>> {
         let ours = self.rows.iter().map(|row| {
             let [done, planned] = row.runs;
@@ -234,7 +235,7 @@ impl StudyTable {
     }
 }
 
-/// `table.md`: all tables, what the marks mean, and what is missing.
+/// `table.md`: all tables, the meaning of the marks, and the missing runs.
 pub fn to_markdown(manifest: &Manifest, results: &Results, tables: &[StudyTable], curves: &[RateCurves]) -> String {
     let study = &manifest.study;
     let mut text = format!("# {}\n\nReproduces: {}.\n", study.title, study.reproduces);
@@ -257,7 +258,7 @@ pub fn to_markdown(manifest: &Manifest, results: &Results, tables: &[StudyTable]
     text
 }
 
-/// What the figures mean.
+/// The meaning of the figures.
 pub fn legend(manifest: &Manifest) -> String {
     let variants = manifest.variants();
     let reference = manifest.study.reference.clone().unwrap_or_else(|| variants[0].name.clone());
@@ -285,7 +286,7 @@ mod tests {
     use super::super::{Manifest, Study};
     use super::*;
 
-    /// Two variants on some scenes, with PSNR `psnr(scene, variant, seed)`; None for a run that is missing.
+    /// Two variants on some scenes, with PSNR `psnr(scene, variant, seed)`; `None` for a run that is missing.
     fn example(scenes: &[&str], seeds: u64, psnr: impl Fn(usize, usize, u64) -> Option<f64>) -> (Manifest, Results) {
         let text = r#"
 title = "Example"
@@ -375,14 +376,14 @@ bytes = 2.2e6
 
     #[test]
     fn differences_are_between_runs_of_one_seed() {
-        // Seeds lie far apart, both variants of each do not.
+        // Seeds differ much, the two variants of a seed do not.
         let (manifest, results) =
             example(&["y"], 3, |_, variant, seed| Some(20.0 + 0.1 * variant as f64 + 20.0 * seed as f64));
         let table = &tables(&manifest, &results)[0];
         assert_eq!(texts(table, 1)[1..4], ["40.10 ± 20.00", "+0.10 ± 0.00", "+0.31 ± 0.17"]);
         assert_eq!(table.rows[1].cells[1].as_ref().unwrap().within_spread, Some(false));
         assert!(table.published.is_empty(), "another scene");
-        // One seed the one way, one the other.
+        // One seed differs in one direction, one in the other.
         let (manifest, results) = example(&["y"], 2, |_, variant, seed| Some(20.0 + (variant as u64 * seed) as f64));
         assert_eq!(texts(&tables(&manifest, &results)[0], 1)[2], "+0.50 ± 0.71 ≈");
         // Only the seeds that both variants have.
@@ -393,7 +394,7 @@ bytes = 2.2e6
 
     #[test]
     fn means_over_scenes_are_by_seed() {
-        // The scenes lie far apart, the seeds do not: the spread is that of the seeds.
+        // The scenes differ much, the seeds do not: the standard deviation is that of the seeds.
         let (manifest, results) = example(&["x", "y"], 2, |scene, _, seed| Some(10.0 * scene as f64 + seed as f64));
         let tables = tables(&manifest, &results);
         assert_eq!(tables.len(), 3);

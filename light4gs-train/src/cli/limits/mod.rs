@@ -1,11 +1,11 @@
-//! `--limits`: how much a file may ask for, and how much a command makes at most.
+//! `--limits`: how much memory and time a file may take, and how much output a command may make.
 
 pub(super) mod most;
 
 use clap::{Args, ValueEnum};
 use light4gs_codec::Limits;
 
-/// Commands that open a file take this argument.
+/// An argument of commands that open a file.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct LimitsArgument {
     /// How much memory and time reading the file may take.
@@ -15,14 +15,15 @@ pub(super) struct LimitsArgument {
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Choice {
-    /// For files of strangers: 256 MiB and about 2 seconds of one thread; more for a large file, in proportion to it.
+    /// For files of strangers: 256 MiB and about 2 seconds on one thread; more for a large file, in proportion to its
+    /// size.
     Default,
     /// For files that you trust: up to 64 GiB and half an hour.
     Large,
 }
 
 impl LimitsArgument {
-    /// As the reader has them.
+    /// The reader's limits.
     pub(super) fn get(self) -> Limits {
         match self.limits {
             Choice::Default => Limits::default(),

@@ -1,4 +1,4 @@
-//! How much a command makes at most: the same limits for what a file says of itself as for what the command line says.
+//! The most output that a command makes. The limits are the same for numbers from a file and from the command line.
 
 use light4gs_codec::SceneMeta;
 
@@ -11,10 +11,10 @@ const MOST_PIXELS: u64 = 1 << 25;
 /// Frames of a video, files of an export.
 pub(in crate::cli) const MOST_FRAMES: u32 = 100_000;
 
-/// Size of the images to render: the file's own, or of this width.
+/// Size of the images to render: the file's own, or one of this width.
 ///
 /// # Errors
-/// [`TrainError::Input`] that names what the file says, and `--width` as the way around it.
+/// [`TrainError::Input`] with the size that the file has, and with `--width` as the remedy.
 pub(in crate::cli) fn image_size(meta: &SceneMeta, width: Option<u32>) -> Result<(u32, u32), TrainError> {
     let (own_width, own_height) = (meta.width.max(1), meta.height.max(1));
     let wanted = width.unwrap_or(own_width);
@@ -36,10 +36,10 @@ pub(in crate::cli) fn image_size(meta: &SceneMeta, width: Option<u32>) -> Result
     Ok((wanted, height as u32))
 }
 
-/// Moments to export: as many as asked for, or as the file says it was made from.
+/// Number of times to export: as requested, or as many as the file was made from.
 ///
 /// # Errors
-/// [`TrainError::Input`] if the file says more than the command line may.
+/// [`TrainError::Input`] if the file has more frames than the command line accepts.
 pub(in crate::cli) fn frame_count(meta: &SceneMeta, frames: Option<u32>) -> Result<u32, TrainError> {
     let count = frames.unwrap_or(meta.frame_count.max(1));
     if count > MOST_FRAMES {

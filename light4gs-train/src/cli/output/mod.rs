@@ -1,4 +1,4 @@
-//! What a command prints.
+//! The output of commands.
 
 pub(super) mod progress;
 
@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Write};
 
 use crate::error::TrainError;
 
-/// Prints a line, or a table. A reader that went away, such as `head`, is no error: the work goes on without it.
+/// Prints a line, or a table. A reader that has gone away, such as `head`, is no error: the work continues without it.
 pub(super) fn say(text: impl Display) -> Result<(), TrainError> {
     match writeln!(std::io::stdout().lock(), "{}", printable(&text.to_string())) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(TrainError::Input(format!(
@@ -18,7 +18,7 @@ pub(super) fn say(text: impl Display) -> Result<(), TrainError> {
     }
 }
 
-/// Prints a line, or a table, on standard error. Where even that takes nothing there is nobody left to tell.
+/// Prints a line, or a table, on standard error. An error there is ignored, since it cannot be reported.
 pub(super) fn tell(text: impl Display) {
     let _ = writeln!(std::io::stderr().lock(), "{}", printable(&text.to_string()));
 }
@@ -28,8 +28,8 @@ pub(super) fn say_json(value: &impl serde::Serialize) -> Result<(), TrainError> 
     say(serde_json::to_string_pretty(value).expect("plain data has a JSON form"))
 }
 
-/// Text for a terminal. Names come from files of strangers and could hold what a terminal obeys: control characters, and
-/// marks that turn the direction of writing, are written as JSON escapes.
+/// Text for a terminal. Names come from files of strangers and may contain characters that control a terminal: control
+/// characters, and marks that change the direction of writing, are written as JSON escapes.
 fn printable(text: &str) -> Cow<'_, str> {
     let obeyed = |c: char| {
         let turns =

@@ -16,7 +16,7 @@ pub(in crate::cli) struct ProgressBars {
 }
 
 impl ProgressBars {
-    /// `quiet` shows nothing.
+    /// `quiet` shows no bars.
     pub(in crate::cli) fn new(quiet: bool) -> Self {
         Self { hidden: quiet, stage: ProgressBar::hidden(), fit: FitBar::new(quiet) }
     }
@@ -60,19 +60,19 @@ impl Observer for ProgressBars {
     }
 }
 
-/// The bar of the fitting of entropy models, made when that begins.
+/// The progress bar for fitting entropy models, made when fitting begins.
 pub(in crate::cli) struct FitBar {
     hidden: bool,
     bar: Option<ProgressBar>,
 }
 
 impl FitBar {
-    /// `quiet` shows nothing.
+    /// `quiet` shows no bar.
     pub(in crate::cli) fn new(quiet: bool) -> Self {
         Self { hidden: quiet, bar: None }
     }
 
-    /// So many of the iterations are done.
+    /// Shows the number of iterations that are done.
     pub(in crate::cli) fn show(&mut self, done: usize, iterations: usize) {
         let template = "   fit {wide_bar:.cyan/blue} {pos}/{len}  {per_sec}  ETA {eta}";
         let bar = self.bar.get_or_insert_with(|| bar(self.hidden, iterations, template));

@@ -1,4 +1,4 @@
-//! Tables and report of the runs that are finished.
+//! Tables and report from the runs that are finished.
 
 use std::path::PathBuf;
 
@@ -38,10 +38,10 @@ struct ResultsFile<'a> {
     curves: &'a [RateCurves],
 }
 
-/// Writes everything that the finished runs give, and prints the tables.
+/// Writes tables and report from the finished runs, and prints the tables.
 ///
 /// # Errors
-/// [`TrainError::Input`] that names what is missing, once all has been written.
+/// [`TrainError::Input`] with the runs that are missing, after everything has been written.
 pub(super) fn gather(folder: &StudyFolder, manifest: &Manifest, json: bool) -> Result<(), TrainError> {
     let results = Results::read(folder, manifest)?;
     let tables = tables(manifest, &results);

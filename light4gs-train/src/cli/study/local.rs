@@ -1,4 +1,4 @@
-//! Tasks as processes of this machine.
+//! Tasks as processes on this machine.
 
 use std::fs::File;
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -13,7 +13,7 @@ use super::unfinished;
 use crate::error::TrainError;
 use crate::study::manifest::{Manifest, StudyFolder};
 
-/// How often processes are looked at.
+/// Time between two checks of the processes.
 const PAUSE: Duration = Duration::from_millis(50);
 
 /// A task that is running.
@@ -22,10 +22,10 @@ struct Running {
     process: Child,
 }
 
-/// Runs every task that is not finished, so many at a time. A task that fails does not keep others from running.
+/// Runs every task that is not finished, `jobs` at a time. A task that fails does not stop the others.
 ///
 /// # Errors
-/// [`TrainError::Stopped`] if that was asked for; a process that cannot be started.
+/// [`TrainError::Stopped`] if requested; a process that cannot be started.
 pub(super) fn run_all(folder: &StudyFolder, manifest: &Manifest, jobs: usize, quiet: bool) -> Result<(), TrainError> {
     let stop = stop_flag();
     let mut waiting = unfinished(folder, manifest).into_iter();
@@ -72,7 +72,7 @@ fn start(folder: &StudyFolder, task: usize, jobs: usize, quiet: bool) -> Result<
     let program = std::env::current_exe().map_err(failed)?;
     let mut command = Command::new(program);
     command.arg("study-task").arg(folder.root()).arg(task.to_string()).stdin(Stdio::null());
-    // The tables are what goes to standard output.
+    // Standard output is for the tables.
     command.stdout(Stdio::null());
     if jobs > 1 {
         let path = folder.log(task);
@@ -89,7 +89,7 @@ fn start(folder: &StudyFolder, task: usize, jobs: usize, quiet: bool) -> Result<
     command.spawn().map_err(failed)
 }
 
-/// Forwards the request. A process that has ended meanwhile needs none.
+/// Forwards the request to stop. A process that has ended in the meantime needs none.
 fn ask_to_stop(process: &Child) {
     let sent = Command::new("kill").args(["-USR1", &process.id().to_string()]).stderr(Stdio::null()).status();
     if let Err(error) = sent {
@@ -97,13 +97,13 @@ fn ask_to_stop(process: &Child) {
     }
 }
 
-/// Says how a task has ended, where that was not well, and leaves a word for the summary if the task could not.
+/// Reports a task that has failed, and writes a message for the summary if the task could not.
 fn report(folder: &StudyFolder, task: usize, status: ExitStatus, jobs: usize) {
     if status.success() || status.code() == Some(i32::from(TrainError::Stopped(String::new()).exit_code())) {
         return;
     }
     let failure = folder.failure(task);
-    // A task that was killed, or panicked, has not said so itself.
+    // A task that was killed, or that panicked, has written no message.
     if !failure.exists() {
         let log = if jobs > 1 { format!("; see {}", folder.log(task).display()) } else { String::new() };
         let _ = std::fs::write(&failure, format!("{status}{log}\n"));

@@ -1,4 +1,4 @@
-//! `study`, `gather`, and the task that their launchers start.
+//! `study` and `gather`, and the task that launchers start.
 
 mod gather;
 mod local;
@@ -24,7 +24,7 @@ use crate::study::results::is_finished;
 use crate::study::reuse::find_trained;
 use crate::study::{Study as Definition, catalog};
 
-/// What runs the tasks.
+/// The launcher of the tasks.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Launcher {
     /// Processes on this machine.
@@ -39,11 +39,11 @@ pub(super) struct Study {
     name: String,
     /// Folders of the datasets.
     scenes: Vec<PathBuf>,
-    /// Folder for the runs, the tables and the report. Runs that are finished are not repeated, and those that differ only
-    /// in how the file is written are trained once.
+    /// Folder for the runs, the tables and the report. Finished runs are not repeated, and runs that differ only in how
+    /// the file is written are trained once.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant is laid over; {scene} in it stands for the scene's name.
+    /// The preset or TOML file that every variant starts from; {scene} in it stands for the scene's name.
     #[arg(long, default_value = "dnerf-cpu", value_name = "PRESET|FILE")]
     config: String,
     /// Changes one key of every variant's configuration; may be given more than once.
@@ -52,16 +52,16 @@ pub(super) struct Study {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
-    /// Runs of each variant on each scene, which differ in their seed: tables then show mean and spread.
+    /// Runs of each variant on each scene, with different seeds: tables then show mean and standard deviation.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Folder of another study: what it has trained alike is not trained again. May be given more than once.
+    /// Folder of another study, whose equal trainings are not repeated. May be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
-    /// Print the runs, and do nothing.
+    /// Print the runs, without training.
     #[arg(long)]
     dry_run: bool,
-    /// What runs the tasks.
+    /// The launcher of the tasks.
     #[arg(long, value_enum, default_value = "local")]
     launcher: Launcher,
     /// Tasks at a time.
@@ -109,7 +109,7 @@ impl Study {
     }
 }
 
-/// The names of the program's studies.
+/// Prints the names of the built-in studies.
 fn list() -> Result<(), TrainError> {
     let mut table = Table::new([("study", Align::Left), ("reproduces", Align::Left)]);
     for name in catalog::NAMES {
@@ -118,7 +118,7 @@ fn list() -> Result<(), TrainError> {
     say(table)
 }
 
-/// What a run of a plan would do.
+/// The state of a run of a plan.
 #[derive(Serialize)]
 struct Planned<'a> {
     task: usize,
@@ -179,7 +179,7 @@ fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainErr
     say(format_args!("{} runs in {} tasks, {total} iterations; {finished} runs are finished", rows.len(), plan.tasks()))
 }
 
-/// The tasks that have a run left to do.
+/// The tasks with runs that are not finished.
 fn unfinished(folder: &StudyFolder, manifest: &Manifest) -> Vec<usize> {
     let is_done = |task: usize| manifest.task(task).all(|run| is_finished(&folder.path(&run.name)));
     (0..manifest.tasks()).filter(|task| !is_done(*task)).collect()

@@ -1,9 +1,9 @@
 //! Tasks as a job array of Slurm.
 //!
-//! `sbatch` gets one array for all tasks that are not finished, and a job behind it (`afterany`) that gathers the tables. Two
-//! minutes before the wall time is over Slurm sends SIGUSR1 to the batch script, which passes it on: the run writes a
-//! checkpoint and ends with exit code 75, and the script asks for its job to be queued again. A task that a signal has killed
-//! is queued again as well, a few times.
+//! `sbatch` gets one array for all tasks that are not finished, and a job after it (`afterany`) that gathers the
+//! tables. Two minutes before the wall time is over, Slurm sends SIGUSR1 to the batch script, which forwards it. The
+//! run writes a checkpoint and ends with exit code 75, and the script asks for its job to be queued again. A task that
+//! was killed by a signal is queued again as well, a few times.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,7 +19,7 @@ use crate::study::manifest::{Manifest, StudyFolder};
 const TASK_SCRIPT: &str = include_str!("task.sh");
 const GATHER_SCRIPT: &str = include_str!("gather.sh");
 
-/// What jobs ask of the cluster. What is not given is left to the cluster's defaults.
+/// The resources of jobs. Where one is not given, the cluster's default is used.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Settings {
@@ -60,7 +60,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Reads them from a TOML file.
+    /// Reads the settings from a TOML file.
     ///
     /// # Errors
     /// [`TrainError::Input`] with the file and the key.
@@ -93,7 +93,7 @@ impl Settings {
     }
 }
 
-/// Submits what is not finished, at most `jobs` tasks at a time where that is more than 1.
+/// Submits the unfinished tasks, at most `jobs` at a time if that is more than 1.
 pub(super) fn submit(
     folder: &StudyFolder,
     manifest: &Manifest,
@@ -130,7 +130,7 @@ pub(super) fn submit(
     say(format_args!("job {job} gathers the tables; `light4gs gather {}` does so at any time", root.display()))
 }
 
-/// Numbers as Slurm has them: `0-3,5`.
+/// Numbers in Slurm's notation: `0-3,5`.
 fn ranges(numbers: &[usize]) -> String {
     let mut ranges: Vec<(usize, usize)> = Vec::new();
     for &number in numbers {
@@ -144,7 +144,7 @@ fn ranges(numbers: &[usize]) -> String {
     ranges.iter().map(range).collect::<Vec<_>>().join(",")
 }
 
-/// The number of the job that `sbatch` says it has made.
+/// Submits a job; returns its number, which `sbatch` prints.
 fn sbatch(mut command: Command) -> Result<String, TrainError> {
     let output = command.output().map_err(|error| {
         TrainError::Input(format!(
@@ -152,7 +152,7 @@ fn sbatch(mut command: Command) -> Result<String, TrainError> {
         ))
     })?;
     let printed = String::from_utf8_lossy(&output.stdout);
-    // On several clusters: JOB;CLUSTER.
+    // With several clusters it prints JOB;CLUSTER.
     let job = printed.trim().split(';').next().unwrap_or_default().to_owned();
     if output.status.success() && !job.is_empty() && job.bytes().all(|byte| byte.is_ascii_digit()) {
         return Ok(job);

@@ -13,7 +13,7 @@ use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::results::is_finished;
 use crate::study::reuse::find_trained;
 
-/// How often a run that another process holds is asked for.
+/// Time between two attempts to lock a run that another process holds.
 const PAUSE: Duration = Duration::from_millis(500);
 
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub(in crate::cli) struct StudyTask {
 
 impl StudyTask {
     pub(in crate::cli) fn run(self) -> Result<(), TrainError> {
-        // From the first moment on, so that no request is lost.
+        // Installed first, so that no request is lost.
         stop_flag();
         let (folder, manifest) = StudyFolder::open(&self.study)?;
         if self.task >= manifest.tasks() {
@@ -41,12 +41,12 @@ impl StudyTask {
             )));
         }
         let failure = folder.failure(self.task);
-        // That of an earlier attempt.
+        // The message of an earlier attempt.
         let _ = std::fs::remove_file(&failure);
         let result = run_task(&folder, &manifest, self.task, self.quiet);
         match &result {
             Ok(()) | Err(TrainError::Stopped(_)) => {}
-            // For the summary. Where even that cannot be written, the summary says what it sees.
+            // For the summary. If the message cannot be written, the summary shows only the state of the run.
             Err(error) => drop(std::fs::write(&failure, format!("{error}\n"))),
         }
         result
@@ -75,7 +75,7 @@ fn run_task(folder: &StudyFolder, manifest: &Manifest, task: usize, quiet: bool)
     Ok(())
 }
 
-/// Runs `train`; while another process holds the run, waits for it. That may be this very task before its node was lost.
+/// Runs `train`; while another process holds the run, waits for it. That may be the same task on a node that was lost.
 fn when_free(run: &Path, train: impl Fn() -> Result<(), TrainError>) -> Result<(), TrainError> {
     let stop = stop_flag();
     let mut told = false;

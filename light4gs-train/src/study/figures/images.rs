@@ -11,8 +11,8 @@ use crate::run::RunFolder;
 use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::results::RunResult;
 
-/// The middle frame of the test split, of each run that has saved its images; in front of them the ground truth, where the
-/// dataset is still there.
+/// The middle frame of the test split, for each run that has saved its images; before them the true image, if the
+/// dataset still exists.
 pub(super) fn side_by_side(
     folder: &StudyFolder,
     manifest: &Manifest,
@@ -45,7 +45,7 @@ pub(super) fn side_by_side(
     }))
 }
 
-/// The name in the middle of a folder's images.
+/// The name of the image in the middle of a folder's list.
 fn middle_name(folder: &Path) -> Option<String> {
     let names = std::fs::read_dir(folder).ok()?.flatten().filter_map(|entry| entry.file_name().into_string().ok());
     let mut names: Vec<String> = names.filter(|name| name.ends_with(".png") && !name.starts_with('.')).collect();
@@ -53,7 +53,7 @@ fn middle_name(folder: &Path) -> Option<String> {
     names.get(names.len() / 2).cloned()
 }
 
-/// An image that we wrote; none if it is not there.
+/// An image that an evaluation wrote; `None` if it does not exist.
 fn read(path: &Path) -> Option<RgbImage8> {
     let image = image::open(path).ok()?.into_rgb8();
     Some(RgbImage8 { width: image.width(), height: image.height(), pixels: image.into_raw() })

@@ -1,4 +1,4 @@
-//! What is drawn of a study: files in `figures/`, and the sections of `report.html`.
+//! The figures of a study: files in `figures/`, and the sections of `report.html`.
 
 mod images;
 mod planes;
@@ -21,7 +21,7 @@ use super::spread::Spread;
 use crate::error::TrainError;
 use crate::report::{data_uri, escape};
 
-/// Seed whose run stands for its variant where one image is shown.
+/// The seed whose run is shown for a variant, where one image is shown.
 const SHOWN_SEED: u64 = 0;
 
 /// One figure of a study.
@@ -30,18 +30,18 @@ pub struct Figure {
     section: &'static str,
     /// Name of its files.
     name: String,
-    /// Below it.
+    /// The caption below it.
     caption: String,
     content: Content,
 }
 
 enum Content {
     Drawing(Drawing),
-    /// Under their labels.
+    /// Images with their labels.
     Images(Vec<(String, RgbImage8)>),
 }
 
-/// Everything that the study is to show of the runs that are finished.
+/// All figures of the study, from the runs that are finished.
 ///
 /// # Errors
 /// A run whose files are damaged; a plot that cannot be drawn.
@@ -95,13 +95,13 @@ pub fn figures(
     Ok(figures)
 }
 
-/// The runs of a scene that stand for their variants, with their labels.
+/// The runs of a scene that are shown for their variants, with their labels.
 fn shown<'a>(manifest: &Manifest, results: &'a Results, scene: usize) -> Vec<(String, &'a RunResult)> {
     let variants = manifest.variants().into_iter().enumerate();
     variants.filter_map(|(index, variant)| Some((variant.label, results.get(scene, index, SHOWN_SEED)?))).collect()
 }
 
-/// A heading as a file's name.
+/// A heading as the name of a file.
 fn file_name(heading: &str) -> String {
     heading.replace(|c: char| c.is_whitespace() || c == '/' || c == '\\', "-")
 }
@@ -177,7 +177,7 @@ fn latency(name: &str, manifest: &Manifest, results: &Results, scene: usize) -> 
 }
 
 impl Figure {
-    /// Writes its files into a study's `figures/`.
+    /// Writes its files into the study's `figures/`.
     fn write(&self, folder: &StudyFolder) -> Result<(), TrainError> {
         let save = |name: String, image: &RgbImage8| image.save_png(&folder.path("figures").join(name));
         match &self.content {

@@ -1,4 +1,4 @@
-//! Of the feature planes: how their values are distributed, and where their bits are.
+//! Figures of the feature planes: the distribution of their values, and maps of their bits.
 
 use light4gs_data::RgbImage8;
 
@@ -13,16 +13,16 @@ use crate::study::results::RunResult;
 
 /// Bins of a histogram.
 const BINS: usize = 120;
-/// Share of the values at each end that a histogram leaves out.
+/// Share of the values at each end that a histogram omits.
 const TAIL: f64 = 0.001;
-/// Share of the places of bit maps that are shown in the brightest color.
+/// Share of the places of bit maps that have the brightest color.
 const BRIGHTEST: f64 = 0.002;
 /// Pixels between two planes.
 const GAP: usize = 3;
 /// An image is enlarged to at least this height, by whole factors.
 const LEAST_HEIGHT: usize = 96;
 
-/// Histograms of the decoded values of all planes, one line a run.
+/// Histograms of the decoded values of all planes, one line for each run.
 pub(super) fn values(
     folder: &StudyFolder,
     scene: &str,
@@ -76,7 +76,7 @@ pub(super) fn values(
     }))
 }
 
-/// The bits of every plane of every run, in one scale of colors.
+/// The bits of every plane of every run, with one color scale.
 pub(super) fn bit_maps(
     folder: &StudyFolder,
     scene: &str,
@@ -95,7 +95,8 @@ pub(super) fn bit_maps(
     }
     let mut bits: Vec<f32> = all.iter().flat_map(|(_, maps)| maps).flat_map(|map| map.bits.iter().copied()).collect();
     bits.sort_unstable_by(f32::total_cmp);
-    // A few places with several times the bits of all others would leave those in the dark.
+    // If the brightest color were that of a few places with several times the bits of all others, all others would be
+    // dark.
     let most = bits.get((bits.len() as f64 * (1.0 - BRIGHTEST)) as usize).copied().unwrap_or(0.0);
     if most <= 0.0 {
         return Ok(None);

@@ -1,4 +1,4 @@
-//! What pruning leaves of the Gaussians: the first and the last frame, and the Gaussians that draw them.
+//! The effect of pruning: the first and the last frame, and the Gaussians that draw them.
 
 use burn::tensor::Device;
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene};
@@ -18,7 +18,7 @@ const SHRINK: f32 = 0.4;
 /// ...and with this opacity logit.
 const OPAQUE: f32 = 5.0;
 
-/// One figure a frame: of each run the rendering, and the primitives as small opaque ellipsoids.
+/// One figure for each of the two frames: for each run the rendering, and the primitives as small opaque ellipsoids.
 pub(super) fn figures(
     folder: &StudyFolder,
     manifest: &Manifest,

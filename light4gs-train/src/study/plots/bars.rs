@@ -1,4 +1,4 @@
-//! Bars of several parts, one above the other.
+//! Stacked bars of several parts.
 
 use std::error::Error;
 
@@ -21,7 +21,7 @@ const MOST_LETTERS: usize = 36;
 /// One bar.
 #[derive(Clone, Debug)]
 pub struct Bar {
-    /// In front of it.
+    /// Its label, before it.
     pub label: String,
     /// One for each part.
     pub values: Vec<f64>,
@@ -30,9 +30,9 @@ pub struct Bar {
 /// Bars side by side, with one legend.
 #[derive(Clone, Debug)]
 pub struct BarPlot {
-    /// Above it.
+    /// The heading.
     pub title: String,
-    /// Of the values.
+    /// The unit of the values.
     pub unit: String,
     /// Names of the parts.
     pub parts: Vec<String>,

@@ -1,7 +1,7 @@
-//! Plots of a study, each as SVG and as PNG, drawn by one and the same code.
+//! Plots of a study, each as SVG and as PNG, drawn by the same code.
 //!
-//! PNG needs a font: a subset of DejaVu Sans is embedded (`DejaVuSans-subset.ttf`, whose license allows that, see
-//! `DejaVuSans.license`), so that no library and no font of the system is asked for.
+//! PNG needs a font. A subset of DejaVu Sans is embedded (`DejaVuSans-subset.ttf`, whose license allows that, see
+//! `DejaVuSans.license`), so that no library and no font of the system is needed.
 
 mod bars;
 mod scatter;
@@ -24,7 +24,7 @@ const SIZE: (u32, u32) = (900, 540);
 const FONT: &str = "sans-serif";
 static FONT_DATA: &[u8] = include_bytes!("DejaVuSans-subset.ttf");
 
-/// Told apart by color-blind readers, too (Okabe and Ito 2008).
+/// Distinguishable for color-blind readers, too (Okabe and Ito 2008).
 const COLORS: [RGBColor; 7] = [
     RGBColor(0, 114, 178),
     RGBColor(213, 94, 0),
@@ -49,7 +49,7 @@ pub trait Plot {
     /// Draws onto an empty area.
     ///
     /// # Errors
-    /// What the back end cannot do.
+    /// An error of the drawing back end.
     fn draw<B: DrawingBackend>(&self, area: &DrawingArea<B, Shift>) -> Result<(), Box<dyn Error>>
     where
         B::ErrorType: 'static;
@@ -63,10 +63,10 @@ pub trait Plot {
 /// Draws a plot in both forms.
 ///
 /// # Errors
-/// [`TrainError::Input`] with what cannot be drawn.
+/// [`TrainError::Input`] if it cannot be drawn.
 pub fn draw(plot: &impl Plot) -> Result<Drawing, TrainError> {
     static REGISTERED: Once = Once::new();
-    // A font that is not registered is found missing below.
+    // If the font is not registered, an error follows below.
     REGISTERED.call_once(|| drop(register_font(FONT, FontStyle::Normal, FONT_DATA)));
     let failed = |error: Box<dyn Error>| TrainError::Input(format!("a plot cannot be drawn: {error}"));
     let (width, height) = plot.size();
@@ -92,7 +92,7 @@ fn color(index: usize) -> RGBColor {
     COLORS[index % COLORS.len()]
 }
 
-/// A paler one, for what stands behind.
+/// A paler color, for the background.
 fn pale(index: usize) -> plotters::style::RGBAColor {
     color(index).mix(0.5)
 }

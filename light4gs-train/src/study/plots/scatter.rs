@@ -14,7 +14,7 @@ use plotters::style::{BLACK, Color, IntoFont, ShapeStyle, WHITE};
 
 use super::{FONT, Plot, color, pale};
 
-/// Pixels for the legend.
+/// Width of the legend in pixels.
 const LEGEND: i32 = 250;
 /// Longer labels are cut.
 const MOST_LETTERS: usize = 30;
@@ -35,7 +35,7 @@ pub enum Mark {
 /// Some points.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// For the legend.
+    /// Its label in the legend.
     pub label: String,
     /// How they are drawn.
     pub mark: Mark,
@@ -46,15 +46,15 @@ pub struct Series {
 /// Series over two axes.
 #[derive(Clone, Debug)]
 pub struct ScatterPlot {
-    /// Above it.
+    /// The heading.
     pub title: String,
-    /// With the unit.
+    /// The label of the x axis, with the unit.
     pub x_label: String,
-    /// With the unit.
+    /// The label of the y axis, with the unit.
     pub y_label: String,
-    /// Whether x is drawn by its logarithm; points whose x is not above 0 are left out then.
+    /// Whether x is drawn by its logarithm; then points whose x is not above 0 are left out.
     pub logarithmic: bool,
-    /// By their colors' order.
+    /// In the order of the colors.
     pub series: Vec<Series>,
     /// Lines across the plot: label and y.
     pub levels: Vec<(String, f64)>,
@@ -127,7 +127,7 @@ fn stroke(mark: Mark, index: usize) -> ShapeStyle {
     style.stroke_width(2)
 }
 
-/// Beside the plot, where it hides nothing.
+/// Beside the plot, where it covers nothing.
 fn draw_legend<'a, B: DrawingBackend>(
     area: &DrawingArea<B, Shift>,
     entries: impl Iterator<Item = (&'a String, Mark, usize)>,
@@ -181,14 +181,14 @@ impl Ranged for TickedAxis {
     }
 }
 
-/// From the least to the most, with a margin; something to draw on where there is nothing.
+/// From the least to the most value, with a margin; a default range if there are no values.
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (least, most) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), value| (a.min(value), b.max(value)));
     if least > most {
         return (0.0, 1.0);
     }
     let margin = 0.05 * (most - least);
-    // Values that differ by rounding alone are one value.
+    // Values that differ only by rounding are one value.
     if margin > 1e-9 * least.abs().max(most.abs()) && margin.is_normal() {
         (least - margin, most + margin)
     } else {
@@ -197,7 +197,7 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     }
 }
 
-/// 1, 2 and 5 times powers of ten, as logarithms, at most some twelve; over a short range, those of a linear axis.
+/// 1, 2 and 5 times powers of ten, as logarithms, at most about twelve; over a short range, those of a linear axis.
 fn logarithmic_ticks((low, high): (f64, f64)) -> Vec<f64> {
     let powers = (low / std::f64::consts::LN_10).floor() as i32..=(high / std::f64::consts::LN_10).ceil() as i32;
     let ticks = |factors: &[f64]| -> Vec<f64> {
@@ -214,7 +214,7 @@ fn logarithmic_ticks((low, high): (f64, f64)) -> Vec<f64> {
     }
 }
 
-/// Some eight multiples of 1, 2 or 5 times a power of ten.
+/// About eight multiples of 1, 2 or 5 times a power of ten.
 fn linear_ticks((low, high): (f64, f64)) -> Vec<f64> {
     let least = ((high - low) / 8.0).max(f64::MIN_POSITIVE);
     let power = 10f64.powf(least.log10().floor());
