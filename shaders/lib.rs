@@ -1,7 +1,7 @@
 //! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with what it includes.
 //!
-//! `README.md` says what each kernel does. The host's side, which puts a kernel together as constants (those of
-//! rendering from `light4gs_codec::rendering`), then includes, then the kernel itself, is `light4gs_model::gpu`.
+//! `README.md` says what each kernel does. The host side is `light4gs_model::gpu`: it assembles a kernel from constants
+//! (those of rendering come from `light4gs_codec::rendering`), then includes, then the kernel itself.
 
 #![no_std]
 
@@ -34,18 +34,18 @@ macro_rules! shaders {
 shaders! {
     /// One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
     ADAM = "elementwise" / "adam" [];
-    /// Puts the Gaussians' numbers of cells into the order of depths.
+    /// Sorts the Gaussians' numbers of cells by depth.
     CELL_COUNTS = "splatting" / "cell_counts" [];
     /// Color of every Gaussian from its spherical harmonics, seen from the camera.
     COLOR = "splatting" / "color" [ARITHMETIC, VIEW, COVARIANCE, QUATERNION, SPHERICAL_HARMONICS];
-    /// Second half of the query's derivative: every cell gathers what the samples around it hand over.
+    /// Second half of the query's derivative: every cell adds up the gradients from the samples around it.
     PLANE_GATHER = "planes" / "plane_gather" [PLANES];
-    /// Brings one plane from [C, H · W] to the layout of `include/planes.wgsl`.
+    /// Converts one plane from [C, H · W] to the layout of `include/planes.wgsl`.
     PLANE_PACK = "planes" / "plane_pack" [];
     /// Features at points: the product over the planes of a scale of their bilinear samples.
     PLANE_QUERY = "planes" / "plane_query" [PLANES];
-    /// First half of the query's derivative: what every point hands to each of its samples, and the points'
-    /// own gradients.
+    /// First half of the query's derivative: the gradients from every point to each of its samples, and the
+    /// points' own gradients.
     PLANE_QUERY_BACKWARD = "planes" / "plane_query_backward" [PLANES];
     /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
     INTERSECT = "splatting" / "intersect" [ARITHMETIC, VIEW, SPLAT];
@@ -62,7 +62,7 @@ shaders! {
     PREFIX_SUM = "sorting" / "prefix_sum" [];
     /// Projects every Gaussian to the screen and counts the cells that it touches.
     PROJECT = "splatting" / "project" [ARITHMETIC, VIEW, SPLAT, QUATERNION, COVARIANCE];
-    /// Adds up every Gaussian's sums over its cells and takes them through the projection to its attributes.
+    /// Adds up every Gaussian's sums over its cells, and computes from these the gradients of its attributes.
     PROJECT_BACKWARD = "splatting" / "project_backward" [ARITHMETIC, VIEW, QUATERNION, COVARIANCE, SPHERICAL_HARMONICS];
     /// First half of a pass of the radix sort: how often each digit occurs in each block.
     RADIX_COUNT = "sorting" / "radix_count" [];
@@ -72,9 +72,9 @@ shaders! {
     RANGES = "sorting" / "ranges" [];
     /// Blends the splats of every cell, front to back.
     RASTERIZE = "splatting" / "rasterize" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
-    /// Derivative of the blending by every splat, front to back like the forward pass.
+    /// Derivative of the blending with respect to every splat, front to back like the forward pass.
     RASTERIZE_BACKWARD = "splatting" / "rasterize_backward" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
-    /// What every splat contributes to one image, without its color: the sums behind significance pruning
+    /// The contributions of every splat to one image, without its color: the sums for significance pruning
     /// (paper III-B).
     SIGNIFICANCE = "splatting" / "significance" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Adds up every Gaussian's sums over its cells.
@@ -91,7 +91,7 @@ shaders! {
     SUBGROUPS = "elementwise" / "subgroups" [];
 }
 
-/// What several kernels share.
+/// Code that several kernels share.
 pub mod include {
     macro_rules! wgsl {
         ($($(#[$doc:meta])* $name:ident = $file:literal;)*) => {
@@ -133,7 +133,7 @@ pub mod include {
         TEAM_SUM_OF_MANY = "include/team_sum_of_many";
         /// A team is a workgroup of TEAM invocations that blends one cell.
         TEAM_WORKGROUP = "include/team_workgroup";
-        /// What is drawn, from where: one uniform for all kernels of an image.
+        /// The view: one uniform for all kernels of an image.
         VIEW = "include/view";
     }
 }

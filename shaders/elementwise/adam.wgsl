@@ -1,11 +1,11 @@
 // One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
 //
-// One invocation owns one value. Reads the four old arrays, writes the three new ones.
+// Each invocation computes one value. It reads the four old arrays and writes the three new ones.
 
 struct Parameters {
     count: u32,
     beta_1: f32,
-    // 1 - beta_1, rounded once: in float32 the difference has lost digits.
+    // 1 - beta_1, computed in float64 and then rounded: in float32 the difference would lose digits.
     rest_1: f32,
     beta_2: f32,
     rest_2: f32,

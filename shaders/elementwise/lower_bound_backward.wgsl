@@ -1,7 +1,7 @@
 // Gradient through max(x, bound) that also passes below the bound where a descent step would increase x (Ballé et al.
 // 2018). The maximum itself is Burn's own operation.
 //
-// One invocation owns one value. Reads `values`, the x, and `upstream`, writes `gradients`.
+// Each invocation computes one value. It reads `values`, the x, and `upstream`, and writes `gradients`.
 
 struct Parameters {
     count: u32,

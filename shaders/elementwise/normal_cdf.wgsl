@@ -1,7 +1,7 @@
 // The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error everywhere (Press et
 // al., Numerical Recipes, section 6.2): the coefficients and the order of operations of `light4gs-model/src/ops`.
 //
-// One invocation owns one value. Reads `places`, writes `probabilities`.
+// Each invocation computes one value. It reads `places` and writes `probabilities`.
 
 struct Parameters {
     count: u32,
@@ -33,7 +33,7 @@ fn main(
     polynomial = (polynomial + 0.09678418) * t;
     polynomial = (polynomial + 0.37409196) * t;
     polynomial = (polynomial + 1.00002368) * t;
-    // Never above 0 but for rounding: at x = 0 it is -9e-8.
+    // Not above 0, except for rounding: at x = 0 it is -9e-8.
     let exponent = (polynomial - 1.26551223) - 0.5 * x * x;
     let lower_tail = 0.5 * t * exponential(exponent);
     probabilities[i] = select(lower_tail, 1.0 - lower_tail, x >= 0.0);

@@ -1,6 +1,6 @@
 // Derivative of the standard normal distribution function: its density times the upstream gradient.
 //
-// One invocation owns one value. Reads `places` and `upstream`, writes `gradients`.
+// Each invocation computes one value. It reads `places` and `upstream`, and writes `gradients`.
 
 struct Parameters {
     count: u32,

@@ -1,5 +1,5 @@
-// The steps of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian to the factor of its
-// 2D covariance.
+// Values of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian to the factor of its 2D
+// covariance.
 
 struct Geometry {
     // In camera coordinates.
@@ -14,7 +14,7 @@ struct Geometry {
     // Rows of J · W.
     row_x: vec3<f32>,
     row_y: vec3<f32>,
-    // x/z and y/z, clamped, and whether each was.
+    // x/z and y/z, clamped, and whether each was clamped.
     slope: vec2<f32>,
     slope_clamped: vec2<bool>,
 }

@@ -1,5 +1,5 @@
-// The exponential of numbers up to 0, to about one unit in the last place. WGSL lets its own be wrong by 3 + 2 |x| units:
-// at the exponents of a distribution's tail, most of the digits that `normal_cdf.wgsl` is there to keep.
+// The exponential of numbers up to 0, to about one unit in the last place. WGSL allows its own to be wrong by 3 + 2 |x|
+// units. At the exponents of a distribution's tail, that is most of the digits that `normal_cdf.wgsl` must keep.
 
 // 2^n for n from -126 to 127.
 fn power_of_two(n: i32) -> f32 {
@@ -7,11 +7,11 @@ fn power_of_two(n: i32) -> f32 {
 }
 
 fn exponential(x: f32) -> f32 {
-    // Below float32's smallest number.
+    // Below the smallest float32.
     if (x < -104.0) {
         return 0.0;
     }
-    // x = n ln 2 + r, |r| <= ln 2 / 2. The logarithm comes in two parts, of which n times the first is exact.
+    // x = n ln 2 + r, |r| <= ln 2 / 2. The logarithm is in two parts; the product of n with the first is exact.
     let n = round(x * 1.44269504);
     let r = (x - n * 0.693359375) + n * 2.12194440e-4;
     // Taylor's series, whose next term is below 6e-9.

@@ -3,13 +3,13 @@
 struct Footprint {
     // After the clamp at MAX_ALPHA.
     alpha: vec4<f32>,
-    // Not skipped for smallness.
+    // Whether alpha is not below the threshold.
     hit: vec4<bool>,
     // Not clamped, so that it still depends on the splat.
     free: vec4<bool>,
 }
 
-// `dx` and `dy` go from the pixels to the center.
+// `dx` and `dy` are the offsets from the pixels to the center.
 fn footprint(conic: vec3<f32>, opacity: f32, dx: f32, dy: vec4<f32>) -> Footprint {
     let power = (-0.5 * conic.z * dy) * dy + (-0.5 * conic.x * dx * dx - conic.y * dx * dy);
     let raw = opacity * exp(power);

@@ -1,4 +1,4 @@
-// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows to a vector.
+// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows in a vector.
 
 const PIXELS: u32 = CELL * CELL / TEAM;
 const QUADS: u32 = PIXELS / 4u;

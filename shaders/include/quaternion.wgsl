@@ -22,7 +22,7 @@ fn sum_of_products(a: vec4<f32>, b: vec4<f32>) -> f32 {
     return a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w;
 }
 
-// From the gradient of the rotation's columns to that of the quaternion as given, before its normalization.
+// From the gradient of the rotation's columns to that of the given quaternion, before its normalization.
 fn rotation_backward(q: vec4<f32>, norm: f32, dx: vec3<f32>, dy: vec3<f32>, dz: vec3<f32>) -> vec4<f32> {
     let w = q.x;
     let x = q.y;

@@ -15,7 +15,7 @@ fn coefficient_count(degree: u32) -> u32 {
     return (degree + 1u) * (degree + 1u);
 }
 
-// Values at a unit direction. All degrees: who uses them stops at the active one.
+// Values at a unit direction, for all degrees; the caller uses those up to the active one.
 fn harmonics(d: vec3<f32>) -> array<f32, 16> {
     let x = d.x;
     let y = d.y;

@@ -69,6 +69,7 @@ fn reaches(splat: Splat, column: u32, row: u32) -> bool {
         quadratic_form(splat.conic, clamp(slope_x * low.y, low.x, high.x), low.y),
         quadratic_form(splat.conic, clamp(slope_x * high.y, low.x, high.x), high.y),
     );
-    // A little slack, since the pixels evaluate the form with other rounding. The builtin logarithm is in it too.
+    // A small margin, since the pixels evaluate the form with other rounding. The error of the builtin logarithm is
+    // within it.
     return min(on_columns, on_rows) <= splat.reach * 1.002 + 4e-3;
 }

@@ -1,11 +1,11 @@
-// A team is a workgroup of TEAM invocations that blends one cell. Here it meets in workgroup memory: for adapters
-// without subgroup operations, or whose subgroups have no fixed size.
+// A team is a workgroup of TEAM invocations that blends one cell. Here its members communicate through workgroup
+// memory: for adapters without subgroup operations, or whose subgroups have no fixed size.
 
 var<workgroup> lent: array<vec4<f32>, 3 * TEAM>;
 var<workgroup> exchanged: array<vec4<f32>, TEAM>;
 var<workgroup> agreed: u32;
 
-// Lends three vectors of every member to the team until the next call.
+// Makes three vectors of every member readable for the team, until the next call.
 fn team_share(a: vec4<f32>, b: vec4<f32>, c: vec4<f32>, lane: u32) {
     workgroupBarrier();
     lent[lane] = a;
@@ -35,7 +35,7 @@ fn team_any(condition: bool, lane: u32) -> bool {
     return team_sum(vec4<f32>(f32(condition)), lane).x > 0.0;
 }
 
-// A value that is the same for all, known to be so.
+// A value that is the same for all members, in a form of which the compiler knows this.
 fn team_uniform(value: u32, lane: u32) -> u32 {
     workgroupBarrier();
     if (lane == 0u) {

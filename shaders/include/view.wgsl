@@ -1,4 +1,4 @@
-// What is drawn, from where: one uniform for all kernels of an image. A kernel declares it as `view`.
+// The view: one uniform for all kernels of an image. A kernel declares it as `view`.
 
 struct View {
     // Columns of the rotation from world to camera. In w: focal lengths x and y, principal point x, all in pixels.
@@ -16,6 +16,6 @@ struct View {
     size: vec4<u32>,
     // Columns and rows of cells, then: which chunk of the lists is blended, and whether it is the last one.
     cells: vec4<u32>,
-    // Gaussians, active SH degree, coefficients of `sh_rest` a Gaussian.
+    // Gaussians, active SH degree, coefficients of `sh_rest` for each Gaussian.
     counts: vec4<u32>,
 }

@@ -1,10 +1,11 @@
-// Second half of the query's derivative: every cell gathers what the samples around it hand over.
+// Second half of the query's derivative: every cell adds up the gradients from the samples around it.
 //
-// One invocation owns one cell of one plane, with all its channels. A sample reaches its low cell and the next ones along
-// width and height, so a cell looks at the samples that begin in it and in three neighbors. Samples come sorted by low
-// cell (`order`, ranges in `starts`), and equal ones in the order of points, so the four are two ranges; every sum has one
-// order, and no atomics. Writes the planes' gradients, each [C, H · W], from the places in `places`; a launch takes so many
-// samples of a cell that no loop gets too long, and later launches add the rest.
+// Each invocation computes one cell of one plane, with all its channels. A sample contributes to its low cell and to
+// the next ones along width and height, so a cell reads the samples that begin in it and in three neighbors. Samples
+// are sorted by low cell (`order`, with ranges in `starts`), and within a cell by point. So the four cells are two
+// ranges, every sum has one order, and no atomics are needed. Writes the planes' gradients, each [C, H · W], at the
+// places in `places`. A launch takes only so many samples of a cell that no loop gets too long; later launches add the
+// rest.
 
 struct Places {
     // Where the gradients of the first four planes begin.
@@ -45,8 +46,8 @@ fn main(
     let row = cell / width;
     let at_left = cell - row * width == 0u;
 
-    // Places in `order`: from the left neighbor's samples on, from the own column's on, and the end; first those that
-    // begin in the row above, then those of the own row.
+    // Positions in `order`: the beginning of the left neighbor's samples, that of the own column's, and the end; first
+    // for those that begin in the row above, then for those of the own row.
     var above = vec3<u32>(0u);
     if (row > 0u) {
         let up = own - width;
@@ -66,8 +67,8 @@ fn main(
     if (plane >= 4u) {
         first = parameters.places.b[plane - 4u];
     }
-    // One loop over samples within vectors of channels: Mesa's software driver runs the body of an inner loop once even
-    // where there is nothing to do, as in most cells.
+    // A single loop over samples and vectors of channels: Mesa's software driver runs the body of an inner loop once
+    // even where it should not run at all, as in most cells.
     var sum = vec4<f32>(0.0);
     var next = begin;
     var quad = 0u;

@@ -1,6 +1,6 @@
-// Brings one plane from [C, H · W] to the layout of `include/planes.wgsl`.
+// Converts one plane from [C, H · W] to the layout of `include/planes.wgsl`.
 //
-// One invocation owns one cell with all its channels; channels that are missing to the last four become zero.
+// Each invocation writes one cell with all its channels; missing channels of the last four become zero.
 
 struct Parameters {
     // Cells of the plane, channels, vectors a cell, first cell in `packed`.

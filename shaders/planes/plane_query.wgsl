@@ -1,7 +1,7 @@
 // Features at points: the product over the planes of a scale of their bilinear samples.
 //
-// One invocation owns one vector of four channels of one point. Reads points [N, 4] in [-1, 1] and the packed planes;
-// writes features [N, C].
+// Each invocation computes one vector of four channels for one point. It reads points [N, 4] in [-1, 1] and the packed
+// planes, and writes features [N, C].
 
 @group(0) @binding(0) var<storage, read_write> points: array<f32>;
 @group(0) @binding(1) var<storage, read_write> packed: array<vec4<f32>>;

@@ -1,8 +1,10 @@
-// First half of the query's derivative: what every point hands to each of its samples, and the points' own gradients.
+// First half of the query's derivative: the gradients from every point to each of its samples, and the points' own
+// gradients.
 //
-// One invocation owns one point. Reads points, packed planes and `upstream` [N, C]. Writes for plane p, at place p · N + n:
-// the derivative by the sample (QUADS vectors of `handed`), the low cell that the sample begins in (`cells`), and the
-// fractions along width and height (`fractions`). Writes the points' gradients [N, 4].
+// Each invocation computes one point. It reads points, packed planes and `upstream` [N, C]. For plane p, at place p · N
+// + n, it writes: the derivative with respect to the sample (QUADS vectors of `handed`), the low cell in which the
+// sample begins (`cells`), and the fractions along width and height (`fractions`). It also writes the points' gradients
+// [N, 4].
 
 @group(0) @binding(0) var<storage, read_write> points: array<f32>;
 @group(0) @binding(1) var<storage, read_write> packed: array<vec4<f32>>;
@@ -65,7 +67,7 @@ fn main(
             let first_column = c2 - c0;
             by_down[plane] = first_column + ((c3 - c1) - first_column) * x;
         }
-        // Product of the others without dividing: upstream · those before · those after.
+        // The product of all other samples, without division: upstream · those before · those after.
         var before: array<vec4<f32>, PLANES>;
         before[0] = above;
         for (var plane = 1u; plane < PLANES; plane++) {

@@ -4,7 +4,7 @@
 //   1: a workgroup, the only one, replaces `values` by their prefix sums and writes the total to `sums[0]`;
 //   2: a workgroup owns a block and replaces it by its prefix sums, on top of the block's entry of `sums`.
 //
-// Few values take launch 1 alone. Many take 0, then 1 over the sums, then 2.
+// With few values only launch 1 is needed. Many values need 0, then 1 over the sums, then 2.
 
 struct Parameters {
     count: u32,
@@ -14,7 +14,7 @@ struct Parameters {
 @group(0) @binding(1) var<storage, read_write> sums: array<u32>;
 @group(0) @binding(2) var<uniform> parameters: Parameters;
 
-// Values of one invocation, next to each other.
+// Values of one invocation, which are neighbors.
 const EACH: u32 = BLOCK / WORKGROUP;
 
 var<workgroup> totals: array<u32, WORKGROUP>;
@@ -29,7 +29,7 @@ fn sum_of_own(first: u32) -> u32 {
     return sum;
 }
 
-// Leaves in `totals` the sums up to and with each invocation's.
+// Writes to `totals` the sums up to and including each invocation's.
 fn scan_totals(own: u32, lane: u32) {
     workgroupBarrier();
     totals[lane] = own;

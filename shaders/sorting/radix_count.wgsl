@@ -1,7 +1,7 @@
 // First half of a pass of the radix sort: how often each digit occurs in each block.
 //
-// A workgroup owns a block of BLOCK keys, an invocation EACH keys next to each other; a digit has RADIX_BITS bits. Writes
-// `table[digit * blocks + block]`, whose prefix sum is where the block's keys with that digit go.
+// A workgroup owns a block of BLOCK keys, an invocation EACH neighboring keys; a digit has RADIX_BITS bits. Writes
+// `table[digit * blocks + block]`, whose prefix sum is the position for the block's keys with that digit.
 
 struct Parameters {
     count: u32,
@@ -16,7 +16,7 @@ struct Parameters {
 const EACH: u32 = BLOCK / WORKGROUP;
 const DIGITS: u32 = 1u << RADIX_BITS;
 
-// A counter for each digit and invocation, so that nothing is added atomically.
+// A counter for each digit and invocation, so that no atomics are needed.
 var<workgroup> counters: array<u32, DIGITS * WORKGROUP>;
 
 @compute @workgroup_size(WORKGROUP)

@@ -1,7 +1,7 @@
 // Second half of a pass of the radix sort: moves keys and values to their places. Stable: equal keys keep their order.
 //
-// A workgroup owns a block of BLOCK keys, an invocation EACH keys next to each other; a digit has RADIX_BITS bits. Reads
-// the prefix sum of the table of `radix_count.wgsl`. In the first pass (FIRST) the value of a key is its number.
+// A workgroup owns a block of BLOCK keys, an invocation EACH neighboring keys; a digit has RADIX_BITS bits. Reads the
+// prefix sum of the table of `radix_count.wgsl`. In the first pass (FIRST) the value of a key is its index.
 
 struct Parameters {
     count: u32,

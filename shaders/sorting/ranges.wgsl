@@ -1,7 +1,7 @@
 // Where each of a number of groups begins among sorted keys.
 //
-// One invocation owns one group, and one more the end: it finds by bisection the first key that is not below its number,
-// and writes the place to `starts`.
+// Each invocation computes the beginning of one group, and a further one the end. It finds by bisection the first key
+// that is not below its group's number, and writes the position to `starts`.
 
 struct Parameters {
     // Keys, groups.

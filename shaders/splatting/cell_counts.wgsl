@@ -1,7 +1,7 @@
-// Puts the Gaussians' numbers of cells into the order of depths.
+// Sorts the Gaussians' numbers of cells by depth.
 //
-// One invocation owns one place in that order. Reads the Gaussian at the place and its splat; writes its count, of which
-// a prefix sum then makes the place of its first intersection.
+// Each invocation computes one position in that order. It reads the Gaussian at the position and its splat, and writes
+// the splat's number of cells. A prefix sum of these numbers then gives the position of its first intersection.
 
 struct Parameters {
     count: u32,

@@ -1,7 +1,7 @@
 // Color of every Gaussian from its spherical harmonics, seen from the camera.
 //
-// One invocation owns one Gaussian. Reads means, sh_dc, sh_rest; writes vector 2 of its splat: the color, not below
-// zero, and a number: 1, 2, 4 for a channel that was clamped, 8 for a color that is not finite.
+// Each invocation computes one Gaussian. It reads means, sh_dc and sh_rest, and writes vector 2 of its splat: the
+// color, not below zero, and a number: 1, 2, 4 for a channel that was clamped, 8 for a color that is not finite.
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> sh_dc: array<f32>;

@@ -1,8 +1,8 @@
 // Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
 //
-// One invocation owns one Gaussian, at a place in the order of depths, and writes its intersections one after the other
-// from the place's entry of `first_places`: the cell and the Gaussian. A Gaussian keeps the number of its first
-// intersection in `first_of_gaussian`, so that the backward pass finds them all.
+// Each invocation computes one Gaussian, at a position in the order of depths. It writes the cell and the Gaussian of
+// each of its intersections, one after the other from the position's entry of `first_places`. The number of its first
+// intersection is kept in `first_of_gaussian`, so that the backward pass finds all of them.
 
 @group(0) @binding(0) var<storage, read_write> by_depth: array<u32>;
 @group(0) @binding(1) var<storage, read_write> first_places: array<u32>;
@@ -56,8 +56,8 @@ fn main(
     if (next == end) {
         return;
     }
-    // Should this compilation round otherwise than that of `project.wgsl`, a place may be left: no cell is there, and
-    // nobody writes sums for it, so the Gaussian is told how many it really has.
+    // If the compiler makes this round differently from `project.wgsl`, a place may remain unused: no cell has it, and
+    // no sums are written for it. So the splat gets the real number of its cells.
     splats[4u * i + 3u].w = f32(next - first_places[place]);
     while (next < end) {
         cells[next] = view.cells.x * view.cells.y;

@@ -1,8 +1,8 @@
 // Projects every Gaussian to the screen and counts the cells that it touches.
 //
-// One invocation owns one Gaussian. Reads its attributes and vector 2 of its splat (`color.wgsl`); writes the other
-// three vectors, its radius, and its key in the order of depths. Depths are positive, so their bits sort as they do; a
-// Gaussian without cells has the largest key.
+// Each invocation computes one Gaussian. It reads its attributes and vector 2 of its splat (`color.wgsl`), and writes
+// the other three vectors, its radius, and its key in the order of depths. Depths are positive, so their bits have the
+// same order; a Gaussian without cells has the largest key.
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> quats: array<f32>;
@@ -118,6 +118,6 @@ fn main(
     splats[4u * i + 1u] = vec4<f32>(splat.conic, splat.reach);
     splats[4u * i + 3u] = vec4<f32>(splat.variance, radius, f32(count));
     depth_keys[i] = select(bitcast<u32>(position.z), 0xffffffffu, count == 0u);
-    // 2^31 - 1, the largest that there is, for what is larger.
+    // Larger radii become 2^31 - 1, the largest integer.
     radii[i] = select(i32(min(radius, 2147483520.0)), 2147483647, radius >= 2147483648.0);
 }

@@ -1,9 +1,10 @@
-// Adds up every Gaussian's sums over its cells and takes them through the projection to its attributes.
+// Adds up every Gaussian's sums over its cells, and computes from these the gradients of its attributes, through the
+// projection.
 //
-// One invocation owns one Gaussian. Reads its attributes, its splat, and the sums of its intersections, which lie next to
-// each other from ten times `first_of_gaussian`; adds them in that order, so that the result does not depend on the order
-// of anything. Writes every gradient once: `gradients` holds those of means [N, 3], quats [N, 4], scales [N, 3],
-// opacities [N], sh_dc [N, 3], sh_rest [N, K, 3] and screen offsets [N, 2], from the places in `places`.
+// Each invocation computes one Gaussian. It reads its attributes, its splat, and the sums of its intersections, which
+// begin at ten times `first_of_gaussian`, and adds them in their order, so that the result is the same in every run.
+// Every gradient is written once: `gradients` holds those of means [N, 3], quats [N, 4], scales [N, 3], opacities [N],
+// sh_dc [N, 3], sh_rest [N, K, 3] and screen offsets [N, 2], at the places in `places`.
 
 struct Places {
     // means, quats, scales, opacities
@@ -35,7 +36,7 @@ fn write3(at: u32, value: vec3<f32>) {
     gradients[at + 2u] = value.z;
 }
 
-// Harmonics' gradients, and the gradient of the mean through the direction that it is seen from.
+// Gradients of the harmonics, and the gradient of the mean through the viewing direction.
 fn color_backward(i: u32, mean: vec3<f32>, upstream: vec3<f32>, state: u32) -> vec3<f32> {
     let offset = mean - view.center.xyz;
     let distance = sqrt(dot3(offset, offset));
@@ -123,7 +124,7 @@ fn main(
     let raw_quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
     let g = geometry_of(mean, raw_quat, scale);
 
-    // Conic to covariance: d(inverse) = -Q dC Q.
+    // From the conic to the covariance: d(inverse) = -Q dC Q.
     let half_gb = 0.5 * d_conic.y;
     let m00 = d_conic.x * conic.x + half_gb * conic.y;
     let m01 = d_conic.x * conic.y + half_gb * conic.z;
@@ -133,7 +134,7 @@ fn main(
     let g_xy = -(conic.x * m01 + conic.y * m11) - (conic.y * m00 + conic.z * m10);
     let g_yy = -(conic.y * m01 + conic.z * m11);
 
-    // Covariance to its factor V = (J W) (R S), two rows.
+    // From the covariance to its factor V = (J W) (R S), two rows.
     let d_factor_x = 2.0 * g_xx * g.factor_x + g_xy * g.factor_y;
     let d_factor_y = g_xy * g.factor_x + 2.0 * g_yy * g.factor_y;
     // d(RS) = (J W)^T dV: column j is the sum over rows of row · dV_j.
@@ -155,7 +156,7 @@ fn main(
     let d_row_x = g.rotation.axis_x * scaled_x.x + g.rotation.axis_y * scaled_x.y + g.rotation.axis_z * scaled_x.z;
     let d_row_y = g.rotation.axis_x * scaled_y.x + g.rotation.axis_y * scaled_y.y + g.rotation.axis_z * scaled_y.z;
 
-    // J W to the view position, with J the projection's Jacobian at the clamped slope.
+    // From J W to the view position, with J the projection's Jacobian at the clamped slope.
     let inverse_z = 1.0 / g.position.z;
     let focal = vec2<f32>(view.axis_x.w, view.axis_y.w);
     let forward = world_row(2u);
@@ -165,7 +166,7 @@ fn main(
     );
     let along_forward = vec2<f32>(dot3(d_row_x, forward), dot3(d_row_y, forward));
     let d_slope = select(-along_forward * focal * inverse_z, vec2<f32>(0.0), g.slope_clamped);
-    // The center on the screen.
+    // From the center on the screen.
     let d_pixel = d_position * focal * inverse_z;
     let d_view_xy = d_slope * inverse_z + d_pixel;
     let d_view_z = -along_rows * focal * inverse_z * inverse_z - d_slope * g.position.xy * inverse_z * inverse_z

@@ -1,15 +1,16 @@
 // Blends the splats of every cell, front to back.
 //
-// A team (one workgroup) owns one cell of CELL × CELL pixels; an invocation owns PIXELS of them, in one column. The team
-// fetches TEAM splats at a time, one a member, and each member then blends all of them. Per pixel:
+// A team (one workgroup) owns one cell of CELL × CELL pixels; an invocation owns PIXELS of them, in one column. The
+// team fetches TEAM splats at a time, one for each member, and each member then blends all of them. For each pixel:
 //
 //   alpha = min(0.99, opacity · exp(-q)),  skipped below 1/255
 //   stop before the splat that would take the transmittance T below 1e-4
 //   color += T · alpha · color_i,  depth += T · alpha · z_i,  T *= 1 - alpha
 //
-// Reads the cell's range in `order`, the numbers of intersections by cell, and `gaussians`, their Gaussians. Writes
+// Reads the cell's range in `order` (the numbers of intersections by cell) and `gaussians` (their Gaussians). Writes
 // `rendering`: color over the background [H, W, 3], then alpha [H, W], then depth [H, W]. Between two chunks of a list
-// (see CHUNK) the image holds the sums so far, and T, negative where the pixel has stopped, in the place of alpha.
+// (see CHUNK) the image holds the sums so far, and, in place of alpha, T, which is negative where the pixel has
+// stopped.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;

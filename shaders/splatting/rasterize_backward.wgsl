@@ -1,14 +1,14 @@
-// Derivative of the blending by every splat, front to back like the forward pass.
+// Derivative of the blending with respect to every splat, front to back like the forward pass.
 //
-// With v_i the splat's color and depth weighed by the upstream gradient, the pixel's value is
-// S = sum_i w_i v_i + T_end · v_background, and dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i).
-// S is known from the finished image, so a running remainder is all that is needed.
+// With v_i the splat's color and depth weighted by the upstream gradient, the pixel's value is S = sum_i w_i v_i +
+// T_end · v_background, and dS/dalpha_i = T_i v_i - (S - sum_{j<=i} w_j v_j) / (1 - alpha_i). S is known from the
+// finished image, so a running remainder is enough.
 //
-// Teams, cells and pixels as in `rasterize.wgsl`. Reads also the finished image and `upstream`, its gradient, in the
-// same layout. Writes ten sums over the cell's pixels for each of its intersections, at ten times its number: gradients
-// of red, green, blue and depth, then the moments of p = alpha · dS/dalpha: p, p dx, p dy, p dx², p dx dy, p dy².
-// Nobody else writes there, so that the sums do not depend on any order. `carried` holds T and the remainder of every
-// pixel between two chunks of a list.
+// Teams, cells and pixels are as in `rasterize.wgsl`. Also reads the finished image and `upstream`, its gradient, in
+// the same layout. For each of its intersections it writes ten sums over the cell's pixels, at ten times the
+// intersection's number: gradients of red, green, blue and depth, then the moments of p = alpha · dS/dalpha: p, p dx, p
+// dy, p dx², p dx dy, p dy². No other invocation writes there, so the sums do not depend on any order. Between two
+// chunks of a list, `carried` holds T and the remainder of every pixel.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
@@ -39,7 +39,7 @@ fn main(
     let pixel_count = view.size.x * view.size.y;
     let x = f32(own.x);
 
-    // T, negative once the pixel has stopped; what is left of S; the gradients of the pixel's values.
+    // T, negative once the pixel has stopped; the remainder of S; the gradients of the pixel's values.
     var transmittance: array<vec4<f32>, QUADS>;
     var left: array<vec4<f32>, QUADS>;
     var up_red: array<vec4<f32>, QUADS>;
@@ -78,7 +78,7 @@ fn main(
         }
         let size = min(TEAM, chunk.y - batch);
         let number = order[batch + min(lane, size - 1u)];
-        // What the member's own splat gets: red, green, blue, depth; p, p dx, p dy, p dx²; p dx dy, p dy².
+        // The sums of the member's own splat: red, green, blue, depth; p, p dx, p dy, p dx²; p dx dy, p dy².
         var linear = vec4<f32>(0.0);
         var moments = vec4<f32>(0.0);
         var moments_y = vec4<f32>(0.0);

@@ -1,9 +1,9 @@
-// What every splat contributes to one image, without its color: the sums behind significance pruning (paper III-B).
+// The contributions of every splat to one image, without its color: the sums for significance pruning (paper III-B).
 //
-// Teams, cells, pixels and decisions as in `rasterize.wgsl`. Writes three sums over the cell's pixels for each of its
-// intersections, at three times its number: the pixels that blend the splat, T · alpha, and T, with T the transmittance
-// before the splat. Nobody else writes there, so that the sums do not depend on any order. `carried` holds T of every
-// pixel, negative where it has stopped, between two chunks of a list.
+// Teams, cells, pixels and decisions are as in `rasterize.wgsl`. For each of its intersections it writes three sums
+// over the cell's pixels, at three times the intersection's number: the pixels that blend the splat, T · alpha, and T,
+// with T the transmittance before the splat. No other invocation writes there, so the sums do not depend on any order.
+// Between two chunks of a list, `carried` holds T of every pixel, negative where it has stopped.
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
@@ -51,7 +51,7 @@ fn main(
         }
         let size = min(TEAM, chunk.y - batch);
         let number = order[batch + min(lane, size - 1u)];
-        // What the member's own splat gets.
+        // The sums of the member's own splat.
         var own_sums = vec4<f32>(0.0);
         if (team_any(any(open), lane)) {
             let mine = 4u * gaussians[number];

@@ -1,7 +1,7 @@
 // Adds up every Gaussian's sums over its cells.
 //
-// One invocation owns one Gaussian. Reads its splat and the sums of its intersections, which lie next to each other from
-// three times `first_of_gaussian`, and adds them in that order. Writes `scores` [N, 4]: pixels, sum of T · alpha, sum of
+// Each invocation computes one Gaussian. It reads its splat and the sums of its intersections, which begin at three
+// times `first_of_gaussian`, and adds them in their order. It writes `scores` [N, 4]: pixels, sum of T · alpha, sum of
 // T · opacity, sum of the opacity.
 
 struct Parameters {
