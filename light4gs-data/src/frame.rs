@@ -18,8 +18,10 @@ pub struct Mask {
 pub enum MaskMeaning {
     /// They are neither trained on nor measured.
     Ignored,
-    /// Something moves there.
+    /// Something moves there, and nothing elsewhere.
     Moving,
+    /// Nothing moves there, and something does elsewhere.
+    Still,
 }
 
 /// A camera, a time, and where the image lies. The image itself is read by [`crate::ImageStore`].

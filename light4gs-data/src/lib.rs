@@ -38,7 +38,7 @@ pub use error::DataError;
 pub use exchange::{GlbOptions, MotionSample, glb_bytes, write_four_dgs, write_glb};
 pub use frame::{Frame, Mask, MaskMeaning};
 pub use images::{
-    ImageStore, PixelMask, RgbImage8, RgbImage32, composite, composite_resized, image_size, measured_pixels,
+    ImageStore, PixelMask, Region, RgbImage8, RgbImage32, composite, composite_resized, image_size, regions,
 };
 pub use layouts::{Colmap, DNerf, DatasetLayout, HyperNerf, Layouts, NerfDs, Nerfstudio, Neu3d};
 pub use lens::{Distortion, Lens};

@@ -1,4 +1,4 @@
-//! Which pixels of an image are used.
+//! Masks as they are read, and which pixels of an image are trained on.
 
 use super::decode::decode_upright;
 use super::undistort::{is_recorded_everywhere, undistort_mask};
@@ -13,7 +13,7 @@ pub struct PixelMask {
     pub width: u32,
     /// Height, pixels.
     pub height: u32,
-    /// `height * width` values, row-major: 1 where a pixel is used, otherwise 0.
+    /// `height * width` values, row-major: 1 where a pixel belongs to what is marked, otherwise 0.
     pub pixels: Vec<u8>,
 }
 
@@ -27,27 +27,20 @@ pub(super) fn trained_pixels(frame: &Frame) -> Result<Option<PixelMask>, DataErr
         None if !bent => Ok(None),
         None => Ok(Some(at_camera(frame, vec![1; size.0 as usize * size.1 as usize]))),
         Some(mask) => {
-            let marks = read(mask, size)?.into_iter().map(|value| u8::from(value != 0)).collect();
-            let mask = at_camera(frame, marks);
+            let mask = kept_pixels(frame, mask)?;
             Ok(mask.pixels.contains(&0).then_some(mask))
         }
     }
 }
 
-/// The pixels of masked metrics: those that the frame's mask does not ignore, or those where something moves; `None`
-/// without a mask.
-///
-/// # Errors
-/// [`DataError::Image`] where the mask cannot be read.
-pub fn measured_pixels(frame: &Frame) -> Result<Option<PixelMask>, DataError> {
-    let Some(mask) = &frame.mask else { return Ok(None) };
-    let counts = |value: u8| (value != 0) == (mask.zero == MaskMeaning::Ignored);
+/// The pixels that a mask of kind [`MaskMeaning::Ignored`] does not ignore.
+pub(super) fn kept_pixels(frame: &Frame, mask: &Mask) -> Result<PixelMask, DataError> {
     let marks = read(mask, (frame.source_width, frame.source_height))?;
-    Ok(Some(at_camera(frame, marks.into_iter().map(|value| u8::from(counts(value))).collect())))
+    Ok(at_camera(frame, marks.into_iter().map(|value| u8::from(value != 0)).collect()))
 }
 
 /// The mask's values at the size of the image's file, each from the nearest pixel.
-fn read(mask: &Mask, size: (u32, u32)) -> Result<Vec<u8>, DataError> {
+pub(super) fn read(mask: &Mask, size: (u32, u32)) -> Result<Vec<u8>, DataError> {
     let found = super::image_size(&mask.path)?;
     let gray = decode_upright(&mask.path, found)?.into_luma8();
     same_aspect(&mask.path, found, size)?;
@@ -73,7 +66,8 @@ fn at_camera(frame: &Frame, marks: Vec<u8>) -> PixelMask {
     PixelMask { width, height, pixels: nearest(&straight, source, (width, height)) }
 }
 
-fn nearest(values: &[u8], from: (u32, u32), to: (u32, u32)) -> Vec<u8> {
+/// `[H, W]` marks at another size, each from the nearest pixel. Sizes are (width, height).
+pub(super) fn nearest(values: &[u8], from: (u32, u32), to: (u32, u32)) -> Vec<u8> {
     if from == to {
         return values.to_vec();
     }
@@ -107,17 +101,15 @@ mod tests {
         let mask = image::GrayImage::from_fn(8, 4, |x, _| image::Luma([if x < 4 { 0 } else { 200 }]));
         mask.save(folder.path().join("m.png")).unwrap();
         let right: Vec<u8> = [0, 0, 0, 0, 1, 1, 1, 1].repeat(4);
-        let left: Vec<u8> = right.iter().map(|v| 1 - v).collect();
         let ignored = frame(folder.path(), MaskMeaning::Ignored);
         assert_eq!(trained_pixels(&ignored).unwrap().unwrap().pixels, right);
-        assert_eq!(measured_pixels(&ignored).unwrap().unwrap().pixels, right);
-        let moving = frame(folder.path(), MaskMeaning::Moving);
-        assert_eq!(trained_pixels(&moving).unwrap(), None);
-        assert_eq!(measured_pixels(&moving).unwrap().unwrap().pixels, left);
-        // A mask that lies on its side is refused; a frame without a mask has none.
+        // What moves is trained on like the rest.
+        for meaning in [MaskMeaning::Moving, MaskMeaning::Still] {
+            assert_eq!(trained_pixels(&frame(folder.path(), meaning)).unwrap(), None);
+        }
+        // A mask that lies on its side is refused.
         image::GrayImage::new(4, 8).save(folder.path().join("m.png")).unwrap();
-        assert!(measured_pixels(&moving).unwrap_err().to_string().contains("m.png"));
-        assert_eq!(measured_pixels(&Frame { mask: None, ..moving }).unwrap(), None);
+        assert!(trained_pixels(&ignored).unwrap_err().to_string().contains("m.png"));
     }
 
     #[test]

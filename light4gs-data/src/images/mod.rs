@@ -1,11 +1,12 @@
-//! Images in memory: headers, decoding within a memory bound, undistortion, compositing on the background, resizing,
-//! and writing as PNG.
+//! Images in memory: headers, decoding within a memory bound, undistortion, compositing on the background, resizing, masks
+//! and the regions that they mark, and writing as PNG.
 
 mod composite;
 mod decode;
 mod header;
 mod large;
 mod mask;
+mod region;
 mod resize;
 mod rgb;
 mod store;
@@ -14,7 +15,8 @@ mod undistort;
 pub use composite::{composite, composite_resized};
 pub use header::image_size;
 pub(crate) use header::{ImageHeader, orientation, read_headers, turns_sideways};
-pub use mask::{PixelMask, measured_pixels};
+pub use mask::PixelMask;
+pub use region::{Region, regions};
 pub(crate) use rgb::save_png;
 pub use rgb::{RgbImage8, RgbImage32};
 pub use store::ImageStore;

@@ -4,13 +4,14 @@
 //! `file_path` (with or without extension), `time` and `transform_matrix` (camera to world, OpenGL
 //! axes). Times are divided by the largest of train and test; a later `val` time counts as 1. `val`
 //! may be absent. A `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise
-//! they are random.
+//! they are random. `mask/` may have masks of what moves, for measuring: that of the image `test/r_003.png` is
+//! `mask/test/r_003.png`, of the same size, 0 where nothing moves; a split has one for each of its images, or none.
 
 use super::layout::DatasetLayout;
 use super::shared::{files, json, posed};
 use crate::camera::{Camera, PoseError};
 use crate::error::DataError;
-use crate::frame::Frame;
+use crate::frame::{Frame, Mask, MaskMeaning};
 use crate::images::read_headers;
 use crate::options::LoadOptions;
 use crate::orbit::orbit_path;
@@ -51,9 +52,9 @@ impl DatasetLayout for DNerf {
         let val = if file("val").is_file() { Some(read_split(root, file("val"))?) } else { None };
         let timed = train.frames.iter().chain(&test.frames);
         let last = timed.fold(0.0f64, |last, frame| last.max(frame.time));
-        let train = frames(&train, last, options)?;
-        let test = frames(&test, last, options)?;
-        let val = val.map_or(Ok(Vec::new()), |val| frames(&val, last, options))?;
+        let frames = |split: &RawSplit| frames(root, split, last, options);
+        let (train, test) = (frames(&train)?, frames(&test)?);
+        let val = val.map_or(Ok(Vec::new()), |val| frames(&val))?;
         let video = video_path(&train[0].camera);
         let splits = SplitFrames { train, test, val, video };
         Scene::new(self.name(), root, splits, points(root, options)?, options.background)
@@ -191,7 +192,7 @@ fn with_suffix(base: &Path) -> PathBuf {
 }
 
 /// Frames with cameras at the wanted size and times in `[0, 1]`; `last` is the time that becomes 1.
-fn frames(split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
+fn frames(root: &Path, split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
     let headers = read_headers(split.frames.par_iter().map(|frame| frame.image.as_path()).collect::<Vec<_>>())?;
     let Some(source) = headers.first().map(|header| header.size) else {
         return Ok(Vec::new());
@@ -209,14 +210,43 @@ fn frames(split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Fram
         ));
     }
     let (width, height) = posed::used_size(&split.frames[0].image, source, options)?;
-    let to_frame = |(i, raw): (usize, &RawFrame)| {
+    let masks = find_masks(root, split, source)?;
+    let to_frame = |((i, raw), mask): ((usize, &RawFrame), Option<Mask>)| {
         let camera = Camera::from_camera_to_world_opengl(&raw.pose, split.fov_x, source.0, source.1)
             .map_err(|error| pose_error(&split.path, i, error))?;
         let time = if last > 0.0 { (raw.time / last).min(1.0) } else { 0.0 };
         let name = raw.image.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
-        Ok(Frame::new(name, camera.resized(width, height), time as f32, raw.image.clone(), source))
+        let frame = Frame::new(name, camera.resized(width, height), time as f32, raw.image.clone(), source);
+        Ok(Frame { mask, ..frame })
     };
-    split.frames.iter().enumerate().map(to_frame).collect()
+    split.frames.iter().enumerate().zip(masks).map(to_frame).collect()
+}
+
+/// The masks of a split's images, which are `source` = (width, height) pixels large. All of them, or none: figures over a part
+/// of the views would pass for figures over all.
+fn find_masks(root: &Path, split: &RawSplit, source: (u32, u32)) -> Result<Vec<Option<Mask>>, DataError> {
+    let folder = root.join("mask");
+    let expected = |raw: &RawFrame| folder.join(raw.image.strip_prefix(root).unwrap_or(&raw.image));
+    let paths: Vec<Option<PathBuf>> = split.frames.iter().map(|raw| files::find_image(&expected(raw))).collect();
+    let found: Vec<&Path> = paths.iter().flatten().map(PathBuf::as_path).collect();
+    if found.is_empty() {
+        return Ok(vec![None; paths.len()]);
+    }
+    if let Some((raw, _)) = split.frames.iter().zip(&paths).find(|(_, path)| path.is_none()) {
+        return Err(DataError::image(
+            &expected(raw),
+            format!("this mask is missing, but {} of the {} images of its split have one", found.len(), paths.len()),
+            "copy it there, or remove the split's masks",
+        ));
+    }
+    for (path, header) in found.iter().zip(read_headers(found.clone())?) {
+        if header.size != source {
+            let (width, height) = header.size;
+            let problem = format!("the mask is {width} x {height} pixels, its image {} x {}", source.0, source.1);
+            return Err(DataError::image(path, problem, "make masks of the images as they are"));
+        }
+    }
+    Ok(paths.into_iter().map(|path| path.map(|path| Mask { path, zero: MaskMeaning::Still })).collect())
 }
 
 fn pose_error(path: &Path, i: usize, error: PoseError) -> DataError {

@@ -72,7 +72,8 @@ impl SyntheticOptions {
 }
 
 /// Writes the procedural scene as a new D-NeRF folder: `transforms_{train,test,val}.json` and
-/// RGBA images `train/r_000.png`...; the folder is complete or absent, never half-written.
+/// RGBA images `train/r_000.png`..., and masks of what moves for the views that are measured, `mask/test/r_000.png`...; the
+/// folder is complete or absent, never half-written.
 ///
 /// The same options give the same files.
 ///
@@ -122,8 +123,8 @@ impl Studio {
         time: f32,
         direction: impl Fn(f32, f32) -> Vec3,
     ) -> crate::images::RgbImage8 {
-        let rgba = render::render_rays(&self.0, eye, size, time, direction);
-        let pixels = crate::images::composite(&rgba, [0.0; 3]);
+        let rendering = render::render_rays(&self.0, eye, size, time, direction);
+        let pixels = crate::images::composite(&rendering.rgba, [0.0; 3]);
         crate::images::RgbImage8 { width: size.0, height: size.1, pixels }
     }
 }
@@ -139,10 +140,10 @@ fn write_folder(folder: &Path, options: &SyntheticOptions) -> Result<(), DataErr
             .map(|(i, (camera, _))| (camera, unseen_time(i, count, options.train_frames)))
             .collect()
     };
-    write_split(folder, "train", &train, &world)?;
-    write_split(folder, "test", &orbit(options.test_frames, ELEVATIONS[0]), &world)?;
+    write_split(folder, "train", None, &train, &world)?;
+    write_split(folder, "test", Some("mask/test"), &orbit(options.test_frames, ELEVATIONS[0]), &world)?;
     if options.val_frames > 0 {
-        write_split(folder, "val", &orbit(options.val_frames, ELEVATIONS[1]), &world)?;
+        write_split(folder, "val", Some("mask/val"), &orbit(options.val_frames, ELEVATIONS[1]), &world)?;
     }
     Ok(())
 }
@@ -176,13 +177,27 @@ fn unseen_time(i: usize, count: usize, train_frames: usize) -> f32 {
     }
 }
 
-fn write_split(folder: &Path, split: &str, views: &[(Camera, f32)], world: &World) -> Result<(), DataError> {
+/// Writes transforms and images of a split, and masks where a folder for them is named.
+fn write_split(
+    folder: &Path,
+    split: &str,
+    masks: Option<&str>,
+    views: &[(Camera, f32)],
+    world: &World,
+) -> Result<(), DataError> {
     let images = folder.join(split);
-    fs::create_dir_all(&images).map_err(DataError::io("create", &images))?;
+    let masks = masks.map(|masks| folder.join(masks));
+    for made in std::iter::once(&images).chain(&masks) {
+        fs::create_dir_all(made).map_err(DataError::io("create", made))?;
+    }
     views.par_iter().enumerate().try_for_each(|(i, (camera, time))| {
-        let rgba = render::render(world, camera, *time);
-        let path = images.join(format!("r_{i:03}.png"));
-        save_png(&path, &rgba, camera.width, camera.height, ExtendedColorType::Rgba8)
+        let rendering = render::render(world, camera, *time);
+        let name = format!("r_{i:03}.png");
+        let save = |folder: &Path, pixels: &[u8], color| {
+            save_png(&folder.join(&name), pixels, camera.width, camera.height, color)
+        };
+        save(&images, &rendering.rgba, ExtendedColorType::Rgba8)?;
+        masks.as_ref().map_or(Ok(()), |masks| save(masks, &rendering.moving, ExtendedColorType::L8))
     })?;
     let frames: Vec<serde_json::Value> = views
         .iter()
@@ -203,7 +218,7 @@ fn write_split(folder: &Path, split: &str, views: &[(Camera, f32)], world: &Worl
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::images::ImageStore;
+    use crate::images::{ImageStore, Region, regions};
     use crate::options::LoadOptions;
     use crate::scene::Scene;
     use std::path::PathBuf;
@@ -239,7 +254,8 @@ mod tests {
                 .map(|(path, bytes)| (path.strip_prefix(&name).unwrap().to_path_buf(), bytes))
                 .collect::<Vec<_>>()
         });
-        assert_eq!(a.len(), 13);
+        // 10 images, 3 transforms, 5 masks.
+        assert_eq!(a.len(), 18);
         assert_eq!(a, b);
         assert_ne!(a, c);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 3);
@@ -264,6 +280,18 @@ mod tests {
             let image = store.get(frame).unwrap();
             let white = image.pixels.chunks_exact(3).filter(|p| **p == [255; 3]).count();
             assert!((100..924).contains(&white), "{}: {white} of 1024 are white", frame.name);
+        }
+        assert!(scene.train.iter().all(|frame| frame.mask.is_none()), "masks are for measuring");
+        for frame in scene.test.iter().chain(&scene.val) {
+            let [(Region::Moving, moving), (Region::Still, still)] = &regions(frame).unwrap()[..] else {
+                panic!("{} has masks of motion", frame.name)
+            };
+            let image = store.get(frame).unwrap();
+            let pixels = || image.pixels.chunks_exact(3).zip(&moving.pixels);
+            let count = pixels().filter(|(_, moves)| **moves == 1).count();
+            assert!((50..500).contains(&count), "{}: {count} of 1024 move", frame.name);
+            assert!(pixels().all(|(color, moves)| *moves == 0 || *color != [255; 3]), "the background does not move");
+            assert!(moving.pixels.iter().zip(&still.pixels).all(|(moving, still)| moving + still == 1));
         }
     }
 

@@ -10,8 +10,19 @@ const SAMPLES: u32 = 4;
 /// Everything is within this distance of the origin.
 const WORLD_RADIUS: f32 = 1.3;
 
-/// Renders `[H, W, 4]` bytes with straight alpha: the share of rays that hit something.
-pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Vec<u8> {
+/// From this many rays of a pixel on that meet something that moves, the pixel moves: a quarter of them.
+const MOVING_RAYS: u32 = SAMPLES * SAMPLES / 4;
+
+/// What a camera sees.
+pub(super) struct Rendering {
+    /// `[H, W, 4]` bytes with straight alpha: the share of rays that hit something.
+    pub(super) rgba: Vec<u8>,
+    /// `[H, W]` bytes: 255 where something moves, otherwise 0.
+    pub(super) moving: Vec<u8>,
+}
+
+/// Renders what a camera sees at a time in `[0, 1]`.
+pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Rendering {
     // A direction is linear in the pixel before it is normalized.
     let axes = camera.rotation.transpose();
     let direction = |u: f32, v: f32| {
@@ -29,38 +40,42 @@ pub(super) fn render_rays(
     (width, height): (u32, u32),
     time: f32,
     direction: impl Fn(f32, f32) -> Vec3,
-) -> Vec<u8> {
+) -> Rendering {
     let solids = world.at(time);
     let mut rgba = Vec::with_capacity((width * height * 4) as usize);
+    let mut moving = Vec::with_capacity((width * height) as usize);
     for j in 0..height {
         for i in 0..width {
             let mut sum = Vec3::ZERO;
             let mut hits = 0u32;
+            let mut moving_hits = 0u32;
             for sample in 0..SAMPLES * SAMPLES {
                 let within = |k: u32| (k as f32 + 0.5) / SAMPLES as f32;
                 let ray = direction(i as f32 + within(sample % SAMPLES), j as f32 + within(sample / SAMPLES));
                 if sphere(eye, ray, WORLD_RADIUS).is_none() {
                     continue;
                 }
-                let mut nearest: Option<Hit> = None;
+                let mut nearest: Option<(Hit, bool)> = None;
                 for solid in &solids {
                     if solid.may_hit(eye, ray) {
-                        let limit = nearest.as_ref().map_or(f32::INFINITY, |hit| hit.distance);
-                        nearest = solid.hit(eye, ray, limit).or(nearest);
+                        let limit = nearest.as_ref().map_or(f32::INFINITY, |(hit, _)| hit.distance);
+                        nearest = solid.hit(eye, ray, limit).map(|hit| (hit, solid.moves)).or(nearest);
                     }
                 }
-                if let Some(hit) = nearest {
+                if let Some((hit, moves)) = nearest {
                     sum += shade(&hit, ray);
                     hits += 1;
+                    moving_hits += u32::from(moves);
                 }
             }
             let color = if hits > 0 { sum / hits as f32 } else { Vec3::ZERO };
             let alpha = hits as f32 / (SAMPLES * SAMPLES) as f32;
             let byte = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
             rgba.extend([color.x, color.y, color.z, alpha].map(byte));
+            moving.push(if moving_hits >= MOVING_RAYS { 255 } else { 0 });
         }
     }
-    rgba
+    Rendering { rgba, moving }
 }
 
 /// Lambert shading with much ambient light, and a small broad highlight that spherical harmonics can represent.

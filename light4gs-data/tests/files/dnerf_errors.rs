@@ -1,6 +1,9 @@
 //! Every way in which a D-NeRF folder can be wrong gives an error that names file, field and remedy.
 
-use light4gs_data::{DataError, ImageStore, LoadOptions, PointCloud, Resolution, RgbImage8, Scene, ply::Encoding};
+use light4gs_data::{
+    DataError, DatasetDigest, ImageStore, LoadOptions, PointCloud, Region, Resolution, RgbImage8, Scene, ply::Encoding,
+    regions,
+};
 use serde_json::{Value, json};
 use std::fs;
 use std::path::Path;
@@ -224,4 +227,55 @@ fn folders_whose_names_are_not_utf_8() {
     let opened = Scene::open(&odd, &LoadOptions::default());
     fs::rename(&odd, folder.path()).unwrap();
     assert_eq!(opened.unwrap().name, "light4gs-\u{fffd}-name");
+}
+
+/// Masks for the images of a split, at their size, in which the pixel in the corner moves.
+fn masks(root: &Path, split: &str, count: usize) {
+    fs::create_dir_all(root.join("mask").join(split)).unwrap();
+    for i in 0..count {
+        let corner = |x, y| image::Luma([if (x, y) == (0, 0) { 255 } else { 0 }]);
+        image::GrayImage::from_fn(32, 24, corner).save(root.join(format!("mask/{split}/r_{i:03}.png"))).unwrap();
+    }
+}
+
+#[test]
+fn masks_of_what_moves() {
+    let folder = scene();
+    let options = LoadOptions { resolution: Resolution::MaxSide(16), ..Default::default() };
+    let open = || Scene::open(folder.path(), &options).unwrap();
+    let before = DatasetDigest::of(&open()).unwrap();
+    masks(folder.path(), "test", 2);
+    let scene = open();
+    let masked = |frames: &[light4gs_data::Frame]| frames.iter().filter(|frame| frame.mask.is_some()).count();
+    assert_eq!((masked(&scene.train), masked(&scene.test), masked(&scene.val)), (0, 2, 0));
+    let found = regions(&scene.test[1]).unwrap();
+    let count = |i: usize| found[i].1.pixels.iter().map(|v| usize::from(*v)).sum::<usize>();
+    assert_eq!((found[0].0, count(0), found[0].1.pixels[0]), (Region::Moving, 1, 1));
+    assert_eq!((found[1].0, count(1)), (Region::Still, 16 * 12 - 1));
+    assert!(regions(&scene.train[0]).unwrap().is_empty());
+    assert_eq!(DatasetDigest::of(&scene).unwrap().changes_since(&before).len(), 1);
+}
+
+#[test]
+fn bad_masks_are_refused() {
+    let folder = scene();
+    masks(folder.path(), "test", 2);
+    let path = folder.path().join("mask/test/r_001.png");
+    let good = fs::read(&path).unwrap();
+    fs::remove_file(&path).unwrap();
+    expect(folder.path(), &["mask/test/r_001.png", "missing", "1 of the 2 images"]);
+    image(&path, 24, 32);
+    expect(folder.path(), &["mask/test/r_001.png", "24 x 32", "32 x 24"]);
+    fs::write(&path, &good[..good.len() - 5]).unwrap();
+    expect(folder.path(), &["mask/test/r_001.png", "truncated"]);
+    fs::write(&path, "no image").unwrap();
+    expect(folder.path(), &["mask/test/r_001.png", "header"]);
+    // Sound at its ends, damaged between: said when it is read.
+    let mut damaged = good;
+    let middle = damaged.windows(4).position(|name| name == b"IDAT").unwrap() + 6;
+    damaged[middle..middle + 6].fill(0x55);
+    fs::write(&path, damaged).unwrap();
+    let scene = Scene::open(folder.path(), &LoadOptions::default()).unwrap();
+    let message = regions(&scene.test[1]).unwrap_err().to_string();
+    assert!(message.contains("mask/test/r_001.png") && message.contains("damaged"), "{message}");
 }

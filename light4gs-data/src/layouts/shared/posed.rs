@@ -113,7 +113,10 @@ pub(in crate::layouts) fn note_unmasked(images: &[PosedImage], notes: &mut Vec<S
     let without: Vec<&PosedImage> = images.iter().filter(|image| image.mask.is_none()).collect();
     if let Some(first) = without.first() {
         let (count, all, first) = (without.len(), images.len(), first.path.display());
-        notes.push(format!("{count} of the {all} images have no mask and count as a whole; the first is {first}"));
+        notes.push(format!(
+            "{count} of the {all} images have no mask: they are trained on as a whole and left out of the figures of regions; \
+             the first is {first}"
+        ));
     }
 }
 

@@ -3,7 +3,7 @@
 use super::capture::{Capture, SIZE, Shot, opencv};
 use super::*;
 use crate::frame::MaskMeaning;
-use crate::images::RgbImage8;
+use crate::images::{Region, RgbImage8, regions};
 use crate::lens::{Distortion, Lens};
 use serde_json::{Value, json};
 use std::fs;
@@ -91,6 +91,11 @@ fn nerfds_reads_back_with_cameras_and_masks() {
     let masked: Vec<bool> = scene.train.iter().map(|frame| frame.mask.is_some()).collect();
     assert_eq!(masked, [false, true, false]);
     assert_eq!(scene.train[1].mask.as_ref().unwrap().zero, MaskMeaning::Moving);
+    // 255 everywhere: nothing moves, and all that the lens has recorded stands still.
+    let found = regions(&scene.train[1]).unwrap();
+    let count = |i: usize| found[i].1.pixels.iter().map(|v| usize::from(*v)).sum::<usize>();
+    assert_eq!((found[0].0, count(0), found[1].0), (Region::Moving, 0, Region::Still));
+    assert!(count(1) > found[1].1.pixels.len() / 2);
 }
 
 #[test]
