@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use light4gs_codec::{SceneMeta, legal_name};
 use light4gs_data::{
-    DataError, Frame, ImageStore, LoadOptions, PixelMask, Resolution, RgbImage8, Scene, measured_pixels,
+    DataError, Frame, ImageStore, LoadOptions, PixelMask, Region, Resolution, RgbImage8, Scene, regions,
 };
 
 use crate::config::Config;
@@ -27,13 +27,13 @@ pub trait ImageSource: Send + Sync {
         Ok(None)
     }
 
-    /// The pixels of masked metrics; `None` if the frame has no mask.
+    /// The regions of the image over which metrics are taken; none if the frame has no mask.
     ///
     /// # Errors
     /// If the mask cannot be read.
-    fn measured_pixels(&self, frame: &Frame) -> Result<Option<PixelMask>, DataError> {
+    fn regions(&self, frame: &Frame) -> Result<Vec<(Region, PixelMask)>, DataError> {
         let _ = frame;
-        Ok(None)
+        Ok(Vec::new())
     }
 
     /// Announces frames that will be needed, so that a source can begin to read them.
@@ -51,8 +51,8 @@ impl ImageSource for ImageStore {
         Ok(self.get_masked(frame)?.1)
     }
 
-    fn measured_pixels(&self, frame: &Frame) -> Result<Option<PixelMask>, DataError> {
-        measured_pixels(frame)
+    fn regions(&self, frame: &Frame) -> Result<Vec<(Region, PixelMask)>, DataError> {
+        regions(frame)
     }
 
     fn prefetch(&self, frames: &[Frame]) {

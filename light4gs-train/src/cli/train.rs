@@ -311,7 +311,7 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
 /// Quality by split.
 fn quality_table(evaluation: &Evaluation) -> Table {
     let columns = Scores::columns(evaluation.splits.iter().map(|split| &split.scores));
-    let names = [("split", Align::Left), ("views", Align::Right)];
+    let names = [("split".to_owned(), Align::Left), ("views".to_owned(), Align::Right)];
     let mut table = Table::new(names.into_iter().chain(columns.iter().map(|column| (column.label(), Align::Right))));
     for split in &evaluation.splits {
         let begin = [split.split.clone(), split.views.len().to_string()];

@@ -3,7 +3,7 @@
 use std::fs;
 
 use light4gs_codec::Limits;
-use light4gs_data::{DataError, Scene};
+use light4gs_data::{DataError, Region, Scene};
 use light4gs_model::DeformationField;
 
 use crate::compression::BitMap;
@@ -12,6 +12,7 @@ use crate::dataset::image_store;
 use crate::device::{self, describe};
 use crate::error::TrainError;
 use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
+use crate::metrics::{Metric, RegionMetric};
 use crate::observers::metrics_log::read_metrics;
 use crate::report::{CodingReport, PlayerReport, Report, SectionBytes, SummaryTile, write_report};
 use crate::run::RunFolder;
@@ -104,6 +105,14 @@ fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {
         let views = format!("mean over {} views of the decoded file", split.views.len());
         tiles.push(tile(&format!("{} PSNR", split.split), format!("{:.2} dB", split.scores.psnr()), &views));
         tiles.push(tile(&format!("{} SSIM", split.split), format!("{:.4}", split.scores.ssim()), &views));
+        let of = |region| {
+            let metric = Metric::Of(region, RegionMetric::Psnr);
+            split.scores.get(metric).map(|value| format!("{} dB", metric.format(Some(value))))
+        };
+        if let (Some(moving), Some(still)) = (of(Region::Moving), of(Region::Still)) {
+            let hint = format!("over all moving pixels of the views; what stands still has {still}");
+            tiles.push(tile(&format!("{} PSNR, moving", split.split), moving, &hint));
+        }
     }
     tiles.push(tile("File", format!("{:.2} MB", evaluation.bytes as f64 / 1e6), "bytes on disk / 10^6"));
     tiles.push(tile("Gaussians", evaluation.gaussians.to_string(), "in the file"));

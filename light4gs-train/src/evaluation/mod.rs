@@ -15,9 +15,9 @@ use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
+use crate::metrics::image_tensor;
 use crate::metrics::lpips::Lpips;
 use crate::metrics::scores::Scores;
-use crate::metrics::{image_tensor, mask_tensor};
 use crate::report::{SplitQuality, ViewImages, ViewQuality};
 
 /// Quality of one view.
@@ -37,7 +37,7 @@ pub struct ViewScore {
 pub struct SplitScore {
     /// `test`, `val`...
     pub split: String,
-    /// Means over the views.
+    /// Over the views.
     #[serde(flatten)]
     pub scores: Scores,
     /// Every view.
@@ -180,14 +180,13 @@ impl<F: DeformationField> DecodedScene<F> {
                 let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
-                let mask = images.measured_pixels(frame)?.map(|mask| mask_tensor(&mask, &self.device));
-                let scores = Scores::measure(&image, &truth_tensor, mask.as_ref(), &lpips);
+                let scores = Scores::measure(&image, &truth_tensor, &images.regions(frame)?, &lpips);
                 let (name, time, psnr) = (frame.name.clone(), frame.time, scores.psnr());
                 views.push(ViewScore { name: name.clone(), time, scores });
                 let (truth, render) = ((*truth).clone(), render.to_u8());
                 rendered.push(RenderedView { split, name, time, psnr, truth, render });
             }
-            let scores = Scores::mean(views.iter().map(|view| &view.scores));
+            let scores = Scores::over(views.iter().map(|view| &view.scores));
             splits.push(SplitScore { split: name.to_string(), scores, views });
         }
         let frames = if scene.test.is_empty() { &scene.train } else { &scene.test };

@@ -1,19 +1,24 @@
-//! Metrics of how alike two images are, all differentiable. Images are `[H, W, 3]` in [0, 1]; a mask is `[H, W]`, 1 where
-//! pixels count and 0 where they do not.
+//! Metrics of how alike two images are, all differentiable. Images are `[H, W, 3]` in [0, 1].
 //!
 //! - here: L1, squared differences, PSNR
 //! - `ssim`: SSIM in the field's two conventions, MS-SSIM and the D-SSIM of the tables
 //! - [`lpips`]: the learned distance, with weights from a file
-//! - [`scores`]: the metrics by name, and the scores of an image
+//! - `pixel_map`: a number for each pixel, of which a metric is the mean over a region
+//! - `metric`: the metrics by name
+//! - [`scores`]: the scores of a view, and over views
 
 pub mod lpips;
+mod metric;
+mod pixel_map;
 pub mod scores;
 mod ssim;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::{PixelMask, RgbImage8};
 
-pub use ssim::{MS_SSIM_LEAST_SIDE, WINDOW, d_ssim, masked_ssim, ms_ssim, ssim, ssim_valid};
+pub use metric::{Metric, RegionMetric};
+pub use pixel_map::PixelMap;
+pub use ssim::{MS_SSIM_LEAST_SIDE, WINDOW, d_ssim, ms_ssim, ssim, ssim_map, ssim_valid};
 
 /// Mean absolute difference over pixels and channels, `[1]`.
 pub fn l1(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
@@ -22,28 +27,22 @@ pub fn l1(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
 
 /// Mean squared difference over pixels and channels, `[1]`.
 pub fn l2(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
-    (image - truth).powi_scalar(2).mean()
+    squared_differences(image, truth).mean()
+}
+
+/// Squared difference at every pixel and channel, `[H, W, 3]`.
+pub fn squared_differences(image: Tensor<3>, truth: Tensor<3>) -> Tensor<3> {
+    (image - truth).powi_scalar(2)
 }
 
 /// Peak signal-to-noise ratio in dB over the whole image, for a peak of 1.
 pub fn psnr(image: Tensor<3>, truth: Tensor<3>) -> f64 {
-    decibels(l2(image, truth))
+    decibels(l2(image, truth).into_scalar::<f64>())
 }
 
-/// [`psnr`] over the pixels of a mask.
-pub fn masked_psnr(image: Tensor<3>, truth: Tensor<3>, mask: Tensor<2>) -> f64 {
-    decibels(masked_mean((image - truth).powi_scalar(2), mask))
-}
-
-fn decibels(mean_squared_error: Tensor<1>) -> f64 {
-    -10.0 * mean_squared_error.into_scalar::<f64>().log10()
-}
-
-/// Mean of a map `[H, W, C]` over the pixels of a mask, `[1]`; NaN where the mask is empty.
-fn masked_mean(map: Tensor<3>, mask: Tensor<2>) -> Tensor<1> {
-    let channels = map.dims()[2] as f32;
-    let pixels = mask.clone().sum();
-    (map * mask.unsqueeze_dim::<3>(2)).sum() / (pixels * channels)
+/// The PSNR of a mean squared error, dB, for a peak of 1.
+pub fn decibels(mean_squared_error: f64) -> f64 {
+    -10.0 * mean_squared_error.log10()
 }
 
 /// Which pixels count as a tensor `[H, W]`: 1 where they do.

@@ -9,8 +9,6 @@ use burn::tensor::module::{avg_pool2d, conv2d};
 use burn::tensor::ops::{AvgPoolOptions, ConvOptions};
 use burn::tensor::{Device, Tensor, TensorData, s};
 
-use super::masked_mean;
-
 /// Side of the window in pixels.
 pub const WINDOW: usize = 11;
 /// Standard deviation of the window in pixels.
@@ -101,10 +99,10 @@ pub fn ssim_valid(image: Tensor<3>, truth: Tensor<3>) -> Option<Tensor<1>> {
     fits.then(|| similarity(planes(image), planes(truth), Windows::Inside).full().mean())
 }
 
-/// [`ssim`] over the pixels of a mask: the mean of the windows around them, `[1]`.
-pub fn masked_ssim(image: Tensor<3>, truth: Tensor<3>, mask: Tensor<2>) -> Tensor<1> {
+/// What [`ssim`] is the mean of: the similarity in the window around every pixel, in every channel, `[H, W, C]`.
+pub fn ssim_map(image: Tensor<3>, truth: Tensor<3>) -> Tensor<3> {
     let map = similarity(planes(image), planes(truth), Windows::Padded).full();
-    masked_mean(map.squeeze_dim::<3>(1).permute([1, 2, 0]), mask)
+    map.squeeze_dim::<3>(1).permute([1, 2, 0])
 }
 
 /// MS-SSIM over five scales, windows inside the image, averaged over channels, `[1]`; none where a side is under

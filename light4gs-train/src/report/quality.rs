@@ -6,7 +6,8 @@ use super::SplitQuality;
 use super::chart::{Chart, Mark, Series};
 use super::format::{count, fixed};
 use super::html::escape;
-use crate::metrics::scores::{Metric, Scores};
+use crate::metrics::Metric;
+use crate::metrics::scores::Scores;
 
 pub(super) fn section(splits: &[SplitQuality]) -> String {
     if splits.is_empty() {
@@ -24,7 +25,9 @@ pub(super) fn section(splits: &[SplitQuality]) -> String {
 /// What the columns mean, for those who compare with other tables.
 const LEGEND: &str = "<p class=\"legend\">SSIM has zeros around the image, as 3DGS; SSIM valid counts windows inside it, as \
     TensorFlow and scikit-image with Gaussian weights. D-SSIM is (1 - MS-SSIM) / 2. LPIPS needs weights from a file: \
-    <code>light4gs eval --lpips FILE</code>. Measures with an m count the pixels of the dataset's masks.</p>\n";
+    <code>light4gs eval --lpips FILE</code>. The worst 5 % are the pixels of a view \
+    with the largest squared errors. Moving and still pixels are told apart by the dataset's masks; figures of a split are over all such pixels \
+    of its views together. Metrics with an m leave out the pixels that masks ignore.</p>\n";
 
 fn heads(html: &mut String, names: &[&str], columns: &[Metric]) {
     html.push_str("<thead><tr>");

@@ -1,7 +1,7 @@
 use super::*;
 use crate::compression::{BitEstimate, PlaneRecord};
+use crate::metrics::Metric;
 use crate::metrics::lpips::LpipsNetwork;
-use crate::metrics::scores::Metric;
 use crate::stage::Stage;
 
 fn image(width: u32, height: u32, shift: u8) -> RgbImage8 {

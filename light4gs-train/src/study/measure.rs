@@ -16,6 +16,16 @@ choice! {
         Ssim = "ssim",
         /// Mean PSNR of the validation split, dB.
         ValPsnr = "val_psnr",
+        /// PSNR of the same split as [`Self::Psnr`] over all pixels that move, dB; only where the dataset has masks.
+        MovingPsnr = "moving_psnr",
+        /// The same over all pixels that stand still.
+        StillPsnr = "still_psnr",
+        /// SSIM over all pixels that move.
+        MovingSsim = "moving_ssim",
+        /// SSIM over all pixels that stand still.
+        StillSsim = "still_ssim",
+        /// PSNR over the worst pixels of the same split: the 5 % of each view with the largest squared errors, dB.
+        WorstPsnr = "worst_psnr",
         /// Size of the file.
         Bytes = "bytes",
         /// Size of the Gaussians: their attributes and spherical harmonics.
@@ -57,10 +67,15 @@ choice! {
 
 impl Measure {
     /// All of them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 26] = [
         Self::Psnr,
         Self::Ssim,
         Self::ValPsnr,
+        Self::MovingPsnr,
+        Self::StillPsnr,
+        Self::MovingSsim,
+        Self::StillSsim,
+        Self::WorstPsnr,
         Self::Bytes,
         Self::GaussianBytes,
         Self::ShBytes,
@@ -87,6 +102,11 @@ impl Measure {
             Self::Psnr => "PSNR dB",
             Self::Ssim => "SSIM",
             Self::ValPsnr => "val PSNR dB",
+            Self::MovingPsnr => "moving dB",
+            Self::StillPsnr => "still dB",
+            Self::MovingSsim => "moving SSIM",
+            Self::StillSsim => "still SSIM",
+            Self::WorstPsnr => "worst 5 % dB",
             Self::Bytes => "file, bytes",
             Self::GaussianBytes => "Gaussians, bytes",
             Self::ShBytes => "SH, bytes",
@@ -119,10 +139,16 @@ impl Measure {
             Self::Bytes | Self::GaussianBytes | Self::ShBytes | Self::PlaneBytes | Self::ContextBytes => 0,
             Self::MotionBytes | Self::Gaussians => 0,
             Self::Minutes | Self::FitSeconds | Self::Fps => 1,
-            Self::Psnr | Self::ValPsnr | Self::EncodeSeconds | Self::DecodeSeconds | Self::RenderMilliseconds => 2,
+            Self::Psnr | Self::ValPsnr | Self::MovingPsnr | Self::StillPsnr | Self::WorstPsnr => 2,
+            Self::EncodeSeconds | Self::DecodeSeconds | Self::RenderMilliseconds => 2,
             Self::EncodePerFrame | Self::DecodePerFrame | Self::EndToEnd => 2,
-            Self::Ssim | Self::LeastStep | Self::MostStep => 4,
+            Self::Ssim | Self::MovingSsim | Self::StillSsim | Self::LeastStep | Self::MostStep => 4,
         }
+    }
+
+    /// Whether it is of a region that only some datasets mark.
+    pub fn needs_masks(self) -> bool {
+        matches!(self, Self::MovingPsnr | Self::StillPsnr | Self::MovingSsim | Self::StillSsim)
     }
 
     /// Whether it is a time, which differs in every run.
@@ -150,9 +176,14 @@ impl Measure {
         let per_frame = |seconds: Option<f64>| Some(1e3 * seconds? / run.frames? as f64);
         let render = 1e3 / run.fps;
         let value = match self {
-            Self::Psnr => run.psnr,
-            Self::Ssim => run.ssim,
+            Self::Psnr => run.quality.psnr,
+            Self::Ssim => run.quality.ssim,
             Self::ValPsnr => run.val_psnr,
+            Self::MovingPsnr => run.quality.moving_psnr,
+            Self::StillPsnr => run.quality.still_psnr,
+            Self::MovingSsim => run.quality.moving_ssim,
+            Self::StillSsim => run.quality.still_ssim,
+            Self::WorstPsnr => run.quality.worst_psnr,
             Self::Bytes => Some(run.bytes as f64),
             Self::GaussianBytes => section(&["gaussians", "sh"]),
             Self::ShBytes => section(&["sh"]),
@@ -198,14 +229,18 @@ pub struct Column {
     pub form: Form,
 }
 
-/// The columns of a study that does not choose any.
+/// The columns of a study that does not choose any. Those of regions show where the datasets have masks.
 pub(super) fn default_columns() -> Vec<Column> {
     let value = |measure| Column { measure, form: Form::Value };
     let percent = |measure| Column { measure, form: Form::Percent };
     vec![
         value(Measure::Psnr),
         percent(Measure::Psnr),
+        value(Measure::MovingPsnr),
+        value(Measure::StillPsnr),
         value(Measure::Ssim),
+        value(Measure::MovingSsim),
+        value(Measure::StillSsim),
         value(Measure::Bytes),
         percent(Measure::Bytes),
         value(Measure::Gaussians),

@@ -27,10 +27,9 @@ pub struct RunResult {
     pub seed: u64,
     /// Digest of its configuration.
     pub configuration: String,
-    /// Mean PSNR of the test split, dB; of the first measured split where there is none.
-    pub psnr: Option<f64>,
-    /// Mean SSIM of the same split.
-    pub ssim: Option<f64>,
+    /// Of the test split; of the first measured split where there is none.
+    #[serde(flatten)]
+    pub quality: Quality,
     /// Mean PSNR of the validation split, dB.
     pub val_psnr: Option<f64>,
     /// Size of the file.
@@ -63,6 +62,25 @@ pub struct RunResult {
     /// The device on which it was measured.
     #[serde(skip)]
     pub device: String,
+}
+
+/// What studies show of a split's quality. None where it was not measured.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Mean PSNR, dB.
+    pub psnr: Option<f64>,
+    /// Mean SSIM.
+    pub ssim: Option<f64>,
+    /// PSNR over all pixels that move, dB.
+    pub moving_psnr: Option<f64>,
+    /// PSNR over all pixels that stand still, dB.
+    pub still_psnr: Option<f64>,
+    /// SSIM over all pixels that move.
+    pub moving_ssim: Option<f64>,
+    /// SSIM over all pixels that stand still.
+    pub still_ssim: Option<f64>,
+    /// PSNR over the worst pixels, dB.
+    pub worst_psnr: Option<f64>,
 }
 
 /// A run without a result.
@@ -111,8 +129,8 @@ struct SectionFile {
 #[derive(Deserialize)]
 struct SplitFile {
     split: String,
-    psnr: Option<f64>,
-    ssim: Option<f64>,
+    #[serde(flatten)]
+    quality: Quality,
 }
 
 /// Whether a run in a folder is finished: `report.html` is written last.
@@ -201,9 +219,8 @@ fn result(run: &ManifestRun, evaluation: EvaluationFile, frames: Option<u32>) ->
         variant: run.variant,
         seed: run.seed,
         configuration: run.configuration.clone(),
-        psnr: shown.and_then(|split| split.psnr),
-        ssim: shown.and_then(|split| split.ssim),
-        val_psnr: split("val").and_then(|split| split.psnr),
+        quality: shown.map(|split| split.quality).unwrap_or_default(),
+        val_psnr: split("val").and_then(|split| split.quality.psnr),
         bytes: evaluation.bytes,
         sections: evaluation.sections.iter().map(|section| (section.name.clone(), section.bytes)).collect(),
         gaussians: evaluation.gaussians,

@@ -82,14 +82,18 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     let reference = study.reference.as_ref().and_then(|name| variants.iter().position(|variant| variant.name == *name));
     let reference = reference.unwrap_or(0);
     let of = |variant: usize, measure: Measure| by_seed(manifest, results, scenes, variant, measure);
+    // Most datasets have no masks.
+    let is_measured =
+        |measure: Measure| (0..variants.len()).any(|index| of(index, measure).iter().any(Option::is_some));
+    let shown = |column: &&Column| !column.measure.needs_masks() || is_measured(column.measure);
+    let columns: Vec<&Column> = study.columns.iter().filter(shown).collect();
     let rows = variants.iter().enumerate().map(|(index, variant)| StudyRow {
         label: variant.label.clone(),
         runs: [
             results.runs.iter().filter(|run| run.variant == index && scenes.contains(&run.scene)).count(),
             manifest.runs.iter().filter(|run| run.variant == index && scenes.contains(&run.scene)).count(),
         ],
-        cells: study
-            .columns
+        cells: columns
             .iter()
             .map(|column| {
                 let own = of(index, column.measure);
@@ -103,7 +107,7 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     });
     StudyTable {
         heading: heading.to_owned(),
-        columns: study.columns.iter().map(Column::heading).collect(),
+        columns: columns.iter().map(|column| column.heading()).collect(),
         rows: rows.collect(),
         published: published(manifest, results, scenes),
     }
@@ -282,7 +286,7 @@ pub fn legend(manifest: &Manifest) -> String {
 mod tests {
     use super::super::manifest::{ManifestRun, ManifestScene};
     use super::super::rate_curves::rate_curves;
-    use super::super::results::{MissingRun, RunResult};
+    use super::super::results::{MissingRun, Quality, RunResult};
     use super::super::{Manifest, Study};
     use super::*;
 
@@ -336,8 +340,7 @@ bytes = 2.2e6
             variant,
             seed,
             configuration: String::new(),
-            psnr: Some(psnr),
-            ssim: None,
+            quality: Quality { psnr: Some(psnr), ..Quality::default() },
             val_psnr: None,
             bytes: 1000 * (variant as u64 + 1),
             sections: Vec::new(),
@@ -401,6 +404,22 @@ bytes = 2.2e6
         let cell = tables[0].rows[0].cells[0].as_ref().unwrap();
         assert_eq!((cell.value, cell.deviation), (5.5, Some(0.5f64.sqrt())));
         assert_eq!(texts(&tables[0], 1)[2], "+0.00 ± 0.00 ≈");
+    }
+
+    #[test]
+    fn columns_of_regions_show_where_there_are_masks() {
+        let (mut manifest, mut results) = example(&["x", "y"], 1, |_, _, _| Some(20.0));
+        let column = |text: &str| serde_json::from_value(text.into()).unwrap();
+        manifest.study.columns = ["psnr", "moving_psnr", "moving_psnr:difference", "still_ssim"].map(column).into();
+        assert!(tables(&manifest, &results).iter().all(|table| table.columns == ["PSNR dB"]));
+        for run in results.runs.iter_mut().filter(|run| run.scene == 1) {
+            run.quality.moving_psnr = Some(15.0 + run.variant as f64);
+        }
+        // The scenes have no common mean of what only one of them has.
+        let [mean, x, y] = &tables(&manifest, &results)[..] else { panic!("three tables") };
+        assert_eq!((&mean.columns[..], &x.columns[..]), (&["PSNR dB".to_owned()][..], &["PSNR dB".to_owned()][..]));
+        assert_eq!(y.columns, ["PSNR dB", "moving dB", "Δmoving dB"]);
+        assert_eq!(texts(y, 1), ["two", "20.00", "16.00", "+1.00"]);
     }
 
     #[test]

@@ -3,10 +3,13 @@
 use std::path::PathBuf;
 
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_data::{PixelMask, Region};
 use light4gs_tests::golden::{Golden, assert_close, cpu_devices, devices, values_of};
 use light4gs_train::metrics::lpips::{Lpips, LpipsNetwork};
-use light4gs_train::metrics::scores::{Metric, Scores};
-use light4gs_train::metrics::{MS_SSIM_LEAST_SIDE, d_ssim, masked_psnr, masked_ssim, ms_ssim, psnr, ssim, ssim_valid};
+use light4gs_train::metrics::scores::Scores;
+use light4gs_train::metrics::{
+    MS_SSIM_LEAST_SIDE, Metric, PixelMap, RegionMetric, d_ssim, decibels, ms_ssim, psnr, ssim, ssim_map, ssim_valid,
+};
 
 /// An image of bytes as `[H, W, 3]` in [0, 1]; `channels_first` says how the file has it.
 fn bytes_image(golden: &Golden, key: &str, channels_first: bool, device: &Device) -> Tensor<3> {
@@ -51,11 +54,10 @@ fn learned_distance() {
             assert_close(&format!("{name} {pair}"), &distance, &golden.values(&format!("pair{pair}.lpips")), 1e-4);
             let itself = values_of(&lpips.distance(a.clone(), a.clone()).unwrap());
             assert_eq!(itself, [0.0]);
-            let [height, width, _] = a.dims();
-            let everything = Tensor::ones([height, width], &device);
-            let masked = values_of(&lpips.masked_distance(a, b, everything).unwrap());
+            let map = lpips.distance_map(a.clone(), b).unwrap();
+            assert_eq!(map.dims()[..2], a.dims()[..2]);
             // Bilinear enlargement counts the border more, so this is near the distance and not equal to it.
-            assert_close(&format!("{name} {pair} masked"), &masked, &distance, 0.05);
+            assert_close(&format!("{name} {pair} map"), &values_of(&map.mean()), &distance, 0.05);
         }
     }
 }
@@ -124,7 +126,7 @@ fn images_that_are_too_small_have_no_multiscale_similarity() {
     for (name, device) in cpu_devices() {
         let measure = |height, width| {
             let (image, truth) = (pattern(height, width, 0.0, &device), pattern(height, width, 0.1, &device));
-            Scores::measure(&image, &truth, None, &[])
+            Scores::measure(&image, &truth, &[], &[])
         };
         let least = MS_SSIM_LEAST_SIDE;
         assert!(measure(least, least + 4).get(Metric::MsSsim).is_some(), "{name}");
@@ -143,33 +145,87 @@ fn valid_windows_are_the_inner_ones() {
     let device = Device::flex();
     // Windows of the padded convention at least five pixels from the border are those that lie inside.
     let (image, truth) = (pattern(24, 31, 0.0, &device), pattern(24, 31, 0.4, &device));
-    let mut inner = vec![0.0f32; 24 * 31];
+    let mut pixels = vec![0; 24 * 31];
     for row in 5..24 - 5 {
-        inner[row * 31 + 5..row * 31 + 31 - 5].fill(1.0);
+        pixels[row * 31 + 5..row * 31 + 31 - 5].fill(1);
     }
-    let mask = Tensor::<2>::from_data(TensorData::new(inner, [24, 31]), &device);
-    let inside = masked_ssim(image.clone(), truth.clone(), mask).into_scalar::<f32>();
-    let valid = ssim_valid(image, truth).unwrap().into_scalar::<f32>();
+    let inner = PixelMask { width: 31, height: 24, pixels };
+    let (inside, _) = PixelMap::of(ssim_map(image.clone(), truth.clone())).mean_over(&inner).unwrap();
+    let valid = ssim_valid(image, truth).unwrap().into_scalar::<f64>();
     assert!((inside - valid).abs() < 1e-6, "{inside} against {valid}");
 }
 
+/// A mask of 40 × 40 pixels: the columns from `from` on, up to `to`.
+fn columns(from: usize, to: usize) -> PixelMask {
+    let pixels = (0..1600).map(|i| u8::from((from..to).contains(&(i % 40)))).collect();
+    PixelMask { width: 40, height: 40, pixels }
+}
+
+/// An image whose columns from 0 up to `to` are off by `shift`, and the truth.
+fn shifted(to: usize, shift: f32, device: &Device) -> [Tensor<3>; 2] {
+    let truth = pattern(40, 40, 0.0, device);
+    let off: Vec<f32> = columns(0, to).pixels.iter().map(|inside| shift * f32::from(*inside)).collect();
+    let off = Tensor::<2>::from_data(TensorData::new(off, [40, 40]), device);
+    [truth.clone() + off.unsqueeze_dim::<3>(2), truth]
+}
+
 #[test]
-fn masks_choose_the_pixels_that_count() {
+fn regions_are_measured_apart() {
+    use RegionMetric::{Psnr, Ssim};
     for (name, device) in cpu_devices() {
-        let truth = pattern(40, 40, 0.0, &device);
-        // The left half is off by 0.1, the right half by nothing.
-        let columns = |left: f32, right: f32| {
-            let value = |i: usize| if i % 40 < 20 { left } else { right };
-            Tensor::<2>::from_data(TensorData::new((0..1600).map(value).collect::<Vec<_>>(), [40, 40]), &device)
+        let near = |found: Option<f64>, expected: f64| {
+            assert!((found.unwrap() - expected).abs() < 1e-3, "{name}: {found:?}, expected {expected}");
         };
-        let image = truth.clone() + columns(0.1, 0.0).unsqueeze_dim::<3>(2);
-        let left = masked_psnr(image.clone(), truth.clone(), columns(1.0, 0.0));
-        assert!((left - 20.0).abs() < 1e-3, "{name}: {left}");
-        assert!((psnr(image.clone(), truth.clone()) - 23.0103).abs() < 1e-3, "{name}");
-        let scores = Scores::measure(&image, &truth, Some(&columns(0.0, 1.0)), &[]);
-        assert_eq!(scores.get(Metric::MaskedPsnr), Some(f64::INFINITY), "{name}");
-        assert!(scores.get(Metric::MaskedSsim).unwrap() > scores.ssim(), "{name}");
-        let empty = Scores::measure(&image, &truth, Some(&columns(0.0, 0.0)), &[]);
-        assert_eq!(empty.get(Metric::MaskedPsnr), None, "{name}: an empty mask has no mean");
+        // The left half is off by 0.1, the right half by nothing.
+        let [image, truth] = shifted(20, 0.1, &device);
+        let regions =
+            [(Region::Moving, columns(0, 30)), (Region::Still, columns(30, 40)), (Region::Masked, columns(40, 40))];
+        let scores = Scores::measure(&image, &truth, &regions, &[]);
+        near(Some(scores.psnr()), 23.0103);
+        // 20 of 30 columns have a squared error of 0.01.
+        near(scores.get(Metric::Of(Region::Moving, Psnr)), 21.7609);
+        assert_eq!(scores.get(Metric::Of(Region::Still, Psnr)), Some(f64::INFINITY), "{name}");
+        near(scores.get(Metric::WorstPsnr), 20.0);
+        // Windows reach five pixels far.
+        near(scores.get(Metric::Of(Region::Still, Ssim)), 1.0);
+        let [moving, whole] = [scores.get(Metric::Of(Region::Moving, Ssim)).unwrap(), scores.ssim()];
+        near(Some(0.75 * moving + 0.25), whole);
+        assert_eq!(scores.get(Metric::Of(Region::Masked, Psnr)), None, "{name}: an empty region has no mean");
+        let json = serde_json::to_value(&scores).unwrap();
+        near(json["moving_psnr"].as_f64(), 21.7609);
+        near(json["worst_psnr"].as_f64(), 20.0);
+        assert!(json.get("masked_psnr").is_none() && json.get("moving_lpips_alex").is_none(), "{json}");
     }
+}
+
+#[test]
+fn figures_over_views_are_over_all_pixels_of_a_region() {
+    use RegionMetric::{Psnr, Ssim};
+    let device = Device::flex();
+    let measure = |shift: f32, moving: usize| {
+        // Only the first columns are off, in a view in which `moving` of them move.
+        let [image, truth] = shifted(moving, shift, &device);
+        let regions = [(Region::Moving, columns(0, moving)), (Region::Still, columns(moving, 40))];
+        let masked = (Region::Masked, columns(0, moving));
+        Scores::measure(&image, &truth, &[&regions[..], &[masked]].concat(), &[])
+    };
+    // 10 columns with a squared error of 0.01, 30 with 0.0001, and a view in which nothing moves.
+    let views = [measure(0.1, 10), measure(0.01, 30), measure(0.0, 0)];
+    let over = Scores::over(views.iter());
+    let near = |metric: Metric, expected: f64| {
+        let found = over.get(metric).unwrap();
+        assert!((found - expected).abs() < 1e-3, "{}: {found}, expected {expected}", metric.key());
+    };
+    near(Metric::Of(Region::Moving, Psnr), decibels((10.0 * 0.01 + 30.0 * 0.0001) / 40.0));
+    assert_eq!(over.get(Metric::Of(Region::Still, Psnr)), Some(f64::INFINITY));
+    // Two columns of each view are the worst.
+    near(Metric::WorstPsnr, decibels((0.01 + 0.0001 + 0.0) / 3.0));
+    // The field's masked metrics are means over the views that have them.
+    near(Metric::Of(Region::Masked, Psnr), (20.0 + 40.0) / 2.0);
+    let ssim = |view: usize| views[view].get(Metric::Of(Region::Moving, Ssim)).unwrap();
+    near(Metric::Of(Region::Moving, Ssim), (10.0 * ssim(0) + 30.0 * ssim(1)) / 40.0);
+    near(Metric::Of(Region::Masked, Ssim), (ssim(0) + ssim(1)) / 2.0);
+    let shown: Vec<String> = Scores::columns(views.iter()).into_iter().map(Metric::label).collect();
+    let regions = ["moving dB", "still dB", "moving SSIM", "still SSIM", "mPSNR dB", "mSSIM"];
+    assert_eq!((&shown[7][..], &shown[8..]), ("worst 5 % dB", &regions.map(str::to_owned)[..]));
 }

@@ -18,8 +18,6 @@ use light4gs_data::DataError;
 
 pub use network::LpipsNetwork;
 
-use super::masked_mean;
-
 /// What the images are shifted and scaled by, after they are mapped to [-1, 1].
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
 const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
@@ -65,18 +63,15 @@ impl Lpips {
         Some(Tensor::cat(maps.into_iter().map(|map| map.mean()).collect(), 0))
     }
 
-    /// [`Self::distance`] over the pixels of a mask `[H, W]`: each tap's map is brought to the image's size (bilinear) and
-    /// averaged there.
-    pub fn masked_distance(&self, image: Tensor<3>, truth: Tensor<3>, mask: Tensor<2>) -> Option<Tensor<1>> {
+    /// [`Self::distance`] at every pixel, `[H, W, 1]`: each tap's map is brought to the image's size (bilinear), and the sum
+    /// taken there.
+    pub fn distance_map(&self, image: Tensor<3>, truth: Tensor<3>) -> Option<Tensor<3>> {
         let [height, width, _] = image.dims();
         let options = InterpolateOptions::new(InterpolateMode::Bilinear)
             .with_align_corners(false)
             .with_output_size([height, width]);
-        let mean = |map: Tensor<4>| {
-            let map = interpolate(map, options.clone()).reshape([height, width, 1]);
-            masked_mean(map, mask.clone())
-        };
-        self.maps(image, truth)?.into_iter().map(mean).reduce(|sum, part| sum + part)
+        let enlarged = |map: Tensor<4>| interpolate(map, options.clone()).reshape([height, width, 1]);
+        self.maps(image, truth)?.into_iter().map(enlarged).reduce(|sum, part| sum + part)
     }
 
     /// `[1, 1, h, w]` for each tap: weighted squared differences of the normalized features.
