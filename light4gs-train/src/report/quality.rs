@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+use light4gs_data::Region;
+
 use super::SplitQuality;
 use super::chart::{Chart, Mark, Series};
 use super::format::{count, fixed};
@@ -23,11 +25,19 @@ pub(super) fn section(splits: &[SplitQuality]) -> String {
 }
 
 /// What the columns mean, for those who compare with other tables.
-const LEGEND: &str = "<p class=\"legend\">SSIM has zeros around the image, as 3DGS; SSIM valid counts windows inside it, as \
-    TensorFlow and scikit-image with Gaussian weights. D-SSIM is (1 - MS-SSIM) / 2. LPIPS needs weights from a file: \
-    <code>light4gs eval --lpips FILE</code>. The worst 5 % are the pixels of a view \
-    with the largest squared errors. Moving and still pixels are told apart by the dataset's masks; figures of a split are over all such pixels \
-    of its views together. Metrics with an m leave out the pixels that masks ignore.</p>\n";
+fn legend(columns: &[Metric]) -> String {
+    const ALWAYS: &str = "SSIM has zeros around the image, as 3DGS; SSIM valid counts windows inside it, as TensorFlow and \
+        scikit-image with Gaussian weights. D-SSIM is (1 - MS-SSIM) / 2. LPIPS needs weights from a file: <code>light4gs eval \
+        --lpips FILE</code>. The worst 5 % are the pixels of a view with the largest squared errors.";
+    const MOTION: &str = " Moving and still pixels are told apart by the dataset's masks; figures of a split are over all such \
+        pixels of its views together.";
+    const MASKED: &str = " Metrics with an m leave out the pixels that the dataset's masks ignore.";
+    let has =
+        |wanted: Region| columns.iter().any(|metric| matches!(metric, Metric::Of(region, _) if *region == wanted));
+    let motion = if has(Region::Moving) || has(Region::Still) { MOTION } else { "" };
+    let masked = if has(Region::Masked) { MASKED } else { "" };
+    format!("<p class=\"legend\">{ALWAYS}{motion}{masked}</p>\n")
+}
 
 fn heads(html: &mut String, names: &[&str], columns: &[Metric]) {
     html.push_str("<thead><tr>");
@@ -57,7 +67,7 @@ fn summary(html: &mut String, splits: &[SplitQuality]) {
         cells(html, &split.scores, &columns);
     }
     html.push_str("</tbody>\n</table></div>\n");
-    html.push_str(LEGEND);
+    html.push_str(&legend(&columns));
 }
 
 fn views(html: &mut String, splits: &[SplitQuality]) {

@@ -58,6 +58,50 @@ fn a_scene_goes_all_the_way() {
 }
 
 #[test]
+fn masks_of_the_dataset_split_quality_into_what_moves_and_what_stands_still() {
+    let w = trained();
+    const KEYS: [&str; 4] = ["moving_psnr", "still_psnr", "moving_ssim", "still_ssim"];
+    // The run was trained elsewhere, so it names another folder.
+    let eval = |run: &str| -> serde_json::Value {
+        let output = w.run(["eval", run, "--scene", "scene", "--json"]);
+        assert_success(&output);
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let masked = eval("run");
+    let test = &masked["splits"][0];
+    let [moving, still, ..] = KEYS.map(|key| test[key].as_f64().unwrap());
+    let whole = test["psnr"].as_f64().unwrap();
+    assert!(moving.min(still) < whole && whole < moving.max(still), "{moving}, {still}, whole {whole}");
+    assert!(test["worst_psnr"].as_f64().unwrap() < whole.min(moving));
+    assert!(KEYS.iter().all(|key| test["views"][0][key].is_number()), "{test}");
+    let report = fs::read_to_string(w.path("run/report.html")).unwrap();
+    assert!(report.contains("test PSNR, moving") && report.contains(">still SSIM<"));
+    let text = String::from_utf8(w.run(["eval", "run", "--scene", "scene"]).stdout).unwrap();
+    assert!(text.contains("moving dB") && text.contains(&format!("{moving:.2}")), "{text}");
+
+    // Without masks the rest is the same to the last bit.
+    fs::rename(w.path("run"), w.path("plain")).unwrap();
+    fs::rename(w.path("scene/mask"), w.path("masks")).unwrap();
+    let plain = eval("plain");
+    assert!(KEYS.iter().all(|key| plain["splits"][0].get(key).is_none()));
+    for key in ["psnr", "ssim", "ms_ssim", "worst_psnr"] {
+        assert_eq!(plain["splits"][0].get(key), test.get(key), "{key}");
+    }
+    assert!(!fs::read_to_string(w.path("plain/report.html")).unwrap().contains(">moving dB<"));
+    assert_success(&w.train("run", &["seed=1"]).output().unwrap());
+    fs::rename(w.path("masks"), w.path("scene/mask")).unwrap();
+    eval("run");
+    let compared = String::from_utf8(w.run(["compare", "plain", "run"]).stdout).unwrap();
+    assert!(KEYS.iter().all(|key| compared.contains(&format!("splits.test.{key}"))), "{compared}");
+
+    // Half a set of masks, and one that is no image.
+    fs::write(w.path("scene/mask/test/r_001.png"), "hello").unwrap();
+    assert_refused(&w.run(["eval", "run", "--scene", "scene"]), &["mask/test/r_001.png"]);
+    fs::remove_file(w.path("scene/mask/test/r_001.png")).unwrap();
+    assert_refused(&w.run(["eval", "run", "--scene", "scene"]), &["mask/test/r_001.png", "2 of the 3", "remove"]);
+}
+
+#[test]
 fn both_devices_train() {
     let w = Workspace::new(PROGRAM);
     for device in ["ndarray", "flex"] {

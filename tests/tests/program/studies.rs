@@ -49,6 +49,7 @@ fn a_study_from_plan_to_table() {
     assert_eq!(results["runs"].as_array().unwrap().len(), 5);
     assert_eq!(results["missing"], Value::Array(Vec::new()));
     let table = fs::read_to_string(w.path("study/table.md")).unwrap();
+    assert!(table.contains("| moving dB | still dB |"), "the scene has masks: {table}");
     for row in ["float32", "medium, paper's profile", "high", "medium", "small"] {
         assert!(table.contains(&format!("| {row} |")), "{table}");
     }
