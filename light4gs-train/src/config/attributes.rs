@@ -1,4 +1,5 @@
-//! What the configuration says of the attributes of the Gaussians, by the keys that the table of attributes names.
+//! The keys of the configuration that concern the attributes of the Gaussians. The table of attributes names the key of
+//! each attribute.
 
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_model::Attribute;
@@ -9,13 +10,13 @@ use super::{AttributesConfig, LearningRates};
 /// The learning rate of an attribute over a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct AttributeRate {
-    /// The key that says it and its value, where it stands in the configuration.
+    /// Its key in the configuration, with the value; none where no key sets the rate.
     pub(crate) key: Option<(&'static str, f64)>,
     /// At the first step.
     pub(crate) first: f64,
     /// At the end of the schedule.
     pub(crate) last: f64,
-    /// Whether `learning_rate.scale_by_extent` concerns it.
+    /// Whether `learning_rate.scale_by_extent` applies to it.
     pub(crate) by_extent: bool,
 }
 
@@ -47,7 +48,8 @@ impl AttributeRate {
 }
 
 impl AttributesConfig {
-    /// The steps of Gaussians that have these attributes: those that stand here, and those that the attributes bring.
+    /// The quantization steps for Gaussians that have these attributes: from the keys of this table, or from the
+    /// attribute itself where it declares a number.
     pub fn steps_of<'a>(&self, attributes: impl Iterator<Item = &'a Attribute>) -> AttributeSteps {
         let configured = self.steps();
         let step = |attribute: &Attribute| match attribute.coding {

@@ -1,4 +1,4 @@
-//! `[compression]`: how small, and how (paper III-C to III-E).
+//! `[compression]`: how the scene is compressed (paper III-C to III-E).
 
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
@@ -9,7 +9,7 @@ use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
 use crate::keys::{ITERATION, RATE, STEP, TOLERANCE, WEIGHT, choice, keys, named};
 
 keys! {
-    /// What the file looks like, and what is trained for its sake (paper III-C to III-E,
+    /// The form of the file, and what is trained to make it small (paper III-C to III-E,
     /// [design](design.md#compression)).
     pub struct CompressionConfig {
         /// `"compact"`: everything is quantized and entropy coded. `"paper"`: planes and spherical harmonics are
@@ -45,7 +45,7 @@ choice! {
 }
 
 impl FileProfile {
-    /// The codec's name for it; none where nothing is entropy coded.
+    /// The codec's profile; none where nothing is entropy coded.
     pub fn coded(self) -> Option<Profile> {
         match self {
             Self::Compact => Some(Profile::Compact),
@@ -66,23 +66,23 @@ keys! {
         /// distortion, or `"per_symbol"`, bits per plane symbol plus bits per symbol of the spherical harmonics.
         weighting: RateWeighting = RateWeighting::Megabytes;
             Word(RateWeighting::NAMES), "ours; paper", "what lambda weighs; or \"per_symbol\", as the paper";
-        /// The rate of the planes shapes the planes. Off: their entropy model is trained, but its gradient does
-        /// not reach the planes.
+        /// The rate of the planes has a gradient with respect to the planes. Off: their entropy model is trained, but
+        /// the planes are not trained for a low rate.
         planes: bool = true;
-            Flag, "ours, for the ablation", "false = the rate trains the planes' model only, not the planes";
+            Flag, "ours, for the ablation", "false = the rate trains only the planes' entropy model";
         /// The same for the spherical harmonics.
         sh: bool = true; Flag, "ours, for the ablation", "the same for the spherical harmonics";
-        /// The rate is taken in every so many iterations.
+        /// Iterations from one that has the rate in its loss to the next such iteration.
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
-        /// Share of the planes, and of the Gaussians, on which it is estimated; the estimate is unbiased.
+        /// Share of the planes, and of the Gaussians, on which the rate is estimated. The estimate is unbiased.
         fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours", "of the planes and the Gaussians";
-        /// Iteration of the fine stage from which planes have quantization noise and the rate counts.
-        /// Spherical harmonics join once densification is over.
+        /// Iteration of the fine stage from which the planes have quantization noise and the rate is part of the loss.
+        /// Spherical harmonics follow when densification is over.
         from: usize = 1000; ITERATION, "reference: 3; SH 2000";
-        /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will
-        /// have, and the rest of the scene goes on learning around them. 0: never.
+        /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have,
+        /// and only the rest of the scene is trained on. 0: never.
         planes_until: usize = 27_000;
-            ITERATION, "ours", "0 = the planes change to the last iteration, as the paper's";
+            ITERATION, "ours", "0 = the planes are trained to the last iteration, as in the paper";
     }
 }
 
@@ -97,7 +97,7 @@ choice! {
 }
 
 named! {
-    /// A part of the context model: one of [`ContextPart::NAMES`] in TOML. Which there are is said in the model crate.
+    /// A part of the context model: one of [`ContextPart::NAMES`] in TOML. The model crate has the list.
     pub struct ContextPartName(pub ContextPart): "part";
 }
 
@@ -110,8 +110,8 @@ keys! {
         /// (`"reference"`).
         architecture: ContextArchitecture = ContextArchitecture::Compact;
             Word(ContextArchitecture::NAMES), "ours; reference", "or \"reference\", the public code's sizes";
-        /// What the context model consists of: the paper's four parts. The public code has
-        /// `"high_scale_hyperprior"` as well, which needs `"hyperprior"` and `"inter_scale"`. Without any, every channel
+        /// The parts of the context model; the default is the paper's four. The public code also has
+        /// `"high_scale_hyperprior"`, which needs `"hyperprior"` and `"inter_scale"`. Without any part, every channel
         /// has one learned distribution.
         parts: Vec<ContextPartName> = ContextPart::PAPER.map(ContextPartName).to_vec();
             List { element: &PART, length: None }, "paper", "the public code also has \"high_scale_hyperprior\"";
@@ -137,24 +137,24 @@ choice! {
 keys! {
     /// Quantization steps of the planes.
     pub struct StepsConfig {
-        /// Quantization step of the planes over space, at the beginning.
+        /// Quantization step of the space-only planes at the start.
         space_only: f64 = quantization().space_only; STEP, "ours; reference: 0.1, fixed";
-        /// The same for the planes over an axis and time.
+        /// The same for the space-time planes.
         space_time: f64 = quantization().space_time; STEP, "ours; reference: 0.1, fixed";
         /// The steps are learned.
         adaptive: bool = true; Flag, "paper; dropped by the reference";
-        /// Iteration of the fine stage from which they are.
+        /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";
-        /// Learned steps may become finer than they begin. That serves training frames and not others:
+        /// Learned steps may become finer than they are at the start. Finer steps improve training frames only:
         /// [results](results.md#learned-quantization-steps).
         refine: bool = false; Flag, "ours; paper: yes", "finer steps help training frames only";
         /// Every scale has a pair of steps of its own.
         per_scale: bool = quantization().per_scale; Flag, "ours";
         /// Learning rate of the steps' logarithms.
         learning_rate: f64 = 2e-3; RATE, "ours";
-        /// Where a scene was trained without a rate, such as an imported one: the encoder looks for the coarsest
-        /// steps that cost this much PSNR, dB. 0: the steps as they stand.
-        search_tolerance: f64 = 0.0; TOLERANCE, "ours", "dB; 0 = these steps also where the training knew no rate";
+        /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
+        /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
+        search_tolerance: f64 = 0.0; TOLERANCE, "ours", "dB; 0 = no search, also for a scene trained without a rate";
     }
 }
 
@@ -162,12 +162,12 @@ keys! {
     /// The model of the spherical harmonics beyond degree 0.
     pub struct ShConfig {
         /// Entropy model of the spherical harmonics beyond degree 0: `"factorized"`, `"mixture_of_logistics"`,
-        /// `"channel_autoregressive"` or `"hexplane_coupled"`. Trained for degree 3; lower degrees are coded with the
-        /// frequencies of their symbols.
+        /// `"channel_autoregressive"` or `"hexplane_coupled"`. It is trained for degree 3. Scenes of a lower degree are
+        /// coded with the frequencies of their symbols.
         model: ShModel = ShModel(ShKind::Factorized);
             Kind { names: ShKind::NAMES, list: "light4gs-model/src/sh/mod.rs" },
             "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";
-        /// Their quantization step.
+        /// Quantization step of the spherical harmonics beyond degree 0.
         step: f64 = 0.02; STEP, "paper";
         /// Learning rate of that model at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
@@ -179,15 +179,15 @@ keys! {
 }
 
 named! {
-    /// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. Which there are is said in the model crate.
+    /// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. The model crate has the list.
     pub struct ShModel(pub ShKind): "model";
 }
 
 keys! {
-    /// Quantization of what every Gaussian has besides spherical harmonics.
+    /// Quantization of the attributes other than the spherical harmonics beyond degree 0.
     pub struct AttributesConfig {
-        /// Step of the positions as a share of the typical Gaussian's size. This and the next four: `compact` profile
-        /// only, and where the search begins.
+        /// Step of the positions, as a share of a typical Gaussian's size. This key and the next four apply in the
+        /// `compact` profile only. The search starts from them.
         means: f32 = step("means"); STEP, "ours", "of the size of the typical Gaussian";
         /// Step of the scales' logarithms.
         log_scales: f32 = step("log_scales"); STEP, "ours";
@@ -197,14 +197,14 @@ keys! {
         opacity_logits: f32 = step("opacity_logits"); STEP, "ours";
         /// Step of the constant colors.
         sh_dc: f32 = step("sh_dc"); STEP, "ours";
-        /// The encoder looks for the coarsest steps that cost this much PSNR on some training views, dB. 0: the steps
-        /// as they stand.
+        /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.
+        /// 0: the steps are used as they are.
         search_tolerance: f64 = 0.05; TOLERANCE, "ours", "dB of training PSNR";
     }
 }
 
 impl AttributesConfig {
-    /// The steps, as the codec has them: by the names of the attributes, which are those of the keys.
+    /// The steps in the codec's type, by the names of the attributes. The keys have the same names.
     pub fn steps(&self) -> AttributeSteps {
         let Self { means, log_scales, quats, opacity_logits, sh_dc, search_tolerance: _ } = *self;
         let steps = AttributeSteps::default().with("means", means).with("log_scales", log_scales);
@@ -212,7 +212,7 @@ impl AttributesConfig {
     }
 }
 
-/// Where the steps' defaults come from.
+/// The codec's default step of an attribute.
 fn step(attribute: &str) -> f32 {
     AttributeSteps::default().of(attribute).unwrap_or(1.0)
 }
@@ -224,23 +224,23 @@ const WEIGHT_BITS: Bounds = Whole { least: 4, most: MOST_WEIGHT_BITS as u64 };
 keys! {
     /// Quantization of network weights.
     pub struct WeightsConfig {
-        /// Bits a weight of the deformation network.
+        /// Bits per weight of the deformation network.
         deformation_bits: u8 = bits(WeightPrecisions::default().motion); WEIGHT_BITS, "ours";
-        /// Bits a weight of the entropy models' networks.
+        /// Bits per weight of the entropy models' networks.
         context_bits: u8 = bits(WeightPrecisions::default().context_model); WEIGHT_BITS, "ours";
     }
 }
 
-/// Where the steps' defaults come from.
+/// The model crate's defaults for the planes' quantization.
 fn quantization() -> AdaptiveQuantizationConfig {
     AdaptiveQuantizationConfig::new()
 }
 
-/// The configuration knows bits only.
+/// A precision in bits, the only form that the configuration has.
 fn bits(precision: WeightPrecision) -> u8 {
     match precision {
         WeightPrecision::Bits(bits) => bits,
-        // So many lose nothing that matters.
+        // With so many bits nothing that matters is lost.
         WeightPrecision::Step(_) => MOST_WEIGHT_BITS,
     }
 }

@@ -1,4 +1,4 @@
-//! `[data]`: what is trained on.
+//! `[data]`: the training data.
 
 use light4gs_data::Layouts;
 
@@ -14,8 +14,8 @@ keys! {
         layout: Option<String> = None;
             LayoutOrNone { names: || Layouts::default().names() },
             "ours", "or \"dnerf\", \"neu3d\", \"nerfds\", ...; empty = found by content";
-        /// Length of the sequence in frames: later ones are left out, and where the dataset counts frames (`neu3d`)
-        /// frame `i` has time `i` divided by this. 0: as many as there are.
+        /// Length of the sequence in frames; later frames are left out. Where the dataset numbers its frames (`neu3d`),
+        /// frame `i` has the time `i` divided by this. 0: all frames.
         #[serde(with = "optional")]
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
@@ -27,12 +27,12 @@ keys! {
             WholeOrNone { least: 8, most: 16_384 }, "ours", "pixels of the longer side; 0 = images as they are";
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
-        /// Upper bound of the memory for decoded images. Above it they are decoded again, ahead of the iterations
-        /// that need them.
+        /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the
+        /// iterations that need them.
         memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";
-        /// Gaussians to start from where the dataset brings no point cloud.
+        /// Number of Gaussians at the start, where the dataset has no point cloud.
         initial_points: usize = 2000; Whole { least: 4, most: MOST_GAUSSIANS }, "reference, D-NeRF";
-        /// They are scattered in a cube of ± this, in world units.
+        /// They are scattered in a cube that reaches from minus this to plus this on every axis, in world units.
         initial_box: f32 = 1.3; Number { least: 1e-6, most: 1e6 }, "reference, D-NeRF";
     }
 }

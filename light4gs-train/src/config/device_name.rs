@@ -47,7 +47,7 @@ impl DeviceName {
         }
     }
 
-    /// Whether the work is done by the processor's own threads, as the caller's is.
+    /// Whether it computes on the processor, on which the caller runs too.
     pub fn computes_on_processor(self) -> bool {
         matches!(self, Self::NdArray | Self::Flex)
     }

@@ -44,7 +44,7 @@ pub enum ConfigError {
         /// Why.
         source: std::io::Error,
     },
-    /// Text that is not TOML. What stands there is not quoted: the file may be any that `extends` names.
+    /// Text that is not TOML. The message does not quote the text: `extends` may name any file, even a secret one.
     #[error("{origin}{}: not valid TOML: {message}", at_line(*line))]
     Syntax {
         /// Where.
@@ -98,7 +98,7 @@ pub enum ConfigError {
         /// The preset most like it.
         nearest: String,
     },
-    /// A layout of a dataset for which no preset is made, where no configuration is named.
+    /// No configuration is named, and there is no preset for the dataset's layout.
     #[error("there is no preset for datasets of the layout `{layout}`: name one, or a file (presets: {})", super::preset_names().join(", "))]
     NoPreset {
         /// The layout's name.
@@ -111,7 +111,7 @@ pub enum ConfigError {
         chain: Vec<Origin>,
     },
     /// A layer laid on top by `+` that would replace everything below it.
-    #[error("{origin} extends another one, so it cannot be laid on top of one by `+`; name it first, or alone")]
+    #[error("{origin} extends another configuration, so it cannot follow a `+`: name it first, or alone")]
     LayerExtends {
         /// The layer.
         origin: Origin,

@@ -1,4 +1,4 @@
-//! `[eval]`: how it is measured.
+//! `[eval]`: what is measured.
 
 use std::path::PathBuf;
 
@@ -10,7 +10,7 @@ use crate::keys::{ITERATION, choice, keys};
 keys! {
     /// What is measured, on the decoded file.
     pub struct EvalConfig {
-        /// Splits to measure: `test`, `val`, `train`. One that the dataset lacks is passed over.
+        /// Splits to measure: `test`, `val`, `train`. A split that the dataset does not have is skipped.
         splits: Vec<EvalSplit> = vec![EvalSplit::Test, EvalSplit::Val];
             List { element: &Word(EvalSplit::NAMES), length: None }, "ours";
         /// Save every rendered view as a PNG in `renders/`.
@@ -19,22 +19,23 @@ keys! {
         fps_warmup: usize = 5; Whole { least: 0, most: 1_000_000 }, "ours";
         /// Frames over which the frame rate is measured.
         fps_frames: usize = 50; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// While training, test PSNR every so many iterations. 0 means never.
+        /// Iterations between two measurements of test PSNR during training. 0: never measured.
         interval: usize = 1000; ITERATION, "ours";
         /// Test views for that measurement.
         views: usize = 4; ITERATION, "ours";
-        /// Files with the weights of LPIPS ([metrics.md](metrics.md)); without any, its columns say so.
+        /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without them LPIPS is not measured, and its
+        /// columns say so.
         lpips: Vec<PathBuf> = Vec::new();
             List { element: &Text, length: None }, "ours", "files with weights, see docs/metrics.md";
     }
 }
 
 choice! {
-    /// A split whose images can be compared with.
+    /// A split whose images are compared with renders.
     pub enum EvalSplit: "split" {
         /// Frames that are never trained.
         Test = "test",
-        /// More of them.
+        /// Further frames that are never trained.
         Val = "val",
         /// Frames that are trained.
         Train = "train",

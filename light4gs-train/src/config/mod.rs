@@ -50,7 +50,7 @@ pub use layering::presets::preset_names;
 pub use model::{CoordinatesTable, DeformationTable, FieldKind, HexPlaneTable, ModelConfig};
 pub use train::{LearningRates, RegularizerConfig, TrainConfig};
 
-/// Files of configurations are far shorter.
+/// Far longer than any real configuration.
 pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;
 
 keys! {

@@ -40,12 +40,12 @@ choice! {
 keys! {
     /// From world coordinates to those of the planes (paper III-A).
     pub struct CoordinatesTable {
-        /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, with the
+        /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, scaled by the
         /// cloud's standard deviation along each.
         pca: bool = light4gs_model::CoordinatesConfig::default().pca;
             Flag, "paper", "along the principal axes of the initial cloud; false = along the world's";
-        /// What lies outside of one standard deviation of the cloud is contracted. Off: the whole cloud is scaled
-        /// into the ball that contraction leaves as it is, which is half as wide as the planes.
+        /// Points more than one standard deviation away from the cloud's center are contracted. Off: the whole cloud is
+        /// scaled into the ball that contraction does not change, which is half as wide as the planes.
         contraction: bool = light4gs_model::CoordinatesConfig::default().contraction;
             Flag, "paper", "false = the whole cloud is scaled into what is not contracted";
     }
@@ -54,14 +54,15 @@ keys! {
 keys! {
     /// Sizes of the multiscale hexplane.
     pub struct HexPlaneTable {
-        /// Features a plane.
+        /// Number of features of a plane.
         channels: usize = light4gs_model::HexPlaneConfig::new().channels;
             Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
         /// Resolution along x, y, z, t at the lowest scale. Multiples of 4.
         resolution: [usize; 4] = light4gs_model::HexPlaneConfig::new().resolution;
             List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION }, length: Some(4) },
             "paper; its 25 time steps are no multiple of 4", "x, y, z, t; multiples of 4";
-        /// One scale each, ascending: spatial resolution is the base times this. Time keeps its resolution.
+        /// One scale of planes for each number, ascending. The spatial resolution is the base resolution times the
+        /// number; the resolution in time stays the same.
         multipliers: Vec<usize> = light4gs_model::HexPlaneConfig::new().multipliers;
             List { element: &Whole { least: 1, most: MOST_PLANE_RESOLUTION / 4 }, length: None },
             "paper", "spatial axes only";

@@ -16,7 +16,7 @@ keys! {
         coarse_iterations: usize = 3000; ITERATIONS, "paper";
         /// Iterations of the fine stage, which counts from 1 again with a new optimizer.
         fine_iterations: usize = 30_000; ITERATIONS, "paper: 30000 for D-NeRF, 20000 elsewhere";
-        /// Frames an iteration.
+        /// Frames per iteration.
         batch_size: usize = 1; Whole { least: 1, most: 1024 }, "paper: 1 for D-NeRF, 2 to 4 elsewhere";
         /// What rendered views are compared by. The keys of each loss stand in a table of its name.
         loss: LossKind = LossKind::Photometric;
@@ -38,13 +38,13 @@ keys! {
         #[serde(with = "optional")]
         coarse_times: Option<usize> = None;
             ITERATION, "reference", "the coarse stage sees so many times from the beginning; 0 = all";
-        /// The active degree of the spherical harmonics grows by one every so many iterations.
+        /// Iterations after which the active degree of the spherical harmonics grows by one.
         sh_degree_interval: usize = 1000; INTERVAL, "3DGS";
-        /// A checkpoint every so many iterations.
+        /// Iterations between two checkpoints.
         checkpoint_interval: usize = 1000; INTERVAL, "ours";
-        /// A line of `metrics.jsonl` every so many iterations.
+        /// Iterations between two lines of `metrics.jsonl`.
         log_interval: usize = 10; INTERVAL, "ours";
-        /// Checkpoints that are kept, the newest ones.
+        /// Number of checkpoints that are kept, the newest ones.
         keep_checkpoints: usize = 2; INTERVAL, "ours";
         /// Learning rates by parameter group.
         learning_rate: LearningRates;
@@ -104,7 +104,7 @@ keys! {
         /// schedule; 1 keeps them constant.
         attributes_final_share: f64 = 1.0;
             Number { least: 1e-9, most: 1e3 }, "3DGS: constant", "of the five rates above at the end; 1 = constant";
-        /// Length of the decay in iterations. 0 takes the stage's length.
+        /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000", "0 = the stage's length";
         /// Rates of positions, deformation and feature planes are multiplied by the scene's extent.

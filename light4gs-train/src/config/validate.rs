@@ -1,4 +1,4 @@
-//! What keys may not hold together. What each may hold by itself is said where it is declared.
+//! Checks of keys against each other. The bounds of a single key are where it is declared.
 
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, check_resolution};
 use light4gs_codec::{CodecError, checks};
@@ -56,7 +56,7 @@ fn hexplane(check: &mut Check, planes: &HexPlaneTable) {
     }
 }
 
-/// Width and depth are legal by themselves and not together.
+/// Width and depth may be too large together even where each is within its bounds.
 fn deformation(check: &mut Check, model: &ModelConfig) {
     check.encodable("model.deformation.width", model.hexplane_field().deformation.check_size());
 }
@@ -130,8 +130,8 @@ impl Check {
         }
     }
 
-    /// What the encoder says, so that nothing is trained that it would refuse. A key whose bounds have been left says so
-    /// already.
+    /// Asks the encoder, so that nothing is trained that it would refuse. A value that is out of its bounds has been
+    /// reported already.
     fn encodable(&mut self, key: &str, answer: Result<(), CodecError>) {
         let known = self.problems.iter().any(|problem| problem.key == key);
         if let (Err(error), false) = (answer, known) {

@@ -24,33 +24,33 @@ keys! {
         from: usize = 500; ITERATION, "3DGS";
         /// Cloning, splitting and opacity reset end before this iteration.
         until: usize = 15_000; ITERATION, "reference; the paper says 14000";
-        /// Every so many iterations.
+        /// Iterations between two rounds of cloning and splitting.
         interval: usize = 100; INTERVAL, "reference";
         /// Screen-space gradient (in half-image units) above which a Gaussian is cloned or split, coarse stage.
         grad_threshold_coarse: f32 = 2e-4; THRESHOLD, "3DGS";
         /// The same at the start of the fine stage.
         grad_threshold_fine_init: f32 = 2e-4; THRESHOLD, "reference";
-        /// The same at `until`; linear in between.
+        /// The same at `until`; linear between the two.
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians up to this share of the scene's extent are cloned, larger ones split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
-        /// No cloning or splitting from this many on.
+        /// From this number of Gaussians on, none is cloned or split.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference";
         /// Opacity below which a Gaussian is removed, coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
         /// The same at the start of the fine stage.
         opacity_threshold_fine_init: f32 = 0.005; SHARE, "reference";
-        /// The same at `until`; linear in between.
+        /// The same at `until`; linear between the two.
         opacity_threshold_fine_final: f32 = 0.005; SHARE, "reference";
         /// Pruning starts after this iteration.
         prune_from: usize = 500; ITERATION, "reference";
-        /// Every so many iterations.
+        /// Iterations between two rounds of pruning.
         prune_interval: usize = 100; INTERVAL, "reference";
-        /// Prune by opacity only above this many Gaussians. Below it fast objects survive the coarse stage, where
-        /// they are faint. 0 means always.
+        /// Gaussians are pruned by opacity only while there are more than this. While there are fewer, fast objects
+        /// survive the coarse stage, where they are faint. 0: always.
         prune_above: usize = 200_000;
             ITERATION, "reference: 200000", "Gaussians; below it nothing is pruned for its opacity";
-        /// Opacities are reset every so many iterations; 0 = never.
+        /// Iterations between two resets of the opacities; 0 = never.
         opacity_reset_interval: usize = 3000; ITERATION, "3DGS";
     }
 }

@@ -44,10 +44,10 @@ kinds! {
 }
 
 keys! {
-    /// How Gaussians come and go.
+    /// How Gaussians are added and removed.
     pub struct DensifyConfig {
-        /// The strategy: `"adaptive"` clones, splits and prunes, `"none"` keeps the Gaussians of the cloud. The keys of each
-        /// stand in a table of its name.
+        /// The strategy: `"adaptive"` clones, splits and prunes, `"none"` keeps the Gaussians of the cloud. The keys of
+        /// each strategy are in a table of its name.
         strategy: DensityKind = DensityKind::Adaptive;
             Kind { names: DensityKind::NAMES, list: "light4gs-train/src/density/mod.rs" },
             "3DGS", "or \"none\"";

@@ -29,7 +29,7 @@ keys! {
             "paper; the reference has the unclamped one, unused", "or \"none\", \"unclamped\" (as the public code)";
         /// Exponent of that factor.
         volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
-        /// Look through one random camera a time instead of every training view; for data with many cameras.
+        /// A pass uses one random camera for each time instead of every training view; for data with many cameras.
         one_camera_per_time: bool = false; Flag, "paper, multi-view data";
     }
 }

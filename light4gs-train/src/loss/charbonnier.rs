@@ -8,7 +8,7 @@ use crate::keys::{Bounds::Number, keys};
 keys! {
     /// The mean of `sqrt(difference² + epsilon²)`: L1 where images differ by more than epsilon, squared below.
     pub struct CharbonnierLoss {
-        /// Difference of colors, 0 to 1, at which the loss turns from squared to linear.
+        /// Difference of colors, 0 to 1, at which the loss changes from squared to linear.
         epsilon: f32 = 1e-3; Number { least: 1e-4, most: 1.0 }, "LapSRN";
     }
 }

@@ -10,7 +10,7 @@ use crate::stage::Stage;
 keys! {
     /// `(1 - lambda) · L1 + lambda · (1 - SSIM)`, or the squared difference in the first iterations. The default.
     pub struct PhotometricLoss {
-        /// Weight of D-SSIM in the loss, 0 to 1; L1 has the rest.
+        /// Weight of D-SSIM in the loss, 0 to 1; the rest is the weight of L1.
         lambda_dssim: f32 = 0.0; SHARE, "reference";
         /// The loss is the squared difference until this iteration of the fine stage (and in the coarse stage, if not
         /// 0). L1 is smallest at the median, which for a fast object is the background behind it.

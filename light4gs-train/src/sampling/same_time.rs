@@ -7,8 +7,8 @@ use super::{BatchRequest, FrameSampler};
 use crate::keys::keys;
 
 keys! {
-    /// Different cameras at one time. Where a time has fewer cameras than a batch has frames, the batch goes on with another
-    /// time.
+    /// Different cameras at one time. Where a time has fewer cameras than a batch has frames, the batch continues with
+    /// another time.
     pub struct SameTime {}
 }
 

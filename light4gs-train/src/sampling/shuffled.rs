@@ -1,4 +1,4 @@
-//! Any frames, in an order that is shuffled anew when all have been seen.
+//! Any frames, in an order that is shuffled anew whenever all have been used.
 
 use rand::seq::SliceRandom;
 
@@ -6,7 +6,7 @@ use super::{BatchRequest, FrameSampler};
 use crate::keys::keys;
 
 keys! {
-    /// Any frames, in an order that is shuffled anew when all have been seen. The default.
+    /// Any frames, in an order that is shuffled anew whenever all have been used. The default.
     pub struct Shuffled {}
 }
 

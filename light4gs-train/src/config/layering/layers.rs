@@ -89,7 +89,7 @@ fn collect(
     collect(&below, Some(origin), above, into)
 }
 
-/// The text of a layer, and what tells it from all others (one file has many paths).
+/// The text of a layer, and its origin in a form that is the same for all paths of one file.
 fn read(origin: &Origin, by: Option<&Origin>) -> Result<(Origin, String), ConfigError> {
     match origin {
         Origin::Preset(name) => {
@@ -133,8 +133,8 @@ fn parse(text: &str, origin: &Origin) -> Result<(Table, Option<String>), ConfigE
     Ok((layer, extends))
 }
 
-/// Merges the layers, the lowest first. Each must leave something that fits the structs, so that an error is
-/// laid to the right one.
+/// Merges the layers, the lowest first. The result must fit the structs after every layer, so that an error names the
+/// layer that causes it.
 fn build(layers: Vec<(Origin, Table)>) -> Result<Config, ConfigError> {
     let mut merged = Table::new();
     let mut config = Config::default();

@@ -1,6 +1,7 @@
 //! The files of `configs/`, embedded so that the binary alone is enough.
 
-// `PRESETS: &[(&str, &str)]`, name and text of every preset, sorted by name: written by `build.rs`, which looks what there is.
+// `PRESETS: &[(&str, &str)]`, name and text of every preset, sorted by name. `build.rs` writes it from the files that
+// there are.
 include!(concat!(env!("OUT_DIR"), "/presets.rs"));
 
 /// The names of the built-in presets, sorted.

@@ -23,7 +23,7 @@ struct Context<'a> {
 }
 
 impl Context<'_> {
-    /// Overrides are one line long: a number would say nothing.
+    /// An override is one line long, so a line number would say nothing.
     fn line(&self, path: &[String]) -> Option<usize> {
         if matches!(self.origin, Origin::Text(_)) { None } else { line_of(self.text, path) }
     }
