@@ -19,7 +19,8 @@ pub struct Golden {
 }
 
 impl Golden {
-    /// Opens the file whose name begins with `case` and a letter follows, e.g. `c08_raster` for `c08_raster_a.safetensors`.
+    /// Opens the file whose name is `case`, an underscore and the letter of the set, e.g. `c08_raster` for
+    /// `c08_raster_a.safetensors`.
     ///
     /// # Panics
     /// If there is none: a missing golden file fails the test.
@@ -98,8 +99,7 @@ impl Golden {
 
 /// Every back end that is built, by name.
 ///
-/// # Panics
-/// If there is no graphics adapter, not even one in software: a back end that cannot be tested fails its tests.
+/// If there is no graphics adapter, not even a software one: the tests of a back end that cannot be tested must fail.
 pub fn devices() -> Vec<(&'static str, Device)> {
     built_in().into_iter().map(|name| (name, device_by_name(name).unwrap_or_else(|error| panic!("{error}")))).collect()
 }

@@ -1,10 +1,10 @@
-//! What the cross-crate tests share.
+//! Code that the cross-crate tests share.
 
 // Burn 0.22 deprecates its `ndarray` back end in favour of `flex`; we serve both.
 #![allow(deprecated)]
 
 pub mod golden;
-// Beside the hostile streams, which are a crate of their own: they need the codec alone.
+// In a folder beside the hostile streams, which are a crate of their own because they need only the codec.
 #[path = "../hostile/runs/mod.rs"]
 pub mod hostile;
 pub mod named;

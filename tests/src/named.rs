@@ -1,4 +1,5 @@
-//! Modules whose parameters come from a golden file, and whose gradients are compared with one, by path.
+//! Modules whose parameters come from a golden file and whose gradients are compared with those of a golden file, by
+//! path.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Tensor};
@@ -20,7 +21,7 @@ impl<N: Fn(&str) -> Option<String>> ParameterMapper for Load<'_, N> {
     }
 }
 
-/// Replaces every parameter of which `name_in_file` knows the golden tensor.
+/// Replaces every parameter for which `name_in_file` names a golden tensor.
 pub fn load<M: Module>(module: &mut M, golden: &Golden, name_in_file: impl Fn(&str) -> Option<String>) {
     update_parameters(module, &mut Load { golden, name_in_file });
 }

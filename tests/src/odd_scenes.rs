@@ -1,4 +1,4 @@
-//! Scenes that nobody would make on purpose: Gaussians at the edge of what can be drawn, and beyond it.
+//! Scenes that nobody would make on purpose: Gaussians that can only just be drawn, and Gaussians that cannot.
 
 use burn::tensor::Device;
 use light4gs_data::Camera;
@@ -11,19 +11,19 @@ pub const BACKGROUND: [f32; 3] = [0.1, 0.6, 1.0];
 /// Widths and heights, most of them no multiples of a tile.
 pub const SIZES: [[u32; 2]; 6] = [[1, 1], [17, 31], [40, 30], [16, 16], [64, 3], [33, 48]];
 
-/// What a rendering and its backward pass give.
+/// The results of a rendering and its backward pass.
 pub struct Run {
     /// `[H, W, 5]`.
     pub image: Vec<f32>,
     /// `[N]`.
     pub radii: Vec<i64>,
-    /// How many could not be drawn.
+    /// Number of Gaussians that could not be drawn.
     pub invalid: usize,
-    /// Of the sum of the image times random weights, by the seven inputs.
+    /// Gradients of the sum of the image times random weights, with respect to the seven inputs.
     pub gradients: [Vec<f32>; 7],
 }
 
-/// Renders and goes back, with random weights a pixel and channel.
+/// Renders, and computes gradients with a random weight for each pixel and channel.
 pub fn run(scene: &SplatScene, camera: &Camera, degree: usize, device: &Device) -> Run {
     let weights = Random::new(99).normals((camera.width * camera.height * 5) as usize);
     run_weighed(scene, camera, degree, device, &weights)
@@ -65,7 +65,7 @@ pub fn make_odd(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut 
     }
 }
 
-/// Makes a Gaussian one that cannot be drawn; it stands in the image otherwise. Returns what was done.
+/// Makes a Gaussian one that cannot be drawn, at a place in the image. Returns what was done.
 pub fn poison(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) -> String {
     let place = point_in_view(camera, random.uniform(-0.8, 0.8) as f32, random.uniform(-0.8, 0.8) as f32, 3.0);
     scene.row_mut(MEANS, i).copy_from_slice(&place);

@@ -3,8 +3,8 @@
 use light4gs_codec::plane_layout::PlaneAxes::{self, Xt, Xy, Xz, Yt, Yz, Zt};
 use light4gs_codec::plane_layout::{PlaneLayout, PlaneShape};
 
-/// Small layouts with names, each of which a context model treats in a way of its own. Sizes differ between the axes; the
-/// first is a hexplane of two scales.
+/// Small layouts with names. A context model treats each of them differently. Sizes differ between the axes; the first
+/// is a hexplane of two scales.
 pub fn plane_sets() -> Vec<(&'static str, PlaneLayout)> {
     let of = |axes: &[PlaneAxes], multipliers: &[usize]| PlaneLayout::multiscale(axes, [8, 12, 4, 8], multipliers);
     let list = |planes: &[(usize, PlaneAxes, [usize; 2])]| {

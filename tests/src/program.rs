@@ -14,7 +14,7 @@ pub struct Workspace {
     program: PathBuf,
 }
 
-/// What makes a run take seconds.
+/// Overrides that make a run take seconds.
 pub const TINY: [&str; 15] = [
     "train.coarse_iterations=12",
     "train.fine_iterations=48",
@@ -33,7 +33,7 @@ pub const TINY: [&str; 15] = [
     "compression.context.fit_iterations=4",
 ];
 
-/// Overrides that put everything that compresses into a tiny run.
+/// Overrides that turn on everything that compresses, in a tiny run.
 pub const TINY_COMPRESSION: [&str; 6] = [
     "compression.rate.lambda=0.05",
     "compression.rate.from=12",
@@ -44,8 +44,9 @@ pub const TINY_COMPRESSION: [&str; 6] = [
 ];
 
 impl Workspace {
-    /// A copy of a folder in which a tiny run, `run`, has been trained: once for all tests of a process. `temporary` is
-    /// `env!("CARGO_TARGET_TMPDIR")`, where the original stays until a later process finds it to be old.
+    /// A copy of a folder in which a tiny run, `run`, has been trained. It is trained once for all tests of a process.
+    /// `temporary` is `env!("CARGO_TARGET_TMPDIR")`, where the original stays until a later process removes it because
+    /// it is old.
     pub fn trained(program: &str, temporary: &str) -> Self {
         static TRAINED: OnceLock<Workspace> = OnceLock::new();
         let original = TRAINED.get_or_init(|| {
@@ -91,7 +92,7 @@ impl Workspace {
         self.command(arguments).output().expect("the program starts")
     }
 
-    /// `train scene --out RUN` in seconds, with more `--set` on top.
+    /// `train scene --out RUN`, which takes seconds, with more `--set`.
     pub fn train(&self, run: &str, overrides: &[&str]) -> Command {
         let mut command = self.command(["train", "scene", "--quiet", "--config", "dnerf-cpu", "--out", run]);
         for key_value in TINY.iter().chain(overrides) {
@@ -100,7 +101,7 @@ impl Workspace {
         command
     }
 
-    /// Names in the folder or one below it, sorted.
+    /// Names in the folder or in a folder below it, sorted.
     pub fn names(&self, below: &str) -> Vec<String> {
         names(&self.path(below))
     }
@@ -120,7 +121,7 @@ fn copy(from: &Path, to: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Removes what earlier processes have left, but not what one may be at work on.
+/// Removes what earlier processes have left, except what a process may still use.
 fn remove_old(folder: &Path, prefix: &str) {
     const OLD: Duration = Duration::from_secs(3600);
     for name in names(folder).into_iter().filter(|name| name.starts_with(prefix)) {
@@ -140,7 +141,7 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Fails with the program's own words.
+/// Fails, and prints the program's output.
 #[track_caller]
 pub fn assert_success(output: &Output) {
     assert!(
@@ -152,7 +153,7 @@ pub fn assert_success(output: &Output) {
     );
 }
 
-/// Fails unless the exit code is 2, without a panic, and stderr has all the words.
+/// Fails unless the exit code is 2, there was no panic, and stderr contains all the words.
 #[track_caller]
 pub fn assert_refused(output: &Output, words: &[&str]) {
     let text = String::from_utf8_lossy(&output.stderr);

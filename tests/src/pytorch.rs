@@ -6,7 +6,7 @@ use std::path::Path;
 /// Tensors by name: shape and row-major values.
 pub type StateDict = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
-/// Writes a state dict as `torch.save` does: a ZIP archive of a pickle and a storage a tensor.
+/// Writes a state dict as `torch.save` does: a ZIP archive of a pickle and one storage for each tensor.
 ///
 /// # Panics
 /// If the file cannot be written.
@@ -49,7 +49,7 @@ pub fn save_state_dict(path: &Path, tensors: &StateDict) {
     std::fs::write(path, zip(&entries)).expect("a writable folder");
 }
 
-/// Entries as they are, without compression.
+/// The entries, not compressed.
 fn zip(entries: &[(String, Vec<u8>)]) -> Vec<u8> {
     let (mut file, mut directory) = (Vec::new(), Vec::new());
     for (name, data) in entries {

@@ -1,4 +1,4 @@
-//! Plain arrays of activated Gaussians: for random scenes, and as what the operation and its twin are both given.
+//! Plain arrays of activated Gaussians: for random scenes, and as the input of both the operation and its float64 twin.
 
 use burn::tensor::{Device, Tensor, TensorData, s};
 use light4gs_data::Camera;
@@ -9,7 +9,7 @@ use crate::random::Random;
 
 /// Names of the seven differentiable inputs, in the order of [`SplatScene::attributes`].
 pub const ATTRIBUTES: [&str; 7] = ["means", "quats", "scales", "opacities", "sh_dc", "sh_rest", "screen_offsets"];
-/// Values of each input a Gaussian.
+/// Number of values of each input per Gaussian.
 pub const WIDTHS: [usize; 7] = [3, 4, 3, 1, 3, 45, 2];
 /// Position of the means in [`ATTRIBUTES`].
 pub const MEANS: usize = 0;
@@ -33,7 +33,7 @@ pub struct SplatScene {
     pub attributes: [Vec<f64>; 7],
 }
 
-/// What a random Gaussian is drawn from.
+/// The ranges from which a random Gaussian is drawn.
 #[derive(Clone, Copy, Debug)]
 pub struct Ranges {
     /// Half the side of the cube around the origin that the means are in.
@@ -60,7 +60,7 @@ impl SplatScene {
         self.attributes[OPACITIES].len()
     }
 
-    /// Whether there is none.
+    /// Whether there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

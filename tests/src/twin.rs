@@ -1,7 +1,7 @@
 //! A slow, plain rasterizer in float64, written from `docs/design.md` (conventions) and sharing no code with the operation:
 //! a loop over pixels, and in each one over all Gaussians by depth.
 //!
-//! It also says where float32 may decide otherwise than float64 (a threshold within rounding), so that a test can
+//! It also says where float32 may decide differently from float64 (a threshold within rounding), so that a test can
 //! leave such pixels and Gaussians out.
 
 use glam::{DMat3, DQuat, DVec3};
@@ -11,16 +11,16 @@ use crate::splat_scene::{MEANS, OPACITIES, QUATS, SCALES, SCREEN_OFFSETS, SH_DC,
 
 const TILE: usize = 16;
 
-/// What the twin draws.
+/// The results of the twin.
 #[derive(Clone, Debug)]
 pub struct TwinImage {
     /// `[H, W, 5]`: red, green, blue, alpha, depth.
     pub values: Vec<f64>,
-    /// `[H, W]`: a threshold was met within rounding.
+    /// `[H, W]`: whether a threshold was met within rounding.
     pub doubtful: Vec<bool>,
-    /// `[N]`: 3 sigma in pixels, rounded up; 0 if outside or behind.
+    /// `[N]`: 3 sigma in pixels, rounded up; 0 for a Gaussian outside the image or behind the camera.
     pub radii: Vec<i64>,
-    /// `[N]`: which tiles it touches, or its place in the order of depths, is within rounding.
+    /// `[N]`: whether rounding decides which tiles the Gaussian touches, or its place in the order of depths.
     pub doubtful_gaussians: Vec<bool>,
     /// Smallest alpha before the 1/255 threshold, over all pixels and drawn Gaussians; infinite if there is none.
     pub smallest_alpha: f64,
@@ -28,7 +28,7 @@ pub struct TwinImage {
     pub largest_alpha: f64,
     /// Smallest transmittance of a pixel at the end.
     pub smallest_transmittance: f64,
-    /// Hash of which Gaussian was blended at which pixel. Where two images have the same, no jump lies between them.
+    /// Hash of which Gaussian was blended at which pixel. Between two images with the same hash there is no jump.
     pub decisions: u64,
 }
 
@@ -141,7 +141,7 @@ fn project(scene: &SplatScene, index: usize, camera: &Camera, degree: usize) -> 
     })
 }
 
-/// Draws activated Gaussians, all of which must be finite and have an orientation.
+/// Draws activated Gaussians. All must be finite, and their quaternions not 0.
 pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree: usize) -> TwinImage {
     let (width, height) = (camera.width as usize, camera.height as usize);
     let mut radii = vec![0; scene.len()];
@@ -176,7 +176,7 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
         for splat in &splats {
             let Splat { columns, rows, center, inverse, .. } = splat;
             if !(columns[0]..columns[1]).contains(&column) || !(rows[0]..rows[1]).contains(&row) {
-                // Outside of its box it is as if it were cut off: not smooth there.
+                // Outside of its box a Gaussian is cut off, so the image is not smooth there.
                 image.smallest_alpha = 0.0;
                 continue;
             }
@@ -214,7 +214,7 @@ pub fn render(scene: &SplatScene, camera: &Camera, background: [f32; 3], degree:
     image
 }
 
-/// A scene without the Gaussians whose tiles or order are within rounding, and its image.
+/// A scene without the Gaussians whose tiles or order depend on rounding, and its image.
 pub fn render_without_doubt(
     scene: &SplatScene,
     camera: &Camera,

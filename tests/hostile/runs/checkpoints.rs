@@ -1,4 +1,4 @@
-//! Damage to checkpoints that leaves them safetensors files.
+//! Damage to checkpoints after which they are still safetensors files.
 
 use std::collections::HashMap;
 
@@ -7,7 +7,7 @@ use rand::seq::IndexedRandom;
 use safetensors::tensor::TensorView;
 use safetensors::{Dtype, SafeTensors};
 
-/// A checkpoint, taken apart.
+/// A checkpoint taken apart.
 #[derive(Clone, Debug)]
 pub struct Parts {
     /// Texts by key.
@@ -30,7 +30,7 @@ impl Parts {
         Self { metadata: header.metadata().clone().unwrap_or_default(), tensors }
     }
 
-    /// Puts it together again.
+    /// Puts the checkpoint together again.
     pub fn to_bytes(&self) -> Vec<u8> {
         let views = self.tensors.iter().map(|(name, dtype, shape, bytes)| {
             (name.clone(), TensorView::new(*dtype, shape.clone(), bytes).expect("bytes of that shape"))
@@ -38,14 +38,14 @@ impl Parts {
         safetensors::serialize(views, Some(self.metadata.clone())).expect("a file")
     }
 
-    /// Takes the checksums out, as in a file of an older version: what remains has only its structure to be checked by.
+    /// Removes the checksums, as in a file of an older version. Then only the file's structure can be checked.
     pub fn without_checksums(mut self) -> Self {
         self.metadata.retain(|key, _| !key.starts_with("checksum"));
         self
     }
 }
 
-/// Changes a checkpoint in one of the ways that must be noticed, and says how. Nothing is left as it was.
+/// Changes a checkpoint in one of the ways that must be noticed, and says how. There is always a change.
 pub fn mutate(parts: &Parts, random: &mut impl Rng) -> (Parts, String) {
     let mut out = parts.clone();
     let at = random.random_range(0..out.tensors.len());

@@ -1,10 +1,10 @@
-//! Odd configurations: values at and beyond the ends of ranges, of the wrong kind, several at once.
+//! Odd configurations: values at and beyond the ends of their ranges, of the wrong type, several at once.
 
 use light4gs_train::config::{Bounds, Config, KEYS, Key};
 use rand::Rng;
 use rand::seq::IndexedRandom;
 
-/// Keys that make a run of a few iterations on a few Gaussians, with everything that compresses in it.
+/// Keys for a run of a few iterations on a few Gaussians, with everything that compresses.
 pub const TINY: &str = r#"
 device = "flex"
 data.resolution = 16
@@ -43,12 +43,12 @@ fn merge(base: &mut toml::Table, top: toml::Table) {
     }
 }
 
-/// The ends of what a key may hold, as TOML.
+/// The ends of the range of a key, as TOML.
 pub fn ends(bounds: &Bounds) -> Vec<String> {
     match bounds {
         Bounds::Flag => ["true", "false"].map(str::to_owned).to_vec(),
         Bounds::Text => vec!["\"\"".to_owned()],
-        // A named layout needs a dataset in it.
+        // A named layout needs a dataset in that layout.
         Bounds::LayoutOrNone { .. } => vec!["\"\"".to_owned()],
         Bounds::Word(words) | Bounds::Kind { names: words, .. } => {
             words.iter().map(|word| format!("\"{word}\"")).collect()
@@ -57,7 +57,7 @@ pub fn ends(bounds: &Bounds) -> Vec<String> {
         Bounds::Whole { least, most } => vec![least.to_string(), most.to_string()],
         Bounds::WholeOrNone { least, most } => vec!["0".to_owned(), least.to_string(), most.to_string()],
         Bounds::Number { least, most } => [least, most].map(|value| format!("{value:e}")).to_vec(),
-        // Files have to be there.
+        // The files would have to exist.
         Bounds::List { element: Bounds::Text, .. } => vec!["[]".to_owned()],
         Bounds::List { element, length } => ends(element)
             .into_iter()
@@ -66,7 +66,7 @@ pub fn ends(bounds: &Bounds) -> Vec<String> {
     }
 }
 
-/// Values of the wrong kind, out of range, or just strange.
+/// Values of the wrong type, out of range, or unusual.
 const ODD: [&str; 22] = [
     "-1",
     "0",
@@ -92,7 +92,7 @@ const ODD: [&str; 22] = [
     "17",
 ];
 
-/// A configuration with a few odd keys, and what is odd about it.
+/// A configuration with a few odd keys, and a description of what is odd.
 pub fn odd(random: &mut impl Rng) -> String {
     let mut pairs = Vec::new();
     for _ in 0..random.random_range(1..4) {
@@ -108,7 +108,7 @@ pub fn odd(random: &mut impl Rng) -> String {
     tiny_with(&pairs)
 }
 
-/// Whether a few iterations with a configuration take a moment and not the machine.
+/// Whether a few iterations with a configuration are quick and need little memory.
 pub fn is_cheap(config: &Config) -> bool {
     let planes = &config.model.hexplane;
     let largest = planes.multipliers.last().copied().unwrap_or(1);

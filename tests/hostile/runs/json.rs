@@ -1,10 +1,10 @@
-//! Damage to JSON that leaves it JSON.
+//! Damage to JSON after which it is still JSON.
 
 use rand::Rng;
 use rand::seq::IndexedRandom;
 use serde_json::{Map, Value, json};
 
-/// Values that no field expects, or that only just fit.
+/// Values that no field expects, or that are at the end of what fits.
 fn odd_value(random: &mut impl Rng) -> Value {
     let values = [
         json!(null),
@@ -29,7 +29,7 @@ fn odd_value(random: &mut impl Rng) -> Value {
     values.choose(random).expect("some").clone()
 }
 
-/// Changes one place of a value, and says which and how.
+/// Changes one place of a value, and says which place and how.
 pub fn mutate(value: &Value, random: &mut impl Rng) -> (Value, String) {
     let mut places = Vec::new();
     collect(value, String::new(), &mut places);
@@ -78,7 +78,7 @@ fn collect(value: &Value, place: String, into: &mut Vec<String>) {
         Value::Object(map) => map.iter().for_each(|(key, inner)| {
             collect(inner, format!("{place}/{}", key.replace('~', "~0").replace('/', "~1")), into);
         }),
-        // A few of many: each would be as good.
+        // A few of many: the others would test the same.
         Value::Array(list) => list.iter().enumerate().take(6).for_each(|(i, inner)| {
             collect(inner, format!("{place}/{i}"), into);
         }),

@@ -1,7 +1,7 @@
-//! Hostile inputs, made by the hundred from a seed.
+//! Hostile inputs, hundreds of them, made from a seed.
 //!
-//! `LIGHT4GS_HOSTILE_CASES` says how many each test makes (short runs in CI are in the tests themselves), and
-//! `LIGHT4GS_HOSTILE_SEED` which ones.
+//! `LIGHT4GS_HOSTILE_CASES` sets how many cases each test makes (the tests themselves have a short run for CI), and
+//! `LIGHT4GS_HOSTILE_SEED` sets the seed.
 
 pub mod bytes;
 pub mod checkpoints;
@@ -21,12 +21,12 @@ use light4gs_train::trainer::Trainer;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// How many cases a test makes: as many as the environment says, or `short`.
+/// Number of cases that a test makes: the number in the environment, or `short`.
 pub fn cases(short: usize) -> usize {
     number("LIGHT4GS_HOSTILE_CASES").map_or(short, |cases| cases as usize)
 }
 
-/// The generator of a case.
+/// The random generator of a case.
 pub fn generator(case: usize) -> ChaCha8Rng {
     let seed = number("LIGHT4GS_HOSTILE_SEED").unwrap_or(0);
     ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(case as u64))
@@ -43,10 +43,10 @@ pub fn without_panic<T>(what: &str, action: impl FnOnce() -> T) -> T {
     catch_unwind(AssertUnwindSafe(action)).unwrap_or_else(|_| panic!("panicked on: {what}"))
 }
 
-/// Trains a few iterations without a folder, and makes the file of what came out.
+/// Trains a few iterations without a folder, and makes the file of the result.
 ///
 /// # Errors
-/// What the program would say.
+/// The error that the program would print.
 pub fn train(config: &Config, scene: &Path, iterations: usize) -> Result<(), TrainError> {
     let data = Scene::open(scene, &load_options(config))?;
     let mut trainer = Trainer::builder(config.clone(), data).build()?;
@@ -56,7 +56,7 @@ pub fn train(config: &Config, scene: &Path, iterations: usize) -> Result<(), Tra
     trainer.encode().map(drop)
 }
 
-/// Runs a command to its end, or to the end of our patience.
+/// Runs a command to its end, or stops it after a time limit.
 #[track_caller]
 pub fn run_within(command: &mut Command, limit: Duration, what: &str) -> Output {
     let mut child: Child =
@@ -72,7 +72,7 @@ pub fn run_within(command: &mut Command, limit: Duration, what: &str) -> Output 
     child.wait_with_output().expect("a child")
 }
 
-/// Fails unless the program ended well or refused its input with words fit for a terminal.
+/// Fails unless the program ended well, or refused its input with a message fit for a terminal.
 #[track_caller]
 pub fn assert_bearable(output: &Output, what: &str) {
     let text = String::from_utf8_lossy(&output.stderr);

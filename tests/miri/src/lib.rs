@@ -1,4 +1,4 @@
-//! The vectors of `light4gs-model`, in which all of its unsafe code stands, with their own tests.
+//! The vectors of `light4gs-model`, which contain all of its unsafe code, with their own tests.
 
 #![allow(dead_code, reason = "the kernels that use them are not here")]
 

@@ -1,5 +1,5 @@
-//! The program as the command-line tests run it: cargo builds a package's own binaries for its tests, not its
-//! dependencies' ones.
+//! The program for the command-line tests. Cargo builds the binaries of the package under test, but not those of its
+//! dependencies, so this package has its own.
 
 fn main() -> std::process::ExitCode {
     light4gs_train::cli::main()

@@ -1,8 +1,8 @@
 //! Golden case c06 (the hexplane context model of the public code) on every back end.
 //!
-//! The reference differs from ours in one part: its inter-plane context averages the space-time planes over space instead
-//! of time, adds the two maps up, and shares its convolution with the inter-scale context. That part is written here
-//! as one more [`PriorPart`], and the rest is the model itself in its reference configuration.
+//! The reference differs from ours in one part: its inter-plane context averages the space-time planes over space
+//! instead of time, adds the two maps, and shares its convolution with the inter-scale context. That part is written
+//! here as one more [`PriorPart`]. Everything else is the model itself in its reference configuration.
 
 use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::network::Operation;
@@ -38,14 +38,14 @@ fn name_in_file(path: &str) -> String {
     path.replace(ours, theirs)
 }
 
-/// The reference's model with the file's sizes and weights. The file's only bottleneck is that of the hyperprior.
+/// The reference's model with the file's sizes and weights. The file's only bottleneck is the hyperprior's.
 fn model_of(golden: &Golden, device: &Device) -> ContextModel {
     let [channels, ..] = plane_shape(golden);
     let latent_channels = golden.shape("param.h_a.0.weight")[0];
     let mut config = ContextModelConfig::reference(channels);
     config.latent_channels = latent_channels;
     config.inter_scale = KernelShape::new(golden.shape("param.context_to_params.weight")[2], 1);
-    // The reference's inter-plane part is in this file.
+    // The reference's inter-plane part is defined in this test.
     config.parts.retain(|part| *part != ContextPart::InterPlane);
     let mut model = config.init(device);
     load(&mut model, golden, |path| Some(format!("param.{}", name_in_file(path))));
@@ -73,7 +73,8 @@ fn steps_of(golden: &Golden, device: &Device) -> PlaneSteps {
     PlaneSteps::fixed(&vec![golden.scalar("Q"); 6 * scales_of(golden)], device)
 }
 
-/// The public code's inter-plane context (NOTES b1): space averages, moments stretched over the rows.
+/// The public code's inter-plane context (NOTES b1): averages over space, with the points of time stretched over the
+/// rows.
 struct ReferenceInterPlane<'a>(&'a InterScale);
 
 impl ReferenceInterPlane<'_> {
@@ -103,7 +104,7 @@ impl PriorPart for ReferenceInterPlane<'_> {
         Some(Prior { parameters, context: None, passes: Passes::AnchorsFirst, latent_bits: None })
     }
 
-    /// Where moments are stretched over the rows.
+    /// The description for the case that points of time are stretched over the rows.
     fn describe(&self, layout: &PlaneLayout, plane: usize) -> Option<DescribedPrior> {
         let sources = layout.over_time(plane)?.map(|source| PlaneSource::SameScale(layout.planes()[source].axes));
         let mut layer = self.0.conv.to_layer();
@@ -129,8 +130,8 @@ fn parts(model: &ContextModel) -> Vec<Box<dyn PriorPart + '_>> {
     parts
 }
 
-/// Anchors and the others of `[C, H, W]` (H and W even), each `[2 C, H / 2, W / 2]`: first the even rows' values, then the odd
-/// rows'.
+/// Anchors and the others of `[C, H, W]` (H and W even), each `[2 C, H / 2, W / 2]`: first the values of the even rows,
+/// then those of the odd rows.
 fn demultiplex(plane: Tensor<3>) -> [Tensor<3>; 2] {
     let [channels, height, width] = plane.dims();
     let split: Tensor<5> = plane.reshape([channels, height / 2, 2, width / 2, 2]);
@@ -187,7 +188,7 @@ fn masked_convolution() {
         expect("grad_x", values_of(&x.grad(&gradients).unwrap()), golden.values("maskconv.grad_x"));
         let bias = conv.bias.val().grad(&gradients).unwrap();
         expect("grad_bias", values_of(&bias), golden.values("maskconv.grad_bias"));
-        // PyTorch also has gradients for the taps that the mask then sets to zero. We do not.
+        // PyTorch also computes gradients for the taps that the mask then sets to zero; our code does not.
         let mask = golden.values("mask5x5");
         let masked =
             golden.values("maskconv.grad_weight").into_iter().enumerate().map(|(i, g)| g * mask[i % mask.len()]);
@@ -232,7 +233,7 @@ fn pieces() {
     }
 }
 
-/// The maps on the way to the Gaussians of a space-time plane, each from its own part.
+/// The intermediate maps from which the Gaussians of a space-time plane are computed, one for each part.
 #[test]
 fn trace_of_a_space_time_plane() {
     let golden = Golden::open("c06_context");
@@ -257,7 +258,7 @@ fn trace_of_a_space_time_plane() {
             Tensor::cat(vec![gaussians.scales, gaussians.means], 0)
         };
         check("gauss_anchor", &both(None));
-        // The file has the second pass at every place; ours leaves the anchors' parameters alone.
+        // The file has the second pass at every place; our second pass leaves the anchors' parameters as they are.
         let context = conv.forward(plane * anchor_mask([height, width], &device));
         check("gauss_full", &both(Some(context)));
     }
@@ -328,7 +329,7 @@ fn eval() {
     }
 }
 
-/// Our quantizer against the planes that CompressAI's decoder gave back, and what they cost.
+/// Our quantizer against the planes that CompressAI's decoder returned, and their cost.
 #[test]
 fn stream() {
     let golden = Golden::open("c06_context");

@@ -9,8 +9,8 @@ use std::path::PathBuf;
 
 const TOLERANCE: f32 = 1e-5;
 
-/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter; in the set's folder or in
-/// `datasets` there.
+/// The folder or file of the golden set whose name begins with `prefix`, whatever its letter, either in the set's
+/// folder or in `datasets` in it.
 fn golden(prefix: &str) -> PathBuf {
     let folder = light4gs_tests::golden::directory();
     let mut found: Vec<PathBuf> = std::fs::read_dir(&folder)
@@ -60,7 +60,7 @@ fn check_camera(tensors: &SafeTensors, split: &str, i: usize, camera: &Camera, t
     close(&label("full_proj"), &clip.to_cols_array(), &entry("full_proj_transform", 16));
 }
 
-/// The pose with the square image the reference brings every one to (ours keeps the true aspect).
+/// The pose with the square image to which the reference resizes every image (we keep the true aspect ratio).
 fn squared(camera: &Camera, size: (i32, i32)) -> Camera {
     assert_eq!(size.0, size.1);
     let focal = camera.fx * size.0 as f32 / camera.width as f32;
@@ -122,7 +122,7 @@ fn compositing_is_exact() {
     for (name, value) in [("white", 1.0f32), ("black", 0.0)] {
         let expected = tensors.tensor(&format!("composite.{name}_u8")).unwrap();
         assert!(composite(rgba.data(), [value; 3]) == expected.data(), "{name}");
-        // The same through the files.
+        // The same, read from the files.
         let (scene, options) = open(value);
         let store = ImageStore::new(&options, 1 << 20);
         let images = expected.data().chunks_exact(per_image / 4 * 3);
@@ -152,7 +152,7 @@ fn initial_scales() {
     let tensors = SafeTensors::deserialize(&bytes).unwrap();
     let points: Vec<[f32; 3]> = floats(&tensors, "init.points").chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
     let found = mean_squared_distance_to_3_nearest(&points);
-    // The file has the bare means; the clamp shows in its logarithms.
+    // The file has the distances without the clamp; the clamp is in its logarithms.
     let means = floats(&tensors, "init.mean_dist2");
     let clamped: Vec<f32> = means.iter().map(|m| m.max(1e-7)).collect();
     close("mean_dist2", &found, &clamped);

@@ -10,7 +10,7 @@ use light4gs_model::{
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_tests::named::{compare_gradients, load};
 
-/// `[B, C, H, W]` as the bottleneck has it: `[C, B · H, W]`.
+/// `[B, C, H, W]` in the shape of the bottleneck: `[C, B · H, W]`.
 fn channels_first(tensor: Tensor<4>) -> Tensor<3> {
     let [batch, channels, height, width] = tensor.dims();
     tensor.swap_dims(0, 1).reshape([channels, batch * height, width])
@@ -111,8 +111,8 @@ fn check_bottleneck(
     assert_eq!(compared, 5 + 5 + 4, "{what}: compared parameters");
 }
 
-/// CompressAI's integer tables (README of the golden vectors; NOTES 20): rounding, rescaling, then one taken from the smallest frequency
-/// above one for each empty symbol.
+/// CompressAI's integer tables (README of the golden vectors; NOTES 20): rounding, rescaling, then for each empty
+/// symbol one is taken from the smallest frequency above one.
 fn quantized_cdf(pmf: &[f64], tail: f64) -> Vec<i64> {
     const TOTAL: i64 = 1 << 16;
     let frequencies: Vec<i64> = pmf.iter().chain([&tail]).map(|p| (*p as f32 * TOTAL as f32).round() as i64).collect();
@@ -136,7 +136,8 @@ fn quantized_cdf(pmf: &[f64], tail: f64) -> Vec<i64> {
     cdf
 }
 
-/// The tables that CompressAI makes of the bottleneck's quantiles. Its upper tail begins at the end of the longest row.
+/// The tables that CompressAI makes from the bottleneck's quantiles. Its upper tail begins at the end of the longest
+/// row.
 fn tables(bottleneck: &EntropyBottleneck) -> Vec<(i64, Vec<i64>)> {
     let density = bottleneck.density.to_plain();
     let medians: Vec<f64> = bottleneck.medians().into_data().iter::<f64>().collect();
@@ -236,7 +237,7 @@ fn sh_bottleneck() {
             let known = nothing_known(&x);
             let values = match prefix {
                 "noise" => x.clone() + golden.tensor::<3>("noise.unit_noise", &device) * step,
-                // Straight through.
+                // The straight-through gradient.
                 _ => x.clone() + (model.quantize(x.clone(), &known) - x.clone()).detach(),
             };
             let expected = |key: &str| golden.values(&format!("{prefix}.{key}"));
@@ -256,7 +257,7 @@ fn sh_bottleneck() {
     }
 }
 
-/// The reference's float tables: sums of the probabilities from the lowest symbol on.
+/// The reference's float tables: cumulative sums of the probabilities, from the lowest symbol on.
 #[test]
 fn sh_bottleneck_tables() {
     let golden = Golden::open("c04_sh_bottleneck");
@@ -304,7 +305,7 @@ fn gaussian_conditional() {
 
         for prefix in ["noise", "bits"] {
             let [y, means, scales] = ["in.y", "in.means", "in.scales"].map(leaf);
-            // From the means on: the sum of value and noise alone, in float32, is off by more than the tolerance.
+            // Relative to the means: the sum of value and noise alone, in float32, is wrong by more than the tolerance.
             let origin = read("in.means");
             let values = (y.clone() - origin.clone()) + read("noise.noise");
             let likelihood =
@@ -328,7 +329,8 @@ fn gaussian_conditional() {
     }
 }
 
-/// The gradient below the bound: passed if descent raises the value, else blocked; at the bound always passed.
+/// The gradient below the bound: it is passed if gradient descent would raise the value, and blocked otherwise. At the
+/// bound it is always passed.
 #[test]
 fn lower_bound_gradient() {
     for (name, device) in devices() {

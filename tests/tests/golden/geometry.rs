@@ -128,7 +128,7 @@ fn hexplane_query_in_scene_coordinates() {
     }
 }
 
-/// The layers of a golden network with the key that each was read from.
+/// The layers of a golden network, each with the key that it was read from.
 struct GoldenNetwork {
     network: Deformation,
     layers: Vec<(String, Linear)>,
@@ -210,8 +210,8 @@ fn deformation() {
     }
 }
 
-/// The reference's coordinates, which are not ours: a box around the points, the contraction, a quarter of it, and a
-/// half on top. `[N, 4]` in [0, 1] for space and in [-1, 1] for time.
+/// The reference's coordinates, which differ from ours: a box around the points, then the contraction, then a quarter
+/// of the result plus one half. `[N, 4]` in [0, 1] for space and in [-1, 1] for time.
 fn reference_query_points(golden: &Golden, xyz: Tensor<2>, device: &Device) -> Tensor<2> {
     let count = xyz.dims()[0];
     let (low, high) = (golden.tensor::<2>("full.aabb_min", device), golden.tensor::<2>("full.aabb_max", device));
@@ -268,7 +268,7 @@ fn deformed_gaussians() {
             let weights = Tensor::<1>::from_floats(&weights[..], &device).reshape(output.dims());
             loss = loss + (output * weights).sum();
         }
-        // A sum of numbers that cancel.
+        // A sum of numbers that cancel each other.
         assert_close_relative(&format!("{name} loss"), &values_of(&loss), &golden.values("full.loss"), 1e-4);
 
         let grads = loss.backward();

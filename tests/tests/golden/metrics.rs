@@ -37,7 +37,7 @@ fn multiscale_similarity() {
     }
 }
 
-/// The weights are not ours to spread: `LIGHT4GS_LPIPS` names a file with them.
+/// We may not redistribute the weights: `LIGHT4GS_LPIPS` names a file with them.
 #[test]
 #[ignore = "needs the weights of LPIPS: LIGHT4GS_LPIPS=FILE"]
 fn learned_distance() {
@@ -56,7 +56,7 @@ fn learned_distance() {
             assert_eq!(itself, [0.0]);
             let map = lpips.distance_map(a.clone(), b).unwrap();
             assert_eq!(map.dims()[..2], a.dims()[..2]);
-            // Bilinear enlargement counts the border more, so this is near the distance and not equal to it.
+            // Bilinear enlargement gives the border more weight, so this is close to the distance but not equal to it.
             assert_close(&format!("{name} {pair} map"), &values_of(&map.mean()), &distance, 0.05);
         }
     }

@@ -51,7 +51,7 @@ fn golden_sh(golden: &Golden, at: usize) -> f32 {
     SH.with(|sh| sh.get_or_init(|| golden.values("sh"))[at])
 }
 
-/// Images, radii and gradients of one camera. `grads` is the prefix of the gradients that are the judge.
+/// Images, radii and gradients of one camera. `grads` is the prefix of the gradients to compare with.
 fn check_camera(golden: &Golden, camera_name: &str, grads_key: &str, with_depth: bool) {
     let key = |name: &str| format!("{camera_name}.{name}");
     let size = golden.integers(&key("width_height"));
@@ -176,7 +176,7 @@ fn significance_over_views_with_volumes_and_masks() {
     let volumes: Vec<f64> =
         golden.values("scales").as_chunks::<3>().0.iter().map(|s| s.iter().map(|v| f64::from(*v)).product()).collect();
     for (name, device) in devices() {
-        // Leaves on the tape: the scores are taken off it.
+        // The leaves are on the tape; the scores must not be.
         let gaussians = raw_gaussians(&golden, &device.autodiff());
         let mut significance = Significance::new(gaussians.means.dims()[0]);
         for camera in &cameras {
@@ -214,7 +214,7 @@ fn least_significant_rows_with_ties() {
     }
 }
 
-/// The scene's activated attributes, taken back to raw ones.
+/// The scene's activated attributes, converted back to raw ones.
 fn raw_gaussians(golden: &Golden, device: &Device) -> GaussianTensors {
     let Leaves { means, quats, scales, opacities, sh, .. } = Leaves::read(golden, device);
     let [_, coefficients, _] = sh.dims();

@@ -44,7 +44,7 @@ fn image_losses() {
         check("l1", batch_mean(&image, &truth, l1));
         check("l2", batch_mean(&image, &truth, l2));
         check("ssim", batch_mean(&image, &truth, ssim));
-        // The reference adds D-SSIM to the whole of L1.
+        // The reference adds D-SSIM to L1 with its full weight.
         check(
             "l1_plus_02dssim",
             batch_mean(&image, &truth, |a, b| l1(a.clone(), b.clone()) + (-ssim(a, b) + 1.0) * 0.2),
@@ -56,7 +56,8 @@ fn image_losses() {
     }
 }
 
-/// The training loss `(1 - lambda) L1 + lambda (1 - SSIM)` is the golden `L1 + lambda (1 - SSIM)` less `lambda L1`.
+/// The golden value is `L1 + lambda (1 - SSIM)`. Our training loss `(1 - lambda) L1 + lambda (1 - SSIM)` is that value
+/// minus `lambda L1`.
 #[test]
 fn photometric_loss() {
     let golden = Golden::open("c09_losses");
@@ -125,10 +126,11 @@ fn plane_regularizers() {
     }
 }
 
-/// Gaussian rows of c10, which have ranks 2 and 3, flattened; the optimizer does not care.
+/// The rows of c10 that belong to Gaussians have ranks 2 and 3. They are flattened, which makes no difference to the
+/// optimizer.
 struct Group {
     key: &'static str,
-    /// Under which the optimizer knows it; the opacities by the name that [`reset_opacity`] uses.
+    /// The name under which the optimizer knows the parameter. The opacities have the name that [`reset_opacity`] uses.
     name: &'static str,
     parameter: Param<Tensor<2>>,
 }
@@ -148,8 +150,8 @@ fn rows_of(golden: &Golden, key: &str, device: &Device) -> Tensor<2> {
     Tensor::from_data(TensorData::new(values, [count, width]), device)
 }
 
-/// A step of several parameters with given gradients; those without one are left out of the loss, as when they take no
-/// part in an iteration.
+/// One step of several parameters with given gradients. Parameters without a gradient are left out of the loss, as when
+/// an iteration does not use them.
 fn step(adam: &mut Adam, groups: &mut [Group], gradients: &[Option<Tensor<2>>], rates: &[f64]) {
     let terms = groups.iter().zip(gradients).filter_map(|(group, gradient)| {
         gradient.as_ref().map(|gradient| (group.parameter.val() * gradient.clone()).sum())
@@ -162,7 +164,7 @@ fn step(adam: &mut Adam, groups: &mut [Group], gradients: &[Option<Tensor<2>>], 
     }
 }
 
-/// Steps all groups of c10 to the end; the last rate of `xyz` comes along.
+/// Steps all groups of c10 to the end. Also returns the last rate of `xyz`.
 fn stepped(golden: &Golden, name: &str, device: &Device) -> (Adam, Vec<Group>, f64) {
     let mut adam = Adam::default();
     let mut groups: Vec<Group> = GROUPS
@@ -208,7 +210,7 @@ fn adam() {
             let check = |what: &str, found: &Tensor<1>| {
                 let expected = golden.values(&key(what));
                 assert_close(&format!("{name} {}", key(what)), &values_of(found), &expected, 1e-6);
-                // Second moments are small. 1 - 0.999 in float32 is off by a share of 1.3e-5, and so are they.
+                // Second moments are small. In float32, 1 - 0.999 has a relative error of 1.3e-5, and so have they.
                 assert_close_relative(&format!("{name} {}", key(what)), &values_of(found), &expected, 5e-5);
             };
             check("exp_avg", first);
@@ -233,7 +235,7 @@ fn adam_after_rows_came_and_went() {
         let ints = |values: &[i64], device: &Device| {
             Tensor::<1, Int>::from_data(TensorData::new(values.to_vec(), [values.len()]), device)
         };
-        // New rows have no source; any row does, since its moments become zeros.
+        // New rows have no source row. Any row may be named, since its moments become zeros.
         let is_new = |row: &i64| *row >= before as i64;
         let sources: Vec<i64> = kept.iter().map(|row| if is_new(row) { 0 } else { *row }).collect();
         let fresh: Vec<f32> = kept.iter().map(|row| f32::from(is_new(row))).collect();
@@ -305,7 +307,7 @@ fn learning_rates() {
         let found: Vec<f32> = steps.iter().map(|step| decay.at(*step as f64) as f32).collect();
         assert_close(&format!("{config:?}"), &found, expected, 1e-6);
         for (found, expected) in found.iter().zip(expected) {
-            // The rates are themselves near 1e-6, so this is the test that bites.
+            // The rates themselves are near 1e-6, so the relative comparison is the strict one.
             assert!((found - expected).abs() <= 1e-5 * expected, "{config:?}: {found:e} against {expected:e}");
         }
     }
@@ -358,8 +360,8 @@ fn densification() {
         // The file has more normals than there are halves.
         let normals = golden.values("in.unit_normals")[..masks.normals_needed()].to_vec();
 
-        // The file has the moments after only. Rows that stay tell what they were before; those that are split had
-        // some that must not survive.
+        // The file has only the moments after the step. Rows that stay tell what their moments were before. Rows that
+        // are split had some as well, which must not survive.
         let sources: Vec<usize> = golden.integers("after_densify.source_index").iter().map(|i| *i as usize).collect();
         let after = golden.values("after_densify.exp_avg_xyz");
         let mut moments = vec![7.0; 3 * count];
@@ -397,7 +399,7 @@ fn densification() {
     }
 }
 
-/// Moments that say which row they belong to.
+/// Moments whose values tell the row that they belong to.
 fn numbered_moments(gaussians: &Gaussians, device: &Device) -> Adam {
     let values: Vec<f32> = (0..gaussians.len()).map(|row| row as f32).collect();
     let first = Tensor::<1>::from_floats(&values[..], device);

@@ -1,9 +1,9 @@
-//! Every back end draws the same images and has the same gradients, on scenes of all sizes with odd and broken
-//! Gaussians among them.
+//! Every back end draws the same images and computes the same gradients. The scenes are of all sizes, and have odd and
+//! broken Gaussians among them.
 //!
 //! Back ends round differently, and at a threshold (alpha 1/255, transmittance 1e-4) the last bit decides. The float64
-//! twin says at which pixels that may be; those have no weight in the loss and are left out of the comparison. Gaussians
-//! whose tiles or place in the order hang on the last bit are not in the scenes at all.
+//! twin says at which pixels that may happen. Those pixels have no weight in the loss and are left out of the
+//! comparison. Gaussians whose tiles or place in the order depend on the last bit are not in the scenes at all.
 
 use burn::tensor::{Tensor, TensorData};
 use light4gs_data::Camera;
@@ -17,7 +17,7 @@ use light4gs_tests::twin;
 const IMAGE: f32 = 2e-4;
 const GRADIENT: f32 = 1e-3;
 
-/// `keep` tells which Gaussians can be drawn. At most `doubtful` of the pixels may be left out.
+/// `keep` says which Gaussians can be drawn. At most `doubtful` of the pixels may be left out.
 #[track_caller]
 fn assert_agreement(
     what: &str,
@@ -65,7 +65,8 @@ fn assert_agreement(
     }
 }
 
-/// A scene without Gaussians in doubt, some of them made odd, some broken; which can be drawn; and its camera.
+/// A scene without Gaussians whose tiles or order depend on rounding, some of them made odd, some broken; which of them
+/// can be drawn; and the camera.
 fn odd_scene(count: usize, size: [u32; 2], ranges: &Ranges, random: &mut Random) -> (SplatScene, Vec<bool>, Camera) {
     let camera = random_camera(size[0], size[1], random);
     let mut scene = SplatScene::random(count, ranges, random);
@@ -73,7 +74,7 @@ fn odd_scene(count: usize, size: [u32; 2], ranges: &Ranges, random: &mut Random)
         if random.below(6) == 0 {
             let ordinary = scene.row_mut(SCALES, i).to_vec();
             make_odd(&mut scene, i, &camera, random);
-            // Far larger than the scene: in float32 its covariance keeps three digits or fewer, whoever computes it.
+            // Far larger than the scene: in float32 its covariance keeps three digits or fewer on every back end.
             if scene.row_mut(SCALES, i).iter().any(|scale| *scale > 1.0) {
                 scene.row_mut(SCALES, i).copy_from_slice(&ordinary);
             }
@@ -121,7 +122,7 @@ fn large_scenes() {
     }
 }
 
-/// More than one launch of the GPU blends: a cell's list is longer than a part (32768).
+/// Blending takes more than one launch on the GPU: a cell's list is longer than a part (32768).
 #[test]
 fn seventy_thousand_gaussians_in_one_tile() {
     let mut random = Random::new(6);
@@ -152,7 +153,7 @@ fn all_but_one_behind_the_camera() {
     assert_agreement("behind", &scene, &[true; 100], &camera, 3, 0.1, &mut random);
 }
 
-/// So many that the pairs of a tile and a Gaussian must be sorted, blended and summed in more than one launch.
+/// Enough Gaussians that the pairs of a tile and a Gaussian are sorted, blended and summed in more than one launch.
 #[test]
 fn a_million_gaussians_in_one_tile() {
     const COUNT: usize = 1_000_000;

@@ -22,7 +22,7 @@ fn profile(config: &Config) -> Profile {
     config.compression.profile.coded().unwrap()
 }
 
-/// The whole model, and each with a part less.
+/// The whole model, and the models that each lack one part.
 fn compositions() -> Vec<ContextModelConfig> {
     let parts = ContextPart::PAPER.map(|part| ContextPart::paper_without(&[part]));
     let parts = parts.into_iter().chain([ContextPart::PAPER.to_vec(), ContextPart::ALL.to_vec(), Vec::new()]);
@@ -30,7 +30,7 @@ fn compositions() -> Vec<ContextModelConfig> {
     compact.chain([ContextModelConfig::reference(CHANNELS)]).collect()
 }
 
-/// Weights far from their start, so that every path through the networks counts.
+/// Weights far from their initial values, so that every path through the networks affects the result.
 fn shaken(mut model: ContextModel, planes: &PlaneTensors, steps: &PlaneSteps) -> ContextModel {
     model.start_from(planes, steps);
     let [.., last] = &mut model.entropy_parameters.layers;
@@ -47,7 +47,7 @@ fn modules_and_exact_executor_agree() {
     for (name, device) in devices() {
         device.seed(3);
         let sets = plane_sets();
-        // The hexplane with each composition, every other set of planes with the whole model.
+        // The hexplane with each composition, and every other set of planes with the whole model.
         let cases = sets.iter().enumerate().flat_map(|(place, set)| {
             let count = if place == 0 { usize::MAX } else { 1 };
             compositions().into_iter().enumerate().take(count).map(move |config| (set, config))
@@ -103,7 +103,7 @@ fn config(overrides: &[&str]) -> Config {
     Config::load("dnerf-cpu", &overrides).unwrap()
 }
 
-/// Over many draws the estimate on a part is the rate of everything.
+/// Averaged over many draws, the estimate from a part of the planes is the rate of all planes.
 #[test]
 fn the_rate_on_a_part_is_unbiased() {
     let device = Device::flex().autodiff();
@@ -111,7 +111,7 @@ fn the_rate_on_a_part_is_unbiased() {
     let scene = scene(&config, &device);
     let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
     let noisy = compression.noisy(&scene, false, true);
-    // The hyperprior's own noise is drawn anew each time; seeding it makes all draws see the same.
+    // The hyperprior's noise is drawn anew each time. Seeding it gives all draws the same noise.
     let estimate = |fraction: f64, seed: u64| {
         device.seed(1);
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
@@ -130,8 +130,8 @@ fn the_rate_on_a_part_is_unbiased() {
     assert!((sh_sum / sh - 1.0).abs() < 0.02, "spherical harmonics: {sh_sum} on parts, {sh} on all");
 }
 
-/// Every part switched off, every model of the spherical harmonics, both profiles, every degree: the file decodes to
-/// what the encoder said, with the size that the models expect.
+/// With every part switched off, every model of the spherical harmonics, both profiles and every degree, the file
+/// decodes to the values that the encoder reported and has the size that the models expect.
 #[test]
 fn every_configuration_makes_a_file_that_decodes() {
     let device = Device::flex().autodiff();
@@ -167,7 +167,7 @@ fn every_configuration_makes_a_file_that_decodes() {
         let coded = encoded.coded;
         let bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
         let (expected, found) = (coded.estimate.planes, 8.0 * bytes as f64);
-        // What the sub-streams of a plane spend on whole words at their ends, and quantized weights.
+        // The bytes that the sub-streams of a plane lose to whole words at their ends, and quantized weights.
         let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
         let sh_bytes: u64 = coded.report.sh.degrees.iter().sum();
@@ -177,7 +177,8 @@ fn every_configuration_makes_a_file_that_decodes() {
     }
 }
 
-/// Once frozen, planes are what the file has, bit for bit: what learns around them learns around the right thing.
+/// Frozen planes are the planes of the file, bit for bit, so that the rest of the scene is trained around the values
+/// that it will have.
 #[test]
 fn frozen_planes_are_those_of_the_file() {
     for (name, device) in devices() {
@@ -205,8 +206,8 @@ fn frozen_planes_are_those_of_the_file() {
     }
 }
 
-/// A hyperprior that is sensitive to rounding asks for other symbols each time that decoded planes are coded again. However
-/// often that happens, no value moves by more than rounding does.
+/// A hyperprior that is sensitive to rounding gives other symbols each time that decoded planes are coded again.
+/// However often that happens, no value changes by more than rounding.
 #[test]
 fn freezing_does_not_carry_planes_away() {
     let device = Device::flex().autodiff();

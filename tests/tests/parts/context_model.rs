@@ -1,5 +1,5 @@
-//! Properties of the context model that do not depend on golden vectors: what may depend on what, and that every
-//! ablation works.
+//! Properties of the context model that do not depend on golden vectors: which values may depend on which, and that
+//! every ablation works.
 
 use burn::module::Param;
 use burn::optim::{AdamConfig, GradientsParams};
@@ -52,7 +52,7 @@ fn all_planes() -> Vec<usize> {
     (0..PLANES).collect()
 }
 
-/// The hexplane with each composition, every other set of planes with the whole model.
+/// The hexplane with each composition, and every other set of planes with the whole model.
 fn cases() -> impl Iterator<Item = (String, PlaneLayout, ContextModelConfig)> {
     plane_sets().into_iter().enumerate().flat_map(|(place, (set, layout))| {
         let compositions = compositions().into_iter().take(if place == 0 { usize::MAX } else { 1 });
@@ -66,8 +66,8 @@ fn parameters(model: &ContextModel, planes: &PlaneTensors, plane: usize) -> Vec<
     [values_of(&found[0].means), values_of(&found[0].scales)].concat()
 }
 
-/// Which parameters of a plane change if one value of a plane changes; none where a plane has a hyperprior, which is
-/// transmitted and may look at all of it.
+/// Which parameters of a plane change if one value of a plane changes. None for a plane with a hyperprior, which is
+/// transmitted and may depend on the whole plane.
 #[test]
 fn parameters_depend_only_on_what_is_decoded() {
     let device = Device::flex();
@@ -82,7 +82,7 @@ fn parameters_depend_only_on_what_is_decoded() {
             }
             let before = parameters(&model, &planes, plane);
             for later in &order[place..] {
-                // Of the plane itself, a value that is no anchor: nothing may depend on that.
+                // In the plane itself a value that is not an anchor is changed: no parameter may depend on it.
                 let mut changed = planes.clone();
                 let [channels, height, width] = changed[*later].dims();
                 let mask: Vec<f32> = (0..channels * height * width)
@@ -97,7 +97,7 @@ fn parameters_depend_only_on_what_is_decoded() {
     }
 }
 
-/// What the quantizer believes is what the rate says of its result.
+/// The bits that the quantizer assumes are those that the rate gives for its result.
 #[test]
 fn rate_of_the_quantized_planes() {
     for (name, device) in devices() {
@@ -115,7 +115,7 @@ fn rate_of_the_quantized_planes() {
                 assert!(error <= 0.1 / 2.0 + 1e-5, "{what}: decoded {error} away");
                 let [rate, map] = [&rates[plane].values_bits, &maps[plane].clone().sum()].map(values_of);
                 assert_close_relative(&what, &map, &rate, 1e-5);
-                // Where there is a hyperprior, that of the decoded plane is another one.
+                // Where there is a hyperprior, the decoded plane gives another one.
                 if rates[plane].latent_bits.is_none() {
                     assert_close_relative(&what, &rate, &values_of(&quantized[plane].rate.values_bits), 1e-3);
                 }
@@ -166,8 +166,8 @@ fn compact_is_compact() {
     assert!((5000..8000).contains(&in_stream.0), "{} weights", in_stream.0);
 }
 
-/// From the statistics of the planes, a value costs about what its Gaussian's entropy says, and far less than the 29.9
-/// bits of the floor that PyTorch's initial weights lie on.
+/// With distributions that start from the statistics of the planes, a value costs about the entropy of its Gaussian.
+/// That is far less than the 29.9 bits of the floor, which is the cost with PyTorch's initial weights.
 #[test]
 fn a_start_from_statistics_is_sane() {
     let device = Device::flex();
@@ -186,7 +186,8 @@ fn a_start_from_statistics_is_sane() {
     assert!((5.0..9.0).contains(&bits_each(&warm)), "{}", bits_each(&warm));
 }
 
-/// A finer step costs more bits, and the gradient says so; through the noise it also reaches the distortion.
+/// A finer step costs more bits, and the gradient of the rate has that sign; through the noise the step also affects
+/// the distortion.
 #[test]
 fn learned_steps_have_a_gradient() {
     for (name, device) in devices() {
@@ -203,7 +204,7 @@ fn learned_steps_have_a_gradient() {
         assert_eq!(gradient.len(), 4);
         assert!(gradient.iter().all(|g| *g < 0.0), "{name}: {gradient:?}");
 
-        // A tape is consumed by its backward pass.
+        // A backward pass consumes its tape.
         let noisy = quantization.steps().add_noise(&planes);
         let error = (noisy[0].clone() - planes[0].clone()).powi_scalar(2).sum();
         let gradient = values_of(&quantization.log_steps.val().grad(&error.clone().backward()).unwrap());
@@ -229,9 +230,9 @@ fn steps_no_finer_than_they_began() {
     }
 }
 
-/// With Burn's own optimizer, on planes that are smooth and resemble each other across scales: the rate falls well below
-/// what statistics alone give, with noise in every step and a third of the planes. (Measured: to 0.7 of it, and to 0.5 in
-/// 1000 steps.)
+/// With Burn's own optimizer, on planes that are smooth and resemble each other across scales: the rate falls well
+/// below what the statistics alone give, with noise in every step and a third of the planes used in each. (Measured: to
+/// 0.7 of it, and in 1000 steps to 0.5.)
 #[test]
 fn training_lowers_the_rate() {
     let device = Device::flex().autodiff();

@@ -1,4 +1,5 @@
-//! Whatever the configuration allows trains: both ends of every key's range, every word, true and false.
+//! Every configuration that is accepted can be trained: tested with both ends of every key's range, every word, true
+//! and false.
 
 use std::path::Path;
 
@@ -8,8 +9,8 @@ use light4gs_tests::hostile::{train, without_panic};
 use light4gs_train::config::{Config, KEYS, Key};
 use light4gs_train::error::TrainError;
 
-/// In place of the last value: a large one that takes a moment where the end of the range would ask for the whole machine, and
-/// a part together with those that it needs.
+/// Values to use instead of the last one: a large value that trains quickly where the end of the range would use the
+/// whole machine, and a part together with the parts that it needs.
 const INSTEAD: [(&str, &str); 10] = [
     ("data.resolution", "64"),
     ("data.initial_points", "3000"),
@@ -26,7 +27,7 @@ const INSTEAD: [(&str, &str); 10] = [
 /// Keys and their values.
 type Overrides = &'static [(&'static str, &'static str)];
 
-/// What else must be said where a value does not stand alone.
+/// Other keys that must be set where a value is not legal alone.
 const COMPANIONS: [(&str, &str, Overrides); 11] = [
     ("train.coarse_iterations", "0", &[("train.fine_iterations", "3")]),
     ("train.fine_iterations", "0", &[("train.prune.iterations", "[]"), ("train.coarse_iterations", "3")]),
@@ -71,7 +72,7 @@ fn every_legal_value_of_every_key_trains_and_is_encoded() {
             let config = Config::from_toml(&text, key).unwrap_or_else(|error| panic!("{key} = {value}: {error}"));
             count += 1;
             match without_panic(&format!("{key} = {value}"), || train(&config, &data, 4)) {
-                // What training makes of an extreme rate is its own affair, as long as it says so.
+                // Training may fail with an extreme rate, as long as it says so.
                 Ok(()) | Err(TrainError::Diverged(_)) => {}
                 Err(error) => failures.push(format!("{key} = {value}: {error}")),
             }

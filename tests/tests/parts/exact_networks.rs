@@ -1,5 +1,5 @@
-//! The Burn modules against the codec's exact executor of what they describe: spherical harmonics and motion. The context
-//! model's networks are compared in `compression.rs`.
+//! The Burn modules against the codec's exact executor, which runs their descriptions: spherical harmonics and motion.
+//! The context model's networks are compared in `compression.rs`.
 
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor, TensorData};
@@ -16,7 +16,7 @@ use rand_chacha::ChaCha8Rng;
 
 const COUNT: usize = 61;
 
-/// A scene whose planes and networks are far from their start, and which moves in every attribute.
+/// A scene whose planes and networks are far from their initial values, and in which every attribute changes over time.
 fn scene(depth: usize, device: &Device) -> DynamicScene<HexPlaneField> {
     device.seed(5);
     let mut random = ChaCha8Rng::seed_from_u64(9);
@@ -36,7 +36,7 @@ fn scene(depth: usize, device: &Device) -> DynamicScene<HexPlaneField> {
     scene
 }
 
-/// The codec runs the network that a file holds, and finds the Gaussians where the model has them.
+/// The codec runs the network of a file, and places the Gaussians where the model places them.
 #[test]
 fn positions_are_those_of_the_model() {
     for (name, device) in devices() {
@@ -55,7 +55,7 @@ fn positions_are_those_of_the_model() {
     }
 }
 
-/// Bits under what the codec computes are the bits that the model gives.
+/// The bits under the distributions that the codec computes are the bits that the model gives.
 #[test]
 fn spherical_harmonics_cost_what_the_model_says() {
     for (name, device) in devices() {

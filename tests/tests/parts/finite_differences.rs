@@ -1,6 +1,6 @@
 //! Hand-written derivatives of the custom operations against central finite differences, on every back end.
 //!
-//! Two judges for each operation, since each has what the other lacks:
+//! There are two references for each operation, since each has what the other lacks:
 //!
 //! - *Differences of the operation itself*, along random directions. They see the very function that is trained, but
 //!   it is float32, whose rounding a step h magnifies by 1/h, while the central difference is off by the order of h².
@@ -64,7 +64,8 @@ fn check_directions(
     }
 }
 
-/// Weights `[H, W, 5]` that vary slowly over the image, so that what the pixels say adds up, and their rounding less.
+/// Weights `[H, W, 5]` that vary slowly over the image: contributions of the pixels then add up, and their rounding
+/// errors matter less.
 fn smooth_weights(camera: &Camera, random: &mut Random) -> Vec<f64> {
     let (width, height) = (f64::from(camera.width), f64::from(camera.height));
     let waves: [[f64; 3]; 5] = std::array::from_fn(|_| [0; 3].map(|_| random.uniform(-3.0, 3.0)));
@@ -79,8 +80,7 @@ fn depth_of(scene: &mut SplatScene, i: usize, camera: &Camera) -> f64 {
     (camera.rotation.as_dmat3() * mean + camera.translation.as_dvec3()).z
 }
 
-/// Large, rather transparent Gaussians, so that no threshold lies in the image, and none that a step could move
-/// before another.
+/// Large, rather transparent Gaussians, so that no threshold is met in the image, or can be reached by a step.
 fn smooth_scene(camera: &Camera, random: &mut Random) -> SplatScene {
     let ranges = Ranges { half_size: 0.7, scales: [1.6, 2.6], opacities: [0.2, 0.6], sh: [0.3, 0.1], offset: 0.1 };
     loop {
@@ -128,8 +128,9 @@ fn splat_along_random_directions() {
     }
 }
 
-/// Ordinary scenes, every coordinate of every input. What differs besides rounding is pixels where float32 decides a
-/// threshold otherwise than float64: one pixel of one Gaussian, of weight 1/255. Hence 2e-3 of the largest entry.
+/// Ordinary scenes, every coordinate of every input. Besides rounding, the results differ at pixels where float32
+/// decides a threshold differently from float64: one pixel of one Gaussian, of weight 1/255. Hence the tolerance of
+/// 2e-3 of the largest entry.
 #[test]
 fn splat_against_the_twin() {
     for seed in 10..14 {
@@ -169,7 +170,7 @@ fn splat_against_the_twin() {
     }
 }
 
-/// Points and the six planes of one scale.
+/// Points, and the six planes of one scale.
 #[derive(Clone)]
 struct Query {
     channels: usize,
@@ -232,7 +233,7 @@ impl Query {
         })
     }
 
-    /// Features in float64, plainly: align-corners, border clamp.
+    /// Features in float64, written plainly: align-corners, border clamp.
     fn twin(&self) -> Vec<f64> {
         let points = self.inputs[0].chunks_exact(4);
         points.flat_map(|point| (0..self.channels).map(|c| self.twin_feature(point, c)).collect::<Vec<_>>()).collect()
@@ -248,7 +249,7 @@ impl Query {
             };
             let mut sample = 0.0;
             for (row, column) in (0..height).flat_map(|row| (0..width).map(move |column| (row, column))) {
-                // Tents: of all cells only the four around the point weigh anything.
+                // Tent functions: only the four cells around the point have weight.
                 let tent = |place: f64, cell: usize| (1.0 - (place - cell as f64).abs()).max(0.0);
                 let weight = tent(place(across), column) * tent(place(down), row);
                 sample += weight * self.inputs[plane + 1][(channel * height + row) * width + column];
@@ -259,7 +260,7 @@ impl Query {
     }
 }
 
-/// Channels that do and do not fill the vector lanes, odd resolutions, an axis of two cells.
+/// Numbers of channels that fill the vector lanes and that do not, odd resolutions, an axis of two cells.
 fn queries() -> Vec<(String, Query, Random)> {
     let cases = [(3, [5, 4, 6, 3]), (8, [4, 4, 4, 4]), (9, [7, 3, 5, 2])];
     let seeded = cases.into_iter().enumerate().map(|(seed, (channels, resolution))| {
@@ -319,7 +320,7 @@ fn hexplane_query_against_the_twin() {
     }
 }
 
-/// Elementwise operations: values that are neither all in the tails nor on a threshold.
+/// Elementwise operations, at values that are not all in the tails and not on a threshold.
 fn check_elementwise(
     what: &str,
     values: &[f64],
@@ -340,7 +341,7 @@ fn check_elementwise(
     });
 }
 
-/// Above the bound; what happens below it is no derivative, and golden cases c04 and c05 pin it.
+/// Only above the bound: below it the result is not a derivative. Golden cases c04 and c05 test that part.
 #[test]
 fn lower_bound_above_the_bound() {
     for (name, device) in devices() {
@@ -374,7 +375,7 @@ fn normal_cdf_twin(x: f64) -> f64 {
     (normal_density_twin(low) + inner.sum::<f64>() + normal_density_twin(x)) * step / 3.0
 }
 
-/// Relative errors, down to where nothing is coded any more: the bits of a symbol are a logarithm.
+/// Relative errors, down to probabilities at which nothing is coded any more: the bits of a symbol are a logarithm.
 #[test]
 fn normal_cdf_against_the_twin() {
     let places: Vec<f64> = (-90..=60).map(|i| f64::from((f64::from(i) * 0.1) as f32)).collect();

@@ -1,5 +1,5 @@
-//! Kernels of the wgpu back end where the other tests of back ends do not look: functions far into their tails, and lists that
-//! are longer than one launch takes.
+//! Kernels of the wgpu back end in cases that the other tests of back ends leave out: functions far into their tails,
+//! and lists that are longer than one launch can process.
 
 use burn::tensor::{Device, Tensor, TensorData};
 use glam::Vec3;
@@ -33,7 +33,7 @@ fn values_and_gradients_are_those_of_the_cpu() {
             for (found, expected) in found.iter().zip(&expected) {
                 assert_eq!(found.len(), count);
                 for (i, (found, expected)) in found.iter().zip(expected).enumerate() {
-                    // At -13 a rounding of the exponent, which is -84, is 4e-6 of the value.
+                    // At -13 the exponent is -84, and its rounding alone is a relative error of 4e-6.
                     let allowed = 1e-5 * expected.abs();
                     assert!((found - expected).abs() <= allowed, "{what} {i}: {found} against {expected}");
                 }
@@ -44,7 +44,7 @@ fn values_and_gradients_are_those_of_the_cpu() {
 
 const SIDE: u32 = 8;
 
-/// Faint dots, each in the middle of one pixel of an image that is one cell, no two at one depth: nothing hangs on
+/// Faint dots, each in the middle of one pixel of an image that is one cell, no two at one depth: no result depends on
 /// the last bit.
 fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
     let camera = Camera::look_at(Vec3::new(0.3, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIDE, SIDE);
@@ -70,7 +70,7 @@ fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
     (gaussians, camera)
 }
 
-/// No Gaussian, one, and more in one cell than one launch takes.
+/// No Gaussian, one Gaussian, and more Gaussians in one cell than one launch processes.
 #[test]
 fn scores_are_those_of_the_cpu() {
     for count in [0, 1, 40_000] {
@@ -98,7 +98,7 @@ fn scores_are_those_of_the_cpu() {
     }
 }
 
-/// Far more points in one cell than a loop of Mesa's software driver takes.
+/// Far more points in one cell than the iterations that Mesa's software driver allows for a loop.
 #[test]
 fn a_crowded_cell() {
     const POINTS: usize = 20_000;

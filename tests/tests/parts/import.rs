@@ -1,4 +1,5 @@
-//! Checkpoints of 4DGaussians and of the public code of Light4GS, and plain PLY files: read, rendered alike, and coded.
+//! Checkpoints of 4DGaussians and of the public code of Light4GS, and plain PLY files: they are read, rendered with the
+//! same result, and coded.
 
 use std::path::Path;
 
@@ -105,7 +106,7 @@ fn the_reference_deforms_as_its_golden_vectors_say() {
     }
 }
 
-/// Features of an imported scene at points and a time of each.
+/// Features of an imported scene at points, each with its own time.
 fn features(scene: &DynamicScene<HexPlaneField>, points: Tensor<2>, times: &[f32]) -> Tensor<2> {
     let device = points.device();
     let times: Vec<f32> = times.iter().map(|time| 2.0 * scene.coordinates.field_time(*time) - 1.0).collect();
@@ -166,14 +167,14 @@ fn four_d_gaussians(folder: &Path, gaussians: &GaussianPly, times: usize, channe
     }
     state.insert(format!("{GRID}.aabb"), (vec![2, 3], vec![1.2, 1.5, 1.1, -1.3, -0.9, -1.4]));
     random_network(&mut state, 2 * channels, 16, &mut random, size);
-    // What the program saves besides, and nobody uses.
+    // Parameters that the program saves too and that are not used.
     state.insert("timenet.0.weight".into(), (vec![2, 9], vec![0.0; 18]));
     state.insert("time_poc".into(), (vec![4], vec![1.0, 2.0, 4.0, 8.0]));
     write_checkpoint(folder, gaussians, &state, "Namespace(no_do=True, white_background=False)");
     state
 }
 
-/// The program's own query: a box to [-1, 1] with its far corner at -1, the time as it is, all planes.
+/// The program's own query: space from a box to [-1, 1], with the far corner at -1; the time as it is; all planes.
 fn expected_features(state: &StateDict, points: &[[f32; 3]], time: f32, device: &Device) -> Tensor<2> {
     let aabb = &state[&format!("{GRID}.aabb")].1;
     let row = |point: &[f32; 3]| {
@@ -200,7 +201,7 @@ fn the_coordinates_of_4dgaussians_are_kept_for_every_number_of_times() {
             let rows = imported.scene.field.hexplane.layout().planes()[2].size[0];
             assert!(rows.is_multiple_of(4) && rows as usize <= (times / 2 + 2).next_multiple_of(4), "{times}: {rows}");
             let mut random = Random::new(5);
-            // Some outside the box, where the border counts.
+            // Some points are outside the box, where the values at the border are used.
             let points: Vec<[f32; 3]> = (0..200).map(|_| [0; 3].map(|_| random.uniform(-2.0, 2.0) as f32)).collect();
             for time in [0.0f32, 0.013, 0.5, 0.77, 1.0] {
                 let tensor = Tensor::<2>::from_data(TensorData::new(points.concat(), [200, 3]), &device);
@@ -279,7 +280,8 @@ fn what_is_wrong_with_a_checkpoint_is_said_by_file_and_tensor() {
     assert!(message.contains("no deformation.pth") && message.contains("iteration_14000"), "{message}");
 }
 
-/// The folder of the whole model has its iterations below; the last one counts, and the coarse stage's never does.
+/// The folder of a whole model has a folder for each iteration. The last one is read, and never one of the coarse
+/// stage.
 #[test]
 fn the_last_iteration_of_a_model_is_taken() {
     let folder = tempfile::tempdir().unwrap();
@@ -311,8 +313,8 @@ fn small_fit(preset: &str) -> Config {
     Config::load(preset, &["compression.context.fit_iterations=150".to_owned(), "device=flex".to_owned()]).unwrap()
 }
 
-/// PSNR that coding costs on views that the coder did not look at. The truth is what was imported, off by as much as a good
-/// training leaves.
+/// The PSNR that coding costs on views that the coder did not use. The ground truth is the imported scene, with an
+/// error as large as that of a good training.
 fn cost_in_db(before: &dyn Fn(&Frame) -> Vec<f32>, after: &dyn Fn(&Frame) -> Vec<f32>, frames: &SplitFrames) -> f64 {
     let mut random = Random::new(9);
     let (mut own, mut coded, mut count) = (0.0, 0.0, 0);

@@ -1,5 +1,5 @@
-//! The parts of the crates together, inside one process: back ends against each other, modules against the codec,
-//! derivatives, imports, whatever the configuration allows.
+//! Tests of several crates together in one process: back ends against each other, modules against the codec,
+//! derivatives, imports, all legal configurations.
 
 mod back_ends_agree;
 mod compression;

@@ -1,4 +1,4 @@
-//! Convolutions over planes against Burn's own, values and gradients.
+//! Convolutions over planes against Burn's own: values and gradients.
 
 use burn::module::Param;
 use burn::tensor::module::{conv_transpose2d, conv2d};

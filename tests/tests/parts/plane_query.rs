@@ -1,4 +1,5 @@
-//! The query of sets of planes that are no hexplane, against a hexplane whose other planes are ones: values and gradients.
+//! The query of sets of planes other than the hexplane, against a hexplane whose other planes are filled with ones:
+//! values and gradients.
 
 use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
@@ -17,7 +18,8 @@ fn random_planes(layout: &PlaneLayout, device: &Device) -> PlaneTensors {
     PlaneTensors::new(layout.clone(), planes.collect())
 }
 
-/// For each scale of planes a product of single hexplanes: one for each plane, which has ones for all others.
+/// For each scale of planes a product of single hexplanes: one hexplane for each plane, with ones in all its other
+/// planes.
 fn expected(planes: &PlaneTensors, points: &Tensor<2>) -> Tensor<2> {
     let scale = |scale: usize| {
         let single = planes.layout().scale(scale).map(|place| {
@@ -48,7 +50,7 @@ fn features_and_gradients_of_any_set_of_planes() {
         for (set, layout) in plane_sets() {
             let what = |part: &str| format!("{name}, {set}: {part}");
             let planes = random_planes(&layout, &device);
-            // Some lie outside.
+            // Some points are outside.
             let points = Tensor::<2>::random([POINTS, 4], Distribution::Uniform(-1.1, 1.1), &device).require_grad();
             let weights = Tensor::random([POINTS, CHANNELS * layout.scales()], Distribution::Default, &device);
             let results = [planes.query(points.clone()), expected(&planes, &points)].map(|features| {
@@ -66,7 +68,7 @@ fn features_and_gradients_of_any_set_of_planes() {
     }
 }
 
-/// Positions see the planes without time, whatever else there is.
+/// The gradient of positions goes through the planes without time, whichever other planes there are.
 #[test]
 fn features_over_space_leave_time_out() {
     for (name, device) in devices() {
@@ -86,7 +88,7 @@ fn features_over_space_leave_time_out() {
     }
 }
 
-/// Planes of one kind have the other kind's terms at 0.
+/// In a set of planes of one kind, the terms of the other kind are 0.
 #[test]
 fn regularizers_by_axes() {
     let device = Device::flex().autodiff();

@@ -1,4 +1,5 @@
-//! The rasterizer on scenes that nobody would make on purpose, against a plain twin, and its reproducibility.
+//! The rasterizer on scenes that nobody would make on purpose: compared with a plain float64 twin, and repeated with
+//! the same result.
 
 use burn::tensor::Tensor;
 use light4gs_data::{Camera, PointCloud};
@@ -34,7 +35,7 @@ fn assert_finite(what: &str, run: &Run) {
     assert!(alphas.clone().all(|alpha| (0.0..=1.0).contains(alpha)), "{what}: alpha outside of [0, 1]");
 }
 
-/// Bit by bit equality of images, radii and gradients.
+/// Equality of images, radii and gradients, bit by bit.
 #[track_caller]
 fn assert_same(what: &str, a: &Run, b: &Run) {
     assert_eq!(bits(&a.image), bits(&b.image), "{what}: image");
@@ -44,7 +45,7 @@ fn assert_same(what: &str, a: &Run, b: &Run) {
     }
 }
 
-/// The number of Gaussians of each of the random scenes, which then differ in everything else too.
+/// The number of Gaussians of each random scene. The scenes differ in everything else too.
 const COUNTS: [usize; 12] = [1, 2, 3, 7, 16, 40, 100, 333, 511, 513, 1200, 2000];
 
 #[test]
@@ -79,7 +80,7 @@ fn poisoned_gaussians_are_counted_and_leave_no_trace() {
             let expected = run(&clean, &camera, 3, &device);
             assert_eq!(expected.invalid, 0, "{what}");
             assert_eq!(bits(&found.image), bits(&expected.image), "{what}: image");
-            // So are the gradients of the others; the poisoned ones' are zero.
+            // The gradients of the other Gaussians are the same too; those of the poisoned ones are zero.
             for (k, width) in WIDTHS.into_iter().enumerate() {
                 let rows = found.gradients[k].chunks_exact(width).zip(&keep);
                 let of_kept: Vec<f32> = rows.clone().filter(|(_, k)| **k).flat_map(|(r, _)| r.to_vec()).collect();
@@ -91,7 +92,7 @@ fn poisoned_gaussians_are_counted_and_leave_no_trace() {
     }
 }
 
-/// Each kind of poison alone, so that none hides behind another.
+/// Each kind of poison alone, so that no kind hides the effect of another.
 #[test]
 fn every_attribute_can_be_poisoned() {
     for (name, device) in devices() {
@@ -116,8 +117,8 @@ fn every_attribute_can_be_poisoned() {
     }
 }
 
-/// Scenes half of whose Gaussians have a finite number of any size, 1e-37 to 10^`largest`, in some of the attributes.
-/// Nothing is known of their images but that they are finite; says which are not.
+/// Scenes in which half of the Gaussians have finite numbers of any size, 1e-37 to 10^`largest`, in some attributes.
+/// Only one property of their images is known: they are finite. Returns the images that are not.
 fn failures_at_extremes(attributes: &[usize], largest: f64) -> Vec<String> {
     let mut failures = Vec::new();
     for seed in 0..60 {
@@ -156,7 +157,7 @@ fn extreme_geometry_gives_finite_results() {
     assert!(failures.is_empty(), "{failures:#?}");
 }
 
-/// Colors beyond 1e30 are not asked for: products of several of them leave float32 in the backward pass.
+/// Colors above 1e30 are not tested: products of several of them overflow float32 in the backward pass.
 #[test]
 fn extreme_colors_give_finite_results() {
     let failures = failures_at_extremes(&[SH_DC, SH_REST], 30.0);
@@ -220,7 +221,7 @@ fn twenty_thousand_gaussians_in_one_tile() {
     }
 }
 
-/// Pixels agree, but for those where a threshold is within rounding, which are at most `doubtful` of all.
+/// Pixels agree, except those where a threshold is within rounding; these are at most `doubtful` of all pixels.
 #[track_caller]
 fn assert_twin(what: &str, found: &Run, twin: &twin::TwinImage, tolerance: f64, doubtful: f64) {
     assert_eq!(found.radii, twin.radii, "{what}: radii");
@@ -269,7 +270,7 @@ fn the_plain_twin_agrees() {
             }
         }
         let (scene, twin) = twin::render_without_doubt(&scene, &camera, BACKGROUND, degree);
-        // Else the two might agree on next to nothing.
+        // Otherwise the two might agree on almost nothing.
         assert!(scene.len() + 2 + count / 5 >= count, "seed {seed}: {} of {count} Gaussians left", scene.len());
         for (name, device) in devices() {
             let what = format!("{name} seed {seed}, {} Gaussians, {width}x{height}, degree {degree}", scene.len());
@@ -304,7 +305,7 @@ fn the_number_of_threads_changes_no_bit() {
     }
 }
 
-/// Those of the CPU share their kernels. A graphics driver rounds in its own way: `back_ends_agree.rs`.
+/// The CPU back ends share their kernels. A graphics driver rounds differently: see `back_ends_agree.rs`.
 #[test]
 fn back_ends_of_the_cpu_agree_bit_by_bit() {
     for (seed, count) in [(10, 1), (11, 60), (12, 700), (13, 5000)] {
@@ -317,13 +318,13 @@ fn back_ends_of_the_cpu_agree_bit_by_bit() {
     }
 }
 
-/// What is not finite after a bad raw value in one of two Gaussians.
+/// The values that are not finite after a bad raw value in one of two Gaussians.
 #[derive(Default)]
 struct RawFailures {
     image: Vec<String>,
-    /// In gradients of the Gaussian that has the value.
+    /// In the gradients of the Gaussian that has the value.
     own: Vec<String>,
-    /// In gradients of the other one.
+    /// In the gradients of the other one.
     other: Vec<String>,
 }
 
@@ -364,7 +365,8 @@ fn raw_failures() -> RawFailures {
                 for ((key, width), leaf) in RAW_ATTRIBUTES.iter().zip(&leaves) {
                     let gradient = values_of(&leaf.grad(&grads).unwrap());
                     let (own, other) = gradient.split_at(*width);
-                    // What is not finite itself may have such a derivative: it is lost already.
+                    // A value that is not finite may have a derivative that is not finite: the value is lost in any
+                    // case.
                     if value.is_finite() && !own.iter().all(|g| g.is_finite()) {
                         failures.own.push(format!("{what}: gradient of {key}"));
                     }
@@ -378,7 +380,8 @@ fn raw_failures() -> RawFailures {
     failures
 }
 
-/// Raw attributes go through exp and sigmoid first. Whatever is in one Gaussian, the image and the others are well.
+/// Raw attributes go through exp and sigmoid first. Whatever one Gaussian holds, the image and the other Gaussians stay
+/// correct.
 #[test]
 fn bad_raw_attributes_do_not_reach_other_gaussians() {
     let RawFailures { image, other, .. } = raw_failures();

@@ -1,5 +1,5 @@
-//! The order of the house: a *room* is a folder or file directly under a crate's `src`. Imports between the rooms of a crate
-//! form no circle, and no folder holds more files than one can take in at a glance.
+//! The structure of the sources: a *room* is a folder or file directly under a crate's `src`. Imports between the rooms
+//! of a crate form no circle, and no folder holds more than `MOST_FILES` files.
 //!
 //! The paths that begin with `crate`, `super` or `self` are read from the sources as text; names that the crate's root
 //! exports again count for the room that they come from. `$crate` in a macro counts for the room of the macro. Unit tests count
@@ -29,7 +29,7 @@ const PARTS: [&str; 10] = [
     "tests",
 ];
 
-/// What tools make inside of them.
+/// Folders that tools create inside of them.
 const NOT_OURS: [&str; 4] = ["target", "node_modules", "corpus", "artifacts"];
 
 /// A capture as HyperNeRF's program writes it: an image and a camera for each of its 18 frames.
@@ -124,7 +124,7 @@ fn circles(source: &Path) -> Vec<String> {
     let sources: Vec<Source> = files.iter().map(|file| Source::read(source, file)).collect();
     let lib = sources.iter().find(|file| file.name == "lib.rs").expect("lib.rs");
     let shown = Shown::of(lib, &sources);
-    // From a room to the rooms that it imports, with a place that does.
+    // For each room the rooms that it imports, each with one place of such an import.
     let mut imports: BTreeMap<&str, BTreeMap<String, String>> = BTreeMap::new();
     for file in sources.iter().filter(|file| file.name != "lib.rs" && file.name != "main.rs") {
         let here = file.modules[0].as_str();

@@ -56,7 +56,7 @@ fn bits_and_quantization() {
     }
 }
 
-/// A table's probabilities are the likelihoods of the values that its symbols stand for, and add up to one.
+/// The probabilities of a table are the likelihoods of the values that its symbols stand for, and their sum is one.
 #[test]
 fn tables_agree_with_bits() {
     let device = Device::flex();
@@ -76,8 +76,8 @@ fn tables_agree_with_bits() {
     }
 }
 
-/// The bits of a degree may depend on the lower degrees and on itself, not on the higher ones; what the quantizer takes
-/// for decoded is what the rate then sees.
+/// The bits of a degree may depend on the lower degrees and on the degree itself, but not on the higher ones. The
+/// values that the quantizer takes as decoded are those for which the rate is computed.
 #[test]
 fn a_degree_sees_only_lower_ones() {
     let device = Device::flex();

@@ -1,4 +1,4 @@
-//! The program on real files: the whole pipeline, and what each kind of wrong input gets.
+//! The program on real files: the whole pipeline, and the message for each kind of wrong input.
 
 use std::fs;
 
@@ -119,7 +119,8 @@ fn a_run_with_the_rate_in_its_loss() {
     assert_eq!(coding["profile"], "compact");
     assert_eq!(coding["fit_seconds"], serde_json::Value::Null, "the models were trained with the scene");
     let bits = |part: &str| ["estimated_bits", "coded_bits"].map(|kind| coding[kind][part].as_f64().unwrap());
-    // So small a scene's sub-streams end with whole words; what remains is within two percent.
+    // In so small a scene, the whole words at the ends of sub-streams matter; apart from them the sizes agree within
+    // two percent.
     let [expected, coded] = bits("planes");
     assert!((expected - coded).abs() < 0.02 * coded + 600.0, "{expected} bits expected, {coded} coded");
     // In so few iterations most harmonics are still exactly zero, which costs less than an untrained model says.

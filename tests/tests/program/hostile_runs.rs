@@ -1,5 +1,5 @@
-//! Damaged checkpoints, configurations, run folders and datasets by the hundred: refused with file and field named, or
-//! accepted; never a panic. `LIGHT4GS_HOSTILE_CASES=5000` makes a long run of it.
+//! Hundreds of damaged checkpoints, configurations, run folders and datasets. Each is refused with the file and the
+//! field named, or accepted; none causes a panic. `LIGHT4GS_HOSTILE_CASES=5000` makes this a long run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ fn scene(folder: &Path) -> PathBuf {
     path
 }
 
-/// A tiny run with everything in it, trained in this process: its configuration and its newest checkpoint.
+/// A tiny run with all parts, trained in this process: its configuration and its newest checkpoint.
 fn checkpoint(folder: &Path) -> (Config, PathBuf) {
     let config = Config::from_toml(&tiny_with(&[]), "tiny").unwrap();
     let scene = scene(folder);
@@ -43,7 +43,7 @@ fn checkpoint(folder: &Path) -> (Config, PathBuf) {
     (config, path)
 }
 
-/// As `resume` does: the density strategy takes its part.
+/// As in `resume`, the density strategy restores its state.
 fn load(path: &Path, config: &Config) -> Result<Checkpoint, TrainError> {
     let checkpoint: Checkpoint =
         Checkpoint::load(path, config, &config.model.build(), &ConfiguredModels, &Device::flex().autodiff())?;
@@ -109,7 +109,8 @@ fn a_checkpoint_with_a_number_that_is_not_finite_is_not_written() {
     assert!(!path.exists());
 }
 
-/// A loss, or only its gradient, that is no number: the run stops, says where, and leaves a checkpoint to go on from.
+/// A loss that is not a number, or a gradient of it that is not: the run stops, says where, and leaves a checkpoint
+/// from which it can continue.
 #[test]
 fn numbers_that_are_not_finite_stop_a_run() {
     let folder = tempfile::tempdir().unwrap();
@@ -124,7 +125,7 @@ fn numbers_that_are_not_finite_stop_a_run() {
             match (view.stage == Stage::Fine && view.iteration == 4, of_the_gradient) {
                 (false, _) => error.powi_scalar(2).mean(),
                 (true, false) => (error * f32::NAN).mean(),
-                // The root of 0 has no slope.
+                // The square root has no finite slope at 0.
                 (true, true) => (error * 0.0).sqrt().mean(),
             }
         };
@@ -250,20 +251,21 @@ fn damaged_datasets_do_no_harm() {
     }
 }
 
-/// What was found by hand, each once more.
+/// Inputs that were found by hand, each tested again.
 #[test]
 fn found_before() {
     let w = Workspace::new(PROGRAM);
     assert_success(&w.train("run", &TINY_COMPRESSION).output().unwrap());
 
-    // A pipe as a configuration waited for its other end.
+    // A pipe as a configuration: reading it waited for its other end.
     #[cfg(unix)]
     {
         let pipe = w.path("pipe.toml");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let mut command = w.command(["train", "scene", "--config", "pipe.toml", "--out", "x"]);
         assert_refused(&run_within(&mut command, Duration::from_secs(10), "a pipe"), &["pipe.toml", "regular file"]);
-        // So did one in the place of a stream or of a point cloud, and one to write to was replaced.
+        // The same with a pipe in the place of a stream or of a point cloud; and a pipe to write to was replaced by a
+        // file.
         for arguments in [
             ["info", "pipe.toml", "--limits", "default"],
             ["decode", "pipe.toml", "--out", "x"],
@@ -276,7 +278,7 @@ fn found_before() {
         assert_refused(&run_within(&mut command, Duration::from_secs(10), "a pipe"), &["pipe.toml", "regular file"]);
         assert!(std::os::unix::fs::FileTypeExt::is_fifo(&fs::metadata(&pipe).unwrap().file_type()));
     }
-    // Outputs that replaced what was read, or what a run consists of.
+    // Outputs that replaced an input, or a part of a run.
     fs::copy(w.path("run/scene.l4gs"), w.path("copy.l4gs")).unwrap();
     let checkpoint = format!("run/checkpoints/{}", w.names("run/checkpoints").last().unwrap());
     for (arguments, words) in [
@@ -289,7 +291,7 @@ fn found_before() {
         assert_refused(&w.run(arguments), &words);
     }
     assert_eq!(fs::read(w.path("copy.l4gs")).unwrap(), fs::read(w.path("run/scene.l4gs")).unwrap());
-    // What `extends` names was quoted.
+    // The text of the file that `extends` names was quoted.
     fs::write(w.path("secret.txt"), "root:secret-password:0").unwrap();
     fs::write(w.path("curious.toml"), "extends = \"./secret.txt\"").unwrap();
     let output = w.run(["train", "scene", "--config", "curious.toml", "--out", "x"]);
@@ -309,7 +311,7 @@ fn found_before() {
     }
     assert!(!w.path("x").exists());
 
-    // Negative numbers are values of options.
+    // An option may have a negative number as its value.
     assert_success(&w.run(["render", "run/scene.l4gs", "--out", "low.gif", "--frames", "2", "--elevation", "-30"]));
     assert_refused(&w.run(["render", "run/scene.l4gs", "--out", "x.gif", "--elevation", "-91"]), &["--elevation"]);
     assert_refused(&w.run(["render", "run/scene.l4gs", "--out", "x.gif", "--frames", "-3"]), &["--frames", "-3"]);
@@ -346,7 +348,8 @@ fn found_before() {
     assert!(!w.path("x").exists());
 }
 
-/// A finite number that no stream takes was found by the encoder, after the last iteration, without the tensor's name.
+/// A finite number that no stream can hold was found only by the encoder, after the last iteration, without the
+/// tensor's name.
 #[test]
 fn numbers_beyond_what_the_encoder_takes_are_found_in_the_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
@@ -366,7 +369,8 @@ fn numbers_beyond_what_the_encoder_takes_are_found_in_the_checkpoint() {
     }
 }
 
-/// What the encoder refuses, and cameras that no training survives, are refused before `--overwrite` removes anything.
+/// Scenes that the encoder refuses, and cameras that no training survives, are refused before `--overwrite` removes
+/// anything.
 #[test]
 fn a_dataset_that_cannot_be_coded_costs_no_run() {
     let w = Workspace::new(PROGRAM);
@@ -405,7 +409,8 @@ fn a_dataset_that_cannot_be_coded_costs_no_run() {
     refused("0.1", 1e-30, 1.0, &["transforms.json", "focal length"]);
 }
 
-/// Found by an odd configuration: planes frozen before spherical harmonics count left a rate without a gradient.
+/// Found with an odd configuration: planes were frozen before the rate of the spherical harmonics began, so the rate
+/// had no gradient.
 #[test]
 fn frozen_planes_alone_have_no_rate() {
     let folder = tempfile::tempdir().unwrap();
@@ -416,7 +421,7 @@ fn frozen_planes_alone_have_no_rate() {
     }
 }
 
-/// Whatever is not as it was when the run began is said before anything is trained.
+/// Everything that has changed since the run began is reported before anything is trained.
 #[test]
 fn a_dataset_that_changed_is_noticed() {
     let w = Workspace::new(PROGRAM);
@@ -451,7 +456,7 @@ fn a_dataset_that_changed_is_noticed() {
     let image = w.path("scene/train/r_001.png");
     fs::copy(w.path("scene/train/r_002.png"), &image).unwrap();
     assert_refused(&resume(&[]), &["replaced", "r_001.png"]);
-    // Whoever means it can go on, and is not asked again.
+    // `--accept-changed-dataset` continues the run, and is not needed again.
     assert_success(&resume(&["--accept-changed-dataset"]));
     assert_success(&resume(&[]));
 }
@@ -471,7 +476,7 @@ fn a_run_that_diverges_says_so_and_goes_on_with_another_rate() {
     assert_success(&w.run(changed));
     let config = fs::read_to_string(w.path("run/config.toml")).unwrap();
     assert!(config.contains("fine_iterations = 60") && config.contains("log_interval = 7"), "{config}");
-    // What has been trained must fit, and a change that does not leaves the run as it is.
+    // The changed configuration must fit what has been trained. A change that does not fit leaves the run as it is.
     for (key_value, words) in [
         ("model.sh_degree=1", ["sh_rest", "shape"]),
         ("train.fine_iterations=50", ["iteration", "50"]),

@@ -1,6 +1,7 @@
-//! SIGKILL at any moment: every folder can be resumed or begun again and ends with the same bytes, and no temporary file stays.
+//! SIGKILL at any point: every folder can be resumed or begun again and ends with the same bytes, and no temporary file
+//! stays.
 //!
-//! `LIGHT4GS_KILLS=100` spreads a hundred kills over a run; a short run has a few.
+//! `LIGHT4GS_KILLS=100` makes a hundred kills, spread over a run; a short run makes a few.
 
 use std::fs;
 use std::path::Path;
@@ -63,7 +64,7 @@ fn a_run_that_is_killed_anywhere_ends_with_the_same_bytes() {
         // From the first millisecond to a little before the end.
         let delay = Duration::from_millis(1) + whole.mul_f64(f64::from(point) / f64::from(points));
         let run = format!("killed-{point}");
-        // Every third run replaces one that is there.
+        // Every third run replaces an existing one.
         let overwrite: &[&str] = if point % 3 == 2 { &["--overwrite"] } else { &[] };
         if !overwrite.is_empty() {
             copy_folder(&w.path("old"), &w.path(&run));
@@ -112,7 +113,7 @@ fn a_dataset_whose_making_is_killed_is_made_again() {
     assert_eq!(leftovers(&w.path("")), Vec::<String>::new());
 }
 
-/// Two processes in one folder would write over each other.
+/// Two processes in one folder would overwrite each other's files.
 #[test]
 fn one_process_a_run_folder() {
     let w = Workspace::new(PROGRAM);
@@ -130,7 +131,7 @@ fn one_process_a_run_folder() {
     assert_success(&w.run(["encode", "run", "--out", "x.l4gs"]));
     first.kill().unwrap();
     first.wait().unwrap();
-    // The lock has ended with its process.
+    // The lock was released when its process ended.
     let shorter = ["resume", "run", "--quiet", "--set", "train.fine_iterations=1000000"];
     let mut second = quietly(w.command(shorter)).spawn().unwrap();
     std::thread::sleep(Duration::from_millis(300));
@@ -139,7 +140,7 @@ fn one_process_a_run_folder() {
     second.wait().unwrap();
 }
 
-/// States that a kill can leave, made by hand.
+/// States that a kill can leave, constructed by hand.
 #[test]
 fn starts_that_were_stopped_are_begun_again() {
     let w = Workspace::new(PROGRAM);
@@ -147,7 +148,8 @@ fn starts_that_were_stopped_are_begun_again() {
     let expected = fs::read(w.path("whole/scene.l4gs")).unwrap();
     let config = fs::read(w.path("whole/config.toml")).unwrap();
 
-    // Between `config.toml` and `run.json`, with temporary files of killed processes; by this version, which locks, and without.
+    // Killed between `config.toml` and `run.json`, with temporary files of the killed process: once with this version's
+    // lock file, once without.
     for (run, locked) in [("locked", true), ("unlocked", false)] {
         let root = w.path(run);
         fs::create_dir_all(root.join("checkpoints")).unwrap();
@@ -170,7 +172,7 @@ fn starts_that_were_stopped_are_begun_again() {
     assert_refused(&train(&w, "whole", &[]).output().unwrap(), &["--overwrite"]);
     assert_eq!(fs::read(w.path("whole/scene.l4gs")).unwrap(), expected);
     assert_success(&train(&w, "whole", &["--overwrite"]).output().unwrap());
-    // A configuration that somebody wrote is not ours to replace.
+    // A configuration that the user wrote must not be replaced.
     fs::create_dir(w.path("mine")).unwrap();
     fs::write(w.path("mine/config.toml"), "extends = \"dnerf-cpu\"\n").unwrap();
     assert_refused(&train(&w, "mine", &["--overwrite"]).output().unwrap(), &["mine", "config.toml"]);

@@ -28,7 +28,7 @@ fn killed_and_resumed_runs_are_bit_identical() {
         if w.path("killed/run.json").exists() {
             child = w.command(["resume", "killed", "--quiet"]).spawn().unwrap();
         } else {
-            // Killed before there was a run: what a user does then is to start again.
+            // Killed before there was a run: the user would start it again.
             let _ = fs::remove_dir_all(w.path("killed"));
             child = w.train("killed", &TINY_COMPRESSION).spawn().unwrap();
         }
@@ -52,7 +52,7 @@ fn a_seed_repeats_and_threads_do_not_matter() {
     }
 }
 
-/// A checkpoint holds plain numbers: another back end than the one that wrote it goes on from there.
+/// A checkpoint holds plain numbers, so a run can be resumed on another back end than the one that wrote it.
 #[test]
 fn a_run_changes_its_back_end() {
     let w = Workspace::new(PROGRAM);

@@ -7,10 +7,10 @@ use crate::PROGRAM;
 use light4gs_tests::program::{TINY, TINY_COMPRESSION, Workspace, assert_refused, assert_success};
 use serde_json::Value;
 
-/// `study NAME scene` with runs of seconds, into `study` where nothing else is said.
+/// `study NAME scene` with runs that take seconds, written into `study` unless another folder is given.
 fn study(w: &Workspace, name: &str, more: &[&str]) -> Command {
     let mut command = w.command(["study", name, "scene", "--quiet", "--device", "flex"]);
-    // What a study varies must stay as it has it.
+    // Keys that the study varies must not be overridden.
     let varied = ["compression.rate.lambda", "train.prune.fraction"];
     for key_value in TINY.iter().chain(&TINY_COMPRESSION).filter(|set| !varied.iter().any(|key| set.starts_with(key))) {
         command.args(["--set", key_value]);
@@ -53,11 +53,12 @@ fn a_study_from_plan_to_table() {
     for row in ["float32", "medium, paper's profile", "high", "medium", "small"] {
         assert!(table.contains(&format!("| {row} |")), "{table}");
     }
-    // The middle size is not trained again for the paper's profile: the log says so to the microsecond.
+    // The medium size is not trained again for the paper's profile: the times in the log are the same to the
+    // microsecond.
     let log = |variant: &str| fs::read(w.path(&format!("study/scene/{variant}/seed-0/metrics.jsonl"))).unwrap();
     assert_eq!(log("paper-profile"), log("medium"));
     assert_ne!(log("medium"), log("small"));
-    // The manifest has the digest of each configuration, which is the one of the run's folder.
+    // The manifest has the digest of each configuration, the same as in the run's folder.
     let manifest = json(&w, "study/study.json");
     let results = json(&w, "study/results.json");
     assert_eq!(manifest["runs"][1]["configuration"], results["runs"][1]["configuration"]);
@@ -75,7 +76,7 @@ fn a_study_from_plan_to_table() {
     assert_success(&w.run(["gather", "study"]));
     assert_eq!(fs::read_to_string(w.path("study/table.md")).unwrap(), table);
 
-    // A run that was lost is trained again, to the same bytes; until then it is missing by name.
+    // A run that was lost is trained again, to the same bytes. Until then the tables name it as missing.
     let lost = w.path("study/scene/small/seed-0");
     let bytes = fs::read(lost.join("scene.l4gs")).unwrap();
     fs::remove_dir_all(&lost).unwrap();
@@ -85,7 +86,7 @@ fn a_study_from_plan_to_table() {
     assert_eq!(fs::read(lost.join("scene.l4gs")).unwrap(), bytes);
     assert_eq!(fs::read_to_string(w.path("study/table.md")).unwrap(), table);
 
-    // Another study reuses what this one has trained, and says so; its files are those of its own training.
+    // Another study uses the runs that this one has trained, and says so; its files come from its own training.
     let command = |more: &[&str]| study(&w, "latency", &[&["--out", "other", "--reuse", "study"], more].concat());
     let plan = String::from_utf8(run(command(&["--dry-run"])).stdout).unwrap();
     assert!(plan.contains("reused") && plan.contains("4 runs in 4 tasks, 0 iterations"), "{plan}");
@@ -95,7 +96,7 @@ fn a_study_from_plan_to_table() {
     assert_eq!(other("scene.l4gs"), bytes);
     let record = |run: &str| json(&w, &format!("{run}/scene/small/seed-0/run.json"));
     assert_eq!(record("other")["trained_by"], record("study"));
-    // But not from a dataset that was another one, although it lies in the same place.
+    // It does not use runs of a dataset with other contents, even where the path is the same.
     fs::remove_dir_all(w.path("other/scene/small")).unwrap();
     let image = fs::read_dir(w.path("scene/test")).unwrap().next().unwrap().unwrap().path();
     let (original, replacement) = (fs::read(&image).unwrap(), fs::read(w.path("scene/train/r_000.png")).unwrap());
@@ -145,7 +146,7 @@ fn seeds_give_a_spread_and_failures_do_not_stop_others() {
         "--set",
         "compression.rate.planes_until=0",
     ];
-    // A folder that no run can be made in.
+    // A folder in which no run can be created.
     fs::create_dir_all(w.path("study/.configurations")).unwrap();
     fs::create_dir_all(w.path("study/scene/two/seed-1")).unwrap();
     fs::write(w.path("study/scene/two/seed-1/notes.txt"), "mine").unwrap();
@@ -181,7 +182,7 @@ fn what_is_wrong_is_said_before_anything_is_written() {
     refused("broken.toml", &[], &["broken.toml:6", "psnr:diff", "`:percent`", "docs/studies.md"]);
     assert_refused(&w.run(["gather", "scene"]), &["scene", "not the folder of a study"]);
     assert_refused(&w.run(["study", "sizes", "nowhere", "--out", "study"]), &["nowhere"]);
-    // A folder with other things in it is not written into.
+    // The study does not write into a folder that holds other files.
     let output = w.run(["study", "sizes", "scene", "--out", "scene"]);
     assert_refused(&output, &["holds files but no study"]);
     assert_success(&w.run(["study", "list"]));
@@ -223,7 +224,7 @@ mod interrupted {
         let stopped_at = lines();
         assert!(stopped_at < 212 && !w.path("run/scene.l4gs").exists());
         assert_eq!(w.names("run/checkpoints").len(), 2, "that of the coarse stage's end, and that of the request");
-        // And once more, while it resumes.
+        // Killed once more, while it resumes.
         let mut process = w.command(["resume", "run", "--quiet"]).spawn().unwrap();
         wait_for(|| lines() > stopped_at + 20);
         signal(process.id(), "-USR1");
@@ -263,7 +264,7 @@ mod interrupted {
                 fs::remove_dir_all(w.path("study/scene/one")).unwrap();
             }
         }
-        // Tasks of the killed launcher may be at work still: this waits for them.
+        // Tasks of the killed launcher may still run: this waits for them.
         assert_success(&run(study(&w, "mine.toml", &longer)));
         assert!(files() == expected);
         assert_eq!(fs::read_to_string(w.path("study/table.md")).unwrap(), table);

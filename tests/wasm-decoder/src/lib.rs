@@ -1,10 +1,11 @@
-//! The decoder as a WebAssembly module, for `.ci/wasm`: bytes in, the scene as a stream without loss out.
+//! The decoder as a WebAssembly module, for `.ci/wasm`: the input is a file's bytes, the output the scene as a stream
+//! without loss.
 //!
-//! Node puts a stream where [`input`] says, calls [`decode`], and finds the answer at [`answer`].
+//! Node writes a stream to the address that [`input`] returns, calls [`decode`], and reads the answer at [`answer`].
 
 use std::sync::Mutex;
 
-/// What goes in, and what comes out.
+/// The input and the answer.
 static INPUT: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 static ANSWER: Mutex<Vec<u8>> = Mutex::new(Vec::new());
 
@@ -14,14 +15,14 @@ fn place(of: &Mutex<Vec<u8>>, make: impl FnOnce(&mut Vec<u8>)) -> *mut u8 {
     bytes.as_mut_ptr()
 }
 
-/// Memory for a stream of so many bytes.
-// SAFETY: no other symbol of this module is called so.
+/// Memory for a stream of this many bytes.
+// SAFETY: no other symbol of this module has this name.
 #[unsafe(no_mangle)]
 pub extern "C" fn input(length: usize) -> *mut u8 {
     place(&INPUT, |bytes| *bytes = vec![0; length])
 }
 
-/// Decodes what stands in that memory; returns the length of the answer, or minus that of a message.
+/// Decodes the stream in that memory. Returns the length of the answer, or the negative length of a message.
 // SAFETY: as above.
 #[unsafe(no_mangle)]
 pub extern "C" fn decode() -> i32 {
@@ -36,7 +37,7 @@ pub extern "C" fn decode() -> i32 {
     sign * length
 }
 
-/// Where the answer stands.
+/// The address of the answer.
 // SAFETY: as above.
 #[unsafe(no_mangle)]
 pub extern "C" fn answer() -> *mut u8 {

@@ -1,4 +1,4 @@
-//! Streams that promise much with few bytes: legal, or close to it, written from docs/format.md.
+//! Streams of few bytes that claim to hold much: legal, or almost legal, written from docs/format.md.
 
 use light4gs_codec::network_weights::{self, WeightPrecision, WeightTensor};
 
@@ -7,7 +7,7 @@ use crate::{
     random::Random,
 };
 
-/// Puts a bomb into a stream; returns its name.
+/// Puts a bomb into a stream, and returns the bomb's name.
 pub(crate) fn arm(parts: &mut Parts, random: &mut Random) -> &'static str {
     match random.below(5) {
         0 => {
@@ -36,7 +36,7 @@ pub(crate) fn arm(parts: &mut Parts, random: &mut Random) -> &'static str {
     }
 }
 
-/// Quantized Gaussians; returns how many.
+/// Quantized Gaussians; returns their number.
 fn gaussians(parts: &mut Parts, random: &mut Random) -> u64 {
     let most = random.pick(&[1 << 18, 1 << 20, 1 << 22]);
     let count = random.scale(most);
@@ -58,7 +58,7 @@ fn gaussians(parts: &mut Parts, random: &mut Random) -> u64 {
     count
 }
 
-/// Gaussians of zeros as float32; returns how many.
+/// Gaussians of zeros as float32; returns their number.
 fn few_gaussians(parts: &mut Parts, most: u64, random: &mut Random) -> u64 {
     let count = random.scale(most);
     let mut payload = (count as u32).to_le_bytes().to_vec();
@@ -74,7 +74,8 @@ struct Network {
     lengths: Vec<u64>,
 }
 
-/// Random nodes over inputs of some channels, made to end with so many. `maps` where it may look beyond one place.
+/// Random nodes on inputs of the given channels, made to end with the given number of channels. `maps` where a node may
+/// read more than one place.
 fn network(inputs: &[u64], outputs: u64, maps: bool, random: &mut Random) -> Network {
     let mut nodes: Vec<Vec<u8>> = Vec::new();
     let mut channels = inputs.to_vec();
@@ -93,7 +94,7 @@ fn network(inputs: &[u64], outputs: u64, maps: bool, random: &mut Random) -> Net
                 [vec![0], read, varint(own)].concat()
             }
             2 => {
-                // One group a channel: many small matrices.
+                // One group per channel: many small matrices.
                 lengths.extend([from, from]);
                 [vec![1], read, varint(from), vec![1], varint(from)].concat()
             }
@@ -145,7 +146,7 @@ fn network(inputs: &[u64], outputs: u64, maps: bool, random: &mut Random) -> Net
     Network { description, lengths }
 }
 
-/// Weights of these lengths: zeros, which take next to no bytes, or numbers that products make subnormal.
+/// Weights of these lengths: zeros, which take almost no bytes, or numbers whose products are subnormal.
 fn weights(lengths: &[u64], random: &mut Random) -> Vec<u8> {
     let total: u64 = lengths.iter().sum();
     if total > 1 << 21 {
@@ -221,7 +222,7 @@ fn planes(parts: &mut Parts, random: &mut Random) {
     let last = if anchors { checkerboard(channels) } else { network(&[channels], 2 * channels, true, random) };
     networks.push(last);
     if random.chance(4) {
-        // Networks that nobody uses.
+        // Networks that nothing uses.
         networks.extend((0..random.below(28)).map(|_| network(&[1], 1, true, random)));
     }
     let mut model = varint(channels);
@@ -244,7 +245,7 @@ fn planes(parts: &mut Parts, random: &mut Random) {
     let streams = scales * (6 + if anchors { 5 } else { 0 });
     payload.extend(vec![0; streams as usize]);
     parts.set(5, 2, 1, payload);
-    // Nothing moves, so nothing asks for other features.
+    // Without motion nothing needs other features.
     parts.set(4, 1, 0, vec![0; 3]);
     if random.chance(2) {
         parts.set(2, 1, 0, vec![0, 0]);
@@ -252,7 +253,7 @@ fn planes(parts: &mut Parts, random: &mut Random) {
     }
 }
 
-/// All inputs behind each other, and one linear layer.
+/// All inputs concatenated, and one linear layer.
 fn concatenation(inputs: &[u64], outputs: u64) -> Network {
     let mut description = varint(inputs.len() as u64);
     inputs.iter().for_each(|&channels| description.extend(varint(channels)));
@@ -262,7 +263,7 @@ fn concatenation(inputs: &[u64], outputs: u64) -> Network {
     Network { description, lengths: vec![inputs.iter().sum::<u64>() * outputs, outputs] }
 }
 
-/// What the anchors say: one masked convolution of kernel 5, a group a channel.
+/// The context from the anchors: one masked convolution of kernel 5, one group per channel.
 fn checkerboard(channels: u64) -> Network {
     let mut description = [vec![1], varint(channels), vec![1, 4, 0], varint(2 * channels), vec![5]].concat();
     description.extend([varint(channels), vec![1, 1]].concat());

@@ -1,7 +1,9 @@
-//! Hostile streams by the thousand: mutations of sound ones and streams built to be bombs, all with checksums that fit.
+//! Hostile streams by the thousand: changed copies of valid streams, and streams built as bombs, all with correct
+//! checksums.
 //!
-//! Every input follows from a seed and its number, so a finding is two numbers. The decoder reads each one at its default
-//! limits on one thread, under an allocator that counts and a clock of the thread's own time.
+//! Every input is determined by a seed and its number, so these two numbers are enough to report a finding. The decoder
+//! reads each input at its default limits on one thread. Its memory is counted by the allocator, and its time by the
+//! thread's own clock.
 //!
 //! | file | what |
 //! |---|---|

@@ -1,6 +1,6 @@
 //! Many hostile streams: `cargo run --release -p light4gs-hostile -- --inputs 1000000 --threads 2 --seed 1`.
 //!
-//! Prints what was found, and saves the bytes of each finding.
+//! Prints the findings, and saves the bytes of each.
 
 use std::{
     collections::BTreeMap,
@@ -24,10 +24,10 @@ use light4gs_hostile::{
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const USAGE: &str = "usage: hostile-streams [--inputs N] [--threads N] [--seed N] [--first N] [--out FOLDER]";
-/// Inputs between two lines of progress.
+/// Number of inputs between two lines of progress.
 const REPORT: u64 = 50_000;
 
-/// What all inputs did.
+/// The results of all inputs.
 #[derive(Default)]
 struct Summary {
     sound: u64,

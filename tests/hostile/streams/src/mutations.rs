@@ -1,4 +1,4 @@
-//! What is done to sound streams.
+//! Changes to valid streams.
 
 use crate::{
     parts::{Parts, varint},
@@ -28,7 +28,7 @@ pub(crate) fn mutate(parts: &mut Parts, sound: &[Parts], random: &mut Random) ->
             "flip"
         }
         4 | 5 => {
-            // Heads are where the counts are.
+            // Most counts are in the heads of sections.
             let payload = &mut parts.sections[section].payload;
             let head = payload.len().min(48);
             flip(&mut payload[..head], random);
@@ -91,7 +91,7 @@ pub(crate) fn mutate(parts: &mut Parts, sound: &[Parts], random: &mut Random) ->
     }
 }
 
-/// Numbers at the edges of types and limits.
+/// Numbers at the ends of types and limits.
 fn edge(random: &mut Random) -> u64 {
     let power = 1u64 << random.below(34);
     match random.below(4) {

@@ -1,4 +1,4 @@
-//! A stream taken apart, and put together with checksums that fit (docs/format.md).
+//! A stream taken apart, and put together again with correct checksums (docs/format.md).
 
 const PRELUDE: usize = 32;
 const ENTRY: usize = 16;
@@ -6,11 +6,11 @@ const ENTRY: usize = 16;
 /// A section of a stream.
 #[derive(Clone, Debug)]
 pub struct Section {
-    /// Which one.
+    /// Its number.
     pub id: u16,
-    /// What it holds.
+    /// The kind of its contents.
     pub kind: u8,
-    /// How its numbers are stored.
+    /// The form in which its numbers are stored.
     pub encoding: u8,
     /// Its bytes.
     pub payload: Vec<u8>,
@@ -26,10 +26,10 @@ pub struct Parts {
 }
 
 impl Parts {
-    /// A sound stream taken apart.
+    /// Takes a valid stream apart.
     ///
     /// # Panics
-    /// Where the stream has no table or ends early.
+    /// If the stream has no table or ends early.
     pub fn of(bytes: &[u8]) -> Self {
         let u32_at = |at: usize| u32::from_le_bytes(*bytes[at..].first_chunk().expect("four bytes")) as usize;
         let (count, meta) = (u32_at(12), u32_at(16));
@@ -61,7 +61,7 @@ impl Parts {
         self.sections.sort_by_key(|section| section.id);
     }
 
-    /// The stream, with lengths and checksums that fit.
+    /// The stream, with correct lengths and checksums.
     pub fn assemble(&self) -> Vec<u8> {
         let mut bytes = b"\x89L4GS\r\n\x1a\x01\0\0\0".to_vec();
         bytes.extend((self.sections.len() as u32).to_le_bytes());

@@ -1,4 +1,4 @@
-//! Numbers that follow from a seed (SplitMix64).
+//! Random numbers from a seed (SplitMix64).
 
 /// A generator.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ impl Random {
         (self.next() % count.max(1) as u64) as usize
     }
 
-    /// One time in `count`.
+    /// True once in `count` calls, on average.
     pub(crate) fn chance(&mut self, count: usize) -> bool {
         self.below(count) == 0
     }

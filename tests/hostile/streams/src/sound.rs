@@ -1,4 +1,4 @@
-//! Sound streams to begin with.
+//! Valid streams, from which the hostile ones are made.
 
 use light4gs_codec::{CompressionInput, FrequencyTable, Profile, ShCoding, encode, encode_compressed};
 
@@ -9,8 +9,8 @@ mod common;
 
 use common::compression::{ALL_PARTS, ShKind, compact_shape, input, scene, sh_networks, tiny};
 
-/// Streams with something of everything: without loss, in both profiles, with every kind of harmonics, with many Gaussians,
-/// with long frequency tables.
+/// Streams that together contain everything: without loss, in both profiles, with every model of the spherical
+/// harmonics, with many Gaussians, with long frequency tables.
 pub(crate) fn streams() -> Vec<Parts> {
     let mut streams = vec![encode(&common::sample()).expect("sound")];
     let mut add = |scene: &_, input: &_| streams.push(encode_compressed(scene, input).expect("sound").bytes);

@@ -1,4 +1,4 @@
-//! Memory, time and panics of one decoding.
+//! Memory, time and panics of decoding one stream.
 
 use std::{
     alloc::{GlobalAlloc, Layout, System},
@@ -10,18 +10,18 @@ use std::{
 use light4gs_codec::{CodecError, decode, info};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-/// What a decoding may take at the default limits.
+/// The memory that decoding may take at the default limits.
 pub const MOST_BYTES: usize = 256 << 20;
-/// Likewise.
+/// The time that decoding may take at the default limits.
 pub const MOST_TIME: Duration = Duration::from_secs(2);
 
 thread_local! {
-    /// Bytes that this thread has taken and not given back, and the most there were.
+    /// Bytes that this thread has allocated and not freed, and the largest number of them so far.
     static USED: Cell<usize> = const { Cell::new(0) };
     static MOST: Cell<usize> = const { Cell::new(0) };
 }
 
-/// Counts the memory of each thread; a binary makes it its global allocator.
+/// Counts the memory of each thread. A program makes it its global allocator.
 #[derive(Debug)]
 pub struct CountingAllocator;
 
@@ -36,12 +36,12 @@ fn given_back(bytes: usize) {
     USED.with(|used| used.set(used.get().wrapping_sub(bytes)));
 }
 
-// SAFETY: every call goes to the system's allocator as it came. The counters are plain cells of the thread, made without
-// an allocation and never dropped.
+// SAFETY: every call is passed to the system's allocator unchanged. The counters are plain cells of the thread. They
+// are made without an allocation and never dropped.
 unsafe impl GlobalAlloc for CountingAllocator {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         taken(layout.size());
-        // SAFETY: what the caller promises is what the system asks for.
+        // SAFETY: the caller's promises are those that the system's allocator asks for.
         unsafe { System.alloc(layout) }
     }
 
@@ -52,7 +52,7 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 
     unsafe fn realloc(&self, pointer: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        // Both are there for a moment.
+        // Both blocks exist for a short time.
         taken(size);
         given_back(layout.size());
         // SAFETY: as above.
@@ -66,19 +66,19 @@ unsafe impl GlobalAlloc for CountingAllocator {
     }
 }
 
-/// What a decoding did.
+/// The results of decoding one stream.
 #[derive(Debug)]
 pub struct Outcome {
-    /// What the decoder said; nothing where it panicked.
+    /// The decoder's answer; none if it panicked.
     pub answer: Option<Result<(), CodecError>>,
-    /// The most memory that it had at a time, results included.
+    /// The largest amount of memory in use at one time, results included.
     pub bytes: usize,
     /// Processor time of the thread.
     pub time: Duration,
 }
 
 impl Outcome {
-    /// What is wrong with it.
+    /// Everything that is wrong with the results.
     pub fn fault(&self) -> Option<&'static str> {
         match &self.answer {
             None => Some("panic"),
@@ -90,7 +90,7 @@ impl Outcome {
     }
 }
 
-/// A thread's decoder: whatever it would do on several threads it does on this one.
+/// A decoder on one thread: work that it would spread over several threads is done on this one.
 #[derive(Debug)]
 pub struct Decoder {
     pool: ThreadPool,
@@ -100,16 +100,16 @@ impl Decoder {
     /// For the current thread.
     ///
     /// # Panics
-    /// Where the thread belongs to a pool already.
+    /// If the thread already belongs to a pool.
     pub fn on_this_thread() -> Self {
         let pool = ThreadPoolBuilder::new().num_threads(1).use_current_thread().build();
         let decoder = Self { pool: pool.expect("this thread is in no pool yet") };
-        // Tables that are made once.
+        // Tables that are made only once.
         let _ = decoder.run(&[]);
         decoder
     }
 
-    /// Decodes `bytes` at the default limits, and asks what they hold.
+    /// Decodes `bytes` at the default limits, and reads what they hold.
     pub fn run(&self, bytes: &[u8]) -> Outcome {
         let before = USED.get();
         MOST.set(before);
@@ -125,10 +125,10 @@ impl Decoder {
     }
 }
 
-/// Processor time of this thread: what others do beside it does not count.
+/// Processor time of this thread, so that other threads do not count.
 fn processor_time() -> Duration {
     let mut time = libc::timespec { tv_sec: 0, tv_nsec: 0 };
-    // SAFETY: the clock exists on Linux and macOS, and the place to write to is ours.
+    // SAFETY: the clock exists on Linux and macOS, and the memory to write to is ours.
     unsafe { libc::clock_gettime(libc::CLOCK_THREAD_CPUTIME_ID, &mut time) };
     Duration::new(time.tv_sec as u64, time.tv_nsec as u32)
 }

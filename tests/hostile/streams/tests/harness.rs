@@ -1,4 +1,4 @@
-//! What the harness itself must do.
+//! Tests of the harness itself.
 
 use light4gs_codec::{SceneData, decode, encode};
 use light4gs_hostile::{Inputs, parts::Parts};
