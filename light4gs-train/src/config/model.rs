@@ -1,9 +1,12 @@
 //! `[model]`: what is trained.
 
-use light4gs_model::{BuiltInFieldConfig, DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig};
+use light4gs_model::{
+    BuiltInFieldConfig, DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig, MOST_NODES,
+    NodesFieldConfig,
+};
 
-use crate::keys::Bounds::{Flag, Kind, List, Whole};
-use crate::keys::{choice, keys};
+use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole};
+use crate::keys::{WEIGHT, choice, keys};
 
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
 pub(super) const MOST_PLANE_RESOLUTION: u64 = 4096;
@@ -13,17 +16,19 @@ keys! {
     pub struct ModelConfig {
         /// Highest degree of the spherical harmonics, 0 to 3.
         sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";
-        /// What moves the Gaussians: `"hexplane"`, of which `model.hexplane` and `model.deformation` are the keys, or
-        /// `"still"`, nothing.
+        /// What moves the Gaussians: `"hexplane"`, of which `model.hexplane` and `model.deformation` are the keys,
+        /// `"nodes"`, of which `model.nodes` are the keys, or `"still"`, nothing.
         field: FieldKind = FieldKind::HexPlane;
             Kind { names: FieldKind::NAMES, list: "light4gs-train/src/config/model.rs" },
-            "paper", "or \"still\": nothing moves";
+            "paper", "or \"nodes\", which Gaussians follow; \"still\": nothing moves";
         /// From world coordinates to those of the planes.
         coordinates: CoordinatesTable;
         /// The feature planes.
         hexplane: HexPlaneTable;
         /// The network that turns features into motion.
         deformation: DeformationTable;
+        /// The control nodes.
+        nodes: NodesTable;
     }
 }
 
@@ -32,6 +37,8 @@ choice! {
     pub enum FieldKind: "field" {
         /// The paper's: hexplane and network.
         HexPlane = "hexplane",
+        /// Control nodes, which Gaussians follow.
+        Nodes = "nodes",
         /// Nothing moves.
         Still = "still",
     }
@@ -91,6 +98,41 @@ keys! {
     }
 }
 
+keys! {
+    /// Control nodes, and their trajectories.
+    pub struct NodesTable {
+        /// Nodes, or as many as there are Gaussians if those are fewer.
+        count: usize = nodes().nodes; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
+        /// Training times between two knots of a trajectory.
+        times_a_knot: f64 = nodes().times_a_knot; Number { least: 0.1, most: 1e6 }, "ours";
+        /// A node's radius at the beginning, as a share of the distance to the nearest other one.
+        radius: f64 = nodes().radius; Number { least: 0.01, most: 100.0 }, "ours";
+        /// Nodes are placed where Gaussians are at least so opaque.
+        opacity: f64 = nodes().opacity; Number { least: 1e-4, most: 0.999 }, "ours";
+        /// Every Gaussian learns how still it stands.
+        stillness: bool = nodes().stillness.is_some(); Flag, "ours", "every Gaussian learns how still it stands";
+        /// The logit of standing still at the beginning, where 0 is that of a node's own place.
+        stillness_start: f64 = nodes().stillness.unwrap_or(-4.0); Number { least: -30.0, most: 30.0 }, "ours";
+        /// Weight of the term that keeps neighboring nodes in place as seen from each other.
+        rigidity: f64 = nodes().rigidity; WEIGHT, "ours; SC-GS: 1e-4 to 0";
+        /// Weight of the squared second differences of trajectories.
+        smoothness: f64 = nodes().smoothness; WEIGHT, "ours";
+        /// How much faster than the deformation's rate translations are learned, as shares of the scene's extent.
+        translation_rate: f64 = nodes().translation_rate; FACTOR, "ours";
+        /// How much faster than the deformation's rate rotations are learned.
+        rotation_rate: f64 = nodes().rotation_rate; FACTOR, "ours";
+        /// How much faster than the deformation's rate the nodes' places and radii are learned.
+        anchor_rate: f64 = nodes().anchor_rate; FACTOR, "ours";
+    }
+}
+
+const FACTOR: Bounds = Number { least: 0.0, most: 1e3 };
+
+/// Where the nodes' defaults come from.
+fn nodes() -> NodesFieldConfig {
+    NodesFieldConfig::new()
+}
+
 /// Where the network's defaults come from.
 fn network() -> light4gs_model::DeformationConfig {
     light4gs_model::DeformationConfig::new(0)
@@ -115,7 +157,25 @@ impl ModelConfig {
     pub fn field(&self) -> BuiltInFieldConfig {
         match self.field {
             FieldKind::HexPlane => BuiltInFieldConfig::HexPlane(self.hexplane_field()),
+            FieldKind::Nodes => BuiltInFieldConfig::Nodes(self.nodes_field()),
             FieldKind::Still => BuiltInFieldConfig::Still(()),
+        }
+    }
+
+    /// The keys of control nodes.
+    fn nodes_field(&self) -> NodesFieldConfig {
+        let table = &self.nodes;
+        NodesFieldConfig {
+            nodes: table.count,
+            times_a_knot: table.times_a_knot,
+            radius: table.radius,
+            opacity: table.opacity,
+            stillness: table.stillness.then_some(table.stillness_start),
+            rigidity: table.rigidity,
+            smoothness: table.smoothness,
+            translation_rate: table.translation_rate,
+            rotation_rate: table.rotation_rate,
+            anchor_rate: table.anchor_rate,
         }
     }
 

@@ -26,7 +26,7 @@ keys! {
         #[serde(flatten)]
         losses: Losses;
         /// Which frames an iteration looks at: any (`"shuffled"`), or (`"same_time"`) different cameras at one time, where
-        /// the dataset has several.
+        /// the dataset has several; or (`"widening_window"`) those of a window of time that widens.
         sampling: SamplerKind = SamplerKind::Shuffled;
             Kind { names: SamplerKind::NAMES, list: "light4gs-train/src/sampling/mod.rs" },
             "ours; the reference shuffles", "or \"same_time\": a batch is several cameras at one time";

@@ -1,12 +1,13 @@
 //! Samplers choose the training frames of an iteration.
 //!
 //! - this file: [`FrameSampler`], the trainer's interface to a sampler, and [`SamplerKind`], the built-in ones by name
-//! - `shuffled`, `same_time`: one file each
+//! - `shuffled`, `same_time`, `widening_window`: one file each
 //! - `candidates`: the frames that a stage may use
 
 mod candidates;
 mod same_time;
 mod shuffled;
+mod widening_window;
 
 use light4gs_data::Frame;
 use rand::Rng;
@@ -15,6 +16,7 @@ pub use candidates::CandidateFrames;
 pub(crate) use candidates::StageFrames;
 pub use same_time::SameTime;
 pub use shuffled::Shuffled;
+pub use widening_window::WideningWindow;
 
 use crate::keys::kinds;
 use crate::randomness::{Purpose, generator};
@@ -25,6 +27,7 @@ kinds! {
     pub enum SamplerKind: "sampler" {
         Shuffled = shuffled: Shuffled,
         SameTime = same_time: SameTime,
+        WideningWindow = widening_window: WideningWindow,
     }
     /// The keys of the built-in samplers.
     pub struct Samplers: dyn FrameSampler;
@@ -63,6 +66,12 @@ impl BatchRequest<'_> {
 pub trait FrameSampler: Send + Sync {
     /// Indices into [`BatchRequest::frames`], at least one. The loss is the mean over them.
     fn batch(&self, request: &BatchRequest) -> Vec<usize>;
+
+    /// The earliest and the latest time of the frames of this iteration and of those before it. Motion outside of them is
+    /// not known yet. All times, unless a sampler overrides it.
+    fn window(&self, _request: &BatchRequest) -> [f32; 2] {
+        [0.0, 1.0]
+    }
 }
 
 /// A function is a sampler.

@@ -25,7 +25,13 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     fn fine_position(&self, iteration: usize) -> FinePosition {
         let seed = generator(self.config.seed, Purpose::Motion, Stage::Fine, iteration).random();
         self.device.seed(seed);
-        FinePosition { iteration, iterations: self.config.train.iterations(Stage::Fine), seed }
+        FinePosition {
+            iteration,
+            iterations: self.config.train.iterations(Stage::Fine),
+            times: self.stage_frames.of(Stage::Fine).times.len(),
+            window: self.sampler.window(&self.batch_request(Stage::Fine, iteration)),
+            seed,
+        }
     }
 
     /// Lets the field make parameters from the Gaussians that it is going to move.

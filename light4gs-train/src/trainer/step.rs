@@ -95,17 +95,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// The frames of an iteration, by their indices in the training split.
     fn batch(&self, stage: Stage, iteration: usize) -> Result<Vec<usize>, TrainError> {
-        let train = &self.config.train;
         let frames = &self.data.train;
-        let indices = self.sampler.batch(&BatchRequest {
-            frames,
-            candidates: self.stage_frames.of(stage),
-            batch_size: train.batch_size.max(1),
-            stage,
-            iteration,
-            iterations: train.iterations(stage),
-            seed: self.config.seed,
-        });
+        let indices = self.sampler.batch(&self.batch_request(stage, iteration));
         let problem = match indices.iter().find(|index| **index >= frames.len()) {
             Some(index) => format!("frame {index} of {}", frames.len()),
             None if indices.is_empty() => "no frame".to_owned(),
@@ -115,6 +106,20 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Err(TrainError::Input(format!(
             "the sampler gives {problem} for {place}; it must name at least one training frame"
         )))
+    }
+
+    /// What the sampler is asked for an iteration.
+    pub(super) fn batch_request(&self, stage: Stage, iteration: usize) -> BatchRequest<'_> {
+        let train = &self.config.train;
+        BatchRequest {
+            frames: &self.data.train,
+            candidates: self.stage_frames.of(stage),
+            batch_size: train.batch_size.max(1),
+            stage,
+            iteration,
+            iterations: train.iterations(stage),
+            seed: self.config.seed,
+        }
     }
 
     /// Adds the gradients of the planes' regularizers, and returns their value, `[1]`.

@@ -7,6 +7,7 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
 
 use super::hexplane::HexPlaneField;
+use super::nodes::NodesField;
 use super::still::StillField;
 use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
 use crate::planes::FeaturePlanes;
@@ -117,6 +118,8 @@ macro_rules! built_in_fields {
 built_in_fields! {
     /// The paper's field: multiscale hexplane and network.
     HexPlane(HexPlaneField),
+    /// Control nodes, which Gaussians follow.
+    Nodes(NodesField),
     /// Nothing moves.
     Still(StillField),
 }

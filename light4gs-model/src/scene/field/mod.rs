@@ -2,12 +2,14 @@
 //!
 //! - this file: [`DeformationField`], and its inputs
 //! - `hexplane`, `deformation`: the paper's field, and its network
+//! - `nodes`: control nodes, which Gaussians follow
 //! - `still`: nothing moves
 //! - `built_in`: the fields of this crate as one type, from which a configuration or a file chooses
 
 mod built_in;
 mod deformation;
 mod hexplane;
+mod nodes;
 mod still;
 
 use std::collections::BTreeMap;
@@ -20,6 +22,7 @@ use light4gs_codec::MotionArrays;
 pub use built_in::{BuiltInField, BuiltInFieldConfig};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use hexplane::{HexPlaneField, HexPlaneFieldConfig};
+pub use nodes::{MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS};
 pub use still::StillField;
 
 use super::arrays::ModelError;
@@ -154,9 +157,23 @@ pub struct FinePosition {
     pub iteration: usize,
     /// Iterations of the stage.
     pub iterations: usize,
+    /// Different times that the training frames have.
+    pub times: usize,
+    /// From the earliest to the latest time that the sampler shows at this iteration or has shown before it.
+    pub window: [f32; 2],
     /// Seed for random numbers. It depends only on the run's seed and the iteration, so that a resumed run draws the
     /// same. Before a field is called, the device's own generator is seeded with it as well.
     pub seed: u64,
+}
+
+impl FinePosition {
+    /// A time in the window, another one in each iteration.
+    pub fn random_time(&self) -> f32 {
+        let [low, high] = self.window;
+        // The top bits of the seed as a number in [0, 1).
+        let share = (self.seed >> 40) as f32 / (1 << 24) as f32;
+        low + share * (high - low)
+    }
 }
 
 /// The learning rate of a parameter: Adam's rate, interpolated log-linearly from the beginning of the stage to its end.

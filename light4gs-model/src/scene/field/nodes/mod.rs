@@ -1,0 +1,235 @@
+//! Control nodes: few rigid bodies with a trajectory each, and Gaussians that follow those around them.
+//!
+//! A node has a place (its anchor), a radius, and a rotation and translation over time. A Gaussian follows the nodes by linear
+//! blend skinning, weighted by its distance from their anchors before anything moves; a share of it that it learns itself
+//! stands still. Textures turn with their object, and motion costs the same bytes however many Gaussians there are. After
+//! SC-GS (Huang et al., CVPR 2024), with splines in place of its network.
+//!
+//! | file | what |
+//! |---|---|
+//! | `trajectory` | splines over time, and the nodes' poses at a time |
+//! | `skinning` | from poses to moved Gaussians |
+//! | `placement` | where the nodes are when motion begins |
+//! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
+//! | `stream` | the same as operations of the codec, in a file |
+
+mod placement;
+mod regularizer;
+mod skinning;
+mod stream;
+mod trajectory;
+
+use std::collections::BTreeMap;
+
+use burn::config::Config;
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_codec::MotionArrays;
+
+use trajectory::Poses;
+
+use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
+use crate::planes::FeaturePlanes;
+use crate::scene::{Attribute, GaussianTensors, ModelError};
+
+/// The attribute by which a Gaussian says how still it stands, `[N, 1]`: the logit of a node that never moves.
+pub const STILLNESS: &str = "stillness";
+
+/// Most nodes of a field.
+pub const MOST_NODES: usize = 512;
+/// Most knots of a trajectory.
+pub const MOST_KNOTS: usize = 1024;
+
+/// How fast a Gaussian's stillness is learned, and its step in a file.
+const STILLNESS_RATE: f64 = 0.02;
+const STILLNESS_STEP: f64 = 0.25;
+
+/// Configuration of a [`NodesField`].
+#[derive(Config, Debug)]
+pub struct NodesFieldConfig {
+    /// Nodes, or as many as there are Gaussians if those are fewer; 1 to [`MOST_NODES`].
+    #[config(default = 32)]
+    pub nodes: usize,
+    /// Training times between two knots of a trajectory.
+    #[config(default = 4.0)]
+    pub times_a_knot: f64,
+    /// A node's radius at the beginning, as a share of the distance to the nearest other one.
+    #[config(default = 0.6)]
+    pub radius: f64,
+    /// Nodes are placed where Gaussians are at least so opaque.
+    #[config(default = 0.15)]
+    pub opacity: f64,
+    /// Every Gaussian has a share of its own that stands still, with this logit at the beginning. None: all follow the nodes alone.
+    #[config(default = "Some(-4.0)")]
+    pub stillness: Option<f64>,
+    /// Weight of the term that keeps neighboring nodes in place as seen from each other, for distances as shares of the
+    /// scene's extent.
+    #[config(default = 1.0)]
+    pub rigidity: f64,
+    /// Weight of the squared second differences of trajectories, translations as shares of the scene's extent.
+    #[config(default = 0.1)]
+    pub smoothness: f64,
+    /// How much faster than the usual rate translations are learned, as shares of the scene's extent.
+    #[config(default = 2.0)]
+    pub translation_rate: f64,
+    /// How much faster than the usual rate rotations are learned.
+    #[config(default = 8.0)]
+    pub rotation_rate: f64,
+    /// How much faster than the usual rate anchors (as shares of the scene's extent) and logarithms of radii are learned.
+    #[config(default = 5.0)]
+    pub anchor_rate: f64,
+}
+
+/// `B` nodes on trajectories of `K` knots. Lengths are shares of `unit`.
+///
+/// ```
+/// use burn::tensor::{Device, Tensor};
+/// use light4gs_data::PointCloud;
+/// use light4gs_model::{DynamicSceneConfig, GaussiansConfig, NodesField, NodesFieldConfig};
+///
+/// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0]], colors: vec![[0.5; 3]; 2] };
+/// let config = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), NodesFieldConfig::new());
+/// // Until motion begins there is one node, which does not move.
+/// let scene = config.init(&cloud, &Device::flex());
+/// let moved = scene.at(0.25).means - scene.gaussians.means.val();
+/// assert!(moved.abs().max().into_scalar::<f32>() < 1e-6);
+/// ```
+#[derive(Module, Debug)]
+pub struct NodesField {
+    /// `[B, 3]`.
+    anchors: Param<Tensor<2>>,
+    /// `[B, 1]`: logarithms of how far a node reaches.
+    log_radii: Param<Tensor<2>>,
+    /// `[K, 3 B]`, the three of a node behind each other: how far it is moved.
+    translations: Param<Tensor<2>>,
+    /// `[K, 4 B]`, the four of a node behind each other: how it is turned, a quaternion (w, x, y, z) less (1, 0, 0, 0).
+    rotations: Param<Tensor<2>>,
+    /// `[1]`, a constant: the scene's extent, world units.
+    unit: Param<Tensor<1>>,
+    #[module(skip)]
+    config: NodesFieldConfig,
+}
+
+impl NodesField {
+    fn zeros(config: NodesFieldConfig, nodes: usize, knots: usize, device: &Device) -> Self {
+        let zeros = |shape: [usize; 2]| Param::from_tensor(Tensor::zeros(shape, device));
+        Self {
+            anchors: zeros([nodes, 3]),
+            log_radii: zeros([nodes, 1]),
+            translations: zeros([knots, 3 * nodes]),
+            rotations: zeros([knots, 4 * nodes]),
+            unit: Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false),
+            config,
+        }
+    }
+
+    /// Nodes.
+    pub fn nodes(&self) -> usize {
+        self.anchors.dims()[0]
+    }
+
+    /// Knots of a trajectory.
+    pub fn knots(&self) -> usize {
+        self.translations.dims()[0]
+    }
+
+    /// Knots that so many training times ask for.
+    fn knots_of(config: &NodesFieldConfig, times: usize) -> usize {
+        let segments = (times as f64 / config.times_a_knot).ceil() as usize;
+        (segments + 3).clamp(4, MOST_KNOTS)
+    }
+}
+
+impl DeformationField for NodesField {
+    type Config = NodesFieldConfig;
+
+    const KINDS: &'static [&'static str] = &["nodes"];
+
+    fn attributes(config: &NodesFieldConfig) -> Vec<Attribute> {
+        let row = |logit: f64| {
+            let attribute = Attribute::new(STILLNESS, 1).with_start(vec![logit as f32]).constant();
+            attribute.with_learning_rate(STILLNESS_RATE).with_step(STILLNESS_STEP)
+        };
+        config.stillness.map(row).into_iter().collect()
+    }
+
+    /// One node that does not move, until there is a cloud to make more from.
+    fn init(config: &NodesFieldConfig, device: &Device) -> Self {
+        Self::zeros(config.clone(), 1, 4, device)
+    }
+
+    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+        let Poses { matrices, offsets, quats } = self.poses(time);
+        skinning::skin(
+            canonical,
+            skinning::NodesAtTime {
+                anchors: self.world_anchors(),
+                precisions: self.precisions(),
+                poses: Tensor::cat(vec![matrices, offsets, quats], 1),
+            },
+        )
+    }
+
+    fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
+        *self = self.placed(scene, position);
+    }
+
+    /// Knots that no training view has shown yet go on as those before them did.
+    fn begin_step(&mut self, _: &SceneAtRest<'_>, position: &FinePosition) {
+        let [low, high] = position.window;
+        if low > 0.0 || high < 1.0 {
+            let continued = |knots: &Param<Tensor<2>>| {
+                let value = trajectory::continued(knots.val(), low, high);
+                Param::initialized(knots.id, value.detach().require_grad())
+            };
+            self.translations = continued(&self.translations);
+            self.rotations = continued(&self.rotations);
+        }
+    }
+
+    fn regularizer(&self, _: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
+        let NodesFieldConfig { rigidity, smoothness, .. } = self.config;
+        let terms = [
+            (smoothness > 0.0).then(|| self.roughness() * smoothness),
+            (rigidity > 0.0 && self.nodes() > 1).then(|| self.strain(position.random_time()) * rigidity),
+        ];
+        terms.into_iter().flatten().reduce(|sum, term| sum + term)
+    }
+
+    fn learning_rate(&self, path: &str, usual: LearningRate) -> LearningRate {
+        usual.times(match path {
+            "translations" => self.config.translation_rate,
+            "rotations" => self.config.rotation_rate,
+            _ => self.config.anchor_rate,
+        })
+    }
+
+    fn resize(&mut self, shapes: &BTreeMap<String, Vec<usize>>) -> Result<(), ModelError> {
+        let rows = |name: &str| shapes.get(name).and_then(|shape| shape.first().copied()).unwrap_or(0);
+        let (nodes, knots) = (rows("anchors"), rows("translations"));
+        if !(1..=MOST_NODES).contains(&nodes) || !(4..=MOST_KNOTS).contains(&knots) {
+            let expected = format!("expected 1 to {MOST_NODES} and 4 to {MOST_KNOTS}");
+            return Err(ModelError::Motion(format!("{nodes} nodes with {knots} knots, {expected}")));
+        }
+        *self = Self::zeros(self.config.clone(), nodes, knots, &self.anchors.device());
+        Ok(())
+    }
+
+    fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
+        Ok(self.describe())
+    }
+
+    fn from_arrays(arrays: &MotionArrays, _: Option<FeaturePlanes>, device: &Device) -> Result<Self, ModelError> {
+        Self::of_description(arrays, device)
+    }
+}
+
+/// Rows of a tensor that stands on a device, from numbers.
+fn tensor(numbers: Vec<f32>, shape: [usize; 2], device: &Device) -> Tensor<2> {
+    Tensor::from_data(TensorData::new(numbers, shape), device)
+}
+
+/// Numbers of a tensor, row by row.
+fn numbers<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
+    tensor.into_data().iter().collect()
+}

@@ -1,0 +1,140 @@
+//! Trajectories: uniform cubic B-splines over time, and the poses of the nodes at a time.
+
+use burn::tensor::{Device, Int, Tensor, TensorData, s};
+
+use super::{NodesField, tensor};
+
+/// Where the nodes are at a time: a point x near node b goes to `R x + offset`.
+pub(super) struct Poses {
+    /// `[B, 9]`: R, row by row.
+    pub matrices: Tensor<2>,
+    /// `[B, 3]`, world units.
+    pub offsets: Tensor<2>,
+    /// `[B, 4]`: R as a unit quaternion (w, x, y, z).
+    pub quats: Tensor<2>,
+}
+
+/// Products of the quaternion's components (w, x, y, z) that a rotation matrix is made of: xx yy zz, xy yz xz, wz wx wy.
+pub(super) const FACTORS: [[usize; 9]; 2] = [[1, 2, 3, 1, 2, 1, 0, 0, 0], [1, 2, 3, 2, 3, 3, 3, 1, 2]];
+/// The diagonal is 1 - 2 (a + b) of these products.
+pub(super) const DIAGONAL: [[usize; 3]; 2] = [[1, 0, 0], [2, 2, 1]];
+/// The other elements are 2 (a - b) and 2 (a + b) of these.
+pub(super) const OTHERS: [[usize; 3]; 2] = [[3, 4, 5], [6, 7, 8]];
+/// Where the nine elements, row by row, stand behind diagonal, differences and sums.
+pub(super) const ELEMENTS: [usize; 9] = [0, 3, 8, 6, 1, 4, 5, 7, 2];
+
+/// Columns of a tensor by their numbers.
+pub(super) fn columns(tensor: &Tensor<2>, numbers: &[usize]) -> Tensor<2> {
+    let numbers: Vec<i64> = numbers.iter().map(|number| *number as i64).collect();
+    tensor.clone().select(1, Tensor::<1, Int>::from_data(TensorData::from(&numbers[..]), &tensor.device()))
+}
+
+/// How much each of so many knots counts at a time, `[K]`: the uniform cubic B-spline at its distance.
+pub(super) fn basis(time: f32, knots: usize) -> Vec<f32> {
+    let weight = |knot: usize| {
+        let distance = (time * (knots - 3) as f32 + 1.0 - knot as f32).abs();
+        let [outer, inner] = [2.0, 1.0].map(|end: f32| (end - distance).max(0.0).powi(3) / 6.0);
+        outer - 4.0 * inner
+    };
+    (0..knots).map(weight).collect()
+}
+
+/// How much of the last difference between two knots there is in the next one, where a trajectory is continued.
+const DAMPING: f32 = 0.9;
+
+/// Knots `[K, C]` of which only those count that the times from `low` to `high` touch: the others continue them, ever slower.
+pub(super) fn continued(knots: Tensor<2>, low: f32, high: f32) -> Tensor<2> {
+    let [count, _] = knots.dims();
+    let segment = |time: f32| ((time.clamp(0.0, 1.0) * (count - 3) as f32) as usize).min(count - 4);
+    // The outermost touched knot has next to no weight at the end of the window, so it is continued as well.
+    let (first, last) = (segment(low) + 1, segment(high) + 2);
+    let row = |knot: usize| knots.clone().slice(s![knot..knot + 1, ..]);
+    let beyond = |at: usize, inner: usize, count: usize| -> Vec<Tensor<2>> {
+        let difference = row(at) - row(inner);
+        let mut step = 0.0;
+        let shares = (1..=count).map(|power| {
+            step += DAMPING.powi(power as i32);
+            step
+        });
+        shares.map(|share| row(at) + difference.clone() * share).collect()
+    };
+    let mut all = if low > 0.0 { beyond(first, first + 1, first) } else { (0..first).rev().map(row).collect() };
+    all.reverse();
+    all.extend((first..=last).map(row));
+    let after = count - 1 - last;
+    all.extend(if high < 1.0 { beyond(last, last - 1, after) } else { (last + 1..count).map(row).collect() });
+    Tensor::cat(all, 0)
+}
+
+impl NodesField {
+    /// `[B, 3]`, world units.
+    pub(super) fn world_anchors(&self) -> Tensor<2> {
+        self.anchors.val() * self.unit.val().unsqueeze()
+    }
+
+    /// `[B, 1]`: 1 / (2 r²), world units.
+    pub(super) fn precisions(&self) -> Tensor<2> {
+        (self.log_radii.val() * -2.0).exp() / (self.unit.val().powi_scalar(2) * 2.0).unsqueeze()
+    }
+
+    /// Translations `[B, 3]`, shares of the unit, and unit quaternions `[B, 4]` at a time.
+    pub(super) fn motion(&self, time: f32) -> (Tensor<2>, Tensor<2>) {
+        let (nodes, device) = (self.nodes(), self.device());
+        let basis = tensor(basis(time, self.knots()), [1, self.knots()], &device);
+        let translations = basis.clone().matmul(self.translations.val()).reshape([nodes, 3]);
+        let one = Tensor::from_floats([[1.0, 0.0, 0.0, 0.0]], &device);
+        let quats = basis.matmul(self.rotations.val()).reshape([nodes, 4]) + one;
+        (translations, quats.clone() / quats.powi_scalar(2).sum_dim(1).sqrt())
+    }
+
+    /// The poses at a time.
+    pub(super) fn poses(&self, time: f32) -> Poses {
+        let nodes = self.nodes();
+        let (translations, quats) = self.motion(time);
+        let matrices = rotation_matrices(&quats);
+        let anchors = self.anchors.val();
+        let turned = (matrices.clone().reshape([nodes, 3, 3]) * anchors.clone().reshape([nodes, 1, 3])).sum_dim(2);
+        let offsets = (anchors + translations - turned.reshape([nodes, 3])) * self.unit.val().unsqueeze();
+        Poses { matrices, offsets, quats }
+    }
+
+    pub(super) fn device(&self) -> Device {
+        self.anchors.device()
+    }
+}
+
+/// `[B, 9]`, row by row, of unit quaternions `[B, 4]`.
+pub(super) fn rotation_matrices(quats: &Tensor<2>) -> Tensor<2> {
+    let terms = columns(quats, &FACTORS[0]) * columns(quats, &FACTORS[1]);
+    let [first, second] = OTHERS.map(|numbers| columns(&terms, &numbers));
+    let diagonal = (columns(&terms, &DIAGONAL[0]) + columns(&terms, &DIAGONAL[1])) * -2.0 + 1.0;
+    let others = [(first.clone() - second.clone()) * 2.0, (first + second) * 2.0];
+    columns(&Tensor::cat([vec![diagonal], others.to_vec()].concat(), 1), &ELEMENTS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::field::nodes::numbers;
+
+    #[test]
+    fn the_basis_sums_to_one_and_touches_four_knots() {
+        for time in [0.0, 0.013, 0.5, 0.77, 1.0] {
+            let weights = basis(time, 9);
+            assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{time}");
+            assert!(weights.iter().filter(|weight| **weight > 1e-6).count() <= 4);
+        }
+    }
+
+    #[test]
+    fn what_is_not_seen_continues_a_line_ever_slower() {
+        let device = Device::flex();
+        let knots = tensor((0..10).map(|knot| knot as f32).collect(), [10, 1], &device);
+        // Eight knots apart: the window touches knots 2 to 7, of which the outermost count as not seen.
+        let values = numbers(continued(knots.clone(), 0.3, 0.7));
+        assert_eq!(values[3..=6], [3.0, 4.0, 5.0, 6.0]);
+        assert!((values[7] - 6.9).abs() < 1e-6 && (values[8] - 7.71).abs() < 1e-5, "{values:?}");
+        assert!((values[2] - 2.1).abs() < 1e-6 && (values[1] - 1.29).abs() < 1e-5, "{values:?}");
+        assert_eq!(numbers(continued(knots.clone(), 0.0, 1.0)), numbers(knots));
+    }
+}

@@ -1,0 +1,86 @@
+//! A window of time that widens: motion is followed outwards from where it is known.
+
+use rand::Rng;
+
+use super::{BatchRequest, FrameSampler, Shuffled};
+use crate::keys::Bounds::Whole;
+use crate::keys::{SHARE, keys};
+use crate::stage::Stage;
+
+keys! {
+    /// Frames of a window of time that widens until it holds all. Fast objects then move little between what is known and
+    /// what is new. The coarse stage sees the first window.
+    pub struct WideningWindow {
+        /// The middle of the first window.
+        center: f64 = 0.5; SHARE, "ours";
+        /// Different times in the first window.
+        times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
+        /// The share of the fine stage for which the first window stays.
+        held: f64 = 0.07; SHARE, "ours";
+        /// The share of the fine stage after which all times are seen.
+        open: f64 = 0.6; SHARE, "ours";
+        /// The share of the draws that go to the newest times while the window widens.
+        newest: f64 = 0.3; SHARE, "ours";
+        /// How many times on each side are the newest.
+        newest_times: usize = 4; Whole { least: 1, most: 1_000_000 }, "ours";
+    }
+}
+
+impl WideningWindow {
+    /// How far the window is open, between the first one (0) and all (1).
+    fn share(&self, request: &BatchRequest) -> f64 {
+        if request.stage == Stage::Coarse {
+            return 0.0;
+        }
+        let done = request.iteration as f64 / request.iterations.max(1) as f64;
+        if done >= self.open { 1.0 } else { ((done - self.held) / (self.open - self.held)).clamp(0.0, 1.0) }
+    }
+
+    /// The places of the first and the last time in the window among all times.
+    fn places(&self, request: &BatchRequest) -> [usize; 2] {
+        let end = request.candidates.times.len() - 1;
+        let center = self.center * end as f64;
+        let first_half = 0.5 * (self.times as f64 - 1.0);
+        let half = first_half + (center.max(end as f64 - center) - first_half).max(0.0) * self.share(request);
+        let (first, last) = ((center - half).ceil().max(0.0) as usize, ((center + half).floor() as usize).min(end));
+        // A window between two times has none.
+        if first <= last { [first, last] } else { [last, last] }
+    }
+
+    /// A time in a window, by its place, while the window widens.
+    fn draw(&self, [first, last]: [usize; 2], end: usize, random: &mut impl Rng) -> usize {
+        if random.random::<f64>() >= self.newest {
+            return random.random_range(first..=last);
+        }
+        let width = self.newest_times.min(last - first + 1) - 1;
+        // A window that has come to one end of time grows at the other only.
+        let sides = [(first > 0, first..=first + width), (last < end, last - width..=last)];
+        let sides: Vec<_> = sides.into_iter().filter(|(grows, _)| *grows).collect();
+        let side = random.random_range(0..sides.len());
+        random.random_range(sides[side].1.clone())
+    }
+}
+
+impl FrameSampler for WideningWindow {
+    fn batch(&self, request: &BatchRequest) -> Vec<usize> {
+        let times = &request.candidates.times;
+        let (window, end) = (self.places(request), times.len() - 1);
+        if window == [0, end] {
+            return Shuffled {}.batch(request);
+        }
+        let random = &mut request.generator(request.iteration);
+        let view = |_| {
+            let frames = &times[self.draw(window, end, random)];
+            frames[random.random_range(0..frames.len())]
+        };
+        (0..request.batch_size).map(view).collect()
+    }
+
+    fn window(&self, request: &BatchRequest) -> [f32; 2] {
+        let times = &request.candidates.times;
+        let [first, last] = self.places(request);
+        let at = |place: usize| request.frames[times[place][0]].time;
+        // At the ends there is nothing beyond.
+        [if first == 0 { 0.0 } else { at(first) }, if last + 1 == times.len() { 1.0 } else { at(last) }]
+    }
+}
