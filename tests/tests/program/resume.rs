@@ -8,12 +8,23 @@ use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_success};
 
 #[test]
 fn killed_and_resumed_runs_are_bit_identical() {
+    killed_and_resumed(&TINY_COMPRESSION);
+}
+
+/// Nodes are made when motion begins, as many as there are Gaussians for, and knots that were not seen are continued.
+#[test]
+fn killed_and_resumed_runs_of_control_nodes_are_bit_identical() {
+    let nodes = ["model.field=nodes", "train.sampling=widening_window", "train.widening_window.times=3"];
+    killed_and_resumed(&TINY_COMPRESSION.into_iter().chain(nodes).collect::<Vec<&str>>());
+}
+
+fn killed_and_resumed(settings: &[&str]) {
     let w = Workspace::new(PROGRAM);
-    assert_success(&w.train("whole", &TINY_COMPRESSION).output().unwrap());
+    assert_success(&w.train("whole", settings).output().unwrap());
     let expected = fs::read(w.path("whole/scene.l4gs")).unwrap();
 
     // SIGKILL after a growing delay: in the first iterations, between checkpoints, in the fine stage.
-    let mut child = w.train("killed", &TINY_COMPRESSION).spawn().unwrap();
+    let mut child = w.train("killed", settings).spawn().unwrap();
     let mut kills = 0;
     for attempt in 1..60 {
         let delay = Duration::from_millis(40 * attempt);
@@ -30,7 +41,7 @@ fn killed_and_resumed_runs_are_bit_identical() {
         } else {
             // Killed before there was a run: the user would start it again.
             let _ = fs::remove_dir_all(w.path("killed"));
-            child = w.train("killed", &TINY_COMPRESSION).spawn().unwrap();
+            child = w.train("killed", settings).spawn().unwrap();
         }
     }
     assert!(child.wait().unwrap().success());
@@ -41,7 +52,7 @@ fn killed_and_resumed_runs_are_bit_identical() {
 #[test]
 fn a_seed_repeats_and_threads_do_not_matter() {
     let w = Workspace::new(PROGRAM);
-    for views in ["train.batch_size=1", "train.batch_size=3"] {
+    for views in ["train.batch_size=1", "train.batch_size=3", "model.field=nodes"] {
         let settings: Vec<&str> = TINY_COMPRESSION.into_iter().chain([views]).collect();
         let files = ["1", "2", "3"].map(|threads| {
             let run = format!("{views}-{threads}");
