@@ -232,10 +232,11 @@ fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T,
     times[times.len() / 2]
 }
 
-/// Gaussians and nodes in a box, a node's radius 0.6 times what would fill it, all of them on the tape.
+/// Gaussians and nodes in a box, a node's radius 0.6 times what would fill it; with gradients on a device that records them.
 pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningInputs {
+    let leaf = |tensor: Tensor<2>| if device.is_autodiff() { tensor.require_grad() } else { tensor };
     let random = |rows: usize, columns: usize| {
-        Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device).require_grad()
+        leaf(Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device))
     };
     let radius = 0.6 * 2.0 / (nodes as f32).cbrt();
     SkinningInputs {
@@ -243,7 +244,7 @@ pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningI
         quats: random(count, 4),
         stillness: random(count, 1),
         anchors: random(nodes, 3),
-        precisions: Tensor::full([nodes, 1], 0.5 / (radius * radius), device).require_grad(),
+        precisions: leaf(Tensor::full([nodes, 1], 0.5 / (radius * radius), device)),
         poses: random(nodes, 16),
     }
 }
