@@ -1,10 +1,10 @@
-//! A part of the context model of one's own: the plane xz is predicted from what the plane xy, decoded before, is like on
-//! average at each x. Trained beside a scene with the rate in its loss, resumed, coded, decoded. Nothing of Light4GS is
-//! edited, and the codec runs the part exactly.
+//! A part of the context model in your own crate: the plane xz is predicted from the plane xy, which is decoded before
+//! it, averaged for each x. It is trained with a scene and the rate in its loss, resumed, coded and decoded. No file of
+//! Light4GS is edited, and the codec runs the part exactly.
 //!
-//! A [`PriorPart`] says the same thing twice: `prior` computes it with Burn, for training; `describe` gives it to the codec
-//! as a list of layers. A model is a list of parts ([`PlaneEntropy`]), and for each plane the first that applies speaks.
-//! [`EntropyModels`] makes the model for a trainer.
+//! A [`PriorPart`] describes one computation twice: `prior` computes it with Burn, for training; `describe` gives it to
+//! the codec as a list of layers. A model is a list of parts ([`PlaneEntropy`]), and for each plane the first part that
+//! applies is used. [`EntropyModels`] makes the model for a trainer.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
@@ -37,8 +37,8 @@ struct ProfileAlongX {
 }
 
 impl ProfileAlongX {
-    /// The planes that this part speaks for: xz of the lowest scale, where there is xy. Above, the plane one scale below says
-    /// more.
+    /// The planes to which this part applies: xz of the lowest scale, if there is an xy. At higher scales the plane one
+    /// scale below is a better predictor.
     fn applies(layout: &PlaneLayout, plane: usize) -> bool {
         let PlaneShape { scale, axes, .. } = layout.planes()[plane];
         scale == 0 && axes == PlaneAxes::Xz && layout.in_same_scale(plane, PlaneAxes::Xy).is_some()
@@ -95,7 +95,7 @@ impl PlaneEntropy for ModelWithProfile {
     }
 }
 
-/// What a trainer makes its entropy models with: ours for the planes, the configured one for the spherical harmonics.
+/// Makes the entropy models for a trainer: ours for the planes, the configured one for the spherical harmonics.
 #[derive(Debug)]
 struct WithProfile;
 
@@ -129,7 +129,7 @@ fn main() -> Outcome {
     let scene = tiny_scene(folder.path())?;
     let data = Scene::open(&scene, &load_options(&config))?;
 
-    // Trained: the part learns in the loop, from the rate in the loss.
+    // Trained: the part is trained with everything else, by the rate in the loss.
     let run = RunFolder::create(&folder.path().join("run"), Some(&scene), &config, false)?;
     let builder = |data: &Scene| Trainer::builder(config.clone(), data.clone()).entropy_models(WithProfile);
     let mut trainer = builder(&data).run_folder(run.clone()).build()?;
@@ -145,7 +145,8 @@ fn main() -> Outcome {
     assert_eq!(trainer.position(), (light4gs_train::Stage::Fine, 50));
     trainer.run()?;
 
-    // Coded: the file is as large as the model expects, and any decoder reads it: the composition travels as data.
+    // Coded: the file is as large as the model expects. Any decoder reads it, since the composition is part of the
+    // file.
     let coded = trainer.encode()?;
     let (record, _) = coded.coding.expect("the profile is a coded one");
     let [planes, _] = record.parts();
@@ -153,7 +154,7 @@ fn main() -> Outcome {
     assert!((planes.expected / planes.coded - 1.0).abs() < 0.02);
     let decoded = decode(&coded.bytes)?;
 
-    // The codec's exact executor says what the Burn module says, to float tolerance.
+    // The codec's exact executor gives the same as the Burn module, to float tolerance.
     let PlaneModels { context: mut model, quantization } =
         trainer.compression().cloned().and_then(|models| models.planes).expect("the rate is in the loss").valid();
     model.base_mut().update_quantiles();

@@ -1,4 +1,4 @@
-//! A dataset layout of one's own, from one's own crate: nothing of Light4GS is edited.
+//! A dataset layout in your own crate: no file of Light4GS is edited.
 //!
 //! The layout is a folder with a table `cameras.csv`: for each image its split, its file, a time in seconds and where the
 //! camera stands. All cameras look at the origin.
@@ -15,7 +15,7 @@ use light4gs_examples::{Outcome, tiny_scene};
 /// The horizontal field of view of every camera of this layout, radians.
 const FOV_X: f32 = 0.691_111_2;
 
-/// The layout has no state. One that has (a scale, a list of cameras to leave out) keeps it in fields.
+/// This layout has no state. A layout with state (a scale, a list of cameras to leave out) keeps it in fields.
 struct CameraTable;
 
 impl DatasetLayout for CameraTable {
@@ -53,7 +53,7 @@ impl DatasetLayout for CameraTable {
         for frame in frames.train.iter_mut().chain(&mut frames.test).chain(&mut frames.val).chain(&mut frames.video) {
             frame.time = (frame.time / last).clamp(0.0, 1.0);
         }
-        // This layout brings no points, so the Gaussians start anywhere in a cube.
+        // This layout has no points, so the Gaussians start anywhere in a cube.
         let points = PointCloud::random(options.random_points, options.random_half_size, options.seed);
         Scene::new(self.name(), root, frames, points, options.background)
     }
@@ -97,7 +97,8 @@ fn main() -> Outcome {
     }
     fs::write(root.join("cameras.csv"), table)?;
 
-    // Without the layout the folder is not understood; with it, it is found by content or by name.
+    // Without the layout the folder is not recognized. With it, the folder is recognized by its files or by the
+    // layout's name.
     let refused = Scene::open(&root, &options).unwrap_err();
     assert!(matches!(refused, DataError::UnknownLayout { .. }), "{refused}");
     let layouts = Layouts::default().with(CameraTable);

@@ -1,8 +1,8 @@
-//! A deformation field of one's own, from one's own crate: trained, coded, decoded. Nothing of Light4GS is edited.
+//! A deformation field in your own crate: trained, coded, decoded. No file of Light4GS is edited.
 //!
-//! The field has no planes. A few trajectories over time are shared by the whole scene, and each place mixes them: offset =
-//! W · (where(x, y, z) × when(t)), two small branches that are multiplied. The codec has never heard of such a field. The
-//! field describes its network as a list of layers, the stream carries the list, and any decoder can run it.
+//! The field has no planes. The whole scene shares a few trajectories over time, and each place mixes them: offset = W
+//! · (where(x, y, z) × when(t)), a product of two small branches. The codec does not know this field. The field
+//! describes its network as a list of layers, the stream contains the list, and any decoder can run it.
 
 use burn::config::Config;
 use burn::module::Module;
@@ -31,12 +31,12 @@ struct SharedTrajectoriesConfig {
     trajectories: usize,
 }
 
-/// What moves the Gaussians.
+/// The field.
 #[derive(Module, Debug)]
 struct SharedTrajectories {
-    /// `[3]` to `[W]` to `[K]`: how much of each trajectory a place takes.
+    /// `[3]` to `[W]` to `[K]`: how much each trajectory contributes at a place.
     place: [Linear; 2],
-    /// `[1]` to `[W]` to `[K]`: how far along each trajectory is.
+    /// `[1]` to `[W]` to `[K]`: how far along each trajectory a time is.
     pace: [Linear; 2],
     /// `[K]` to `[3]`: the directions of the trajectories.
     directions: Linear,
@@ -53,7 +53,7 @@ impl SharedTrajectories {
 impl DeformationField for SharedTrajectories {
     type Config = SharedTrajectoriesConfig;
 
-    /// The stream's name of it. A program that reads a file of another kind says so by this name.
+    /// The field's name in the stream. A program that cannot read the field's files names it in the error.
     const KINDS: &'static [&'static str] = &["shared-trajectories"];
 
     fn init(config: &SharedTrajectoriesConfig, device: &Device) -> Self {
@@ -76,7 +76,7 @@ impl DeformationField for SharedTrajectories {
     }
 
     fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
-        // The same as `deform`, as data. `Point` and `Time` are what the codec calls these inputs.
+        // The same as `deform`, as data. `Point` and `Time` are the codec's names for these inputs.
         let (mut network, [point, time]) = Network::new([3, 1]);
         let branch = |network: &mut Network, [first, second]: &[Linear; 2], input| {
             let hidden = network.layer(input, linear_to_layer(first));
@@ -98,8 +98,8 @@ impl DeformationField for SharedTrajectories {
         let motion = arrays.network.as_ref().ok_or_else(|| wrong("no network"))?;
         let layers: Vec<_> = motion.network.layers().collect();
         let &[place, _, _, _, directions] = layers.as_slice() else { return Err(wrong("other layers")) };
-        // A file may come from anybody. The field is made with the file's sizes, which the codec has checked and bounded, and
-        // compared node by node before its numbers are taken over.
+        // A file may come from anybody. The field is made with the file's sizes, which the codec has checked and
+        // bounded. It is compared with the file node by node before its numbers are taken.
         let (width, trajectories) = (place.outputs as usize, directions.inputs as usize);
         let mut field = Self::init(&SharedTrajectoriesConfig { width, trajectories }, device);
         let ours = field.to_arrays()?.network.expect("this kind has a network");
@@ -118,7 +118,7 @@ fn main() -> Outcome {
     let config = tiny_config()?;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
 
-    // Trained: by the usual trainer, which finds the parameters by itself.
+    // Trained by the usual trainer, which finds the parameters by itself.
     let field = SharedTrajectoriesConfig::new();
     let mut trainer = Trainer::<SharedTrajectories>::builder_with_field(config, data, field).build()?;
     let mut losses = Vec::new();
@@ -135,7 +135,7 @@ fn main() -> Outcome {
     let bytes = trainer.encode()?.bytes;
     println!("{} bytes", bytes.len());
 
-    // Decoded: the arrays name the kind, and the field is made of them again.
+    // Decoded: the arrays name the kind of field, and the field is made from them.
     let arrays = decode(&bytes)?;
     assert_eq!(arrays.motion.kind, "shared-trajectories");
     let device = Device::flex();
@@ -149,7 +149,7 @@ fn main() -> Outcome {
     println!("largest difference between Burn and the codec: {difference:e}");
     assert!(difference < 1e-4);
 
-    // Another model refuses the file by name.
+    // Another model refuses the file and names its field.
     let refused = DynamicScene::<HexPlaneField>::from_arrays(&arrays, &device).unwrap_err().to_string();
     assert!(refused.contains("shared-trajectories"), "{refused}");
     Ok(())

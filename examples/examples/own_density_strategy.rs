@@ -1,8 +1,8 @@
-//! A densification strategy of one's own: the number of Gaussians never changes, but those that nobody can see are moved
-//! to where opaque ones are (the idea of 3DGS-MCMC, Kheradmand et al. 2024, in its simplest form).
+//! A densification strategy in your own crate: the number of Gaussians never changes, but Gaussians that cannot be seen
+//! are moved to opaque ones (the idea of 3DGS-MCMC, Kheradmand et al. 2024, in its simplest form).
 //!
-//! A [`DensityStrategy`] is asked after every backward pass and after every step of the optimizer. It changes the Gaussians
-//! through a [`GaussianEditor`], which keeps the optimizer's moments in line with the rows.
+//! A [`DensityStrategy`] is called after every backward pass and after every step of the optimizer. It changes the
+//! Gaussians through a [`GaussianEditor`], which changes the rows of the optimizer's moments in the same way.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -18,13 +18,13 @@ use light4gs_train::density::{DensityStrategy, GaussianEditor, TrainingPosition,
 use light4gs_train::trainer::Trainer;
 use rand::Rng;
 
-/// Every so many iterations, Gaussians of less than this opacity are moved.
+/// Iterations between two moves of the Gaussians whose opacity is below `TOO_FAINT`.
 const INTERVAL: usize = 20;
 const TOO_FAINT: f32 = 0.05;
 /// Nothing is moved after this iteration of a stage.
 const UNTIL: usize = 80;
 
-/// Counts what it moves, so that a run can be watched from outside.
+/// Counts the moved Gaussians, so that a run can be watched from outside.
 #[derive(Default)]
 struct Relocation {
     moved: Arc<AtomicUsize>,
@@ -33,7 +33,7 @@ struct Relocation {
 impl DensityStrategy for Relocation {
     fn begin_stage(&mut self, _count: usize, _device: &Device) {}
 
-    // Opacities say enough; a strategy that needs gradients of screen positions gathers them here.
+    // This strategy needs only opacities. One that needs gradients of screen positions collects them here.
     fn after_backward(&mut self, _views: &[ViewStatistics], _position: &TrainingPosition) {}
 
     fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition) {
@@ -46,24 +46,24 @@ impl DensityStrategy for Relocation {
         if opaque.is_empty() || faint.is_empty() {
             return;
         }
-        // Each faint one becomes a copy of an opaque one, drawn at random. The generator of the position makes a resumed run
-        // draw the same.
+        // Each faint Gaussian becomes a copy of an opaque one, drawn at random. With the generator of the position a
+        // resumed run draws the same ones.
         let mut generator = position.generator();
         let copies = faint.iter().map(|_| opaque[generator.random_range(0..opaque.len())]);
         let rows: Vec<usize> = opaque.iter().copied().chain(copies).collect();
-        // The first rows keep their moments, the copies begin without.
+        // The first rows keep their moments; those of the copies are zero.
         gaussians.select_rows(&rows, opaque.len());
         self.moved.fetch_add(faint.len(), Ordering::Relaxed);
     }
 
-    // Pruning by significance has dropped rows: nothing here is kept by row.
+    // Pruning by significance has removed rows. This strategy stores nothing for each row.
     fn rows_kept(&mut self, _keep: &[bool]) {}
 
     fn is_over(&self, _stage: Stage, iteration: usize) -> bool {
         iteration > UNTIL
     }
 
-    // What a checkpoint must hold: the count, so that a resumed run reports the same.
+    // State that a checkpoint must have: the count, so that a resumed run reports the same number.
     fn state(&self) -> BTreeMap<String, Tensor<1>> {
         let moved = self.moved.load(Ordering::Relaxed) as f32;
         BTreeMap::from([("moved".to_owned(), Tensor::from_floats([moved], &Device::flex()))])
@@ -95,7 +95,7 @@ fn main() -> Outcome {
     println!("{moved} Gaussians moved, {count} all the time; loss {first:.3} at first, {last:.3} at last");
     assert!(moved > 0 && last < 0.7 * first);
 
-    // What it would tell a checkpoint is what it takes back.
+    // The state for a checkpoint is the state that `restore` accepts.
     let saved = Relocation { moved: Arc::new(AtomicUsize::new(moved)) }.state();
     let mut restored = Relocation::default();
     restored.restore(saved, count)?;

@@ -1,9 +1,9 @@
-//! A frame sampler of one's own: a window of time that grows while the fine stage goes on, so that motion is learned outwards
-//! from the moment at which the coarse stage has learned the scene.
+//! A frame sampler in your own crate: a window of time that grows in the fine stage, so that motion is learned outwards
+//! from the time at which the coarse stage has learned the scene.
 //!
-//! A [`FrameSampler`] answers which frames an iteration looks at. It remembers nothing: the answer follows from the position in
-//! the run, and what is random in it comes from a generator that follows from the position, too. So a resumed run sees the
-//! same frames.
+//! A [`FrameSampler`] says which frames an iteration uses. It has no state: the frames follow from the position in the
+//! run, and random choices come from a generator that also follows from the position. So a resumed run uses the same
+//! frames.
 
 use std::path::Path;
 
@@ -20,13 +20,13 @@ use rand::Rng;
 /// Frames whose time is near `center`.
 #[derive(Clone)]
 struct GrowingWindow {
-    /// In [0, 1], as all times.
+    /// In [0, 1], like all times.
     center: f32,
-    /// Of the window, in the coarse stage and when the fine stage begins.
+    /// Half the width of the window, in the coarse stage and at the start of the fine stage.
     half_width: f32,
     /// Share of the fine stage after which the window holds all times.
     until: f32,
-    /// Share of the frames that are drawn from all times, so that nothing is lost.
+    /// Share of the frames that are drawn from all times, so that no time is forgotten.
     everywhere: f32,
 }
 
@@ -57,7 +57,7 @@ impl FrameSampler for GrowingWindow {
     }
 }
 
-/// Trains to the end, or for some steps only; what the trainer saw, and its losses.
+/// Trains to the end, or for some steps only. Returns the frames that the trainer used, and its losses.
 fn train(trainer: &mut Trainer, steps: usize) -> Outcome<Vec<(Stage, usize, usize, f32)>> {
     let mut seen = Vec::new();
     while seen.len() < steps
@@ -81,7 +81,7 @@ fn main() -> Outcome {
     let run = |name: &str| RunFolder::create(&folder.path().join(Path::new(name)), Some(&scene), &config, false);
     let window = GrowingWindow { center: 0.5, half_width: 0.2, until: 0.6, everywhere: 0.0 };
 
-    // Whole.
+    // The whole run.
     let seen = train(&mut trainer(&config, &data, run("whole")?, &window)?, usize::MAX)?;
     let mut latest = 0.0f32;
     for (stage, iteration, frame, _) in &seen {
@@ -94,14 +94,14 @@ fn main() -> Outcome {
     println!("times up to {latest:.2} from the center; loss {first:.3} at first, {last:.3} at last");
     assert!(latest > 0.4 && last < 0.7 * first);
 
-    // Interrupted, and continued from the last checkpoint: the same frames and the same losses, to the last bit.
+    // Interrupted, and resumed from the last checkpoint: the same frames and the same losses, to the last bit.
     let begun = run("interrupted")?;
     train(&mut trainer(&config, &data, begun.clone(), &window)?, 75)?;
     let rest = train(&mut trainer(&config, &data, begun, &window)?, usize::MAX)?;
     println!("resumed after {} of {} iterations", seen.len() - rest.len(), seen.len());
     assert!(rest.len() < seen.len() && seen.ends_with(&rest));
 
-    // A function is a sampler, too; one that names no frame is refused.
+    // A function is a sampler too. A sampler that names no frame is refused.
     let first_frame = |request: &BatchRequest| vec![request.candidates.frames[0]];
     let mut short = Trainer::builder(config.clone(), data.clone()).sampler(first_frame).build()?;
     assert!(short.step()?.is_some_and(|step| step.frame == 0));

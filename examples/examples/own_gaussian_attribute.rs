@@ -1,9 +1,9 @@
-//! An attribute of every Gaussian of one's own, from one's own crate: a lifetime. Nothing of Light4GS is edited.
+//! An attribute of the Gaussians in your own crate: a lifetime. No file of Light4GS is edited.
 //!
-//! Each Gaussian has a center and a width in time, and is as opaque as it was times a bell curve around that center: things can
-//! appear and vanish without moving. The field asks for the attribute, and it is trained, copied where Gaussians are cloned
-//! and split, kept in checkpoints, coded with a step of its own, and read by name by the network that the file carries, so
-//! that any player shows it.
+//! Each Gaussian has a center and a width in time, and its opacity is multiplied by a bell curve around that center:
+//! things can appear and vanish without moving. The field asks for the attribute. From then on it is trained, copied
+//! where Gaussians are cloned and split, stored in checkpoints, and coded with its own quantization step. The network
+//! in the file reads it by name, so any player shows its effect.
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor, s};
@@ -21,7 +21,7 @@ use light4gs_train::trainer::Trainer;
 /// The name of the attribute, in checkpoints and in files: center, and logarithm of the width, in time.
 const LIFETIME: &str = "lifetime";
 
-/// A field that moves nothing and lets Gaussians come and go.
+/// A field that moves nothing, but lets Gaussians appear and vanish.
 #[derive(Module, Debug)]
 struct Lifetimes;
 
@@ -30,7 +30,8 @@ impl DeformationField for Lifetimes {
 
     const KINDS: &'static [&'static str] = &["lifetimes"];
 
-    /// What every Gaussian must have besides what all have. It begins in the middle of the scene's time, as long as that.
+    /// The attribute that every Gaussian has in addition to the usual ones. It begins in the middle of the scene's
+    /// time, with the length of that time.
     fn attributes((): &()) -> Vec<Attribute> {
         let lifetime = Attribute::new(LIFETIME, 2).with_start(vec![0.5, 0.0]);
         vec![lifetime.with_learning_rate(1e-2).with_step(0.01).constant()]
@@ -53,7 +54,7 @@ impl DeformationField for Lifetimes {
         GaussianTensors { opacity_logits, ..canonical }
     }
 
-    /// The same as data: the codec calls attributes by their names.
+    /// The same as data: the codec refers to attributes by their names.
     fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
         let (mut network, [logit, lifetime, time]) = Network::new([1, 2, 1]);
         let affine = |network: &mut Network, value: Value, scale: f32, offset: f32| {
@@ -80,7 +81,7 @@ impl DeformationField for Lifetimes {
         Ok(MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() })
     }
 
-    /// There is nothing to take over but the attribute, which comes with the Gaussians.
+    /// The field has no numbers of its own; the attribute comes with the Gaussians.
     fn from_arrays(arrays: &MotionArrays, _planes: Option<FeaturePlanes>, _: &Device) -> Result<Self, ModelError> {
         match *arrays == Self.to_arrays()? {
             true => Ok(Self),
@@ -101,7 +102,7 @@ fn main() -> Outcome {
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
     let builder = || Trainer::<Lifetimes>::builder_with_field(config.clone(), data.clone(), ());
 
-    // Trained: the trainer knows the attribute from the field.
+    // Trained: the trainer gets the attribute from the field.
     let mut trainer = builder().build()?;
     let begin = trainer.scene().gaussians.len();
     let mut losses = Vec::new();
@@ -112,7 +113,7 @@ fn main() -> Outcome {
     println!("loss: {first:.3} in the first tenth of the run, {last:.3} in the last");
     assert!(last < 0.7 * first);
 
-    // Densified: Gaussians have come and gone, and each has a lifetime of its own.
+    // Densified: Gaussians have been added and removed, and each has its own lifetime.
     let trained = trainer.scene().gaussians.to_arrays();
     let spread = |values: &[f32]| values.iter().fold(0.0, |most: f32, value| most.max((value - values[0]).abs()));
     println!("{begin} Gaussians became {}", trained.len());
@@ -120,7 +121,7 @@ fn main() -> Outcome {
     assert!(spread(&lifetimes(&trained)) > 0.05, "all lifetimes are alike");
     let bytes = trainer.encode()?.bytes;
 
-    // Resumed: a run that is given up in the middle goes on from its checkpoint, to the same bits.
+    // Resumed: a run that is stopped in the middle continues from its checkpoint, with the same bits.
     let run = folder.path().join("run");
     let mut given_up = builder().run_folder(RunFolder::create(&run, None, &config, false)?).build()?;
     for _ in 0..80 {
@@ -136,7 +137,7 @@ fn main() -> Outcome {
     assert_eq!(resumed.scene().gaussians.to_arrays(), trained);
     assert_eq!(resumed.encode()?.bytes, bytes);
 
-    // Coded and decoded: the stream gives the attribute back by name, off by half a step at most.
+    // Coded and decoded: the stream returns the attribute by name, with an error of at most half a step.
     let arrays = decode(&bytes)?;
     println!("{} bytes for {} Gaussians", bytes.len(), arrays.gaussians.len());
     let decoded = arrays.gaussians.attribute(LIFETIME).expect("the stream has it");
@@ -158,7 +159,7 @@ fn main() -> Outcome {
         assert!(ours.opacity_logits != arrays.gaussians.opacity_logits, "nothing fades");
     }
 
-    // A program that cannot say what the attribute does refuses to show the scene, by its name.
+    // A program that does not know the effect of the attribute refuses to show the scene, and names the attribute.
     let mut unsaid = arrays;
     unsaid.motion = MotionArrays::default();
     let refused = MotionEvaluator::new(&unsaid).unwrap_err().to_string();

@@ -1,6 +1,8 @@
-//! A loss of one's own: colors by a smooth absolute difference, and the outline of what is in front of the background.
+//! A loss in your own crate: a smooth absolute difference for the colors, and a penalty on the outline of everything
+//! that is in front of the background.
 //!
-//! A [`Loss`] sees a rendered view beside its training image and gives one number on the tape. The trainer does the rest.
+//! A [`Loss`] gets a rendered view and its training image, and returns one number on the tape. The trainer does the
+//! rest.
 
 use burn::tensor::{Device, Tensor};
 use light4gs_data::Scene;
@@ -15,7 +17,7 @@ fn silhouette(image: Tensor<3>) -> Tensor<2> {
     image.min_dim(2).squeeze_dim::<2>(2).lower_elem(0.99).float()
 }
 
-/// sqrt(difference² + ε²) for the colors, and a penalty where the rendered opacity is not that of the silhouette.
+/// sqrt(difference² + ε²) for the colors, and a penalty where the rendered opacity differs from the silhouette.
 struct SilhouetteLoss {
     weight: f32,
 }
@@ -60,12 +62,12 @@ fn main() -> Outcome {
     let (first, last) = first_and_last(&losses);
     println!("loss: {first:.3} in the first tenth of the run, {last:.3} in the last");
     assert!(last < 0.7 * first);
-    // And it does what it is for: outlines are better than without it.
+    // It has its intended effect: outlines are better than without it.
     let (with, without) = (outline_error(ours.scene(), &data, &device)?, outline_error(plain.scene(), &data, &device)?);
     println!("error of the outline: {with:.4} with the loss, {without:.4} without");
     assert!(with < without);
 
-    // A function is a loss, too.
+    // A function is a loss too.
     let squared = |view: LossInput| (view.image - view.truth).powi_scalar(2).mean();
     let mut short = Trainer::builder(tiny_config()?, data).loss(squared).build()?;
     assert!(short.step()?.is_some_and(|step| step.loss.is_finite()));

@@ -1,9 +1,10 @@
-//! Feature planes of one's own choice: a tri-plane (xy, xz, yz) instead of a hexplane, and a small network over its features
-//! and the time. Trained with the rate in its loss, coded under the context model, decoded. Nothing of Light4GS is edited.
+//! A set of feature planes of your own: a tri-plane (xy, xz, yz) instead of a hexplane, and a small network whose
+//! inputs are its features and the time. Trained with the rate in its loss, coded under the context model, decoded. No
+//! file of Light4GS is edited.
 //!
-//! A field says which planes it has with a [`PlaneLayout`], and gives them out with `planes` and `planes_mut`: noise, rate,
-//! regularizers, context model and file follow. Where a part of the context model needs planes that are not there, here those
-//! over time, the next one speaks.
+//! A field says which planes it has with a [`PlaneLayout`], and gives access to them with `planes` and `planes_mut`.
+//! Noise, rate, regularizers, context model and file then work on these planes. Where a part of the context model needs
+//! planes that do not exist, here those over time, the next part is used.
 
 use burn::config::Config;
 use burn::module::{Module, Param};
@@ -45,7 +46,7 @@ impl TriPlaneFieldConfig {
     }
 }
 
-/// What moves the Gaussians: features of their places, and the time.
+/// The field: a network whose inputs are features of the places, and the time.
 #[derive(Module, Debug)]
 struct TriPlaneField {
     planes: FeaturePlanes,
@@ -87,7 +88,8 @@ impl DeformationField for TriPlaneField {
     }
 
     fn to_arrays(&self) -> Result<MotionArrays, ModelError> {
-        // The same as `deform`. `Features` are the products of the planes that there are; planes travel apart.
+        // The same as `deform`. `Features` are the products of the existing planes; the file has the planes in another
+        // section.
         let (mut network, [features, time]) = Network::new([self.planes.feature_size() as u32, 1]);
         let known = network.node(Operation::Concatenate, &[features, time]);
         let hidden = network.layer(known, linear_to_layer(&self.hidden));
@@ -123,7 +125,7 @@ fn main() -> Outcome {
     config.compression.rate.from = 10;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
 
-    // Trained: planes carry noise, and what they cost is in the loss.
+    // Trained: planes have noise, and their rate is in the loss.
     let field = TriPlaneFieldConfig::new();
     let mut trainer = Trainer::<TriPlaneField>::builder_with_field(config, data, field).build()?;
     let mut losses = Vec::new();
@@ -136,7 +138,7 @@ fn main() -> Outcome {
     let moved = trainer.scene().at(0.9).means - trainer.scene().at(0.1).means;
     assert!(moved.abs().max().into_scalar::<f32>() > 1e-3, "nothing moves");
 
-    // Coded: the file is as large as the model expects, and lists its planes.
+    // Coded: the file is as large as the model expects, and contains the list of its planes.
     let coded = trainer.encode()?;
     let (record, maps) = coded.coding.expect("the profile is a coded one");
     let [planes, _] = record.parts();
@@ -146,7 +148,7 @@ fn main() -> Outcome {
     assert_eq!(names, ["0.xy", "0.xz", "0.yz", "1.xy", "1.xz", "1.yz"]);
     assert!(maps.iter().map(|map| &map.name).eq(&names), "a map of bits for each plane");
 
-    // Decoded: the field is made of the file again, and the codec moves the Gaussians as it does.
+    // Decoded: the field is made from the file, and the codec moves the Gaussians as the field does.
     let arrays = decode(&coded.bytes)?;
     let device = Device::flex();
     let decoded = DynamicScene::<TriPlaneField>::from_arrays(&arrays, &device)?;
@@ -157,7 +159,7 @@ fn main() -> Outcome {
     println!("largest difference of a position between Burn and the codec: {difference:e}");
     assert!(difference < 1e-4);
 
-    // The context model says the same to both, plane by plane.
+    // The context model gives the same values to both, plane by plane.
     let PlaneModels { context: mut model, quantization } =
         trainer.compression().cloned().and_then(|models| models.planes).expect("the rate is in the loss").valid();
     model.base_mut().update_quantiles();

@@ -1,8 +1,8 @@
-//! A regularizer of one's own: Gaussians should not be needles. Where the longest axis is more than a few times the shortest, the
-//! excess costs.
+//! A regularizer in your own crate: Gaussians should not be needles. Where the longest axis is more than a few times
+//! the shortest, the excess is added to the loss.
 //!
-//! A [`Regularizer`] sees the scene, with its parameters on the tape, and gives one number, or nothing in iterations in which it
-//! has nothing to say. The trainer adds it to the loss, beside the regularizers of planes and field.
+//! A [`Regularizer`] gets the scene, with its parameters on the tape, and returns one number, or nothing in iterations
+//! that it leaves out. The trainer adds the number to the loss, beside the regularizers of planes and field.
 
 use burn::tensor::Tensor;
 use light4gs_data::Scene;
@@ -14,7 +14,7 @@ use light4gs_train::trainer::Trainer;
 
 /// Mean over the Gaussians of how far the ratio of longest to shortest axis lies above a limit.
 struct Roundness {
-    /// Ratio that costs nothing.
+    /// Ratio up to which there is no penalty.
     limit: f32,
     weight: f32,
 }

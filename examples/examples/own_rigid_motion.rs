@@ -1,11 +1,11 @@
-//! Rigid motion from one's own crate: a handful of control nodes that move on splines, and Gaussians that follow those around
-//! them (linear blend skinning). Trained, stopped and resumed, coded, decoded. Nothing of Light4GS is edited.
+//! Rigid motion in your own crate: a few control nodes that move on splines, and Gaussians that follow the nodes around
+//! them (linear blend skinning). Trained, stopped and resumed, coded, decoded. No file of Light4GS is edited.
 //!
-//! What this field asks for beyond the paper's: whole Gaussians and world positions (`deform`), nodes that are made from the
-//! cloud when motion begins (`begin_motion`, `resize`), a bound on what a step has made (`begin_step`), a loss of its own
-//! (`regularizer`) and learning rates of its own (`learning_rate`). The trainer takes a sampler that shows it the middle of the
-//! scene's time first. For the file, skinning is a list of operations that the
-//! codec runs; what depends on the time alone, the nodes' poses, it computes once a frame.
+//! This field uses more of the interface than the paper's: whole Gaussians and world positions (`deform`), nodes that
+//! are made from the cloud when motion begins (`begin_motion`, `resize`), limits on the result of a step
+//! (`begin_step`), its own loss (`regularizer`) and its own learning rates (`learning_rate`). The trainer gets a
+//! sampler that shows the middle of the scene's time first. In the file, skinning is a list of operations that the
+//! codec runs. The nodes' poses depend on the time alone, so the codec computes them once per frame.
 
 use std::collections::BTreeMap;
 
@@ -38,30 +38,31 @@ struct RigidNodesConfig {
     knots: usize,
 }
 
-/// `B` nodes. The numbers of all nodes stand together: `[3, B]` has all x, then all y, then all z.
+/// `B` nodes. The arrays are ordered by component: `[3, B]` has all x, then all y, then all z.
 #[derive(Module, Debug)]
 struct RigidNodes {
-    /// `[3, B]`, world units.
+    /// Places, `[3, B]`, world units.
     anchors: Param<Tensor<2>>,
-    /// `[1, B]`: logarithms of how far a node reaches, world units.
+    /// `[1, B]`: logarithms of the radius in which a node has an effect, world units.
     log_radii: Param<Tensor<2>>,
-    /// `[K, 3 B]`: how far the node is moved, world units.
+    /// `[K, 3 B]`: translations of the nodes, world units.
     shifts: Param<Tensor<2>>,
-    /// `[K, 4 B]`: how it is turned; a quaternion, less the one that turns nothing.
+    /// `[K, 4 B]`: rotations of the nodes, as quaternions minus the identity.
     turns: Param<Tensor<2>>,
-    /// How many there are at most, once motion has begun.
+    /// Largest number of nodes, once motion has begun.
     most: usize,
 }
 
-/// Products of the quaternion's components (w, x, y, z) that a rotation matrix is made of: xx yy zz, xy yz xz, wz wx wy.
+/// Products of the quaternion's components (w, x, y, z) from which a rotation matrix is made: xx yy zz, xy yz xz, wz wx
+/// wy.
 const FACTORS: [[usize; 9]; 2] = [[1, 2, 3, 1, 2, 1, 0, 0, 0], [1, 2, 3, 2, 3, 3, 3, 1, 2]];
 /// The diagonal is 1 - 2 (a + b) of these products.
 const DIAGONAL: [[usize; 3]; 2] = [[1, 0, 0], [2, 2, 1]];
 /// The others are 2 (a - b) and 2 (a + b) of these.
 const OTHERS: [[usize; 3]; 2] = [[3, 4, 5], [6, 7, 8]];
-/// Where the nine elements, row by row, stand behind diagonal, differences and sums.
+/// Positions of the nine elements, row by row, among diagonal, differences and sums.
 const ELEMENTS: [usize; 9] = [0, 3, 8, 6, 1, 4, 5, 7, 2];
-/// The matrix of a product from the left with a quaternion: its components, 4 to 7 negative.
+/// The matrix of multiplication by a quaternion from the left: its components; 4 to 7 are negative.
 const PRODUCT: [usize; 16] = [0, 5, 6, 7, 1, 0, 7, 2, 2, 3, 0, 5, 3, 6, 1, 0];
 
 /// Rows of a tensor by their numbers.
@@ -96,7 +97,7 @@ impl RigidNodes {
         self.shifts.dims()[0]
     }
 
-    /// `[1, K]`: how much each knot counts at a time, the uniform cubic B-spline at its distance.
+    /// `[1, K]`: the weight of each knot at a time, the uniform cubic B-spline at the knot's distance.
     fn basis(&self, time: f32) -> Tensor<2> {
         let weight = |knot: usize| {
             let distance = (time * (self.knots() - 3) as f32 + 1.0 - knot as f32).abs();
@@ -107,7 +108,8 @@ impl RigidNodes {
         Tensor::from_data(TensorData::new(weights, [1, self.knots()]), &self.shifts.device())
     }
 
-    /// `[16, B]` at a time: the rotation matrix row by row, what is added to a rotated point, the rotation as a quaternion.
+    /// `[16, B]` at a time: the rotation matrix row by row, the vector that is added to a rotated point, the rotation
+    /// as a quaternion.
     fn poses(&self, time: f32) -> Tensor<2> {
         let (basis, nodes) = (self.basis(time), self.nodes());
         let shift = basis.clone().matmul(self.shifts.val()).reshape([3, nodes]);
@@ -125,14 +127,14 @@ impl RigidNodes {
         Tensor::cat(vec![matrix, offset, turn], 0)
     }
 
-    /// `[N, B]`: how much each Gaussian follows each node.
+    /// `[N, B]`: the weight of each node for each Gaussian.
     fn weights(&self, means: &Tensor<2>) -> Tensor<2> {
         let offset = means.clone().unsqueeze_dim::<3>(2) - self.anchors.val().unsqueeze_dim::<3>(0);
         let square = offset.powi_scalar(2).sum_dim(1).reshape([means.dims()[0], self.nodes()]);
         softmax(square * (self.log_radii.val() * -2.0).exp() * -0.5, 1)
     }
 
-    /// Numbers of the channels that blocks of `B` have.
+    /// Channel numbers of the given blocks, each of `B` channels.
     fn channels(&self, blocks: &[usize]) -> Vec<u32> {
         let nodes = self.nodes();
         blocks.iter().flat_map(|block| (block * nodes..(block + 1) * nodes).map(|channel| channel as u32)).collect()
@@ -216,18 +218,18 @@ impl RigidNodes {
     }
 }
 
-/// Numbers of a tensor, row by row.
+/// The numbers of a tensor, row by row.
 fn numbers(tensor: Tensor<2>) -> Vec<f32> {
     tensor.into_data().iter().collect()
 }
 
-/// From a basis `[K]` to what the knots `[K, C]` make of it.
+/// From the weights `[K]` of the knots and their values `[K, C]` to the value at the time.
 fn spline_layer(knots: &Tensor<2>) -> Layer {
     Layer::linear(numbers(knots.clone().transpose()), vec![0.0; knots.dims()[1]])
 }
 
-/// Of points, some that are far from each other: the first is the nearest to the middle, and each next one the farthest from
-/// those before.
+/// Chooses points that are far from each other: the first is the nearest to the middle, and each next one the farthest
+/// from those before.
 fn spread_out(points: &[[f32; 3]], count: usize) -> Vec<[f32; 3]> {
     let square = |a: &[f32; 3], b: &[f32; 3]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>();
     let middle = std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f32>() / points.len() as f32);
@@ -245,7 +247,7 @@ impl DeformationField for RigidNodes {
 
     const KINDS: &'static [&'static str] = &["rigid-nodes"];
 
-    /// One node, until there is a cloud to make them from.
+    /// One node, until there is a cloud from which the nodes can be made.
     fn init(config: &RigidNodesConfig, device: &Device) -> Self {
         Self::zeros(1, config.knots, config.nodes, device)
     }
@@ -266,20 +268,20 @@ impl DeformationField for RigidNodes {
         let anchors = spread_out(means.as_chunks().0, self.most);
         *self = Self::zeros(anchors.len(), self.knots(), self.most, &device);
         let columns = Tensor::<2>::from_data(TensorData::new(anchors.concat(), [anchors.len(), 3]), &device);
-        // Half as wide as the box of the nodes would be if each had a cube of its own.
+        // Half the side of each node's cube, if the nodes' box were divided into one cube for each node.
         let extent = columns.clone().max_dim(0) - columns.clone().min_dim(0);
         let radius = 0.5 * extent.max().into_scalar::<f32>().max(1e-3) / (anchors.len() as f32).cbrt();
         self.anchors = Param::from_tensor(Tensor::from_data(columns.transpose().into_data(), &device));
         self.log_radii = Param::from_tensor(Tensor::full([1, anchors.len()], radius.ln(), &device));
     }
 
-    /// No node reaches farther than the scene, and none forgets its neighborhood.
+    /// No node reaches farther than the scene, and none has a radius so small that it loses its neighborhood.
     fn begin_step(&mut self, scene: &SceneAtRest<'_>, _: &FinePosition) {
         let (least, most) = ((0.01 * scene.extent).ln(), scene.extent.ln());
         self.log_radii = Param::from_tensor(self.log_radii.val().clamp(least, most).detach());
     }
 
-    /// Trajectories begin smooth and may become less so.
+    /// Trajectories are smooth at the start and may become less so.
     fn regularizer(&self, scene: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
         let last = self.knots();
         let bend = |knots: Tensor<2>| {
@@ -290,7 +292,7 @@ impl DeformationField for RigidNodes {
         Some((bend(self.shifts.val() / scene.extent) + bend(self.turns.val())) * weight)
     }
 
-    /// Trajectories learn faster than the places that they belong to.
+    /// Trajectories are learned faster than the nodes' places.
     fn learning_rate(&self, path: &str, usual: LearningRate) -> LearningRate {
         if ["shifts", "turns"].contains(&path) { usual.times(10.0) } else { usual }
     }
@@ -340,7 +342,7 @@ impl DeformationField for RigidNodes {
         let layers: Vec<&Layer> = arrays.network.iter().flat_map(|motion| motion.network.layers()).collect();
         let &[anchors, shifts, turns, log_radii] = layers.as_slice() else { return Err(wrong()) };
         let (nodes, knots) = (log_radii.outputs as usize, shifts.inputs as usize);
-        // A file may come from anybody: sizes first.
+        // A file may come from anybody, so its sizes are checked first.
         let is = |layer: &Layer, outputs: usize| {
             layer.outputs as usize == outputs && layer.weight.len() == outputs * layer.inputs as usize
         };
@@ -360,12 +362,13 @@ impl DeformationField for RigidNodes {
             turns: Param::from_tensor(spline(turns)),
             most: nodes,
         };
-        // Then everything: what these numbers make of us must be what the file says.
+        // Then everything is compared: the field made from these numbers must be what the file describes.
         if field.to_arrays()? == *arrays { Ok(field) } else { Err(wrong()) }
     }
 }
 
-/// Frames of the times around the middle first, and then of more and more: a trajectory grows from where it is known.
+/// Frames of the times around the middle first, and then of more and more times: a trajectory is extended from where it
+/// is known.
 fn widening_window(request: &BatchRequest) -> Vec<usize> {
     let times = &request.candidates.times;
     let share = match request.stage {
@@ -382,7 +385,7 @@ fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.train.checkpoint_interval = 50;
-    // Positions of nodes are weights of the network: as fine as there is.
+    // The positions of nodes are weights of the network: they are stored with the highest precision.
     config.compression.weights.deformation_bits = 16;
     let root = tiny_scene(folder.path())?;
     let run = RunFolder::create(&folder.path().join("run"), Some(&root), &config, false)?;
@@ -392,7 +395,7 @@ fn main() -> Outcome {
         Ok(builder.sampler(widening_window).run_folder(run.clone()))
     };
 
-    // Trained into the fine stage, where the nodes are made, and dropped there as a crash would.
+    // Trained into the fine stage, where the nodes are made, and then dropped, as in a crash.
     let mut losses = Vec::new();
     let mut trainer = builder()?.build()?;
     for _ in 0..90 {
@@ -403,7 +406,7 @@ fn main() -> Outcome {
     assert_eq!(nodes, 12);
     drop(trainer);
 
-    // Resumed from the last checkpoint, with the nodes that it holds.
+    // Resumed from the last checkpoint, which has the nodes.
     let mut trainer = builder()?.resume()?;
     assert_eq!((trainer.position().1, trainer.scene().field.nodes()), (50, nodes));
     losses.truncate(20 + 50);

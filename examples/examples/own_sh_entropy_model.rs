@@ -1,8 +1,8 @@
-//! An entropy model of the spherical harmonics of one's own: how wide a Gaussian's view-dependent colors are follows from
-//! its constant color and its place. Trained beside a scene with the rate in its loss, coded and decoded; nothing of
-//! Light4GS is edited.
+//! An entropy model of the spherical harmonics in your own crate: the standard deviation of a Gaussian's view-dependent
+//! colors is predicted from its constant color and its position. It is trained with a scene and the rate in its loss,
+//! coded and decoded. No file of Light4GS is edited.
 //!
-//! [`ShEntropy`] is the seam. A model gives the bits of each value for training, and describes the network behind them for
+//! [`ShEntropy`] is the interface. A model computes the bits of each value for training, and describes its network for
 //! the codec, which runs it exactly. [`EntropyModels`] makes the model for a trainer.
 
 use burn::module::Module;
@@ -20,7 +20,7 @@ use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::trainer::Trainer;
 
-/// From what a decoder knows of a Gaussian to a Gaussian distribution for each of its 45 coefficients.
+/// From a Gaussian's values that a decoder already has to a normal distribution for each of its 45 coefficients.
 #[derive(Module, Debug)]
 struct FromColorAndPlace {
     network: ShNetwork,
@@ -29,7 +29,7 @@ struct FromColorAndPlace {
 
 impl FromColorAndPlace {
     fn new(step: f32, device: &Device) -> Self {
-        // Inputs, hidden width, channels, standard deviations at the beginning in steps.
+        // Inputs, hidden width, channels, standard deviations at the start in steps.
         Self { network: ShNetwork::new(6, 12, SH_CHANNELS, 4.0, device), step }
     }
 
@@ -55,7 +55,7 @@ impl ShEntropy for FromColorAndPlace {
         channels_last(round_around(channels_first(values.detach()), self.output(known).detach(), self.step))
     }
 
-    // The twin of `output`, as data: the same inputs in the same order, the same layers.
+    // The same as `output`, as data: the same inputs in the same order, the same layers.
     fn priors(&self) -> Vec<ShPrior> {
         let (mut network, [color, position]) = Network::new([3, 3]);
         let features = network.node(Operation::Concatenate, &[color, position]);
@@ -65,7 +65,7 @@ impl ShEntropy for FromColorAndPlace {
     }
 }
 
-/// What a trainer makes its entropy models with: the configured one for the planes, ours for the spherical harmonics.
+/// Makes the entropy models for a trainer: the configured one for the planes, ours for the spherical harmonics.
 #[derive(Debug)]
 struct WithColorAndPlace;
 
@@ -82,7 +82,7 @@ impl EntropyModels for WithColorAndPlace {
     }
 }
 
-/// What the decoder has before it reads `sh_rest`.
+/// The values that the decoder has before it reads `sh_rest`.
 fn known(scene: &DynamicScene) -> ShKnown {
     let tensors = scene.gaussians.tensors();
     ShKnown {
@@ -95,16 +95,16 @@ fn known(scene: &DynamicScene) -> ShKnown {
 fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
-    // All degrees of the harmonics early, and the rate as soon as Gaussians neither come nor go.
+    // All degrees of the harmonics early, and the rate as soon as Gaussians are no longer added or removed.
     config.model.sh_degree = 3;
     config.train.sh_degree_interval = 10;
     config.compression.rate.lambda = 0.03;
     config.compression.rate.from = 10;
-    // Weights as float32, so that module and file can be compared to the last symbol.
+    // Weights as float32, so that module and file can be compared symbol by symbol.
     config.compression.profile = FileProfile::Paper;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;
 
-    // Trained: the model learns in the loop, from the rate in the loss.
+    // Trained: the model is trained with everything else, by the rate in the loss.
     let mut trainer = Trainer::builder(config, data).entropy_models(WithColorAndPlace).build()?;
     let model = |trainer: &Trainer<BuiltInField, WithColorAndPlace>| {
         trainer.compression().and_then(|models| models.sh.clone()).expect("the rate is in the loss").valid()
@@ -114,15 +114,15 @@ fn main() -> Outcome {
     let model = model(&trainer);
     assert_ne!(model.priors(), before, "the model learns nothing");
 
-    // Coded: the file has as many bits as training expects.
+    // Coded: the file has as many bits as the training expects.
     let coded = trainer.encode()?;
     let (record, _) = coded.coding.expect("the profile is a coded one");
     let [_, sh] = record.parts();
     println!("spherical harmonics: {:.0} bits expected, {:.0} in the file", sh.expected, sh.coded);
     assert!((sh.expected / sh.coded - 1.0).abs() < 0.02);
 
-    // Decoded: what comes out is what the Burn module says, but for values on the edge between two symbols. The
-    // module looks at what a decoder has.
+    // Decoded: the values are those of the Burn module, except on the edge between two symbols. The module gets the
+    // values that a decoder has.
     let decoded = decode(&coded.bytes)?;
     let scene = DynamicScene::<BuiltInField>::from_arrays(&decoded, &Device::flex())?;
     let again = model.quantize(scene.gaussians.sh_rest.val(), &known(&scene));
@@ -131,7 +131,7 @@ fn main() -> Outcome {
     let close = ours.iter().zip(exact).filter(|(ours, exact)| (**ours - **exact).abs() < 1e-3).count();
     println!("{close} of {} values are the same in Burn and in the codec", exact.len());
     assert!(close as f64 > 0.999 * exact.len() as f64);
-    // A model of the same kind reads it again to the same arrays.
+    // A model of the same kind reads it and gives the same arrays.
     assert_eq!(scene.to_arrays(decoded.meta.clone())?.gaussians, decoded.gaussians);
     Ok(())
 }

@@ -1,7 +1,8 @@
-//! A significance score of one's own: how much of a pixel a Gaussian fills, on average over the pixels that it touches.
+//! A significance score in your own crate: the share of a pixel that a Gaussian fills, on average over the pixels that
+//! it touches.
 //!
-//! A [`SignificanceScore`] gets what the training views say of each Gaussian, and gives one number each. The trainer drops
-//! the share with the smallest numbers.
+//! A [`SignificanceScore`] gets the contributions of each Gaussian to the training views, and returns one number for
+//! each. The trainer removes the share of Gaussians with the smallest numbers.
 
 use std::sync::{Arc, Mutex};
 
@@ -12,8 +13,8 @@ use light4gs_train::dataset::load_options;
 use light4gs_train::density::{GaussianContributions, SignificanceScore};
 use light4gs_train::trainer::Trainer;
 
-/// Mean blending weight over the pixels of a Gaussian: many faint pixels count for less than a few full ones. Keeps what it
-/// has given, for `main` to look at.
+/// Mean blending weight over the pixels of a Gaussian: many faint pixels count less than a few opaque ones. Keeps the
+/// scores that it has returned, so that `main` can look at them.
 #[derive(Clone, Default)]
 struct MeanWeight {
     given: Arc<Mutex<Vec<Vec<f64>>>>,

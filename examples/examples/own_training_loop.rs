@@ -1,4 +1,4 @@
-//! The splatter and the hexplane query with one's own model, loop and loss.
+//! The splatter and the hexplane query with your own model, training loop and loss.
 //!
 //! Nothing of `light4gs-train` is used: Gaussians that only move, Burn's own Adam, a squared error.
 
@@ -60,11 +60,11 @@ fn main() -> Outcome {
         model = optimizer.step(1e-2, model, gradients);
     }
 
-    // Every image is shown ten times. The error of the last round is a small part of that of the first.
+    // Every image is used ten times. The error of the last round is a small part of that of the first.
     let round = |k: usize| losses[12 * k..12 * (k + 1)].iter().sum::<f32>() / 12.0;
     println!("squared error: {:.4} in the first round, {:.4} in the last", round(0), round(9));
     assert!(round(9) < 0.5 * round(0), "the model does not learn: {losses:?}");
-    // And the planes have learned something: Gaussians move with time.
+    // The planes have been trained too: Gaussians move with time.
     let moved = (model.at(0.9).means - model.at(0.1).means).abs().max().into_scalar::<f32>();
     assert!(moved > 0.01, "nothing moves: {moved}");
     Ok(())

@@ -1,6 +1,6 @@
-//! A motion to try out, before anybody has thought about how it is coded: the whole scene turns about the world's z axis, as far
-//! as one learned number says. A field needs no more than this to be trained and measured in memory. Only writing a file asks
-//! for more, and says what.
+//! A motion whose coding is not written yet: the whole scene turns about the world's z axis, by an angle that one
+//! learned number gives. A field needs no more than this to be trained and measured in memory. Only writing a file
+//! needs more, and the error says what.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, s};
@@ -10,7 +10,7 @@ use light4gs_model::{DeformationField, GaussianTensors};
 use light4gs_train::dataset::load_options;
 use light4gs_train::trainer::Trainer;
 
-/// `[1]`: radians from the first time to the last.
+/// `[1]`: the angle at the last time, relative to the first, in radians.
 #[derive(Module, Debug)]
 struct Turntable {
     angle: Param<Tensor<1>>,

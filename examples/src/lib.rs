@@ -1,5 +1,5 @@
-//! What the examples share: a tiny synthetic scene, a configuration that trains on it in seconds, linear layers as the codec
-//! has them.
+//! Code that the examples share: a tiny synthetic scene, a configuration that trains on it in seconds, linear layers in
+//! the codec's form.
 
 use std::path::{Path, PathBuf};
 
@@ -29,7 +29,7 @@ pub fn tiny_scene(folder: &Path) -> Result<PathBuf, DataError> {
 /// loss and no pruning.
 ///
 /// # Errors
-/// None that a test has not seen: the preset is part of the library.
+/// None in practice: the preset is part of the library, and the tests read it.
 pub fn tiny_config() -> Outcome<Config> {
     let mut config = Config::from_preset("dnerf-cpu")?;
     config.device = DeviceName::Flex;
@@ -55,14 +55,14 @@ pub fn image_tensor(image: &RgbImage8, device: &Device) -> Tensor<3> {
     Tensor::from_data(TensorData::new(image.to_f32().pixels, shape), device)
 }
 
-/// The means of the first and of the last tenth of a list: where a loss began and where it ended.
+/// The means of the first and of the last tenth of a list: a loss at its start and at its end.
 pub fn first_and_last(losses: &[f32]) -> (f32, f32) {
     let tenth = (losses.len() / 10).max(1);
     let mean = |part: &[f32]| part.iter().sum::<f32>() / part.len() as f32;
     (mean(&losses[..tenth]), mean(&losses[losses.len() - tenth..]))
 }
 
-/// A linear layer as the codec has it. Burn keeps weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
+/// A linear layer in the codec's form. Burn stores weights as `[inputs, outputs]`, the codec as `[outputs, inputs]`.
 pub fn linear_to_layer(linear: &Linear) -> Layer {
     let values = |tensor: TensorData| tensor.iter::<f32>().collect::<Vec<f32>>();
     let bias = linear.bias.as_ref().expect("these layers have a bias");
