@@ -54,6 +54,9 @@ enum Command {
     #[command(after_help = "Example:\n  light4gs resume runs/bouncing")]
     Resume(train::Resume),
     /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
+    ///
+    /// Where the dataset has masks of what moves, PSNR and SSIM are also given for moving and for still pixels; docs/metrics.md
+    /// explains every column.
     #[command(after_help = "Example:\n  light4gs eval runs/bouncing --json")]
     Eval(train::Eval),
     /// Render a file over time along a camera path, to a GIF, an MP4 or PNG frames.
