@@ -1,4 +1,4 @@
-//! What follows training: the decoded file is measured, and `eval.json`, `renders/` and `report.html` are written.
+//! The steps after training: the decoded file is measured, and `eval.json`, `renders/` and `report.html` are written.
 
 use std::fs;
 
@@ -19,11 +19,11 @@ use crate::run::RunFolder;
 use crate::utc;
 use crate::view::cameras_json;
 
-/// Views a report shows.
+/// Number of views in a report.
 const REPORT_VIEWS: usize = 6;
-/// Cameras of each split that the player of a report offers.
+/// Number of cameras of each split in the player of a report.
 const PLAYER_CAMERAS: usize = 60;
-/// Bytes of the largest file that a report plays.
+/// Size in bytes of the largest file that a report plays.
 const LARGEST_PLAYED_FILE: usize = 16 << 20;
 
 /// Measures the run's file on its own dataset and writes everything that depends on it.
@@ -80,7 +80,7 @@ pub fn evaluate_run<F: DeformationField>(
     Ok(evaluation)
 }
 
-/// The file for the report, unless it would make a page that nobody wants to send.
+/// The file for the report, unless it would make the page too large to send.
 fn player(folder: &RunFolder, scene: &Scene) -> Result<Option<PlayerReport>, TrainError> {
     let path = folder.stream();
     let bytes = fs::read(&path).map_err(|source| DataError::Io { action: "read", path, source })?;

@@ -25,9 +25,9 @@ use crate::report::{SplitQuality, ViewImages, ViewQuality};
 pub struct ViewScore {
     /// Name of the frame.
     pub name: String,
-    /// In [0, 1].
+    /// The frame's time, in [0, 1].
     pub time: f32,
-    /// What was measured.
+    /// Its scores.
     #[serde(flatten)]
     pub scores: Scores,
 }
@@ -37,7 +37,7 @@ pub struct ViewScore {
 pub struct SplitScore {
     /// `test`, `val`...
     pub split: String,
-    /// Over the views.
+    /// The scores over the views.
     #[serde(flatten)]
     pub scores: Scores,
     /// Every view.
@@ -49,11 +49,11 @@ pub struct SplitScore {
 pub struct SectionSize {
     /// Name of the section.
     pub name: String,
-    /// On disk.
+    /// Its size on disk.
     pub bytes: u64,
 }
 
-/// All that was measured, as `eval.json` holds it.
+/// All results, as in `eval.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct Evaluation {
     /// Back end, and the adapter if it has one.
@@ -66,13 +66,13 @@ pub struct Evaluation {
     pub gaussians: usize,
     /// Width and height of the measured images.
     pub resolution: [u32; 2],
-    /// Frames a second, deformation included, decoding excluded, after warm-up.
+    /// Frames per second, deformation included, decoding excluded, after warm-up.
     pub fps: f64,
     /// Seconds to read, check and decode the file.
     pub decode_seconds: f64,
     /// Seconds of training, where known.
     pub training_seconds: Option<f64>,
-    /// One entry a measured split.
+    /// One entry for each measured split.
     pub splits: Vec<SplitScore>,
     /// Expected and coded bits, where the run has a record of its coding.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -85,13 +85,13 @@ pub struct RenderedView {
     pub split: Split,
     /// Name of the frame.
     pub name: String,
-    /// In [0, 1].
+    /// Its time, in [0, 1].
     pub time: f32,
-    /// dB.
+    /// PSNR in dB.
     pub psnr: f64,
-    /// As photographed.
+    /// The frame of the dataset.
     pub truth: RgbImage8,
-    /// As rendered from the decoded file.
+    /// The rendering of the decoded file.
     pub render: RgbImage8,
 }
 
@@ -99,11 +99,11 @@ pub struct RenderedView {
 pub struct DecodedScene<F: DeformationField = BuiltInField> {
     /// The model on the device.
     pub model: DynamicScene<F>,
-    /// What the file says of itself.
+    /// The description of the scene in the file.
     pub data: SceneData,
     /// Sections and sizes.
     pub info: StreamInfo,
-    /// Seconds that decoding took.
+    /// Seconds taken by decoding.
     pub decode_seconds: f64,
     device: Device,
 }
@@ -114,7 +114,8 @@ impl<F: DeformationField> DecodedScene<F> {
         Self::open_with_limits(path, &Limits::default(), device)
     }
 
-    /// As [`DecodedScene::open`]; a file of one's own may have [`Limits::large`].
+    /// As [`DecodedScene::open`], within the given limits; for a file that you made yourself they may be
+    /// [`Limits::large`].
     pub fn open_with_limits(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
         let data = light4gs_codec::read_file_with_limits(path, limits)?;
@@ -137,13 +138,13 @@ impl<F: DeformationField> DecodedScene<F> {
         section_sizes(&self.info)
     }
 
-    /// Frames a second over a list of frames, after warm-up.
+    /// Frames per second over a list of frames, after warm-up.
     fn frames_per_second(&self, frames: &[Frame], eval: &EvalConfig) -> f64 {
         let splatter = Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree));
         let draw = |k: usize| {
             let frame = &frames[k % frames.len()];
             let image = splatter.render(self.model.at(frame.time), &frame.camera, None).image;
-            // Reading one value waits for the device.
+            // Reading one value waits until the device has finished.
             image.slice([0..1, 0..1, 0..1]).into_scalar::<f32>()
         };
         for k in 0..eval.fps_warmup {
@@ -207,7 +208,7 @@ impl<F: DeformationField> DecodedScene<F> {
     }
 }
 
-/// Sections of a file with the header in front; they add up to the file.
+/// Sections of a file with the header in front; their sizes add up to that of the file.
 pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
     let header = SectionSize { name: "header".into(), bytes: info.header_bytes };
     let sections = info.sections.iter().map(|s| SectionSize { name: s.name.to_owned(), bytes: s.bytes });

@@ -50,7 +50,7 @@ impl RegionMetric {
 }
 
 impl Metric {
-    /// What every evaluation has, or says why it has not.
+    /// Metrics that every evaluation has. Where one is absent, its cell says why.
     pub const ALWAYS: [Self; 8] = [
         Self::Psnr,
         Self::Ssim,
@@ -62,7 +62,8 @@ impl Metric {
         Self::WorstPsnr,
     ];
 
-    /// What there is only where the dataset has masks, in the order of columns: what moves beside what stands still.
+    /// Metrics that exist only where the dataset has masks, in the order of columns: the moving region beside the still
+    /// one.
     pub fn of_regions() -> impl Iterator<Item = Self> {
         let motion =
             RegionMetric::ALL.into_iter().flat_map(|metric| [(Region::Moving, metric), (Region::Still, metric)]);
@@ -113,7 +114,7 @@ impl Metric {
         label.to_owned()
     }
 
-    /// What a cell says in place of a number that is absent.
+    /// The text of a cell whose number is absent.
     pub fn absence(self) -> &'static str {
         match self {
             Self::Lpips(_) | Self::Of(_, RegionMetric::Lpips(_)) => "no weights",
@@ -122,7 +123,7 @@ impl Metric {
         }
     }
 
-    /// A number as a cell shows it.
+    /// A number as it is written in a cell.
     pub fn format(self, value: Option<f64>) -> String {
         match value {
             None => self.absence().to_owned(),
@@ -138,8 +139,8 @@ impl Metric {
         matches!(self, Self::Psnr | Self::WorstPsnr | Self::Of(_, RegionMetric::Psnr))
     }
 
-    /// Whether its figure over several views is that over all their pixels together, rather than the mean of the views'
-    /// figures. What moves is a twentieth of one view and a third of the next.
+    /// Whether its figure over several views is computed over all their pixels together, rather than as the mean of the
+    /// views' figures. The moving region may be a twentieth of one view and a third of the next.
     pub(super) fn is_pooled(self) -> bool {
         matches!(self, Self::WorstPsnr | Self::Of(Region::Moving | Region::Still, _))
     }

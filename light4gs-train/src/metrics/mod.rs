@@ -5,7 +5,7 @@
 //! - [`lpips`]: the learned distance, with weights from a file
 //! - `pixel_map`: a number for each pixel, of which a metric is the mean over a region
 //! - `metric`: the metrics by name
-//! - [`scores`]: the scores of a view, and over views
+//! - [`scores`]: the scores of one view, and over several views
 
 pub mod lpips;
 mod metric;
@@ -45,7 +45,7 @@ pub fn decibels(mean_squared_error: f64) -> f64 {
     -10.0 * mean_squared_error.log10()
 }
 
-/// Which pixels count as a tensor `[H, W]`: 1 where they do.
+/// A tensor `[H, W]`: 1 where a pixel counts, else 0.
 pub fn mask_tensor(mask: &PixelMask, device: &Device) -> Tensor<2> {
     let values: Vec<f32> = mask.pixels.iter().map(|value| f32::from(*value)).collect();
     Tensor::from_data(TensorData::new(values, [mask.height as usize, mask.width as usize]), device)

@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use light4gs_data::PixelMask;
 
-/// One pixel of so many is among the worst: 5 %.
+/// One pixel in this many is among the worst: 5 %.
 const WORST_PART: usize = 20;
 
 /// `[H, W]` numbers, row-major.
@@ -18,14 +18,14 @@ impl PixelMap {
         Self(values.chunks_exact(channels.max(1)).map(|pixel| pixel.iter().sum::<f32>() / channels as f32).collect())
     }
 
-    /// The mean over the pixels of a mask of the same size, and how many they are; none where it is empty.
+    /// The mean over the pixels of a mask of the same size, and their number; none where the mask is empty.
     pub fn mean_over(&self, mask: &PixelMask) -> Option<(f64, u64)> {
         let inside = self.0.iter().zip(&mask.pixels).filter(|(_, inside)| **inside != 0).map(|(value, _)| *value);
         mean(inside)
     }
 
-    /// The mean over the 5 % of the pixels that have the largest numbers, and how many they are (rounded up); none without
-    /// pixels.
+    /// The mean over the 5 % of the pixels that have the largest numbers, and the number of those pixels (rounded up);
+    /// none without pixels.
     pub fn mean_of_worst(&self) -> Option<(f64, u64)> {
         let mut values = self.0.clone();
         let count = values.len().div_ceil(WORST_PART);

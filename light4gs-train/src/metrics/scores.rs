@@ -1,4 +1,4 @@
-//! What was measured of a view, and over several.
+//! The scores of one view, and over several views.
 
 use burn::tensor::Tensor;
 use light4gs_data::{PixelMask, Region};
@@ -9,7 +9,7 @@ use super::{
     Metric, PixelMap, RegionMetric, d_ssim, decibels, ms_ssim, psnr, squared_differences, ssim, ssim_map, ssim_valid,
 };
 
-/// What was measured of one view, or over some.
+/// The scores of one view, or over several.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scores(Vec<Score>);
 
@@ -17,7 +17,7 @@ pub struct Scores(Vec<Score>);
 struct Score {
     metric: Metric,
     value: f64,
-    /// How much it weighs where it is pooled with those of other views: pixels.
+    /// The weight where the number is pooled with those of other views: its pixels.
     pixels: u64,
 }
 
@@ -69,13 +69,13 @@ impl Scores {
         self.0.extend(value.map(|value| Score { metric, value, pixels: 1 }));
     }
 
-    /// A metric that is a mean over so many pixels; of a PSNR, the mean squared error is given.
+    /// Adds a metric that is a mean over the given number of pixels. For a PSNR the mean squared error is given.
     fn set_over(&mut self, metric: Metric, mean: Option<(f64, u64)>) {
         let value = |mean| if metric.is_psnr() { decibels(mean) } else { mean };
         self.0.extend(mean.map(|(mean, pixels)| Score { metric, value: value(mean), pixels }));
     }
 
-    /// From numbers that are known. Where they are pooled with others, each weighs the same.
+    /// From known numbers. Where they are pooled with others, each has the same weight.
     pub fn from_values(values: impl IntoIterator<Item = (Metric, f64)>) -> Self {
         Self(values.into_iter().map(|(metric, value)| Score { metric, value, pixels: 1 }).collect())
     }
@@ -99,8 +99,8 @@ impl Scores {
         self.get(Metric::Ssim).unwrap_or(f64::NAN)
     }
 
-    /// The figures over several views, of each metric over the views that have it: the mean of the views' numbers; of what
-    /// moves, what stands still and the worst pixels the number over all such pixels together.
+    /// The figures over several views, for each metric over the views that have it: the mean of the views' numbers. For
+    /// the moving region, the still region and the worst pixels it is the number over all such pixels together.
     pub fn over<'a>(views: impl Iterator<Item = &'a Self> + Clone) -> Self {
         let over = |metric: Metric| {
             let measured = views.clone().filter_map(|scores| scores.score(metric));
@@ -109,7 +109,8 @@ impl Scores {
         Self(Metric::ALWAYS.into_iter().chain(Metric::of_regions()).filter_map(over).collect())
     }
 
-    /// The columns of a table of these scores: what is always measured, then what some of them have of regions.
+    /// The columns of a table of these scores: the metrics that are always measured, then those of regions that some
+    /// scores have.
     pub fn columns<'a>(all: impl Iterator<Item = &'a Self> + Clone) -> Vec<Metric> {
         let present = |metric: &Metric| all.clone().any(|scores| scores.get(*metric).is_some());
         Metric::ALWAYS.into_iter().chain(Metric::of_regions().filter(present)).collect()
@@ -124,7 +125,7 @@ fn mean<'a>(metric: Metric, measured: impl Iterator<Item = &'a Score>) -> Option
     (count > 0).then(|| Score { metric, value: sum / f64::from(count), pixels: 1 })
 }
 
-/// Over all pixels together. Of a PSNR it is the error that is averaged.
+/// Over all pixels together. For a PSNR the error is averaged, not the PSNR.
 fn pooled<'a>(metric: Metric, measured: impl Iterator<Item = &'a Score>) -> Option<Score> {
     let (mut sum, mut pixels) = (0.0, 0);
     for score in measured {
@@ -136,7 +137,7 @@ fn pooled<'a>(metric: Metric, measured: impl Iterator<Item = &'a Score>) -> Opti
     (pixels > 0).then_some(Score { metric, value, pixels })
 }
 
-/// A map from keys to numbers, absent ones left out.
+/// A map from keys to numbers, without the absent ones.
 impl Serialize for Scores {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(self.0.len()))?;

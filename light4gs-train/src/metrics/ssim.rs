@@ -20,12 +20,12 @@ const SCALE_WEIGHTS: [f32; 5] = [0.0448, 0.2856, 0.3001, 0.2363, 0.1333];
 /// Images with a shorter side have no MS-SSIM: at the last scale a window must still fit inside.
 pub const MS_SSIM_LEAST_SIDE: usize = (WINDOW - 1) * (1 << (SCALE_WEIGHTS.len() - 1)) + 1;
 
-/// Which windows count.
+/// The windows that count.
 #[derive(Clone, Copy)]
 enum Windows {
-    /// One at every pixel; what lies outside the image counts as 0.
+    /// One at every pixel; pixels outside the image count as 0.
     Padded,
-    /// Those that lie inside the image.
+    /// Only windows that lie inside the image.
     Inside,
 }
 
@@ -57,7 +57,7 @@ fn gaussian(device: &Device, shape: [usize; 4]) -> Tensor<4> {
     Tensor::from_data(TensorData::new(normalized, shape), device)
 }
 
-/// `[H, W, C]` to `[C, 1, H, W]`: channels become the batch, so that one separable filter serves them all.
+/// `[H, W, C]` to `[C, 1, H, W]`: channels become the batch, so that one separable filter processes all of them.
 fn planes(image: Tensor<3>) -> Tensor<4> {
     let [height, width, channels] = image.dims();
     image.permute([2, 0, 1]).reshape([channels, 1, height, width])
@@ -99,7 +99,8 @@ pub fn ssim_valid(image: Tensor<3>, truth: Tensor<3>) -> Option<Tensor<1>> {
     fits.then(|| similarity(planes(image), planes(truth), Windows::Inside).full().mean())
 }
 
-/// What [`ssim`] is the mean of: the similarity in the window around every pixel, in every channel, `[H, W, C]`.
+/// The map of which [`ssim`] is the mean: the similarity in the window around every pixel, in every channel, `[H, W,
+/// C]`.
 pub fn ssim_map(image: Tensor<3>, truth: Tensor<3>) -> Tensor<3> {
     let map = similarity(planes(image), planes(truth), Windows::Padded).full();
     map.squeeze_dim::<3>(1).permute([1, 2, 0])
@@ -135,8 +136,8 @@ fn halved(planes: Tensor<4>) -> Tensor<4> {
     halved.slice(s![.., .., 0..height.div_ceil(2), 0..width.div_ceil(2)])
 }
 
-/// The dissimilarity `(1 - similarity) / 2`. Of [`ms_ssim`] it is the D-SSIM in the tables of 4DGS and Light4GS; some papers
-/// take it of [`ssim`].
+/// The dissimilarity `(1 - similarity) / 2`. Applied to [`ms_ssim`] it is the D-SSIM in the tables of 4DGS and
+/// Light4GS; some papers apply it to [`ssim`].
 pub fn d_ssim(similarity: f64) -> f64 {
     (1.0 - similarity) / 2.0
 }

@@ -16,13 +16,13 @@ const BOTTOM: f64 = 38.0;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mark {
     Line,
-    /// Background of the series that follows, whose color it has.
+    /// Background of the next series, in that series' color.
     FaintLine,
     DottedLine,
     Dots,
 }
 
-/// Some points, by ascending x where they make a line.
+/// Some points, in order of x if they make a line.
 #[derive(Debug, Clone)]
 pub(super) struct Series {
     pub(super) label: String,
@@ -35,10 +35,10 @@ pub(super) struct Chart {
     pub(super) title: String,
     pub(super) x_label: String,
     pub(super) series: Vec<Series>,
-    /// Where a value is not above zero, the axis is linear all the same.
+    /// A logarithmic axis. If a value is not above zero, the axis is linear all the same.
     pub(super) logarithmic: bool,
     pub(super) from_zero: bool,
-    /// The stretch up to here is shaded: the coarse stage.
+    /// The part up to here is shaded: the coarse stage.
     pub(super) border: Option<f64>,
 }
 
@@ -76,7 +76,7 @@ impl Chart {
         )
     }
 
-    /// The chart in words.
+    /// The chart described in words.
     fn spoken(&self, series: &[Series]) -> String {
         let mut text = format!("{} over {}.", self.title, self.x_label);
         for one in series.iter().filter(|one| one.mark != Mark::FaintLine) {
@@ -89,7 +89,7 @@ impl Chart {
     }
 }
 
-/// From values to places.
+/// The mapping from values to positions.
 struct Axes {
     x: (f64, f64),
     y: (f64, f64),
@@ -210,14 +210,14 @@ fn nice_step(low: f64, high: f64, count: usize) -> f64 {
 /// Multiples of `step` in the range.
 fn ticks(low: f64, high: f64, step: f64) -> Vec<f64> {
     let slack = step * 1e-6;
-    // A range of values that differ by rounding alone must not make ticks without end.
+    // Values that differ only by rounding must not give an endless number of ticks.
     (0..20)
         .map(|index| ((low / step).ceil() + f64::from(index)) * step)
         .take_while(|tick| *tick <= high + slack)
         .collect()
 }
 
-/// 1, 2 and 5 times powers of ten in the range; powers alone if those would be too many.
+/// 1, 2 and 5 times powers of ten in the range; only the powers if those would be too many.
 fn log_ticks(low: f64, high: f64) -> Vec<f64> {
     let powers = (low.log10().floor() as i32)..=(high.log10().ceil() as i32);
     let candidates = |factors: &'static [f64]| -> Vec<f64> {

@@ -1,5 +1,5 @@
-//! How the planes and the spherical harmonics were coded: expected against real bits, every plane, and where its bits
-//! are (the paper's figure "bitrate allocation").
+//! How the planes and the spherical harmonics were coded: expected and actual bits, every plane, and maps of the bits
+//! (the paper's figure "bitrate allocation").
 
 use std::fmt::Write as _;
 use std::path::Path;
@@ -55,7 +55,7 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
     Ok(html)
 }
 
-/// With a capital at its beginning.
+/// The text with a capital at its beginning.
 fn sentence_case(name: &str) -> String {
     let mut letters = name.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

@@ -1,7 +1,7 @@
 //! Colors of the error maps.
 
 /// Seventeen samples of "inferno", by Stéfan van der Walt and Nathaniel Smith for matplotlib (CC0): equal steps look
-/// equal, brighter is always more, and it survives color blindness and gray paper.
+/// equal, brighter is always more, and the map stays readable with color blindness and on gray paper.
 const INFERNO: [[u8; 3]; 17] = [
     [0, 0, 4],
     [11, 7, 36],
@@ -22,10 +22,10 @@ const INFERNO: [[u8; 3]; 17] = [
     [252, 255, 164],
 ];
 
-/// The color of a value, 0 to 1; what lies outside takes the color at the end.
+/// The color of a value, 0 to 1. Values outside have the color of the nearer end.
 pub(crate) fn inferno(value: f32) -> [u8; 3] {
     let last = INFERNO.len() - 1;
-    // Written so that NaN becomes 0.
+    // In this form NaN becomes 0.
     let value = if value > 0.0 { value.min(1.0) } else { 0.0 };
     let place = value * last as f32;
     let index = (place as usize).min(last - 1);

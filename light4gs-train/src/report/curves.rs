@@ -5,7 +5,7 @@ use crate::stage::Stage;
 
 use super::chart::{Chart, Mark, Series};
 
-/// More points than this do not show.
+/// More points than this cannot be seen.
 const MOST_POINTS: usize = 400;
 
 pub(super) fn section(metrics: &[MetricsRecord]) -> String {
@@ -66,8 +66,8 @@ fn noisy(label: &str, points: &[(f64, f64)]) -> Vec<Series> {
     ]
 }
 
-/// Mean over a window of `reach` points to both sides. It is cut off at the end, where the curve is flat; at the start,
-/// where it is steep, it shrinks on both sides, so as not to be pulled along.
+/// Mean over a window of `reach` points to both sides. At the end, where the curve is flat, the window is cut off. At
+/// the start, where the curve is steep, it shrinks on both sides, because one-sided it would shift the mean.
 fn running_mean(points: &[(f64, f64)], reach: usize) -> Vec<(f64, f64)> {
     let mean = |index: usize| {
         let reach = reach.min(index);

@@ -13,7 +13,7 @@ pub(super) fn count(value: u64) -> String {
     grouped
 }
 
-/// A number with so many decimals; a dash where there is none.
+/// A number with the given number of decimals; a dash where there is no number.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_nan() {
         "\u{2013}".to_owned()
@@ -24,7 +24,7 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// A number on an axis or in a heading: as short as it can be said.
+/// A number on an axis or in a heading, in its shortest form.
 pub(super) fn short(value: f64) -> String {
     let size = value.abs();
     let trimmed = |text: String| match text.split_once('.') {

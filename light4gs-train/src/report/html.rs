@@ -1,6 +1,6 @@
-//! Text into HTML.
+//! Conversion of text to HTML.
 
-/// Text as it is to be read: safe between tags and within quoted attributes.
+/// Text for readers: safe between tags and within quoted attributes.
 pub(crate) fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
@@ -16,7 +16,7 @@ pub(crate) fn escape(text: &str) -> String {
     escaped
 }
 
-/// Replaces each `{{name}}` of a template by its value. Values are not searched again, whatever they hold.
+/// Replaces each `{{name}}` in a template by its value. Values are not searched for further names.
 pub(super) fn fill(template: &str, values: &[(&str, &str)]) -> String {
     let mut filled = String::with_capacity(template.len() + values.iter().map(|(_, value)| value.len()).sum::<usize>());
     let mut rest = template;

@@ -14,8 +14,8 @@ use super::color_map::{css_gradient, inferno};
 use super::format::fixed;
 use super::html::escape;
 
-/// Error that gets the brightest color. One scale for all views, so that they can be compared; 0.2 is far more than a
-/// good render has anywhere but along an edge.
+/// Error that gets the brightest color. One scale for all views, so that they can be compared. In a good rendering,
+/// errors reach 0.2 only along edges.
 const BRIGHTEST_ERROR: f32 = 0.2;
 
 pub(super) fn section(path: &Path, views: &[ViewImages]) -> Result<String, DataError> {
@@ -84,7 +84,7 @@ fn error_map(truth: &RgbImage8, render: &RgbImage8) -> Result<RgbImage8, String>
     Ok(RgbImage8 { width, height, pixels })
 }
 
-/// The image as a PNG inside the page.
+/// The image as a PNG, embedded in the page.
 pub(crate) fn data_uri(image: &RgbImage8) -> image::ImageResult<String> {
     let mut png = Vec::new();
     PngEncoder::new(&mut png).write_image(&image.pixels, image.width, image.height, ExtendedColorType::Rgb8)?;

@@ -1,7 +1,7 @@
-//! `report.html`: what a run made and how good it is, in one file that needs nothing else.
+//! `report.html`: the results of a run in one file that needs no other files.
 //!
-//! Style, script, charts (SVG) and images (PNG) are all inside; the page forbids itself every request. It reads
-//! without its script, in light and dark, on paper and aloud.
+//! Style, script, charts (SVG) and images (PNG) are all inside, and the page forbids all requests. It can be read
+//! without its script, in light and dark mode, on paper and with a screen reader.
 
 mod chart;
 mod coding;
@@ -39,12 +39,12 @@ const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
 const SCRIPT: &str = include_str!("script.js");
 
-/// Everything that a report shows. What is empty is left out of the page.
+/// The contents of a report. Empty parts are left out of the page.
 #[derive(Debug, Clone, Default)]
 pub struct Report {
     /// Heading, such as the scene's name.
     pub title: String,
-    /// When the run ended, as it is to be read.
+    /// The time at which the run ended, in a form for readers.
     pub created: String,
     /// Back end and machine.
     pub device: String,
@@ -69,15 +69,15 @@ pub struct Report {
 /// One figure at the top of a report.
 #[derive(Debug, Clone, Default)]
 pub struct SummaryTile {
-    /// What it is: `Test PSNR`.
+    /// Its name: `Test PSNR`.
     pub label: String,
     /// The figure with its unit: `33.1 dB`.
     pub value: String,
-    /// A word on it: `20 views, decoded file`; may be empty.
+    /// A short remark: `20 views, decoded file`; may be empty.
     pub hint: String,
 }
 
-/// What a report plays.
+/// The contents of a report's player.
 #[derive(Debug, Clone)]
 pub struct PlayerReport {
     /// A `.l4gs` stream.
@@ -89,9 +89,9 @@ pub struct PlayerReport {
 /// How a file was coded.
 #[derive(Debug, Clone)]
 pub struct CodingReport {
-    /// Expected and real bits.
+    /// Expected and actual bits.
     pub record: CodingRecord,
-    /// Where the planes' bits are; may be empty.
+    /// Maps of the planes' bits; may be empty.
     pub bit_maps: Vec<BitMap>,
 }
 
@@ -109,7 +109,7 @@ pub struct SectionBytes {
 pub struct SplitQuality {
     /// `test`, `val`...
     pub name: String,
-    /// Means over the views.
+    /// The scores over the views.
     pub scores: Scores,
     /// The views.
     pub views: Vec<ViewQuality>,
@@ -122,7 +122,7 @@ pub struct ViewQuality {
     pub name: String,
     /// Its time, 0 to 1.
     pub time: f32,
-    /// What was measured.
+    /// Its scores.
     pub scores: Scores,
 }
 
@@ -174,14 +174,14 @@ fn page(path: &Path, report: &Report) -> Result<String, DataError> {
     ))
 }
 
-/// The scene in motion; nothing if there is none.
+/// The player; nothing if there is no scene to play.
 fn player(player: Option<&PlayerReport>) -> String {
     let Some(PlayerReport { scene, cameras }) = player else { return String::new() };
     let player = element(Content::Embedded { scene, cameras }, Place::Part);
     format!("<section class=\"player\" aria-label=\"The scene in motion\">\n{player}\n</section>\n")
 }
 
-/// A page in the style of the report, with sections of one's own: pairs of an id-like heading and HTML.
+/// A page in the style of the report, with sections of the caller's: pairs of a heading and HTML.
 #[cfg(feature = "cli")]
 pub(crate) fn page_of(title: &str, about: &str, sections: &[(String, String)]) -> String {
     let sections = sections.iter().enumerate();
@@ -200,7 +200,7 @@ pub(crate) fn page_of(title: &str, about: &str, sections: &[(String, String)]) -
     )
 }
 
-/// A part of the page with its heading; nothing if it has no content.
+/// A section of the page with its heading; nothing if it has no content.
 fn section(id: &str, heading: &str, content: String) -> String {
     if content.is_empty() {
         return String::new();

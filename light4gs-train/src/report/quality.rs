@@ -24,7 +24,7 @@ pub(super) fn section(splits: &[SplitQuality]) -> String {
     html
 }
 
-/// What the columns mean, for those who compare with other tables.
+/// The meaning of the columns, for readers who compare with other tables.
 fn legend(columns: &[Metric]) -> String {
     const ALWAYS: &str = "SSIM has zeros around the image, as 3DGS; SSIM valid counts windows inside it, as TensorFlow and \
         scikit-image with Gaussian weights. D-SSIM is (1 - MS-SSIM) / 2. LPIPS needs weights from a file: <code>light4gs eval \

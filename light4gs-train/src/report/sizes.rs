@@ -1,4 +1,4 @@
-//! Where the bytes of the file are.
+//! The sizes of the sections of the file.
 
 use std::fmt::Write as _;
 

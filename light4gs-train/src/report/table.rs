@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// Side on which a column's cells are flush.
+/// The side on which the cells of a column are aligned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Align {
     /// For names.
@@ -100,7 +100,7 @@ impl fmt::Display for Table {
     }
 }
 
-/// Columns of a terminal, as far as our own text goes: one a character.
+/// Width in columns of a terminal. Our own text has one column for each character.
 fn width(text: &str) -> usize {
     text.chars().count()
 }

@@ -18,27 +18,27 @@ use light4gs_data::DataError;
 
 pub use network::LpipsNetwork;
 
-/// What the images are shifted and scaled by, after they are mapped to [-1, 1].
+/// Shift and scale of the images, after they are mapped to [-1, 1].
 const SHIFT: [f32; 3] = [-0.030, -0.088, -0.188];
 const SCALE: [f32; 3] = [0.458, 0.448, 0.450];
-/// Keeps features that are all zero from being divided by zero.
+/// Prevents a division by zero where all features are zero.
 const EPSILON: f32 = 1e-10;
 
 /// A network and the weights of its channels.
 #[derive(Module, Debug)]
 pub struct Lpips {
-    /// Of the network, up to its last tap.
+    /// The convolutions of the network, up to its last tap.
     convolutions: Vec<Conv2d>,
-    /// `[1, C, 1, 1]` for each of the five taps.
+    /// Weights `[1, C, 1, 1]` for each of the five taps.
     heads: Vec<Param<Tensor<4>>>,
     #[module(skip)]
     network: LpipsNetwork,
 }
 
 impl Lpips {
-    /// The networks whose weights are in files, of which some may hold a network's convolutions and others its heads: the
-    /// layout of the `lpips` package, of torchvision, or plain `conv0.weight`...`lin4.weight`, as SafeTensors or PyTorch.
-    /// None for no files.
+    /// The networks whose weights are in the files. One file may have a network's convolutions and another its heads.
+    /// The layouts are those of the `lpips` package and of torchvision, or plain `conv0.weight`...`lin4.weight`, as
+    /// SafeTensors or PyTorch. Without files there are no networks.
     ///
     /// # Errors
     /// A file that cannot be read, and a network of which a part is missing or has another shape.
@@ -46,7 +46,7 @@ impl Lpips {
         weights::load(files, device)
     }
 
-    /// Which network it is.
+    /// The kind of the network.
     pub fn network(&self) -> LpipsNetwork {
         self.network
     }
@@ -57,14 +57,14 @@ impl Lpips {
         self.layer_distances(image, truth).map(|layers| layers.sum())
     }
 
-    /// The parts of [`Self::distance`] that each of the five taps gives, `[5]`.
+    /// The contribution of each of the five taps to [`Self::distance`], `[5]`.
     pub fn layer_distances(&self, image: Tensor<3>, truth: Tensor<3>) -> Option<Tensor<1>> {
         let maps = self.maps(image, truth)?;
         Some(Tensor::cat(maps.into_iter().map(|map| map.mean()).collect(), 0))
     }
 
-    /// [`Self::distance`] at every pixel, `[H, W, 1]`: each tap's map is brought to the image's size (bilinear), and the sum
-    /// taken there.
+    /// [`Self::distance`] at every pixel, `[H, W, 1]`: the map of each tap is enlarged to the size of the image
+    /// (bilinear), and the maps are added.
     pub fn distance_map(&self, image: Tensor<3>, truth: Tensor<3>) -> Option<Tensor<3>> {
         let [height, width, _] = image.dims();
         let options = InterpolateOptions::new(InterpolateMode::Bilinear)
@@ -107,7 +107,7 @@ impl Lpips {
     }
 }
 
-/// Features of length 1 over the channels.
+/// Features scaled to length 1 over the channels.
 fn normalized(features: Tensor<4>) -> Tensor<4> {
     let length = features.clone().powi_scalar(2).sum_dim(1).sqrt();
     features / (length + EPSILON)

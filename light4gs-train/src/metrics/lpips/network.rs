@@ -1,11 +1,11 @@
-//! The two networks that LPIPS is published for, as far as it looks into them.
+//! The two networks for which LPIPS is published, up to the last layer that it uses.
 
 use std::fmt;
 
 /// A network whose features are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LpipsNetwork {
-    /// AlexNet (Krizhevsky 2014), the one for reporting results.
+    /// AlexNet (Krizhevsky 2014), the one with which papers report results.
     Alex,
     /// VGG-16 (Simonyan and Zisserman 2014).
     Vgg,
@@ -14,7 +14,7 @@ pub enum LpipsNetwork {
 /// A convolution with the ReLU after it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LayerShape {
-    /// Its place among the layers of torchvision's `features`.
+    /// Its number among the layers of torchvision's `features`.
     pub(super) index: usize,
     /// Side of the maximum pooling (stride 2) before it.
     pub(super) pooling: Option<usize>,
@@ -57,7 +57,7 @@ const VGG: [LayerShape; 13] = [
 ];
 
 impl LpipsNetwork {
-    /// Both.
+    /// Both networks.
     pub const ALL: [Self; 2] = [Self::Alex, Self::Vgg];
 
     /// The name that the `lpips` package gives it.
@@ -80,7 +80,7 @@ impl LpipsNetwork {
         self.layers().iter().filter(|layer| layer.is_tap).map(|layer| layer.outputs)
     }
 
-    /// Smaller images lose their last pixel on the way to the last tap.
+    /// The smallest side of an image that still has a pixel at the last tap.
     pub(super) fn least_side(self) -> usize {
         match self {
             Self::Alex => 31,

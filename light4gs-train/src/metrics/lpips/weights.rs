@@ -1,4 +1,4 @@
-//! Weights of LPIPS in the layouts that people have them in.
+//! Weights of LPIPS, in the layouts in which they are published.
 //!
 //! The `lpips` package ships the heads alone (`lin0.model.1.weight`...), torchvision the network (`features.0.weight`...); a
 //! saved `lpips.LPIPS` has both (`net.slice1.0.weight`...), and so have files with plain names (`conv0.weight`,
@@ -25,7 +25,7 @@ struct WeightFile {
     tensors: BTreeMap<String, PlainTensor>,
 }
 
-/// The networks that the files make up.
+/// The networks whose parts the files contain.
 pub(super) fn load(files: &[PathBuf], device: &Device) -> Result<Vec<Lpips>, DataError> {
     let files = files.iter().map(|path| WeightFile::read(path)).collect::<Result<Vec<_>, _>>()?;
     for file in &files {
@@ -62,7 +62,7 @@ impl WeightFile {
         DataError::field(&self.path, "tensors", problem, "name the file that has them too")
     }
 
-    /// The first of the names that is there.
+    /// The first of the names that exists.
     fn find(&self, names: &[String]) -> Option<(&str, &PlainTensor)> {
         names.iter().find_map(|name| self.tensors.get_key_value(name)).map(|(name, tensor)| (name.as_str(), tensor))
     }
@@ -73,13 +73,13 @@ impl WeightFile {
         self.find(&convolution_names(0, first, "weight")).is_some_and(|(_, tensor)| tensor.shape == shape)
     }
 
-    /// The second tap is the first one whose channels differ between the networks.
+    /// The networks are told apart by the second tap, the first one at which they have different channels.
     fn has_heads(&self, network: LpipsNetwork) -> bool {
         let channels = network.tap_channels().nth(1);
         self.find(&head_names(1)).is_some_and(|(_, tensor)| Some(tensor.values.len()) == channels)
     }
 
-    /// A tensor of a given shape; the first of the names is the one that errors tell.
+    /// A tensor of the given shape. Errors name the first of the names.
     fn take(&self, names: &[String], shape: &[usize]) -> Result<Vec<f32>, DataError> {
         let wrong = |field: &str, problem: String| {
             let known = names.join("`, `");
@@ -118,7 +118,7 @@ fn convolution_names(number: usize, layer: &LayerShape, part: &str) -> Vec<Strin
     [format!("conv{number}.{part}"), format!("features.{}.{part}", layer.index)].into_iter().chain(slices).collect()
 }
 
-/// Names of the weights of a tap's channels; the package has them behind a dropout layer, or not.
+/// Names of the weights of a tap's channels. In the package they may follow a dropout layer.
 fn head_names(tap: usize) -> Vec<String> {
     [format!("lin{tap}.weight"), format!("lin{tap}.model.1.weight"), format!("lin{tap}.model.0.weight")].into()
 }
