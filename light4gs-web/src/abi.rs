@@ -1,7 +1,7 @@
 //! The functions that JavaScript calls. An instance of the module holds one scene; a worker has one instance.
 //!
-//! A pointer that is given stays good until the next call. Lengths are counts of bytes, of numbers or of Gaussians, as each
-//! function says. Only WebAssembly exports them under their names: elsewhere `open` is the operating system's.
+//! A returned pointer is valid until the next call. Lengths are counts of bytes, of numbers or of Gaussians, as each
+//! function says. Only WebAssembly exports the functions under their names: elsewhere `open` is the operating system's.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -25,7 +25,7 @@ fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Makes room for the bytes of a file, and says where they belong.
+/// Allocates memory for the bytes of a file, and returns its address.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn reserve_input(bytes: usize) -> *mut u8 {
     let mut state = state();
@@ -33,7 +33,7 @@ pub extern "C" fn reserve_input(bytes: usize) -> *mut u8 {
     state.input.as_mut_ptr()
 }
 
-/// Decodes the input, and forgets it. 1 where it is a scene, else 0. [`text`] has the description of either.
+/// Decodes the input, and frees it. Returns 1 if it is a scene, else 0. [`text`] has the description or the error.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn open() -> u32 {
     let state = &mut *state();
@@ -52,13 +52,13 @@ pub extern "C" fn open() -> u32 {
     }
 }
 
-/// What [`open`] has to say: JSON.
+/// The description or the error from [`open`], as JSON.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn text() -> *const u8 {
     state().text.as_ptr()
 }
 
-/// Bytes of [`text`].
+/// Number of bytes of [`text`].
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn text_length() -> usize {
     state().text.len()
@@ -99,7 +99,7 @@ pub extern "C" fn draw_list(
     list.as_ptr()
 }
 
-/// How many numbers [`draw_list`] gave.
+/// How many numbers [`draw_list`] returned.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn list_length() -> usize {
     state().list_length
@@ -113,13 +113,13 @@ pub extern "C" fn attributes_at(time: f32) -> *const f32 {
     state.numbers.as_ptr()
 }
 
-/// How many numbers [`attributes_at`] gave.
+/// How many numbers [`attributes_at`] returned.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn numbers_length() -> usize {
     state().numbers.len()
 }
 
-/// Frees what [`attributes_at`] gave.
+/// Frees the memory that [`attributes_at`] returned.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn forget_numbers() {
     state().numbers = Vec::new();

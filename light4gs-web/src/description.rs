@@ -1,4 +1,4 @@
-//! What a file holds, and what is wrong with one, as JSON for the page.
+//! The contents of a file, or the error in it, as JSON for the page.
 
 use std::fmt::{Display, Write as _};
 

@@ -2,8 +2,8 @@
 
 use light4gs_codec::SceneData;
 
-/// FNV-1a over everything that was decoded, bit by bit: two scenes with the same digest are the same for all purposes of a
-/// test. Native code and WebAssembly must agree.
+/// FNV-1a over all decoded values, bit by bit. Two scenes with the same digest are equal for the purposes of a test.
+/// Native code and WebAssembly must agree.
 pub fn digest(scene: &SceneData) -> u64 {
     let mut hash = Fnv(0xcbf2_9ce4_8422_2325);
     let SceneData { gaussians, coordinates, feature_planes, motion, .. } = scene;
@@ -55,7 +55,7 @@ impl Fnv {
 
 #[cfg(test)]
 mod tests {
-    /// The browser test compares WebAssembly with the same list.
+    /// The browser test compares the results of WebAssembly with the same list.
     #[test]
     fn golden_streams_have_the_digests_on_record() {
         let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");

@@ -1,19 +1,19 @@
-//! What is drawn: Gaussians in front of a camera, back to front, with the colors that are seen from there.
+//! The list for drawing: Gaussians in front of a camera, back to front, with their colors as seen from there.
 
 use light4gs_codec::GaussianArrays;
 use light4gs_codec::rendering::{MIN_ALPHA, NEAR};
 
 use crate::gaussians::FLOATS;
 
-/// Numbers of one entry, four texels: those of `FLOATS`, then red, green, blue, and three that fill up.
+/// Numbers of one entry, four texels: those of `FLOATS`, then red, green, blue, and three zeros for padding.
 pub const ENTRY: usize = 16;
-/// Entries of a texture's row. Lists are filled up to whole rows with transparent ones.
+/// Entries in a row of the texture. Lists are padded to whole rows with transparent entries.
 pub const ROW: usize = 256;
 
 const DIGIT_BITS: u32 = 11;
 const DIGITS: usize = 1 << DIGIT_BITS;
 
-/// Where a list is seen from.
+/// The view from which a list is made.
 #[derive(Clone, Copy, Debug)]
 pub struct Viewpoint {
     /// The depth of a point is `row · (x, y, z, 1)`.
@@ -22,7 +22,7 @@ pub struct Viewpoint {
     pub eye: [f32; 3],
 }
 
-/// A list and the memory of making it.
+/// A list, and memory that is used again for the next one.
 #[derive(Debug, Default)]
 pub(crate) struct DrawList {
     keys: Vec<(u32, u32)>,
@@ -60,7 +60,7 @@ impl DrawList {
         &self.entries
     }
 
-    /// By rising key, equal ones in their order.
+    /// Sorts by rising key; entries with equal keys keep their order.
     fn sort(&mut self) {
         self.other.resize(self.keys.len(), (0, 0));
         // The sign is 0: 31 bits are left, three digits.
@@ -82,7 +82,7 @@ impl DrawList {
     }
 }
 
-/// The color of a Gaussian seen along an offset from the camera: `max(0, 0.5 + Σ basis · coefficient)`.
+/// The color of a Gaussian at an offset from the camera: `max(0, 0.5 + Σ basis · coefficient)`.
 fn seen_color(gaussians: &GaussianArrays, index: usize, offset: [f32; 3]) -> [f32; 3] {
     let length = offset.iter().map(|x| x * x).sum::<f32>().sqrt();
     let direction = if length > 0.0 { offset.map(|x| x / length) } else { [0.0; 3] };
@@ -146,7 +146,7 @@ mod tests {
         scene.0[FLOATS * 8 + 3] = 0.001;
         let mut list = DrawList::default();
         assert_eq!(order(&mut list, &scene, 1.0), [5, 4, 0, 2, 6]);
-        // The same memory again, seen from the other side.
+        // The same memory is used again, for the view from the other side.
         assert_eq!(order(&mut list, &scene, -1.0), [3]);
     }
 

@@ -1,4 +1,4 @@
-//! Activated Gaussians, and what the vertex shader takes of them.
+//! Activated Gaussians, and the values that the vertex shader needs.
 
 use light4gs_codec::GaussianArrays;
 use light4gs_codec::rendering::MAX_LOGARITHM;
@@ -6,7 +6,7 @@ use light4gs_codec::rendering::MAX_LOGARITHM;
 /// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz.
 pub(crate) const FLOATS: usize = 10;
 
-/// A quaternion that is shorter has no direction.
+/// A quaternion that is shorter than this has no direction.
 const SHORTEST_QUATERNION: f32 = 1e-12;
 
 /// Standard deviations from their logarithms.
@@ -19,7 +19,7 @@ pub(crate) fn opacity(logit: f32) -> f32 {
     1.0 / (1.0 + (-logit).exp())
 }
 
-/// The quaternion of unit length; nothing where it has no direction.
+/// The quaternion of unit length; none where it has no direction.
 pub(crate) fn rotation(quaternion: [f32; 4]) -> Option<[f32; 4]> {
     let length = quaternion.iter().map(|q| q * q).sum::<f32>().sqrt();
     (length.is_finite() && length > SHORTEST_QUATERNION).then(|| quaternion.map(|q| q / length))
@@ -37,7 +37,7 @@ fn covariance([w, x, y, z]: [f32; 4], scales: [f32; 3]) -> [f32; 6] {
     [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)]
 }
 
-/// Packs a range of Gaussians, [`FLOATS`] numbers each. What cannot be drawn gets opacity 0.
+/// Packs a range of Gaussians, [`FLOATS`] numbers each. Gaussians that cannot be drawn get opacity 0.
 pub(crate) fn pack(gaussians: &GaussianArrays, range: std::ops::Range<usize>, packed: &mut [f32]) {
     for (gaussian, packed) in range.clone().zip(packed[FLOATS * range.start..].chunks_exact_mut(FLOATS)) {
         let scales = scales(gaussians.log_scales[gaussian]);

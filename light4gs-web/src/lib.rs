@@ -6,10 +6,10 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `scene.rs` | a decoded scene that is asked for one time after the other |
-//! | `gaussians.rs` | activations, and what the vertex shader takes |
-//! | `draw_list.rs` | back to front, with the colors that are seen |
-//! | `description.rs` | what the panel of the player shows, as JSON |
+//! | `scene.rs` | a decoded scene, of which one time after the other is computed |
+//! | `gaussians.rs` | activations, and the values for the vertex shader |
+//! | `draw_list.rs` | the list for drawing, back to front, with colors |
+//! | `description.rs` | the contents of a file for the player's panel, as JSON |
 //! | `digest.rs` | one number for all bits of a decoded scene |
 //! | `abi.rs` | the functions that JavaScript calls |
 //! | `page.rs` | pages around the player, for the program; not in WebAssembly |

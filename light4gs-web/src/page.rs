@@ -8,7 +8,7 @@ pub const PLAYER: &str = include_str!("../dist/light4gs-player.js");
 
 const PAGE: &str = include_str!("../dist/page.html");
 
-/// Where a page has its scene from.
+/// The source of a page's scene.
 #[derive(Clone, Copy, Debug)]
 pub enum Content<'a> {
     /// From the page itself.
@@ -29,12 +29,12 @@ pub enum Content<'a> {
     },
 }
 
-/// How a player stands in its page.
+/// The place of a player in its page.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
-    /// It is the page.
+    /// The player fills the page.
     Page,
-    /// It is a part of a page that scrolls.
+    /// The player is a part of a page that scrolls.
     Part,
 }
 
@@ -60,7 +60,8 @@ pub fn element(content: Content, place: Place) -> String {
     }
 }
 
-/// A whole page. `script` is the player's address; without one it stands inside, and the page needs nothing else.
+/// A whole page. `script` is the player's address. Without one the player is embedded, and the page needs no other
+/// file.
 pub fn page(title: &str, content: Content, script: Option<&str>) -> String {
     let source = script.map(|address| format!(" src=\"{}\"", escape(address)));
     let inside = if script.is_some() { "" } else { PLAYER };
@@ -82,7 +83,7 @@ pub fn page(title: &str, content: Content, script: Option<&str>) -> String {
     page + rest
 }
 
-/// Text for between tags and for quoted attributes.
+/// Text in a form that is safe between tags and in quoted attributes.
 fn escape(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
 }

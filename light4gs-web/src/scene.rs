@@ -1,4 +1,4 @@
-//! A decoded scene that is asked for one time after the other.
+//! A decoded scene, of which one time after the other is computed.
 
 use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, info};
 
@@ -13,7 +13,7 @@ pub struct OpenScene {
     moved: GaussianArrays,
     evaluator: MotionEvaluator,
     description: String,
-    /// What is drawn: [`FLOATS`] numbers a Gaussian.
+    /// The values for drawing: [`FLOATS`] numbers per Gaussian.
     packed: Vec<f32>,
     list: DrawList,
 }
