@@ -228,7 +228,7 @@ impl LaneKernel for Backward<'_> {
 pub(crate) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
     let nodes = inputs.nodes();
     let count = inputs.stillness.len();
-    let task = count.div_ceil(MOST_TASKS).next_multiple_of(CHUNK);
+    let task = count.div_ceil(MOST_TASKS).max(1).next_multiple_of(CHUNK);
     let (mut means, mut quats, mut stillness) = (vec![0.0; 3 * count], vec![0.0; 4 * count], vec![0.0; count]);
     let tasks = (
         inputs.means.par_chunks(3 * task),

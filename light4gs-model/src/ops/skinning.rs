@@ -190,11 +190,10 @@ pub struct SkinningInputs {
 /// ```
 ///
 /// # Panics
-/// If the shapes do not belong together, or there is no Gaussian or no node; the message names the tensor.
+/// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
     let SkinningInputs { means, quats, stillness, anchors, precisions, poses } = inputs;
     let (count, nodes) = (means.dims()[0], anchors.dims()[0]);
-    assert!(count > 0, "means must have one row or more");
     assert!(nodes > 0, "anchors must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
     assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");

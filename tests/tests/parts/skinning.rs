@@ -270,6 +270,17 @@ fn tensors_may_lie_in_memory_as_they_like() {
 }
 
 #[test]
+fn no_gaussian_is_no_error() {
+    let case = Case::random(0, 3, &mut Random::new(350));
+    for (name, device) in devices() {
+        let (moved, gradients) = case.run(&device, &[], skin);
+        assert!(moved.is_empty(), "{name}");
+        assert!(gradients.iter().flatten().all(|value| *value == 0.0), "{name}");
+        assert_eq!(gradients.map(|values| values.len()), [0, 0, 0, 9, 3, 48], "{name}");
+    }
+}
+
+#[test]
 #[should_panic(expected = "precisions must be [B, 1]")]
 fn a_wrong_shape_is_named() {
     let mut case = Case::random(5, 3, &mut Random::new(340));

@@ -8,27 +8,27 @@
 //! | file | what |
 //! |---|---|
 //! | `trajectory` | splines over time, and the nodes' poses at a time |
-//! | `skinning` | from poses to moved Gaussians |
 //! | `placement` | where the nodes are when motion begins |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
 
 mod placement;
 mod regularizer;
-mod skinning;
 mod stream;
 mod trajectory;
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use burn::config::Config;
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, TensorData};
+use burn::tensor::{Device, Tensor, TensorData, s};
 use light4gs_codec::MotionArrays;
 
 use trajectory::Poses;
 
 use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
+use crate::ops::skinning::{SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
@@ -43,6 +43,8 @@ pub const MOST_KNOTS: usize = 1024;
 /// How fast a Gaussian's stillness is learned, and its step in a file.
 const STILLNESS_RATE: f64 = 0.02;
 const STILLNESS_STEP: f64 = 0.25;
+/// A logit of standing still whose weight is 0.
+const NEVER_STILL: f32 = -1e30;
 
 /// Configuration of a [`NodesField`].
 #[derive(Config, Debug)]
@@ -158,16 +160,22 @@ impl DeformationField for NodesField {
         Self::zeros(config.clone(), 1, 4, device)
     }
 
+    /// Weights take positions as constants: a Gaussian does not move only to follow another node.
     fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
         let Poses { matrices, offsets, quats } = self.poses(time);
-        skinning::skin(
-            canonical,
-            skinning::NodesAtTime {
-                anchors: self.world_anchors(),
-                precisions: self.precisions(),
-                poses: Tensor::cat(vec![matrices, offsets, quats], 1),
-            },
-        )
+        let stillness = canonical.further(STILLNESS).cloned();
+        let stillness = stillness
+            .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
+        let moved = skin(SkinningInputs {
+            means: canonical.means.clone(),
+            quats: canonical.quats.clone(),
+            stillness,
+            anchors: self.world_anchors(),
+            precisions: self.precisions(),
+            poses: Tensor::cat(vec![matrices, offsets, quats], 1),
+        });
+        let part = |columns: Range<usize>| moved.clone().slice(s![.., columns]);
+        GaussianTensors { means: part(0..3), quats: part(3..7), ..canonical }
     }
 
     fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {

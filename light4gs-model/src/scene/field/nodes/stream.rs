@@ -8,11 +8,15 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network};
 
-use super::skinning::{IDENTITY, PRODUCT};
 use super::trajectory::{DIAGONAL, ELEMENTS, FACTORS, OTHERS};
 use super::{MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, numbers, tensor};
 use crate::scene::ModelError;
 use crate::scene::field::DeformationField;
+
+/// The matrix of a product from the left with a quaternion: its components, 4 to 7 negative.
+const PRODUCT: [usize; 16] = [0, 5, 6, 7, 1, 0, 7, 2, 2, 3, 0, 5, 3, 6, 1, 0];
+/// A pose that moves nothing.
+const IDENTITY: [f32; 16] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 fn affine(scale: f32, offset: f32) -> Operation {
     Operation::Affine { scale, offset }
