@@ -27,8 +27,9 @@ const INSTEAD: [(&str, &str); 10] = [
 /// Keys and their values.
 type Overrides = &'static [(&'static str, &'static str)];
 
-/// Other keys that must be set where a value is not legal alone.
-const COMPANIONS: [(&str, &str, Overrides); 11] = [
+/// Other keys that must be set where a value is not legal, or has no effect, alone. A name that ends in a dot is that of a
+/// table: every key in it.
+const COMPANIONS: [(&str, &str, Overrides); 13] = [
     ("train.coarse_iterations", "0", &[("train.fine_iterations", "3")]),
     ("train.fine_iterations", "0", &[("train.prune.iterations", "[]"), ("train.coarse_iterations", "3")]),
     (
@@ -43,6 +44,8 @@ const COMPANIONS: [(&str, &str, Overrides); 11] = [
     ("compression.rate.from", "", &[("compression.rate.planes_until", "0")]),
     ("eval.views", "0", &[("eval.interval", "0")]),
     ("compression.context.fit_iterations", "", &[("compression.rate.lambda", "0.0")]),
+    ("model.nodes.", "", &[("model.field", "\"nodes\"")]),
+    ("train.widening_window.", "", &[("train.sampling", "\"widening_window\"")]),
     ("model.sh_degree", "", &[("train.sh_degree_interval", "1")]),
 ];
 
@@ -64,8 +67,9 @@ fn every_legal_value_of_every_key_trains_and_is_encoded() {
             *values.last_mut().unwrap() = (*instead).to_owned();
         }
         for value in values {
+            let is_meant = |name: &str| if name.ends_with('.') { key.starts_with(name) } else { name == key.as_str() };
             let companions =
-                COMPANIONS.iter().filter(|(other, at, _)| *other == key.as_str() && (at.is_empty() || *at == value));
+                COMPANIONS.iter().filter(|(name, at, _)| is_meant(name) && (at.is_empty() || *at == value));
             let mut pairs: Vec<(&str, &str)> = companions.flat_map(|(_, _, pairs)| *pairs).copied().collect();
             pairs.push((key, &value));
             let text = tiny_with(&pairs);
