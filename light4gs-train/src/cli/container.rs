@@ -180,7 +180,8 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let built_in = |name: &str| BUILT_IN.iter().any(|attribute| attribute.name == name);
     for AttributeInfo { name, width, coder, optional, bytes } in info.attributes.iter().filter(|a| !built_in(&a.name)) {
         let optional = if *optional { ", optional" } else { "" };
-        say(format_args!("their attribute {name}: {width} numbers each, {}, {bytes} bytes{optional}", coder.name()))?;
+        let numbers = if *width == 1 { "number" } else { "numbers" };
+        say(format_args!("their attribute {name}: {width} {numbers} each, {}, {bytes} bytes{optional}", coder.name()))?;
     }
     for scale in 0..info.planes.scales() {
         let planes = info.planes.planes()[info.planes.scale(scale)].iter().map(|plane| {
@@ -197,7 +198,9 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
             .iter()
             .map(|s| format!("{:.4} (space), {:.4} (time)", s.space_only, s.space_time))
             .collect();
-        say(format_args!("profile {}; steps of the planes: {}", profile.name(), steps.join("; ")))?;
+        let steps =
+            if steps.is_empty() { String::new() } else { format!("; steps of the planes: {}", steps.join("; ")) };
+        say(format_args!("profile {}{steps}", profile.name()))?;
     }
     say(format_args!("configuration {digest}\n"))?;
     let sizes = section_sizes(info);
