@@ -33,7 +33,13 @@ impl WideningWindow {
             return 0.0;
         }
         let done = request.iteration as f64 / request.iterations.max(1) as f64;
-        if done >= self.open { 1.0 } else { ((done - self.held) / (self.open - self.held)).clamp(0.0, 1.0) }
+        if done >= self.open {
+            1.0
+        } else if done <= self.held {
+            0.0
+        } else {
+            (done - self.held) / (self.open - self.held)
+        }
     }
 
     /// The places of the first and the last time in the window among all times.
@@ -82,5 +88,51 @@ impl FrameSampler for WideningWindow {
         let at = |place: usize| request.frames[times[place][0]].time;
         // At the ends there is nothing beyond.
         [if first == 0 { 0.0 } else { at(first) }, if last + 1 == times.len() { 1.0 } else { at(last) }]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use light4gs_data::{Camera, Frame};
+
+    use super::*;
+    use crate::sampling::StageFrames;
+
+    /// The windows of some iterations of 100, and whether each batch lies within its own.
+    fn windows(sampler: &WideningWindow, iterations: &[usize]) -> Vec<[f32; 2]> {
+        let camera = Camera::look_at([4.0, 0.0, 0.0].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 8, 8);
+        // Two cameras, 41 times.
+        let frame = |k: usize| Frame::without_image(format!("{k}"), camera, (k % 41) as f32 / 40.0);
+        let frames: Vec<Frame> = (0..82).map(frame).collect();
+        let all = StageFrames::new(None, &frames);
+        let candidates = all.of(Stage::Fine);
+        let window = |iteration: &usize| {
+            let (stage, iteration) = (Stage::Fine, *iteration);
+            let request =
+                BatchRequest { frames: &frames, candidates, batch_size: 3, stage, iteration, iterations: 100, seed: 1 };
+            let [low, high] = sampler.window(&request);
+            let batch = sampler.batch(&request);
+            assert!(batch.len() == 3 && batch.iter().all(|at| (low..=high).contains(&frames[*at].time)), "{iteration}");
+            [low, high]
+        };
+        iterations.iter().map(window).collect()
+    }
+
+    #[test]
+    fn the_window_widens_until_it_holds_all() {
+        let sampler = WideningWindow { times: 5, ..WideningWindow::default() };
+        let all: Vec<usize> = (1..=100).collect();
+        let found = windows(&sampler, &all);
+        assert_eq!((found[0], found[6]), ([0.45, 0.55], [0.45, 0.55]));
+        assert!(found.windows(2).all(|pair| pair[1][0] <= pair[0][0] && pair[1][1] >= pair[0][1]));
+        assert!(found[30][0] > 0.1 && found[30][0] < 0.4, "{:?}", found[30]);
+        assert_eq!(found[59..], [[0.0, 1.0]; 41]);
+    }
+
+    /// A window that is held for longer than it is closed opens when it has to, and not before.
+    #[test]
+    fn a_window_may_open_at_once() {
+        let sampler = WideningWindow { times: 1, held: 0.8, open: 0.5, center: 0.0, ..WideningWindow::default() };
+        assert_eq!(windows(&sampler, &[1, 49, 50]), [[0.0, 0.0], [0.0, 0.0], [0.0, 1.0]]);
     }
 }

@@ -127,5 +127,6 @@ fn other_networks_are_refused() {
     refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.inputs = 0));
     refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.outputs = u32::MAX));
     refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.bias.truncate(1)));
+    refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.bias[0] += 1.0));
     refused(&|arrays| arrays.network.as_mut().unwrap().network.nodes[1].operation = Operation::Exponential);
 }

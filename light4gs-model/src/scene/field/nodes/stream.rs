@@ -211,7 +211,9 @@ impl NodesField {
             && is(log_radii, 1, 1)
             && is(translations, 3, knots)
             && is(rotations, 4, knots);
-        if !fits {
+        // What we do not keep must not do anything in the codec either.
+        let unused = [&anchors.weight, &log_radii.weight, &translations.bias, &rotations.bias];
+        if !fits || unused.into_iter().flatten().any(|number| *number != 0.0) {
             return Err(wrong());
         }
         let still = motion.sources.contains(&MotionSource::Attribute(STILLNESS.to_owned()));
