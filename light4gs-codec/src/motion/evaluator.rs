@@ -4,7 +4,7 @@ use super::query::{Between, multiply_by_space_samples, normalized, scales};
 use crate::{
     CodecError, CoordinateMapping, GaussianArrays, Limits, MotionNetwork, MotionOutput, MotionSource, Plane, SceneData,
     network::{
-        Program,
+        Dependence, Program, Workspace,
         kernels::{LANES, Lanes, kept},
     },
     planes, sh_rest_coefficients,
@@ -13,9 +13,10 @@ use crate::{
 /// A scene's motion, prepared for evaluation at many times.
 ///
 /// What does not depend on the time is computed once: the product of the space-only samples of each Gaussian, which
-/// takes `4 · features` bytes for each. What depends on the time alone is computed once for each time. The evaluator
-/// runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to float tolerance, takes about a
-/// microsecond for each Gaussian, and uses one thread.
+/// takes `4 · features` bytes for each, and what the network computes from attributes and points alone, such as the
+/// weights of control nodes, 4 bytes a channel. What depends on the time alone is computed once for each time. The
+/// evaluator runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to float tolerance, takes
+/// less than a microsecond for each Gaussian, and uses one thread.
 ///
 /// ```
 /// use light4gs_codec::{GaussianArrays, MotionEvaluator, SceneData};
@@ -35,6 +36,9 @@ pub struct MotionEvaluator {
 #[derive(Debug)]
 struct Motion {
     program: Program,
+    /// `[blocks, kept channels]`: what the program computes of the place alone; empty where this is computed anew for
+    /// each time.
+    kept: Vec<Lanes>,
     sources: Vec<MotionSource>,
     outputs: Vec<MotionOutput>,
     mapping: CoordinateMapping,
@@ -56,12 +60,22 @@ struct Line {
 }
 
 impl MotionEvaluator {
-    /// Prepares the motion of a scene.
+    /// Prepares the motion of a scene. The network's values that do not depend on the time are kept if they take at
+    /// most [`Limits::memory_bytes`] of the default limits.
     ///
     /// # Errors
     /// A network that contradicts itself or the planes; an attribute without which the scene would look wrong, and of
     /// which it is not known what it does ([`SceneData::check_attributes_are_known`]).
     pub fn new(scene: &SceneData) -> Result<Self, CodecError> {
+        Self::keeping(scene, Limits::default().memory_bytes)
+    }
+
+    /// As [`MotionEvaluator::new`], with at most so many bytes for the network's values that do not depend on the time.
+    /// If they take more, they are computed anew for each time. The Gaussians are the same to the last bit.
+    ///
+    /// # Errors
+    /// As [`MotionEvaluator::new`].
+    pub fn keeping(scene: &SceneData, most_bytes: u64) -> Result<Self, CodecError> {
         scene.check_attributes_are_known()?;
         let Some(MotionNetwork { network, sources, outputs }) = &scene.motion.network else {
             return Ok(Self { motion: None });
@@ -72,9 +86,14 @@ impl MotionEvaluator {
         scene.motion.check_sources(scene.feature_planes.features(), &scene.gaussians)?;
         let channels = scene.feature_planes.channels as usize;
         let features = scene.feature_planes.features() as usize;
-        let uniform: Vec<bool> = sources.iter().map(|source| *source == MotionSource::Time).collect();
+        let dependence = sources.iter().map(|source| match source {
+            MotionSource::Time => Dependence::TIME,
+            MotionSource::Features => Dependence::TIME_AND_PLACE,
+            MotionSource::Point | MotionSource::Attribute(_) => Dependence::PLACE,
+        });
         let mut motion = Motion {
-            program: Program::pointwise_with_uniform(network, &uniform),
+            program: Program::over_time(network, &dependence.collect::<Vec<_>>()),
+            kept: Vec::new(),
             sources: sources.clone(),
             outputs: outputs.clone(),
             mapping: scene.coordinates.mapping,
@@ -98,6 +117,10 @@ impl MotionEvaluator {
             motion.time_planes = scales(&scene.feature_planes.planes).map(with_time).collect();
             motion.space_features = motion.products_over_space(&scene.feature_planes.planes);
         }
+        let lanes = (motion.program.kept_channels() as u64).saturating_mul(motion.points.len() as u64);
+        if lanes.saturating_mul(size_of::<Lanes>() as u64) <= most_bytes {
+            motion.kept = motion.values_of_places(&scene.gaussians, lanes as usize);
+        }
         Ok(Self { motion: Some(motion) })
     }
 
@@ -112,8 +135,8 @@ impl MotionEvaluator {
         self.motion.as_ref().is_some_and(|motion| motion.outputs.iter().any(of_harmonics))
     }
 
-    /// Writes the Gaussians of a `range` at a `time` in [0, 1] into `moved`: attributes before their activations. Both
-    /// arrays are as long as those of the scene for which the evaluator was made. A long scene can be done in parts, so
+    /// Writes the Gaussians of a `range` at a `time` in [0, 1] into `moved`: attributes before their activations. The
+    /// `canonical` Gaussians are those of the scene for which the evaluator was made, and `moved` is as long. A long scene can be done in parts, so
     /// that a player can respond in between; parts that begin at a multiple of 8 are fastest.
     ///
     /// # Panics
@@ -138,24 +161,31 @@ impl MotionEvaluator {
         }
         let time = motion.mapping.time(time);
         let lines = motion.lines_at(time);
-        let mut workspace = motion.program.workspace();
+        let mut workspace = motion.program.workspace_over_time();
         let mut product = vec![0.0; motion.features];
         for (input, source) in motion.sources.iter().enumerate() {
             if *source == MotionSource::Time {
                 motion.program.input_lanes(&mut workspace, input)[0] = [kept(time); LANES];
             }
         }
-        motion.program.run_uniform(&mut workspace);
+        motion.program.run_time(&mut workspace);
+        let kept_channels = motion.program.kept_channels();
+        let computes_places = kept_channels > 0 && motion.kept.is_empty();
         for block in range.start / LANES..range.end.div_ceil(LANES) {
             for (input, source) in motion.sources.iter().enumerate() {
-                let inputs = motion.program.input_lanes(&mut workspace, input);
-                match source {
-                    MotionSource::Features if motion.features == 0 => {}
-                    MotionSource::Features => motion.set_features(block, &lines, &mut product, inputs),
-                    MotionSource::Point => inputs.copy_from_slice(&motion.points[block]),
-                    MotionSource::Time => {}
-                    MotionSource::Attribute(name) => set_attribute(canonical, name, block, inputs),
+                if *source != MotionSource::Features {
+                    if computes_places || motion.program.reads_input(input) {
+                        motion.set_input_of_place(canonical, block, input, &mut workspace);
+                    }
+                } else if motion.features > 0 {
+                    let inputs = motion.program.input_lanes(&mut workspace, input);
+                    motion.set_features(block, &lines, &mut product, inputs);
                 }
+            }
+            if computes_places {
+                motion.program.run_place(&mut workspace);
+            } else {
+                motion.program.load(&motion.kept[block * kept_channels..][..kept_channels], &mut workspace);
             }
             motion.program.run(&mut workspace);
             let lanes = range.start.max(block * LANES)..range.end.min((block + 1) * LANES);
@@ -173,6 +203,33 @@ impl MotionEvaluator {
 }
 
 impl Motion {
+    /// Sets an input that does not depend on the time.
+    fn set_input_of_place(&self, canonical: &GaussianArrays, block: usize, input: usize, workspace: &mut Workspace) {
+        let inputs = self.program.input_lanes(workspace, input);
+        match &self.sources[input] {
+            MotionSource::Point => inputs.copy_from_slice(&self.points[block]),
+            MotionSource::Attribute(name) => set_attribute(canonical, name, block, inputs),
+            MotionSource::Time | MotionSource::Features => {}
+        }
+    }
+
+    /// `[blocks, kept channels]`: what the program computes of the place alone, `count` in all.
+    fn values_of_places(&self, canonical: &GaussianArrays, count: usize) -> Vec<Lanes> {
+        let mut values = Vec::with_capacity(count);
+        if count == 0 {
+            return values;
+        }
+        let mut workspace = self.program.workspace_over_time();
+        for block in 0..self.points.len() {
+            for input in 0..self.sources.len() {
+                self.set_input_of_place(canonical, block, input, &mut workspace);
+            }
+            self.program.run_place(&mut workspace);
+            self.program.save(&workspace, &mut values);
+        }
+        values
+    }
+
     /// `[blocks, features]`: the product of the samples of the planes without time.
     fn products_over_space(&self, planes: &[Plane]) -> Vec<Lanes> {
         let mut products = vec![[1.0; LANES]; self.points.len() * self.features];
@@ -289,7 +346,8 @@ impl SceneData {
             return Ok(self.gaussians.means.clone());
         }
         let mut moved = self.gaussians.clone();
-        MotionEvaluator::new(self)?.apply(&self.gaussians, time, 0..moved.len(), &mut moved);
+        // For a single time nothing is worth keeping.
+        MotionEvaluator::keeping(self, 0)?.apply(&self.gaussians, time, 0..moved.len(), &mut moved);
         Ok(moved.means)
     }
 }

@@ -40,7 +40,7 @@ mod program;
 pub(crate) mod tensors;
 pub mod weights;
 
-pub(crate) use program::{Maps, Program, Workspace, blocks};
+pub(crate) use program::{Dependence, Maps, Program, Workspace, blocks};
 
 use crate::{CodecError, Limits};
 

@@ -36,6 +36,13 @@ pub fn gaussians(count: usize, sh_degree: u8) -> GaussianArrays {
     }
 }
 
+/// The checksum of what moves, appended to that of earlier frames: means, then quaternions, bit by bit.
+pub fn frame_checksum(before: u32, moved: &GaussianArrays) -> u32 {
+    let numbers = moved.means.as_flattened().iter().chain(moved.quats.as_flattened());
+    let bytes: Vec<u8> = numbers.flat_map(|number| number.to_bits().to_le_bytes()).collect();
+    crc32c::crc32c_append(before, &bytes)
+}
+
 /// An optional further attribute.
 pub fn further(name: &str, width: usize, count: usize) -> FurtherAttribute {
     FurtherAttribute { name: name.into(), width: width as u32, values: numbers(width * count), optional: true }

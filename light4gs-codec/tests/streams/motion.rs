@@ -1,5 +1,7 @@
 //! Positions at a time, on a scene small enough to compute by hand.
 
+use std::time::Instant;
+
 use crate::common;
 
 use common::{hexplane, sample};
@@ -133,4 +135,36 @@ fn unknown_attributes_are_refused_where_a_scene_is_shown() {
     assert!(other.check_attributes_are_known().is_ok());
     other.motion = MotionArrays::default();
     refused(&other);
+}
+
+/// How long a frame takes: `LIGHT4GS_SCENES="FILE FILE" cargo test --release -p light4gs-codec --test streams
+/// time_of_a_frame -- --ignored --nocapture`. The checksum is that of all means and quaternions of ten frames.
+#[test]
+#[ignore = "measures; needs scenes in LIGHT4GS_SCENES"]
+fn time_of_a_frame() {
+    let files = std::env::var("LIGHT4GS_SCENES").expect("files in LIGHT4GS_SCENES");
+    for file in files.split_whitespace() {
+        let scene = light4gs_codec::read_file(file.as_ref()).unwrap();
+        let begin = Instant::now();
+        let evaluator = MotionEvaluator::new(&scene).unwrap();
+        let prepared = begin.elapsed().as_secs_f64() * 1e3;
+        let mut moved = scene.gaussians.clone();
+        let (mut best, mut checksum) = (f64::INFINITY, 0);
+        for frame in 0..40u8 {
+            let begin = Instant::now();
+            evaluator.apply(&scene.gaussians, f32::from(frame % 10) / 9.0, 0..moved.len(), &mut moved);
+            best = best.min(begin.elapsed().as_secs_f64() * 1e3);
+            if frame < 10 {
+                checksum = common::frame_checksum(checksum, &moved);
+            }
+        }
+        let forgetful = MotionEvaluator::keeping(&scene, 0).unwrap();
+        let begin = Instant::now();
+        forgetful.apply(&scene.gaussians, 1.0, 0..moved.len(), &mut moved);
+        let anew = begin.elapsed().as_secs_f64() * 1e3;
+        println!(
+            "{best:7.3} ms a frame ({anew:.3} with nothing kept), {prepared:7.2} ms once, {checksum:08x}, {} Gaussians: {file}",
+            moved.len()
+        );
+    }
 }

@@ -128,6 +128,11 @@ fn motion_reads_attributes_and_replaces_them() {
     for range in [0..3, 3..9, 9..canonical.len()] {
         evaluator.apply(canonical, time, range, &mut moved);
     }
+    // What is not kept is computed anew, to the same bits.
+    let mut anew = canonical.clone();
+    let forgetful = light4gs_codec::MotionEvaluator::keeping(&scene, 0).unwrap();
+    forgetful.apply(canonical, time, 0..canonical.len(), &mut anew);
+    assert_eq!(anew, moved);
     assert_eq!((&moved.means, &moved.log_scales), (&canonical.means, &canonical.log_scales));
     for i in 0..canonical.len() {
         let square: f32 = canonical.means[i].iter().zip([0.5, -1.0, 2.0]).map(|(x, c)| (x - c).powi(2)).sum();

@@ -5,10 +5,10 @@ pub(crate) const LANES: usize = 8;
 /// One channel at [`LANES`] positions.
 pub(crate) type Lanes = [f32; LANES];
 /// Outputs that are computed together.
-const PANEL: usize = 4;
+pub(super) const PANEL: usize = 4;
 
 /// One number for each output of a panel.
-type Panel = [f32; PANEL];
+pub(super) type Panel = [f32; PANEL];
 
 /// Weights and values with a magnitude below this are replaced by 0. So no product and no sum is ever subnormal: many
 /// processors take a hundred times as long for subnormal numbers as for others.

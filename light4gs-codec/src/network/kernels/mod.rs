@@ -8,8 +8,10 @@
 //! | `padded_map.rs` | channels of a map with a border of zeros, and windows of it |
 //! | `convolution.rs`, `transposed.rs`, `masked.rs` | the kinds of convolution |
 //! | `upsampling.rs`, `reductions.rs` | resizing, means, transposition |
+//! | `blend.rs` | weighted sums of numbers that are the same at all places |
 //! | `elementary.rs` | exponential and logarithm |
 
+mod blend;
 mod convolution;
 mod elementary;
 mod lanes;
@@ -19,6 +21,7 @@ mod reductions;
 mod transposed;
 mod upsampling;
 
+pub(crate) use blend::Blend;
 pub(crate) use convolution::Convolution;
 pub(crate) use elementary::{exponential, logarithm};
 pub(crate) use lanes::{LANES, Lanes, kept};

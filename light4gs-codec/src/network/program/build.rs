@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Action, Activation, InputKind, MapPlan, Program, Step, StepKind, ValuePlan};
+use super::{Action, Activation, InputKind, MapPlan, Program, Step, StepKind, ValuePlan, dependence::Before};
 use crate::network::{
     Layer, LayerKind, Network, Operation,
     kernels::{Convolution, MaskedConvolution, TransposedConvolution, kept},
@@ -13,36 +13,22 @@ impl Program {
     pub(crate) fn over_maps(network: &Network) -> Self {
         let kind = |anchors: bool| if anchors { InputKind::Anchors } else { InputKind::Map };
         let inputs = network.anchor_inputs().into_iter().map(kind).collect();
-        Self::new(network, inputs, &vec![true; network.inputs.len()], &[], None)
+        Self::new(network, inputs, &vec![true; network.inputs.len()], None)
     }
 
     /// A program over numbers at single places, of a network that [`Network::check_pointwise`] has accepted. Inputs
     /// that are not `present` are zeros; at the end of a layer's inputs they are left out of the sums.
     pub(crate) fn pointwise(network: &Network, present: &[bool]) -> Self {
-        Self::new(network, vec![InputKind::Lanes; network.inputs.len()], present, &[], None)
-    }
-
-    /// A pointwise program of which some inputs are the same at all places. Values that depend only on these are
-    /// computed by [`Program::run_uniform`], once for all places.
-    pub(crate) fn pointwise_with_uniform(network: &Network, uniform: &[bool]) -> Self {
-        let inputs = vec![InputKind::Lanes; network.inputs.len()];
-        Self::new(network, inputs, &vec![true; network.inputs.len()], uniform, None)
+        Self::new(network, vec![InputKind::Lanes; network.inputs.len()], present, None)
     }
 
     /// The same pointwise program, with other inputs present.
     pub(crate) fn with_present(&self, network: &Network, present: &[bool]) -> Self {
-        Self::new(network, self.inputs.clone(), present, &[], Some(self))
+        Self::new(network, self.inputs.clone(), present, Some(self))
     }
 
-    /// `uniform` inputs are the same at all places; inputs beyond the end of the list are not. `shared` is another
-    /// program of the same network, whose weights are used.
-    fn new(
-        network: &Network,
-        inputs: Vec<InputKind>,
-        present: &[bool],
-        uniform: &[bool],
-        shared: Option<&Self>,
-    ) -> Self {
+    /// `shared` is another program of the same network, whose weights are used.
+    pub(super) fn new(network: &Network, inputs: Vec<InputKind>, present: &[bool], shared: Option<&Self>) -> Self {
         let channels: Vec<usize> = network.channels().into_iter().map(|channels| channels as usize).collect();
         let mut values: Vec<ValuePlan> = Vec::with_capacity(channels.len());
         for &channels in &channels {
@@ -121,27 +107,9 @@ impl Program {
         let outputs = network.outputs.iter().map(|value| stands[value.0 as usize]).collect();
         let slots = values.last().map_or(0, |last| last.slot + last.channels);
         let (schedule, maps) = (Vec::new(), Vec::new());
-        let mut program = Self { inputs, values, steps, outputs, uniform: Vec::new(), schedule, maps, slots };
+        let mut program = Self { inputs, values, steps, outputs, before: Before::default(), schedule, maps, slots };
         program.plan();
-        program.split_schedule(uniform);
         program
-    }
-
-    /// Removes from the schedule what depends on uniform inputs only.
-    fn split_schedule(&mut self, uniform: &[bool]) {
-        if !uniform.contains(&true) {
-            return;
-        }
-        let mut is_uniform = uniform.to_vec();
-        is_uniform.resize(self.inputs.len(), false);
-        for step in &self.steps {
-            // A step that is merged into the one before has no value of its own, and no step reads it.
-            let from_uniform = !step.inputs.is_empty() && step.inputs.iter().all(|&input| is_uniform[input]);
-            is_uniform.push(from_uniform);
-        }
-        let schedule = std::mem::take(&mut self.schedule);
-        let once = |action: &Action| matches!(*action, Action::Run(value) if is_uniform[value]);
-        (self.uniform, self.schedule) = schedule.into_iter().partition(once);
     }
 
     /// Finds the actions that compute each map and the outputs, and after which map each map can be freed.

@@ -7,18 +7,21 @@
 //! | file | what |
 //! |---|---|
 //! | `build.rs` | from a network to a program |
+//! | `dependence.rs` | what is computed once for all times, what once for all places |
 //! | `run.rs` | a program over maps, or at single places |
 //! | `cost.rs` | the cost of running it |
 
 mod build;
 mod cost;
+mod dependence;
 mod run;
 
 pub(crate) use cost::blocks;
+pub(crate) use dependence::Dependence;
 
 use std::sync::Arc;
 
-use super::kernels::{Convolution, LANES, Lanes, MaskedConvolution, PaddedMap, TransposedConvolution};
+use super::kernels::{Blend, Convolution, LANES, Lanes, MaskedConvolution, PaddedMap, TransposedConvolution};
 
 /// What an input of a program is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,9 +41,9 @@ pub(crate) struct Program {
     values: Vec<ValuePlan>,
     steps: Vec<Step>,
     outputs: Vec<usize>,
-    /// The actions that compute values which are the same at all places, and which the outputs need.
-    uniform: Vec<Action>,
-    /// The actions that then compute the outputs at a place.
+    /// The actions that come before the schedule, where places and times are told apart.
+    before: dependence::Before,
+    /// The actions that compute the outputs at a place.
     schedule: Vec<Action>,
     /// Values that are computed as whole maps, in order, with the plan of each.
     maps: Vec<MapPlan>,
@@ -104,6 +107,9 @@ enum StepKind {
     GroupSum(usize),
     GroupMaximum(usize),
     Select(Vec<u32>),
+    /// A product with numbers that are the same at all places, and the sum of each of its groups. Its inputs are the
+    /// numbers and the weights; it is the blend of this number.
+    Blend(usize),
     /// Merged into the step before, which computes its value.
     Merged,
 }
@@ -144,6 +150,9 @@ pub(crate) struct Maps<'a> {
 pub(crate) struct Workspace {
     slots: Vec<Lanes>,
     window: Vec<Lanes>,
+    blends: Vec<Blend>,
+    /// Channels of a blend whose weights are not 0, and these weights.
+    used: Vec<(usize, Lanes)>,
 }
 
 impl Program {
@@ -159,7 +168,7 @@ impl Program {
 
     /// Memory for this program.
     pub(crate) fn workspace(&self) -> Workspace {
-        Workspace { slots: vec![[0.0; LANES]; self.slots], window: Vec::new() }
+        Workspace { slots: vec![[0.0; LANES]; self.slots], ..Workspace::default() }
     }
 
     /// Channels of all inputs.

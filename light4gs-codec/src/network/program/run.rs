@@ -20,14 +20,13 @@ impl Program {
         Maps { program: self, maps }
     }
 
-    /// Computes the values that are the same at all places. Called before [`Program::run`], with the same workspace.
-    pub(crate) fn run_uniform(&self, workspace: &mut Workspace) {
-        self.perform(&self.uniform, &[], None, 0, Columns { first: 0, step: 1 }, workspace);
-    }
-
     /// Computes the outputs of a pointwise program.
     pub(crate) fn run(&self, workspace: &mut Workspace) {
-        self.perform(&self.schedule, &[], None, 0, Columns { first: 0, step: 1 }, workspace);
+        self.perform_at_places(&self.schedule, workspace);
+    }
+
+    pub(super) fn perform_at_places(&self, schedule: &[Action], workspace: &mut Workspace) {
+        self.perform(schedule, &[], None, 0, Columns { first: 0, step: 1 }, workspace);
     }
 
     fn perform(
@@ -40,7 +39,7 @@ impl Program {
         workspace: &mut Workspace,
     ) {
         let map = |value: usize| maps[value].as_ref().expect("maps are made before what reads them");
-        let Workspace { slots, window } = workspace;
+        let Workspace { slots, window, blends, used } = workspace;
         for action in schedule {
             let (Action::Load(value) | Action::Run(value)) = *action;
             let ValuePlan { slot, channels, .. } = self.values[value];
@@ -102,6 +101,7 @@ impl Program {
                     let from = operand(0).0;
                     own.iter_mut().zip(channels).for_each(|(own, &channel)| *own = from[channel as usize]);
                 }
+                StepKind::Blend(index) => blends[*index].apply(operand(1).0, used, own),
                 StepKind::Doubling(_)
                 | StepKind::Resize
                 | StepKind::MeanOverHeight
