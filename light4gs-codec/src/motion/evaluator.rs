@@ -2,7 +2,8 @@
 
 use super::query::{Between, multiply_by_space_samples, normalized, scales};
 use crate::{
-    CodecError, CoordinateMapping, GaussianArrays, Limits, MotionNetwork, MotionOutput, MotionSource, Plane, SceneData,
+    AttributeValues, CodecError, CoordinateMapping, GaussianArrays, Limits, MotionNetwork, MotionOutput, MotionSource,
+    Plane, SceneData,
     network::{
         Dependence, Program, Workspace,
         kernels::{LANES, Lanes, kept},
@@ -169,13 +170,14 @@ impl MotionEvaluator {
             }
         }
         motion.program.run_time(&mut workspace);
+        let attributes = motion.attributes(canonical);
         let kept_channels = motion.program.kept_channels();
         let computes_places = kept_channels > 0 && motion.kept.is_empty();
         for block in range.start / LANES..range.end.div_ceil(LANES) {
             for (input, source) in motion.sources.iter().enumerate() {
                 if *source != MotionSource::Features {
                     if computes_places || motion.program.reads_input(input) {
-                        motion.set_input_of_place(canonical, block, input, &mut workspace);
+                        motion.set_input_of_place(&attributes[input], block, input, &mut workspace);
                     }
                 } else if motion.features > 0 {
                     let inputs = motion.program.input_lanes(&mut workspace, input);
@@ -203,13 +205,28 @@ impl MotionEvaluator {
 }
 
 impl Motion {
+    /// The attributes that are inputs.
+    fn attributes<'a>(&self, canonical: &'a GaussianArrays) -> Vec<Option<AttributeValues<'a>>> {
+        let attribute = |source: &MotionSource| match source {
+            MotionSource::Attribute(name) => canonical.attribute(name),
+            MotionSource::Features | MotionSource::Point | MotionSource::Time => None,
+        };
+        self.sources.iter().map(attribute).collect()
+    }
+
     /// Sets an input that does not depend on the time.
-    fn set_input_of_place(&self, canonical: &GaussianArrays, block: usize, input: usize, workspace: &mut Workspace) {
+    fn set_input_of_place(
+        &self,
+        attribute: &Option<AttributeValues<'_>>,
+        block: usize,
+        input: usize,
+        workspace: &mut Workspace,
+    ) {
         let inputs = self.program.input_lanes(workspace, input);
-        match &self.sources[input] {
-            MotionSource::Point => inputs.copy_from_slice(&self.points[block]),
-            MotionSource::Attribute(name) => set_attribute(canonical, name, block, inputs),
-            MotionSource::Time | MotionSource::Features => {}
+        match (&self.sources[input], attribute) {
+            (MotionSource::Point, _) => inputs.copy_from_slice(&self.points[block]),
+            (_, Some(attribute)) => set_attribute(attribute, block, inputs),
+            _ => {}
         }
     }
 
@@ -220,9 +237,10 @@ impl Motion {
             return values;
         }
         let mut workspace = self.program.workspace_over_time();
+        let attributes = self.attributes(canonical);
         for block in 0..self.points.len() {
-            for input in 0..self.sources.len() {
-                self.set_input_of_place(canonical, block, input, &mut workspace);
+            for (input, attribute) in attributes.iter().enumerate() {
+                self.set_input_of_place(attribute, block, input, &mut workspace);
             }
             self.program.run_place(&mut workspace);
             self.program.save(&workspace, &mut values);
@@ -296,8 +314,7 @@ fn set_to_product<const N: usize>(lines: [&Line; N], point: [f32; 3], product: &
 }
 
 /// An attribute of eight Gaussians, `[width]`; zeros beyond the last one.
-fn set_attribute(canonical: &GaussianArrays, name: &str, block: usize, inputs: &mut [Lanes]) {
-    let attribute = canonical.attribute(name).expect("a source is checked when an evaluator is made");
+fn set_attribute(attribute: &AttributeValues<'_>, block: usize, inputs: &mut [Lanes]) {
     let (width, values) = (attribute.width, attribute.values);
     inputs.fill([0.0; LANES]);
     let rows = values[(block * LANES * width).min(values.len())..].chunks_exact(width).take(LANES);

@@ -9,6 +9,7 @@ mod damage;
 mod files;
 mod golden;
 mod motion;
+mod motion_over_time;
 mod network_weights;
 mod operations;
 mod paper_size;
