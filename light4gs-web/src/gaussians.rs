@@ -1,5 +1,7 @@
 //! Activated Gaussians, and the values that the vertex shader needs.
 
+use std::ops::Range;
+
 use light4gs_codec::GaussianArrays;
 use light4gs_codec::rendering::MAX_LOGARITHM;
 
@@ -37,12 +39,31 @@ fn covariance([w, x, y, z]: [f32; 4], scales: [f32; 3]) -> [f32; 6] {
     [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)]
 }
 
-/// Packs a range of Gaussians, [`FLOATS`] numbers each. Gaussians that cannot be drawn get opacity 0.
-pub(crate) fn pack(gaussians: &GaussianArrays, range: std::ops::Range<usize>, packed: &mut [f32]) {
+/// Standard deviations and opacity of each Gaussian.
+#[derive(Debug)]
+pub(crate) struct Sizes {
+    scales: Vec<[f32; 3]>,
+    opacities: Vec<f32>,
+}
+
+impl Sizes {
+    pub(crate) fn of(gaussians: &GaussianArrays) -> Self {
+        let scales = gaussians.log_scales.iter().map(|&log_scales| scales(log_scales)).collect();
+        let opacities = gaussians.opacity_logits.iter().map(|&logit| opacity(logit)).collect();
+        Self { scales, opacities }
+    }
+}
+
+/// Packs a range of Gaussians, [`FLOATS`] numbers each. Gaussians that cannot be drawn get opacity 0. `sizes` are theirs,
+/// if they are known already.
+pub(crate) fn pack(gaussians: &GaussianArrays, sizes: Option<&Sizes>, range: Range<usize>, packed: &mut [f32]) {
     for (gaussian, packed) in range.clone().zip(packed[FLOATS * range.start..].chunks_exact_mut(FLOATS)) {
-        let scales = scales(gaussians.log_scales[gaussian]);
+        let (scales, opacity) = match sizes {
+            Some(sizes) => (sizes.scales[gaussian], sizes.opacities[gaussian]),
+            None => (scales(gaussians.log_scales[gaussian]), opacity(gaussians.opacity_logits[gaussian])),
+        };
         packed[..3].copy_from_slice(&gaussians.means[gaussian]);
-        packed[3] = opacity(gaussians.opacity_logits[gaussian]);
+        packed[3] = opacity;
         packed[4..].fill(0.0);
         if let Some(rotation) = rotation(gaussians.quats[gaussian]) {
             packed[4..].copy_from_slice(&covariance(rotation, scales));
@@ -69,7 +90,10 @@ mod tests {
             further: Vec::new(),
         };
         let mut packed = vec![-1.0; FLOATS];
-        pack(&gaussians, 0..1, &mut packed);
+        pack(&gaussians, None, 0..1, &mut packed);
+        let mut again = vec![-1.0; FLOATS];
+        pack(&gaussians, Some(&Sizes::of(&gaussians)), 0..1, &mut again);
+        assert_eq!(packed, again);
         packed
     }
 

@@ -130,10 +130,10 @@ impl MotionEvaluator {
         self.motion.is_some()
     }
 
-    /// Whether the spherical harmonics change with time.
-    pub fn changes_harmonics(&self) -> bool {
-        let of_harmonics = |output: &MotionOutput| output.added() == MotionOutput::Sh;
-        self.motion.as_ref().is_some_and(|motion| motion.outputs.iter().any(of_harmonics))
+    /// Whether the attribute of an output may change with time, be it that the output is added or replaces it.
+    pub fn changes(&self, output: MotionOutput) -> bool {
+        let same = |other: &MotionOutput| other.added() == output.added();
+        self.motion.as_ref().is_some_and(|motion| motion.outputs.iter().any(same))
     }
 
     /// Writes the Gaussians of a `range` at a `time` in [0, 1] into `moved`: attributes before their activations. The
@@ -154,7 +154,7 @@ impl MotionEvaluator {
         moved.quats[range.clone()].copy_from_slice(&canonical.quats[range.clone()]);
         moved.opacity_logits[range.clone()].copy_from_slice(&canonical.opacity_logits[range.clone()]);
         let Some(motion) = &self.motion else { return };
-        if self.changes_harmonics() {
+        if self.changes(MotionOutput::Sh) {
             let rest = 3 * sh_rest_coefficients(canonical.sh_degree);
             let rest = rest * range.start..rest * range.end;
             moved.sh_dc[range.clone()].copy_from_slice(&canonical.sh_dc[range.clone()]);

@@ -120,7 +120,7 @@ fn motion_reads_attributes_and_replaces_them() {
     let scene = decode(&encode(&given).unwrap()).unwrap();
     assert_eq!(scene, given);
     let evaluator = light4gs_codec::MotionEvaluator::new(&scene).unwrap();
-    assert!(evaluator.moves() && evaluator.changes_harmonics());
+    assert!(evaluator.moves() && evaluator.changes(MotionOutput::Sh));
     let canonical = &scene.gaussians;
     let mut moved = canonical.clone();
     let time = 0.75f32;
