@@ -2,8 +2,8 @@
 
 use std::ops::Range;
 
-use light4gs_codec::GaussianArrays;
 use light4gs_codec::rendering::MAX_LOGARITHM;
+use light4gs_codec::{GaussianArrays, MotionOutput};
 
 /// Numbers of one Gaussian that change with time: center (3), opacity, covariance xx, xy, xz, yy, yz, zz.
 pub(crate) const FLOATS: usize = 10;
@@ -39,31 +39,34 @@ fn covariance([w, x, y, z]: [f32; 4], scales: [f32; 3]) -> [f32; 6] {
     [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)]
 }
 
-/// Standard deviations and opacity of each Gaussian.
-#[derive(Debug)]
-pub(crate) struct Sizes {
+/// What the motion of a scene does not change, activated once. A list is empty where it may change.
+#[derive(Debug, Default)]
+pub(crate) struct Unchanged {
     scales: Vec<[f32; 3]>,
     opacities: Vec<f32>,
 }
 
-impl Sizes {
-    pub(crate) fn of(gaussians: &GaussianArrays) -> Self {
-        let scales = gaussians.log_scales.iter().map(|&log_scales| scales(log_scales)).collect();
-        let opacities = gaussians.opacity_logits.iter().map(|&logit| opacity(logit)).collect();
-        Self { scales, opacities }
+impl Unchanged {
+    pub(crate) fn of(gaussians: &GaussianArrays, changes: impl Fn(MotionOutput) -> bool) -> Self {
+        let mut unchanged = Self::default();
+        if !changes(MotionOutput::LogScale) {
+            unchanged.scales = gaussians.log_scales.iter().map(|&log_scales| scales(log_scales)).collect();
+        }
+        if !changes(MotionOutput::OpacityLogit) {
+            unchanged.opacities = gaussians.opacity_logits.iter().map(|&logit| opacity(logit)).collect();
+        }
+        unchanged
     }
 }
 
-/// Packs a range of Gaussians, [`FLOATS`] numbers each. Gaussians that cannot be drawn get opacity 0. `sizes` are theirs,
-/// if they are known already.
-pub(crate) fn pack(gaussians: &GaussianArrays, sizes: Option<&Sizes>, range: Range<usize>, packed: &mut [f32]) {
+/// Packs a range of Gaussians, [`FLOATS`] numbers each. Gaussians that cannot be drawn get opacity 0.
+pub(crate) fn pack(gaussians: &GaussianArrays, unchanged: &Unchanged, range: Range<usize>, packed: &mut [f32]) {
     for (gaussian, packed) in range.clone().zip(packed[FLOATS * range.start..].chunks_exact_mut(FLOATS)) {
-        let (scales, opacity) = match sizes {
-            Some(sizes) => (sizes.scales[gaussian], sizes.opacities[gaussian]),
-            None => (scales(gaussians.log_scales[gaussian]), opacity(gaussians.opacity_logits[gaussian])),
-        };
+        let known = unchanged.scales.get(gaussian).copied();
+        let scales = known.unwrap_or_else(|| scales(gaussians.log_scales[gaussian]));
+        let known = unchanged.opacities.get(gaussian).copied();
         packed[..3].copy_from_slice(&gaussians.means[gaussian]);
-        packed[3] = opacity;
+        packed[3] = known.unwrap_or_else(|| opacity(gaussians.opacity_logits[gaussian]));
         packed[4..].fill(0.0);
         if let Some(rotation) = rotation(gaussians.quats[gaussian]) {
             packed[4..].copy_from_slice(&covariance(rotation, scales));
@@ -90,9 +93,9 @@ mod tests {
             further: Vec::new(),
         };
         let mut packed = vec![-1.0; FLOATS];
-        pack(&gaussians, None, 0..1, &mut packed);
+        pack(&gaussians, &Unchanged::default(), 0..1, &mut packed);
         let mut again = vec![-1.0; FLOATS];
-        pack(&gaussians, Some(&Sizes::of(&gaussians)), 0..1, &mut again);
+        pack(&gaussians, &Unchanged::of(&gaussians, |_| false), 0..1, &mut again);
         assert_eq!(packed, again);
         packed
     }

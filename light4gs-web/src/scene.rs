@@ -1,18 +1,17 @@
 //! A decoded scene, of which one time after the other is computed.
 
-use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, MotionOutput, OpenStream, info};
+use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, info};
 
 use crate::description::describe;
 use crate::draw_list::{DrawList, Viewpoint};
-use crate::gaussians::{FLOATS, Sizes, opacity, pack, rotation, scales};
+use crate::gaussians::{FLOATS, Unchanged, opacity, pack, rotation, scales};
 
 /// A decoded scene.
 #[derive(Debug)]
 pub struct OpenScene {
     canonical: GaussianArrays,
     moved: GaussianArrays,
-    /// Where they do not change with time.
-    sizes: Option<Sizes>,
+    unchanged: Unchanged,
     evaluator: MotionEvaluator,
     description: String,
     /// The values for drawing: [`FLOATS`] numbers per Gaussian.
@@ -31,13 +30,10 @@ impl OpenScene {
         let evaluator = MotionEvaluator::new(&scene)?;
         let description = describe(&scene, &info);
         let canonical = scene.gaussians;
-        let change =
-            [MotionOutput::LogScale, MotionOutput::OpacityLogit].into_iter().any(|size| evaluator.changes(size));
-        let sizes = (!change).then(|| Sizes::of(&canonical));
         let floats = FLOATS * canonical.len();
         Ok(Self {
             moved: canonical.clone(),
-            sizes,
+            unchanged: Unchanged::of(&canonical, |output| evaluator.changes(output)),
             canonical,
             evaluator,
             description,
@@ -61,7 +57,7 @@ impl OpenScene {
         let last = last.min(self.count());
         let range = first.min(last)..last;
         self.evaluator.apply(&self.canonical, time, range.clone(), &mut self.moved);
-        pack(&self.moved, self.sizes.as_ref(), range, &mut self.packed);
+        pack(&self.moved, &self.unchanged, range, &mut self.packed);
     }
 
     /// The Gaussians as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
