@@ -113,6 +113,9 @@ keys! {
         stillness: bool = nodes().stillness.is_some(); Flag, "ours", "every Gaussian learns how still it stands";
         /// The logit of standing still at the beginning, where 0 is that of a node's own place.
         stillness_start: f64 = nodes().stillness.unwrap_or(-4.0); Number { least: -30.0, most: 30.0 }, "ours";
+        /// Every Gaussian learns when it is there: its opacity is multiplied by a bell curve over time. From the iteration on
+        /// at which the sampler's window holds all times.
+        lifetime: bool = nodes().lifetime; Flag, "ours", "every Gaussian learns when it is there";
         /// Weight of the term that keeps neighboring nodes in place as seen from each other.
         rigidity: f64 = nodes().rigidity; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
@@ -171,6 +174,7 @@ impl ModelConfig {
             radius: table.radius,
             opacity: table.opacity,
             stillness: table.stillness.then_some(table.stillness_start),
+            lifetime: table.lifetime,
             rigidity: table.rigidity,
             smoothness: table.smoothness,
             translation_rate: table.translation_rate,

@@ -18,7 +18,7 @@ keys! {
         fine_iterations: usize = 30_000; ITERATIONS, "paper: 30000 for D-NeRF, 20000 elsewhere";
         /// Frames per iteration.
         batch_size: usize = 1; Whole { least: 1, most: 1024 }, "paper: 1 for D-NeRF, 2 to 4 elsewhere";
-        /// What rendered views are compared by. The keys of each loss stand in a table of its name.
+        /// The loss by which rendered views are compared with the frames. The keys of each loss are in a table of its name.
         loss: LossKind = LossKind::Photometric;
             Kind { names: LossKind::NAMES, list: "light4gs-train/src/loss/mod.rs" },
             "3DGS", "or \"charbonnier\"";
@@ -33,11 +33,11 @@ keys! {
         /// The keys of the samplers.
         #[serde(flatten)]
         samplers: Samplers;
-        /// The coarse stage sees the frames of so many times from the beginning, 0 those of all. 1 is the reference's
+        /// The coarse stage uses only the frames of this many times from the beginning. 0: all. 1 is the reference's
         /// `zerostamp_init`.
         #[serde(with = "optional")]
         coarse_times: Option<usize> = None;
-            ITERATION, "reference", "the coarse stage sees so many times from the beginning; 0 = all";
+            ITERATION, "reference", "frames of this many times from the beginning; 0 = all";
         /// Iterations after which the active degree of the spherical harmonics grows by one.
         sh_degree_interval: usize = 1000; INTERVAL, "3DGS";
         /// Iterations between two checkpoints.

@@ -20,7 +20,7 @@ struct Shaken;
 
 impl ParameterMapper for Shaken {
     fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let shaken = ["translations", "rotations", "log_radii", "stillness", "quats"];
+        let shaken = ["translations", "rotations", "log_radii", "stillness", "lifetime", "quats"];
         if !shaken.iter().any(|name| path.ends_with(name)) {
             return parameter;
         }
@@ -40,12 +40,13 @@ fn scene(config: NodesFieldConfig, device: &Device) -> DynamicScene<NodesField> 
     scene
 }
 
-fn configurations() -> [NodesFieldConfig; 3] {
+fn configurations() -> [NodesFieldConfig; 4] {
     let config = NodesFieldConfig::new;
     [
         config().with_nodes(9),
         config().with_nodes(9).with_stillness(None),
         config().with_nodes(1).with_times_a_knot(20.0),
+        config().with_nodes(5).with_lifetime(true),
     ]
 }
 
@@ -75,11 +76,31 @@ fn the_codec_moves_gaussians_as_the_model_does() {
                 assert!(exact.means != data.gaussians.means, "{name}: nothing moves");
                 assert_close(name, exact.means.as_flattened(), &values_of(&moved.means), 1e-4);
                 assert_close(name, exact.quats.as_flattened(), &values_of(&moved.quats), 1e-4);
+                assert_close(name, &exact.opacity_logits, &values_of(&moved.opacity_logits), 1e-4);
             }
             let again = DynamicScene::<BuiltInField>::from_arrays(&data, &device).unwrap();
             assert_eq!(again.to_arrays(SceneMeta::default()).unwrap(), data, "{name}");
         }
     }
+}
+
+/// Before a sampler's window holds all times, nothing fades.
+#[test]
+fn gaussians_fade_once_all_times_are_seen() {
+    let device = Device::flex().autodiff();
+    let config = NodesFieldConfig::new().with_nodes(3).with_lifetime(true);
+    let mut scene = map_parameters(scene(config, &device), &mut Shaken);
+    let at_rest = values_of(&scene.gaussians.opacity_logits.val());
+    let mut at_the_end = |window: [f32; 2]| {
+        let DynamicScene { gaussians, coordinates, field, .. } = &mut scene;
+        let position = FinePosition { window, ..POSITION };
+        field.begin_step(&SceneAtRest { gaussians, coordinates, extent: EXTENT }, &position);
+        values_of(&scene.at(1.0).opacity_logits)
+    };
+    assert_eq!(at_the_end([0.3, 1.0]), at_rest);
+    let faded = at_the_end([0.0, 1.0]);
+    assert!(faded.iter().zip(&at_rest).all(|(faded, before)| *faded < before + 1e-5));
+    assert!(faded.iter().zip(&at_rest).any(|(faded, before)| *faded < before - 0.1));
 }
 
 /// One node that is turned turns everything, wherever it is.

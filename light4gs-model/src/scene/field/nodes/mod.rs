@@ -9,9 +9,11 @@
 //! |---|---|
 //! | `trajectory` | splines over time, and the nodes' poses at a time |
 //! | `placement` | where the nodes are when motion begins |
+//! | `lifetime` | what comes and goes |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
 
+mod lifetime;
 mod placement;
 mod regularizer;
 mod stream;
@@ -25,6 +27,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData, s};
 use light4gs_codec::MotionArrays;
 
+pub use lifetime::LIFETIME;
 use trajectory::Poses;
 
 use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
@@ -64,6 +67,9 @@ pub struct NodesFieldConfig {
     /// Every Gaussian has a share of its own that stands still, with this logit at the beginning. None: all follow the nodes alone.
     #[config(default = "Some(-4.0)")]
     pub stillness: Option<f64>,
+    /// Every Gaussian learns when it is there.
+    #[config(default = false)]
+    pub lifetime: bool,
     /// Weight of the term that keeps neighboring nodes in place as seen from each other, for distances as shares of the
     /// scene's extent.
     #[config(default = 1.0)]
@@ -110,6 +116,9 @@ pub struct NodesField {
     unit: Param<Tensor<1>>,
     #[module(skip)]
     config: NodesFieldConfig,
+    /// Whether Gaussians may come and go: before all times are seen, what is lost shall be followed, not fade.
+    #[module(skip)]
+    fades: bool,
 }
 
 impl NodesField {
@@ -122,6 +131,7 @@ impl NodesField {
             rotations: zeros([knots, 4 * nodes]),
             unit: Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false),
             config,
+            fades: true,
         }
     }
 
@@ -152,7 +162,7 @@ impl DeformationField for NodesField {
             let attribute = Attribute::new(STILLNESS, 1).with_start(vec![logit as f32]).constant();
             attribute.with_learning_rate(STILLNESS_RATE).with_step(STILLNESS_STEP)
         };
-        config.stillness.map(row).into_iter().collect()
+        config.stillness.map(row).into_iter().chain(config.lifetime.then(lifetime::attribute)).collect()
     }
 
     /// One node that does not move, until there is a cloud to make more from.
@@ -175,7 +185,11 @@ impl DeformationField for NodesField {
             poses: Tensor::cat(vec![matrices, offsets, quats], 1),
         });
         let part = |columns: Range<usize>| moved.clone().slice(s![.., columns]);
-        GaussianTensors { means: part(0..3), quats: part(3..7), ..canonical }
+        let opacity_logits = match canonical.further(LIFETIME) {
+            Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),
+            _ => canonical.opacity_logits.clone(),
+        };
+        GaussianTensors { means: part(0..3), quats: part(3..7), opacity_logits, ..canonical }
     }
 
     fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
@@ -185,7 +199,8 @@ impl DeformationField for NodesField {
     /// Knots that no training view has shown yet go on as those before them did.
     fn begin_step(&mut self, _: &SceneAtRest<'_>, position: &FinePosition) {
         let [low, high] = position.window;
-        if low > 0.0 || high < 1.0 {
+        self.fades = low <= 0.0 && high >= 1.0;
+        if !self.fades {
             let continued = |knots: &Param<Tensor<2>>| {
                 let value = trajectory::continued(knots.val(), low, high);
                 Param::initialized(knots.id, value.detach().require_grad())

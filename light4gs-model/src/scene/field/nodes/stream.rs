@@ -9,7 +9,7 @@ use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network};
 
 use super::trajectory::{DIAGONAL, ELEMENTS, FACTORS, OTHERS};
-use super::{MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, numbers, tensor};
+use super::{LIFETIME, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, lifetime, numbers, tensor};
 use crate::scene::ModelError;
 use crate::scene::field::DeformationField;
 
@@ -18,7 +18,7 @@ const PRODUCT: [usize; 16] = [0, 5, 6, 7, 1, 0, 7, 2, 2, 3, 0, 5, 3, 6, 1, 0];
 /// A pose that moves nothing.
 const IDENTITY: [f32; 16] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
-fn affine(scale: f32, offset: f32) -> Operation {
+pub(super) fn affine(scale: f32, offset: f32) -> Operation {
     Operation::Affine { scale, offset }
 }
 
@@ -144,13 +144,17 @@ impl NodesField {
     pub(super) fn describe(&self) -> MotionArrays {
         let nodes = self.nodes();
         let still = self.config.stillness.is_some();
-        let (network, [time, means, quats]) = Network::new([1, 3, 4]);
+        let (mut network, [time, means, quats]) = Network::new([1, 3, 4]);
+        let mut sources = vec![MotionSource::Time, source("means"), source("quats")];
+        // Further inputs, behind these.
+        let mut input = |name: &str, width: u32| {
+            network.inputs.push(width);
+            sources.push(source(name));
+            Value(network.inputs.len() as u32 - 1)
+        };
+        let stillness = still.then(|| input(STILLNESS, 1));
+        let lifetime = self.config.lifetime.then(|| [input("opacity_logits", 1), input(LIFETIME, 2)]);
         let mut description = Description { network, nodes };
-        let stillness = still.then(|| {
-            // One more input, behind the others.
-            description.network.inputs.push(1);
-            Value(3)
-        });
         let anchors = numbers(self.world_anchors().transpose());
         let anchors = description.network.constant(time, 1, anchors);
         let basis = description.basis(time, self.knots());
@@ -181,11 +185,12 @@ impl NodesField {
         let mut network = description.network;
         network.output(position);
         network.output(quaternion);
-
-        let attributes = ["means", "quats"].into_iter().chain(still.then_some(STILLNESS));
-        let attributes = attributes.map(|name| MotionSource::Attribute(name.to_owned()));
-        let sources = [MotionSource::Time].into_iter().chain(attributes).collect();
-        let outputs = vec![MotionOutput::NewPosition, MotionOutput::NewQuaternion];
+        let mut outputs = vec![MotionOutput::NewPosition, MotionOutput::NewQuaternion];
+        if let Some([logit, lifetime]) = lifetime {
+            let faded = lifetime::describe(&mut network, logit, lifetime, time);
+            network.output(faded);
+            outputs.push(MotionOutput::NewOpacityLogit);
+        }
         let network = MotionNetwork { network, sources, outputs };
         MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() }
     }
@@ -216,8 +221,9 @@ impl NodesField {
         if !fits || unused.into_iter().flatten().any(|number| *number != 0.0) {
             return Err(wrong());
         }
-        let still = motion.sources.contains(&MotionSource::Attribute(STILLNESS.to_owned()));
-        let config = NodesFieldConfig::new().with_nodes(nodes).with_stillness(still.then_some(0.0));
+        let [still, lives] = [STILLNESS, LIFETIME].map(|name| motion.sources.contains(&source(name)));
+        let config = NodesFieldConfig::new().with_nodes(nodes);
+        let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives);
         let mut field = Self::zeros(config, nodes, knots, device);
         field.anchors = Param::from_tensor(tensor(anchors.bias.clone(), [3, nodes], device).transpose());
         field.log_radii = Param::from_tensor(tensor(log_radii.bias.clone(), [nodes, 1], device));
@@ -232,6 +238,10 @@ impl NodesField {
         });
         if same { Ok(field) } else { Err(wrong()) }
     }
+}
+
+fn source(attribute: &str) -> MotionSource {
+    MotionSource::Attribute(attribute.to_owned())
 }
 
 /// From knots `[K, C B]`, the C of a node behind each other, to a layer from the basis `[K]` to C blocks of B.
