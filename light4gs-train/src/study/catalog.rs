@@ -2,7 +2,7 @@
 
 macro_rules! studies {
     ($($name:literal),* $(,)?) => {
-        /// Names of the built-in studies, in the paper's order.
+        /// Names of the built-in studies, in the paper's order, then our own.
         pub const NAMES: &[&str] = &[$($name),*];
 
         const TEXTS: &[&str] = &[$(include_str!(concat!("../../configs/studies/", $name, ".toml"))),*];
@@ -21,6 +21,7 @@ studies![
     "latency",
     "pruning",
     "sizes",
+    "motion",
 ];
 
 /// The text of a study.
