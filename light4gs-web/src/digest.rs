@@ -64,7 +64,7 @@ mod tests {
             let bytes = std::fs::read(format!("{root}/tests/golden-streams/{name}.l4gs")).expect("a golden stream");
             format!("{:016x}", super::digest(&light4gs_codec::decode(&bytes).expect("a scene")))
         };
-        let names = ["float32", "compact", "compact.decoded", "paper", "paper.decoded"];
+        let names = ["float32", "compact", "compact.decoded", "paper", "paper.decoded", "nodes", "nodes.decoded"];
         let found: String = names.iter().map(|name| format!("{name} {}\n", digest_of(name))).collect();
         assert_eq!(list, found);
     }

@@ -1,11 +1,13 @@
 // Decodes golden streams in WebAssembly: `node golden.mjs light4gs_wasm_decoder.wasm ../golden-streams`. Each must give the
-// bytes that decoding on x86-64 gave: those of NAME.decoded.l4gs, or the stream itself where nothing was lost.
+// bytes that decoding on x86-64 gave: those of NAME.decoded.l4gs, or the stream itself where nothing was lost. Its frames
+// must be those of frames.txt: name, time, checksum.
 import { createHash } from "node:crypto";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 
 const [module, folder] = process.argv.slice(2);
 const { instance } = await WebAssembly.instantiate(readFileSync(module), {});
-const { memory, input: place, decode, answer } = instance.exports;
+const { memory, input: place, decode, frame, answer } = instance.exports;
+const frames = readFileSync(`${folder}/frames.txt`, "utf8").trim().split("\n").map((line) => line.split(" "));
 
 const digest = (bytes) => createHash("sha256").update(bytes).digest("hex");
 let failures = 0;
@@ -23,7 +25,15 @@ for (const name of readdirSync(folder).filter((name) => name.endsWith(".l4gs")).
     const decoded = `${folder}/${name.replace(/\.l4gs$/, ".decoded.l4gs")}`;
     const expected = digest(existsSync(decoded) ? readFileSync(decoded) : input);
     const same = digest(bytes) === expected;
-    console.log(`${name}: ${digest(bytes)} ${same ? "as on x86-64" : `expected ${expected}`}`);
+    const shown = frames.filter(([of]) => `${of}.l4gs` === name);
+    console.log(`${name}: ${digest(bytes)} ${same ? "as on x86-64" : `expected ${expected}`}, ${shown.length} frames`);
     failures += same ? 0 : 1;
+    for (const [, time, checksum] of shown) {
+        const found = (frame(Number(time)) >>> 0).toString(16).padStart(8, "0");
+        if (found !== checksum) {
+            console.error(`${name} at ${time}: ${found}, expected ${checksum}`);
+            failures += 1;
+        }
+    }
 }
 process.exit(failures === 0 ? 0 : 1);

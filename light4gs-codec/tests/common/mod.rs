@@ -36,11 +36,11 @@ pub fn gaussians(count: usize, sh_degree: u8) -> GaussianArrays {
     }
 }
 
-/// The checksum of what moves, appended to that of earlier frames: means, then quaternions, bit by bit.
-pub fn frame_checksum(before: u32, moved: &GaussianArrays) -> u32 {
-    let numbers = moved.means.as_flattened().iter().chain(moved.quats.as_flattened());
+/// The checksum of a frame: all attributes in the order of [`GaussianArrays::attributes`], bit by bit.
+pub fn frame_checksum(moved: &GaussianArrays) -> u32 {
+    let numbers = moved.attributes().flat_map(|attribute| attribute.values);
     let bytes: Vec<u8> = numbers.flat_map(|number| number.to_bits().to_le_bytes()).collect();
-    crc32c::crc32c_append(before, &bytes)
+    crc32c::crc32c(&bytes)
 }
 
 /// An optional further attribute.

@@ -3,7 +3,9 @@
 use crate::common;
 
 use common::{compression::tiny, sample};
-use light4gs_codec::{Profile, decode, encode, encode_compressed, info};
+use light4gs_codec::{MotionEvaluator, MotionSource, Profile, decode, encode, encode_compressed, info};
+
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden-streams");
 
 /// A stream without loss. A change of its bytes is a change of the format, which is free until it is released.
 const FLOAT32: &[u8] = include_bytes!("../../../tests/golden-streams/float32.l4gs");
@@ -14,8 +16,9 @@ fn float32_reads_and_writes_as_it_did() {
     assert_eq!(encode(&sample()).unwrap(), FLOAT32);
 }
 
-/// Compressed streams that were written once, each with the scene that it decoded to then, as a stream without loss.
-const COMPRESSED: [(Profile, &[u8], &[u8]); 2] = [
+/// Compressed streams that were written once, each with the scene that it decoded to then, as a stream without loss: two
+/// with a hexplane, one with control nodes.
+const COMPRESSED: [(Profile, &[u8], &[u8]); 3] = [
     (
         Profile::Compact,
         include_bytes!("../../../tests/golden-streams/compact.l4gs"),
@@ -26,7 +29,15 @@ const COMPRESSED: [(Profile, &[u8], &[u8]); 2] = [
         include_bytes!("../../../tests/golden-streams/paper.l4gs"),
         include_bytes!("../../../tests/golden-streams/paper.decoded.l4gs"),
     ),
+    (Profile::Compact, NODES, include_bytes!("../../../tests/golden-streams/nodes.decoded.l4gs")),
 ];
+
+/// Twelve control nodes, and 150 Gaussians that follow them or stand still. Only a model can make it:
+/// `tests/tests/parts/golden_nodes.rs`.
+const NODES: &[u8] = include_bytes!("../../../tests/golden-streams/nodes.l4gs");
+/// Frames of the streams at some times: name, time, checksum.
+const FRAMES: &str = include_str!("../../../tests/golden-streams/frames.txt");
+const TIMES: [f32; 5] = [0.0, 0.25, 0.37, 0.5, 1.0];
 
 #[test]
 fn compressed_streams_read_as_they_did() {
@@ -49,18 +60,54 @@ fn every_build_writes_the_same_bytes() {
     assert_eq!(checksums, [0xdf79_7e8a, 0x3768_1c72], "{checksums:#x?}");
 }
 
+/// A line for each frame of a stream, with what does not depend on the time kept or computed anew.
+fn frames(name: &str, bytes: &[u8], most_bytes: u64) -> String {
+    let scene = decode(bytes).unwrap();
+    let evaluator = MotionEvaluator::keeping(&scene, most_bytes).unwrap();
+    let frame = |time: f32| {
+        let mut moved = scene.gaussians.clone();
+        evaluator.apply(&scene.gaussians, time, 0..moved.len(), &mut moved);
+        format!("{name} {time} {:08x}\n", common::frame_checksum(&moved))
+    };
+    TIMES.map(frame).concat()
+}
+
+/// A player shows the same Gaussians on every machine.
+#[test]
+fn frames_are_those_that_were_shown() {
+    for most_bytes in [0, 1 << 20] {
+        let streams =
+            [("float32", FLOAT32), ("compact", COMPRESSED[0].1), ("paper", COMPRESSED[1].1), ("nodes", NODES)];
+        let found = streams.map(|(name, bytes)| frames(name, bytes, most_bytes)).concat();
+        assert_eq!(found, FRAMES);
+    }
+}
+
+#[test]
+fn the_golden_nodes_have_stillness_and_move() {
+    let scene = decode(NODES).unwrap();
+    let motion = scene.motion.network.as_ref().unwrap();
+    assert!(motion.sources.contains(&MotionSource::Attribute("stillness".into())));
+    assert_ne!(scene.positions_at(0.2).unwrap(), scene.positions_at(0.8).unwrap());
+}
+
 #[test]
 #[ignore = "writes the golden streams anew, which only a change of the format may ask for"]
 fn write_golden_streams() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/golden-streams");
-    std::fs::write(format!("{folder}/float32.l4gs"), encode(&sample()).unwrap()).unwrap();
-    for (profile, ..) in COMPRESSED {
+    let write = |name: &str, bytes: &[u8]| std::fs::write(format!("{FOLDER}/{name}"), bytes).unwrap();
+    let float32 = encode(&sample()).unwrap();
+    write("float32.l4gs", &float32);
+    let mut shown = frames("float32", &float32, 0);
+    for profile in [Profile::Compact, Profile::Paper] {
         let (scene, input) = tiny(profile);
         let encoded = encode_compressed(&scene, &input).unwrap();
-        std::fs::write(format!("{folder}/{}.l4gs", profile.name()), &encoded.bytes).unwrap();
-        let decoded = encode(&encoded.decoded).unwrap();
-        std::fs::write(format!("{folder}/{}.decoded.l4gs", profile.name()), decoded).unwrap();
+        write(&format!("{}.l4gs", profile.name()), &encoded.bytes);
+        write(&format!("{}.decoded.l4gs", profile.name()), &encode(&encoded.decoded).unwrap());
+        shown += &frames(profile.name(), &encoded.bytes, 0);
     }
+    let nodes = std::fs::read(format!("{FOLDER}/nodes.l4gs")).unwrap();
+    write("nodes.decoded.l4gs", &encode(&decode(&nodes).unwrap()).unwrap());
+    write("frames.txt", (shown + &frames("nodes", &nodes, 0)).as_bytes());
 }
 
 /// A decoder for this one stream, written from `docs/format.md` alone.
