@@ -85,7 +85,7 @@ impl Default for Limits {
             scales: 16,
             networks: 32,
             nodes: 256,
-            layer_width: 1 << 16,
+            layer_width: 1 << 17,
             layer_weights: 1 << 21,
             memory_bytes: 256 << 20,
             nanoseconds: 1_800_000_000,

@@ -2,13 +2,13 @@
 
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
-use light4gs_codec::network::Operation;
-use light4gs_codec::{MotionArrays, MotionEvaluator, SceneMeta, decode, encode};
+use light4gs_codec::network::{Layer, Operation, Value};
+use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, SceneMeta, decode, encode};
 use light4gs_data::PointCloud;
 use light4gs_model::parameters::{ParameterMapper, map_parameters};
 use light4gs_model::{
-    BuiltInField, DeformationField, DynamicScene, DynamicSceneConfig, FinePosition, GaussiansConfig, NodesField,
-    NodesFieldConfig, SceneAtRest,
+    BuiltInField, DeformationField, DynamicScene, DynamicSceneConfig, FinePosition, GaussiansConfig, MOST_KNOTS,
+    MOST_NODES, NodesField, NodesFieldConfig, SceneAtRest,
 };
 use light4gs_tests::golden::{assert_close, devices, values_of};
 
@@ -32,8 +32,12 @@ impl ParameterMapper for Shaken {
 
 /// A cloud of 200 Gaussians and nodes among them.
 fn scene(config: NodesFieldConfig, device: &Device) -> DynamicScene<NodesField> {
+    many(200, config, device)
+}
+
+fn many(gaussians: usize, config: NodesFieldConfig, device: &Device) -> DynamicScene<NodesField> {
     device.seed(3);
-    let cloud = PointCloud::random(200, 1.0, 4);
+    let cloud = PointCloud::random(gaussians, 1.0, 4);
     let mut scene = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), config).init(&cloud, device);
     let DynamicScene { gaussians, coordinates, field, .. } = &mut scene;
     field.begin_motion(&SceneAtRest { gaussians, coordinates, extent: EXTENT }, &POSITION);
@@ -133,21 +137,59 @@ fn what_stands_still_stands_still() {
     assert_close("far from every node", &values_of(&scene.at(0.6).means), &values_of(&far.val()), 1e-5);
 }
 
+/// What a configuration may ask for is a file that everybody reads.
+#[test]
+fn the_largest_field_is_within_the_limits_for_strangers() {
+    let device = Device::flex();
+    let config = NodesFieldConfig::new().with_nodes(MOST_NODES).with_times_a_knot(0.01).with_lifetime(true);
+    let scene = many(1000, config, &device);
+    let data = scene.to_arrays(SceneMeta::default()).unwrap();
+    let knots = data.motion.network.as_ref().unwrap().network.layers().map(|layer| layer.inputs).max();
+    assert_eq!((scene.field.nodes(), knots), (MOST_NODES, Some(MOST_KNOTS as u32)));
+    assert!(decode(&encode(&data).unwrap()).unwrap() == data);
+}
+
+/// Every field by its name, before anything is made of it.
 #[test]
 fn other_networks_are_refused() {
     let scene = scene(NodesFieldConfig::new().with_nodes(4), &Device::flex());
-    let refused = |spoil: &dyn Fn(&mut MotionArrays)| {
+    let refused = |expected: &str, spoil: &dyn Fn(&mut MotionNetwork)| {
         let mut arrays = scene.field.to_arrays().unwrap();
-        spoil(&mut arrays);
+        spoil(arrays.network.as_mut().unwrap());
         let error = NodesField::from_arrays(&arrays, None, &Device::flex()).unwrap_err().to_string();
-        assert!(error.contains("control nodes"), "{error}");
+        assert!(error.contains("the network is not that of control nodes") && error.contains(expected), "{error}");
     };
-    refused(&|arrays| arrays.network = None);
-    refused(&|arrays| drop(arrays.network.as_mut().unwrap().network.nodes.pop()));
-    refused(&|arrays| drop(arrays.network.as_mut().unwrap().sources.pop()));
-    refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.inputs = 0));
-    refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.outputs = u32::MAX));
-    refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.bias.truncate(1)));
-    refused(&|arrays| arrays.network.as_mut().unwrap().network.layers_mut().for_each(|layer| layer.bias[0] += 1.0));
-    refused(&|arrays| arrays.network.as_mut().unwrap().network.nodes[1].operation = Operation::Exponential);
+    let none = MotionArrays { network: None, ..scene.field.to_arrays().unwrap() };
+    assert!(NodesField::from_arrays(&none, None, &Device::flex()).unwrap_err().to_string().contains("there is none"));
+
+    let layer = |motion: &mut MotionNetwork, index: usize, spoil: &dyn Fn(&mut Layer)| {
+        spoil(motion.network.layers_mut().nth(index).unwrap());
+    };
+    let [anchors, translations, rotations, radii] = [0, 1, 2, 3];
+    refused("layers, expected 4", &|motion| {
+        motion.network.constant(Value(0), 1, vec![1.0]);
+    });
+    refused("0 nodes, expected 1 to 512", &|motion| layer(motion, radii, &|layer| layer.outputs = 0));
+    refused("4294967295 nodes", &|motion| layer(motion, radii, &|layer| layer.outputs = u32::MAX));
+    refused("3 knots, expected 4 to 512", &|motion| layer(motion, translations, &|layer| layer.inputs = 3));
+    refused("4294967295 knots", &|motion| layer(motion, translations, &|layer| layer.inputs = u32::MAX));
+    refused("of the anchors are [12, 1, 12], expected [12, 12, 12]", &|motion| {
+        layer(motion, anchors, &|layer| layer.bias.truncate(1));
+    });
+    refused("of the translations are [12, 12, 1]", &|motion| {
+        layer(motion, translations, &|layer| layer.weight.truncate(1))
+    });
+    refused("of the rotations are [4294967295, 16", &|motion| {
+        layer(motion, rotations, &|layer| layer.outputs = u32::MAX)
+    });
+    refused("of the logarithms of radii are [4, 5, 4]", &|motion| layer(motion, radii, &|layer| layer.bias.push(0.0)));
+    refused("one of the weights of the anchors is 1", &|motion| layer(motion, anchors, &|layer| layer.weight[3] = 1.0));
+    refused("weights of the logarithms", &|motion| layer(motion, radii, &|layer| layer.weight[0] = f32::NAN));
+    refused("biases of the translations", &|motion| layer(motion, translations, &|layer| layer.bias[0] = 1.0));
+    refused("biases of the rotations", &|motion| layer(motion, rotations, &|layer| layer.bias[0] = f32::INFINITY));
+    let others = "operations, sources or outputs are others";
+    refused(others, &|motion| drop(motion.network.nodes.pop()));
+    refused(others, &|motion| drop(motion.sources.pop()));
+    refused(others, &|motion| motion.outputs.swap(0, 1));
+    refused(others, &|motion| motion.network.nodes[1].operation = Operation::Exponential);
 }

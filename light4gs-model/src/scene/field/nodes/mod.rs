@@ -41,7 +41,7 @@ pub const STILLNESS: &str = "stillness";
 /// Most nodes of a field.
 pub const MOST_NODES: usize = 512;
 /// Most knots of a trajectory.
-pub const MOST_KNOTS: usize = 1024;
+pub const MOST_KNOTS: usize = 512;
 
 /// How fast a Gaussian's stillness is learned, and its step in a file.
 const STILLNESS_RATE: f64 = 0.02;

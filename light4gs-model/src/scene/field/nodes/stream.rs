@@ -52,11 +52,24 @@ impl Description {
         self.node(Operation::Select(channels), &[value])
     }
 
+    /// So many channels that count up from a number. They double from step to step: a network has few nodes.
+    fn count_from(&mut self, first: f32, any: Value, count: usize) -> Value {
+        let mut numbers = self.node(affine(0.0, first), &[any]);
+        let mut so_far = 1;
+        while so_far < count {
+            let next = self.node(affine(1.0, so_far as f32), &[numbers]);
+            numbers = self.node(Operation::Concatenate, &[numbers, next]);
+            so_far *= 2;
+        }
+        self.channels(numbers, 0..count)
+    }
+
     /// How much each knot counts: from `|t - knot|` in knots, the difference of two truncated cubes.
     fn basis(&mut self, time: Value, knots: usize) -> Value {
-        let distances: Vec<Value> =
-            (0..knots).map(|knot| self.node(affine((knots - 3) as f32, 1.0 - knot as f32), &[time])).collect();
-        let distances = self.node(Operation::Concatenate, &distances);
+        let time = self.node(affine((knots - 3) as f32, 0.0), &[time]);
+        let times = self.channels(time, vec![0; knots]);
+        let places = self.count_from(-1.0, time, knots);
+        let distances = self.node(Operation::Subtract, &[times, places]);
         let square = self.node(Operation::Multiply, &[distances, distances]);
         let distances = self.node(Operation::SquareRoot, &[square]);
         let [outer, inner] = [(2.0, 1.0 / 6.0), (1.0, 4.0 / 6.0)].map(|(end, factor)| {
@@ -115,8 +128,8 @@ impl Description {
 
     /// Behind each block of the poses, that of a node which never moves.
     fn with_identity(&mut self, poses: Value) -> Value {
-        let constants = self.node(affine(0.0, 0.0), &[poses]);
-        let zero = self.channels(constants, [0]);
+        let any = self.channels(poses, [0]);
+        let zero = self.node(affine(0.0, 0.0), &[any]);
         let one = self.node(affine(1.0, 1.0), &[zero]);
         let all = self.node(Operation::Concatenate, &[poses, zero, one]);
         let nodes = self.nodes;
@@ -200,26 +213,43 @@ impl NodesField {
     /// # Errors
     /// Any other network than one that [`Self::describe`] makes.
     pub(super) fn of_description(arrays: &MotionArrays, device: &Device) -> Result<Self, ModelError> {
-        let wrong = || ModelError::Motion("the network is not that of control nodes".to_owned());
-        let motion = arrays.network.as_ref().ok_or_else(wrong)?;
+        let wrong = |what: String| ModelError::Motion(format!("the network is not that of control nodes: {what}"));
+        let motion = arrays.network.as_ref().ok_or_else(|| wrong("there is none".to_owned()))?;
         let layers: Vec<&Layer> = motion.network.layers().collect();
-        let &[anchors, translations, rotations, log_radii] = layers.as_slice() else { return Err(wrong()) };
-        let (nodes, knots) = (log_radii.outputs as usize, translations.inputs as usize);
-        // A file may come from anybody: sizes first.
-        let is = |layer: &Layer, components: usize, inputs: usize| {
-            let (outputs, bias) = (components * nodes, layer.bias.len());
-            layer.outputs as usize == outputs && bias == outputs && layer.weight.len() == outputs * inputs
+        let &[anchors, translations, rotations, log_radii] = layers.as_slice() else {
+            return Err(wrong(format!("{} layers, expected 4", layers.len())));
         };
-        let fits = (1..=MOST_NODES).contains(&nodes)
-            && (4..=MOST_KNOTS).contains(&knots)
-            && is(anchors, 3, 1)
-            && is(log_radii, 1, 1)
-            && is(translations, 3, knots)
-            && is(rotations, 4, knots);
+        // A file may come from anybody: sizes first.
+        let (nodes, knots) = (log_radii.outputs as usize, translations.inputs as usize);
+        if !(1..=MOST_NODES).contains(&nodes) {
+            return Err(wrong(format!("{nodes} nodes, expected 1 to {MOST_NODES}")));
+        }
+        if !(4..=MOST_KNOTS).contains(&knots) {
+            return Err(wrong(format!("{knots} knots, expected 4 to {MOST_KNOTS}")));
+        }
+        for (name, layer, components, inputs) in [
+            ("anchors", anchors, 3, 1),
+            ("translations", translations, 3, knots),
+            ("rotations", rotations, 4, knots),
+            ("logarithms of radii", log_radii, 1, 1),
+        ] {
+            let found = [layer.outputs as usize, layer.bias.len(), layer.weight.len()];
+            let expected = [components * nodes, components * nodes, components * nodes * inputs];
+            if found != expected {
+                let what = format!("outputs, biases and weights of the {name} are {found:?}, expected {expected:?}");
+                return Err(wrong(what));
+            }
+        }
         // What we do not keep must not do anything in the codec either.
-        let unused = [&anchors.weight, &log_radii.weight, &translations.bias, &rotations.bias];
-        if !fits || unused.into_iter().flatten().any(|number| *number != 0.0) {
-            return Err(wrong());
+        for (name, numbers) in [
+            ("weights of the anchors", &anchors.weight),
+            ("weights of the logarithms of radii", &log_radii.weight),
+            ("biases of the translations", &translations.bias),
+            ("biases of the rotations", &rotations.bias),
+        ] {
+            if let Some(number) = numbers.iter().find(|number| **number != 0.0) {
+                return Err(wrong(format!("one of the {name} is {number}, expected 0")));
+            }
         }
         let [still, lives] = [STILLNESS, LIFETIME].map(|name| motion.sources.contains(&source(name)));
         let config = NodesFieldConfig::new().with_nodes(nodes);
@@ -236,7 +266,7 @@ impl NodesField {
                 && own.sources == motion.sources
                 && own.outputs == motion.outputs
         });
-        if same { Ok(field) } else { Err(wrong()) }
+        if same { Ok(field) } else { Err(wrong("operations, sources or outputs are others".to_owned())) }
     }
 }
 
