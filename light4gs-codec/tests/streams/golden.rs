@@ -33,7 +33,7 @@ const COMPRESSED: [(Profile, &[u8], &[u8]); 3] = [
 ];
 
 /// Twelve control nodes, and 150 Gaussians that follow them or stand still. Only a model can make it:
-/// `tests/tests/parts/golden_nodes.rs`.
+/// `tests/tests/parts/control_nodes/golden.rs`.
 const NODES: &[u8] = include_bytes!("../../../tests/golden-streams/nodes.l4gs");
 /// Frames of the streams at some times: name, time, checksum.
 const FRAMES: &str = include_str!("../../../tests/golden-streams/frames.txt");

@@ -8,7 +8,6 @@ mod control_nodes;
 mod every_legal_value;
 mod exact_networks;
 mod finite_differences;
-mod golden_nodes;
 mod gpu_kernels;
 mod import;
 mod plane_convolutions;

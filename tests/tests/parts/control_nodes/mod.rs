@@ -1,5 +1,7 @@
 //! Control nodes: what a file describes of them is what trains, and hostile descriptions are refused.
 
+mod golden;
+
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::network::{Layer, Operation, Value};
