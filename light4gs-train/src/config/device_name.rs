@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+use crate::keys::nearest;
+
 /// The back ends by name; `wgpu` may be followed by an adapter, as in `wgpu:0` or `wgpu:cpu`.
 pub const DEVICES: &[&str] = &["ndarray", "flex", "wgpu"];
 
@@ -86,7 +88,7 @@ impl FromStr for DeviceName {
     fn from_str(name: &str) -> Result<Self, UnknownDevice> {
         let unknown = || {
             let known = ["ndarray", "flex", "wgpu", "wgpu:0", "wgpu:discrete", "wgpu:integrated", "wgpu:cpu"];
-            let nearest = known.into_iter().min_by_key(|known| strsim::damerau_levenshtein(known, name));
+            let nearest = nearest(known, name);
             UnknownDevice { name: name.to_owned(), nearest: nearest.expect("some names are known") }
         };
         match name {

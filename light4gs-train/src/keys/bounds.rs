@@ -6,6 +6,8 @@ use std::fmt;
 use light4gs_codec::checks::LEAST_STEP;
 use serde_json::Value;
 
+use super::nearest;
+
 /// The values that a key may have. Conditions on several keys together are in `config/validate.rs`.
 #[derive(Clone, Copy, Debug)]
 pub enum Bounds {
@@ -137,7 +139,7 @@ impl Bounds {
                 if holds { None } else { outside(&Short(float)) }
             }
             (LayoutOrNone { names }, Value::String(name)) => {
-                let nearest = names().into_iter().min_by_key(|known| strsim::damerau_levenshtein(known, name))?;
+                let nearest = nearest(names(), name)?;
                 let known = name.is_empty() || names().contains(&name.as_str());
                 let problem = || format!("is `{name}`, and the nearest layout is `{nearest}`; it must be {self}");
                 (!known).then(problem)

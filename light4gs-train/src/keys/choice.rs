@@ -17,9 +17,15 @@ pub struct UnknownChoice {
 impl UnknownChoice {
     /// `known` must not be empty.
     pub(crate) fn new(what: &'static str, name: &str, known: &'static [&'static str]) -> Self {
-        let nearest = known.iter().min_by_key(|known| strsim::damerau_levenshtein(known, name));
-        Self { what, name: name.to_owned(), nearest: nearest.expect("some names are known"), known }
+        let nearest = nearest(known.iter().copied(), name).expect("some names are known");
+        Self { what, name: name.to_owned(), nearest, known }
     }
+}
+
+/// The most similar of the known names: one that begins with the name if there is one.
+pub(crate) fn nearest<'a>(known: impl IntoIterator<Item = &'a str>, name: &str) -> Option<&'a str> {
+    let difference = |known: &&str| (!known.starts_with(name), strsim::damerau_levenshtein(known, name));
+    known.into_iter().min_by_key(difference)
 }
 
 /// Declares an enum whose variants have names: `Display` and serde write the name, `FromStr` and serde read it. An

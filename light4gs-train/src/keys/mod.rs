@@ -22,7 +22,7 @@ pub(crate) use bounds::{
     INTERVAL, ITERATION, ITERATIONS, MOST_GAUSSIANS, MOST_INTEGER, RATE, SHARE, STEP, THRESHOLD, TOLERANCE, WEIGHT,
 };
 pub use choice::UnknownChoice;
-pub(crate) use choice::{choice, named, serde_by_name};
+pub(crate) use choice::{choice, named, nearest, serde_by_name};
 pub(crate) use declaration::has_no_keys;
 pub(crate) use declaration::{Entry, KeyTable, default_value, entry, keys};
 pub(crate) use kinds::kinds;

@@ -174,6 +174,7 @@ fn what_is_wrong_is_said_before_anything_is_written() {
         assert!(!w.path("study").exists());
     };
     refused("context", &[], &["context", "nearest is `context-model`", ".toml"]);
+    refused("latenzy", &[], &["nearest is `latency`"]);
     refused("no.toml", &[], &["no.toml"]);
     refused("sizes", &["--set", "train.fine_iteration=1"], &["train.fine_iteration", "train.fine_iterations"]);
     refused("sizes", &["--slurm", "cluster.toml"], &["--launcher slurm"]);

@@ -16,9 +16,5 @@ pub(in crate::config) fn text(name: &str) -> Option<&'static str> {
 
 /// The preset whose name is most like `name`.
 pub(in crate::config) fn nearest(name: &str) -> &'static str {
-    PRESETS
-        .iter()
-        .map(|(known, _)| *known)
-        .min_by_key(|known| strsim::damerau_levenshtein(known, name))
-        .unwrap_or("base")
+    crate::keys::nearest(PRESETS.iter().map(|(known, _)| *known), name).unwrap_or("base")
 }
