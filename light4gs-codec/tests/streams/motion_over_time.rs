@@ -170,6 +170,23 @@ proptest! {
     }
 }
 
+/// Numbers that do not even depend on the time are blended as soon as the scene is opened.
+#[test]
+fn constants_are_blended() {
+    let mut scene = scene(&[], 1);
+    let network = &mut scene.motion.network.as_mut().unwrap().network;
+    *network = Network { inputs: network.inputs.clone(), ..Network::default() };
+    let (time, share) = (Value(0), Value(3));
+    let numbers = (0..35).map(|i| i as f32 - 9.5).collect();
+    let numbers = network.layer(time, Layer::linear(vec![0.0; 35], numbers));
+    let product = network.node(Operation::Multiply, &[numbers, share]);
+    let blended = network.node(Operation::GroupSum(5), &[product]);
+    let position = network.node(Operation::Select(vec![0, 1, 2]), &[blended]);
+    let quaternion = network.node(Operation::Select(vec![3, 4, 5, 6]), &[blended]);
+    network.outputs = vec![position, quaternion];
+    check(&scene);
+}
+
 /// Poses that are infinite or not a number reach every Gaussian, even with a weight of 0.
 #[test]
 fn poses_without_a_number_are_not_left_out() {

@@ -120,12 +120,18 @@ impl Program {
         let mut workspace = self.workspace();
         workspace.blends.resize_with(self.before.blends.len(), Default::default);
         self.perform_at_places(&self.before.constant, &mut workspace);
+        // Blends of constants are complete now, and what depends on the place alone may read them.
+        self.set_blends(&mut workspace);
         workspace
     }
 
     /// Computes what depends on the time alone.
     pub(crate) fn run_time(&self, workspace: &mut Workspace) {
         self.perform_at_places(&self.before.time, workspace);
+        self.set_blends(workspace);
+    }
+
+    fn set_blends(&self, workspace: &mut Workspace) {
         for (blend, &(numbers, group)) in workspace.blends.iter_mut().zip(&self.before.blends) {
             let ValuePlan { slot, channels, .. } = self.values[numbers];
             blend.set(&workspace.slots[slot..slot + channels], group);
