@@ -11,7 +11,7 @@ use include::{
 };
 
 /// One kernel: a file of a folder here, with what it includes.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shader {
     /// The file's name without its ending.
     pub name: &'static str,
@@ -28,6 +28,9 @@ macro_rules! shaders {
             includes: &[DISPATCH, $($include),*],
             source: include_str!(concat!($folder, "/", $name, ".wgsl")),
         };)*
+
+        /// All of them.
+        pub const ALL: &[Shader] = &[$($constant),*];
     };
 }
 
@@ -125,14 +128,16 @@ pub mod include {
         SPHERICAL_HARMONICS = "include/spherical_harmonics";
         /// One Gaussian on the screen: four vectors in `splats`, at 4 * Gaussian.
         SPLAT = "include/splat";
-        /// A team is a workgroup of TEAM invocations that blends one cell.
-        TEAM_SUBGROUP = "include/team_subgroup";
+        /// What a team agrees on, in a form of which every compiler knows that it is the same for all members.
+        TEAM_AGREED = "team/agreed";
+        /// A team whose members communicate through subgroup operations.
+        TEAM_SUBGROUP = "team/subgroup";
         /// Sum over a small team that is a subgroup: member by member, the same order in every run.
-        TEAM_SUM_OF_FEW = "include/team_sum_of_few";
+        TEAM_SUM_OF_FEW = "team/sum_of_few";
         /// Sum over a large team that is a subgroup: by halves, the same order in every run.
-        TEAM_SUM_OF_MANY = "include/team_sum_of_many";
-        /// A team is a workgroup of TEAM invocations that blends one cell.
-        TEAM_WORKGROUP = "include/team_workgroup";
+        TEAM_SUM_OF_MANY = "team/sum_of_many";
+        /// A team whose members communicate through workgroup memory.
+        TEAM_WORKGROUP = "team/workgroup";
         /// The view: one uniform for all kernels of an image.
         VIEW = "include/view";
     }

@@ -11,6 +11,7 @@
 //! | [`entropy`] | the components of these models: densities, convolutions over planes, quantization steps ([`AdaptiveQuantization`]) | III-D |
 //! | [`parameters`] | every float parameter of a module with its path | |
 //! | [`ops`] | custom operations with hand-written derivatives | |
+//! | `gpu` | with the feature `wgpu`: its kernels as text and its launches as data, to try them elsewhere | |
 //!
 //! Every part with parameters is a separate Burn module (`Config` and `init`), which can be used alone. The device of a
 //! tensor chooses the back end of the custom operations at run time.
@@ -29,7 +30,7 @@ pub mod context;
 mod cpu;
 pub mod entropy;
 #[cfg(feature = "wgpu")]
-mod gpu;
+pub mod gpu;
 mod gpu_error;
 mod kernels;
 pub mod ops;

@@ -6,9 +6,15 @@ use burn_wgpu::CubeTensor;
 use light4gs_shaders::ADAM;
 
 use super::context::{Gpu, buffer_of};
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use crate::gpu_error::GpuError;
 use crate::kernels::adam::{AdamStep, AdamTensors};
+
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    vec![ADAM.into()]
+}
 
 fn step_on_gpu(
     tensors: AdamTensors<CubeBackend>,

@@ -7,7 +7,7 @@ use cubecl::Device as CubeDevice;
 use cubecl::client::Client;
 use cubecl::server::Handle;
 
-use super::kernel::first_lines;
+use super::launch::first_lines;
 use crate::gpu_error::GpuError;
 
 /// Tensors within a buffer begin at multiples of this many values, where every adapter can bind them.

@@ -5,8 +5,14 @@ use burn_wgpu::CubeTensor;
 use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Shader};
 
 use super::context::{Gpu, buffer_of, first_words};
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use crate::gpu_error::GpuError;
+
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD].map(Kernel::new).into()
+}
 
 /// Launches a kernel that reads tensors of one shape and writes another of the same shape. Its uniform is their size,
 /// then `numbers`.

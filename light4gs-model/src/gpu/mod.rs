@@ -1,16 +1,59 @@
 //! Kernels of the wgpu back end: the host side of the WGSL in `shaders/`.
+//!
+//! Public are the kernels as text ([`kernels`]) and launches as data ([`record`]), so that compilers and adapters other than
+//! those of this machine can be tried: `.ci/webgpu` does.
 
 mod adam;
 mod context;
 mod elementwise;
 mod kernel;
+mod launch;
 mod planes;
+mod recording;
 mod significance;
 mod skinning;
 mod sort;
 mod splat;
+mod subgroups;
 mod team;
 
 pub(crate) use adam::adam_on_gpu;
 pub(crate) use elementwise::{lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
+pub use kernel::Kernel;
+pub use recording::{RecordedBuffer, RecordedLaunch, record};
 pub(crate) use significance::significance_on_gpu;
+pub use team::{Communication, Team, with_team};
+
+/// Every kernel that the program can launch, on any adapter and with any configuration.
+pub fn kernels() -> Vec<Kernel> {
+    [
+        adam::kernels,
+        elementwise::kernels,
+        planes::kernels,
+        significance::kernels,
+        skinning::kernels,
+        sort::kernels,
+        splat::kernels,
+        subgroups::kernels,
+    ]
+    .into_iter()
+    .flat_map(|kernels| kernels())
+    .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn every_shader_is_in_the_list_of_kernels_and_no_kernel_twice() {
+        let all = kernels();
+        for shader in light4gs_shaders::ALL {
+            assert!(all.iter().any(|kernel| kernel.name() == shader.name), "{}", shader.name);
+        }
+        let names: HashSet<String> = all.iter().map(Kernel::to_string).collect();
+        assert_eq!(names.len(), all.len());
+    }
+}

@@ -10,7 +10,8 @@ use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
 use light4gs_shaders::{PLANE_GATHER, PLANE_PACK, PLANE_QUERY, PLANE_QUERY_BACKWARD, Shader};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use super::sort::{bits_for, ranges, sort};
 use crate::gpu_error::GpuError;
 use crate::kernels::plane_query::{PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
@@ -58,11 +59,27 @@ impl Layout {
     }
 }
 
-/// A launch of a shader that includes `shaders/include/planes.wgsl`.
+/// A shader that includes `shaders/include/planes.wgsl`, for these planes.
+fn kernel(shader: Shader, planes: impl IntoIterator<Item = PlaneAxes>) -> Kernel {
+    let (mut count, mut pairs) = (0, 0);
+    for axes in planes {
+        pairs |= (axes as u32) << (3 * count);
+        count += 1;
+    }
+    Kernel::new(shader).constant("PLANES", count).constant("AXIS_PAIRS", pairs)
+}
+
+/// The kernels of this file, for every set of planes.
+pub(super) fn kernels() -> Vec<Kernel> {
+    let sets = (1..1u32 << MOST_PLANES).flat_map(|set| {
+        let planes = move || PlaneAxes::ALL.into_iter().filter(move |axes| set >> *axes as u32 & 1 == 1);
+        [PLANE_QUERY, PLANE_QUERY_BACKWARD, PLANE_GATHER].map(|shader| kernel(shader, planes()))
+    });
+    sets.chain([PLANE_PACK.into()]).collect()
+}
+
 fn launch<'a>(client: &'a Client, shader: Shader, layout: &Layout) -> Launch<'a> {
-    let planes = layout.planes.iter().enumerate();
-    let pairs = planes.fold(0, |pairs, (place, (axes, _))| pairs | (*axes as u32) << (3 * place));
-    Launch::new(client, shader).constant("PLANES", layout.planes.len() as u32).constant("AXIS_PAIRS", pairs)
+    Launch::new(client, kernel(shader, layout.planes.iter().map(|(axes, _)| *axes)))
 }
 
 /// State between forward and backward.

@@ -6,14 +6,22 @@ use burn_wgpu::CubeTensor;
 use light4gs_shaders::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 
 use super::context::{Gpu, first_words};
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use super::splat::{Begun, begin};
+use super::team::Team;
 use crate::cpu::significance::SCORES;
 use crate::gpu_error::GpuError;
 use crate::kernels::splat::{SplatInputs, View};
 
 /// Values of an intersection's sums.
 const SUMS: usize = 3;
+
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    let blending = Team::all().map(|team| Kernel::new(SIGNIFICANCE).blending(team));
+    blending.chain([SIGNIFICANCE_GATHER.into()]).collect()
+}
 
 fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs.means)?;
@@ -22,9 +30,7 @@ fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, Gp
     let chunks = frame.chunks(lists.count);
     let carried = gpu.allocate("pixels between chunks", if chunks > 1 { frame.pixels() } else { 0 })?;
     for chunk in 0..chunks {
-        frame
-            .team
-            .launch(&gpu, SIGNIFICANCE)
+        Launch::new(&gpu.client, Kernel::new(SIGNIFICANCE).blending(frame.team))
             .reads(&lists.starts)
             .reads(&lists.order)
             .reads(&lists.gaussians)

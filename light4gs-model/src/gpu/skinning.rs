@@ -8,7 +8,8 @@ use cubecl::server::Handle;
 use light4gs_shaders::{SKINNING, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use crate::gpu_error::GpuError;
 use crate::kernels::skinning::{MOVED, POSE, SkinningKernels, SkinningTensors};
 
@@ -21,6 +22,11 @@ const SUMS: usize = POSE + 3 + 1;
 /// Gaussians of a slice, unless there are so many slices then that their sums take more memory than they are worth.
 const SLICE: usize = 64;
 const MOST_SLICES: usize = 256;
+
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    [SKINNING, SKINNING_BACKWARD, SKINNING_NODES, SKINNING_GATHER].map(Kernel::new).into()
+}
 
 /// State between forward and backward.
 #[derive(Clone, Debug)]

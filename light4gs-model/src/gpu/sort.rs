@@ -1,10 +1,11 @@
 //! Prefix sums, a stable radix sort, and ranges of equal keys.
 
 use cubecl::server::Handle;
-use light4gs_shaders::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES};
+use light4gs_shaders::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES, Shader};
 
 use super::context::Gpu;
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use crate::gpu_error::GpuError;
 
 /// Values of one workgroup of the prefix sum.
@@ -17,15 +18,31 @@ const SORT_BLOCK: usize = 1024;
 const SORT_GROUP: u32 = 32;
 const RADIX_BITS: u32 = 7;
 
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    let sums = (0..3).map(summing);
+    let scattering = [true, false].map(scattering);
+    sums.chain([by_digit(RADIX_COUNT)]).chain(scattering).chain([RANGES.into()]).collect()
+}
+
+/// A step of the prefix sum; 1 takes a single workgroup.
+fn summing(step: u32) -> Kernel {
+    Kernel::new(PREFIX_SUM).constant("STEP", step).constant("BLOCK", SUM_BLOCK as u32)
+}
+
+fn by_digit(shader: Shader) -> Kernel {
+    let kernel = Kernel::new(shader).workgroup(SORT_GROUP);
+    kernel.constant("BLOCK", SORT_BLOCK as u32).constant("RADIX_BITS", RADIX_BITS)
+}
+
+fn scattering(first: bool) -> Kernel {
+    by_digit(RADIX_SCATTER).constant("FIRST", u32::from(first))
+}
+
 /// Replaces `count` words by their exclusive prefix sums. Returns a buffer that holds the total.
 pub(super) fn prefix_sum(gpu: &Gpu, values: &Handle, count: usize) -> Result<Handle, GpuError> {
     let step = |step: u32, values: &Handle, sums: &Handle, count: usize| {
-        let launch = Launch::new(&gpu.client, PREFIX_SUM)
-            .constant("STEP", step)
-            .constant("BLOCK", SUM_BLOCK as u32)
-            .updates(values)
-            .updates(sums)
-            .uniform(&[count as u32]);
+        let launch = Launch::new(&gpu.client, summing(step)).updates(values).updates(sums).uniform(&[count as u32]);
         launch.groups(if step == 1 { 1 } else { count.div_ceil(SUM_BLOCK) })
     };
     let total = gpu.allocate("total of a prefix sum", 1)?;
@@ -58,24 +75,22 @@ pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<
     let buffers = (0..passes.min(2))
         .map(|_| Ok(Sorted { keys: gpu.allocate("sorted keys", count)?, order: gpu.allocate("sorted order", count)? }))
         .collect::<Result<Vec<_>, GpuError>>()?;
+    // The first pass reads no order: the index of a key is its place.
+    let no_order = gpu.allocate("no order", 0)?;
     for pass in 0..passes {
         let parameters = [count as u32, pass as u32 * RADIX_BITS, blocks as u32];
-        let launch = |shader| {
-            Launch::new(&gpu.client, shader)
-                .workgroup(SORT_GROUP)
-                .constant("BLOCK", SORT_BLOCK as u32)
-                .constant("RADIX_BITS", RADIX_BITS)
-        };
-        // The first pass reads no order: the index of a key is its place.
         let (from_keys, from_order) = match pass {
-            0 => (keys, keys),
+            0 => (keys, &no_order),
             _ => (&buffers[(pass - 1) % 2].keys, &buffers[(pass - 1) % 2].order),
         };
         let to = &buffers[pass % 2];
-        launch(RADIX_COUNT).reads(from_keys).writes(&table).uniform(&parameters).groups(blocks)?;
+        Launch::new(&gpu.client, by_digit(RADIX_COUNT))
+            .reads(from_keys)
+            .writes(&table)
+            .uniform(&parameters)
+            .groups(blocks)?;
         prefix_sum(gpu, &table, digits * blocks)?;
-        launch(RADIX_SCATTER)
-            .constant("FIRST", u32::from(pass == 0))
+        Launch::new(&gpu.client, scattering(pass == 0))
             .reads(from_keys)
             .reads(from_order)
             .reads(&table)

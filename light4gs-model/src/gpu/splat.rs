@@ -6,11 +6,15 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
-use light4gs_shaders::{CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD};
+use light4gs_shaders::{
+    CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader,
+};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
-use super::kernel::Launch;
+use super::kernel::Kernel;
+use super::launch::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
+use super::subgroups::choose_team;
 use super::team::{CHUNK, Team};
 use crate::cpu::rasterize::CHANNELS;
 use crate::gpu_error::GpuError;
@@ -111,6 +115,19 @@ pub struct GpuSplatSaved {
     rendering: Handle,
 }
 
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    let cells = Team::cells().into_iter().flat_map(|cell| [PROJECT, INTERSECT].map(|shader| by_cells(shader, cell)));
+    let teams =
+        Team::all().flat_map(|team| [RASTERIZE, RASTERIZE_BACKWARD].map(|shader| Kernel::new(shader).blending(team)));
+    cells.chain(teams).chain([COLOR, CELL_COUNTS, PROJECT_BACKWARD].map(Kernel::new)).collect()
+}
+
+/// A kernel of Gaussians that counts or lists cells.
+fn by_cells(shader: Shader, cell: u32) -> Kernel {
+    Kernel::new(shader).constant("CELL", cell)
+}
+
 fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3], GpuError> {
     let count = frame.gaussians;
     let splats = gpu.allocate("splats", 16 * count)?;
@@ -124,8 +141,7 @@ fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3
         .writes(&splats)
         .uniform(&uniform)
         .invocations(count)?;
-    Launch::new(&gpu.client, PROJECT)
-        .constant("CELL", frame.team.cell)
+    Launch::new(&gpu.client, by_cells(PROJECT, frame.team.cell))
         .reads(&inputs.means)
         .reads(&inputs.quats)
         .reads(&inputs.scales)
@@ -159,8 +175,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
     let first_of_gaussian = gpu.allocate("intersections of Gaussians", gaussian_count)?;
     let cells = gpu.allocate("cells of intersections", count)?;
     let gaussians = gpu.allocate("Gaussians of intersections", count)?;
-    Launch::new(&gpu.client, INTERSECT)
-        .constant("CELL", frame.team.cell)
+    Launch::new(&gpu.client, by_cells(INTERSECT, frame.team.cell))
         .reads(&by_depth)
         .reads(&first_places)
         .updates(&splats)
@@ -178,9 +193,7 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
     let rendering = gpu.allocate("image", CHANNELS * frame.pixels())?;
     let chunks = frame.chunks(lists.count);
     for chunk in 0..chunks {
-        frame
-            .team
-            .launch(gpu, RASTERIZE)
+        Launch::new(&gpu.client, Kernel::new(RASTERIZE).blending(frame.team))
             .reads(&lists.starts)
             .reads(&lists.order)
             .reads(&lists.gaussians)
@@ -208,7 +221,7 @@ pub(super) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: View) -> 
     let shapes = inputs.each_ref().map(|tensor| tensor.shape());
     let frame = Frame {
         view,
-        team: Team::choose(gpu, view.camera.width, view.camera.height)?,
+        team: choose_team(gpu, view.camera.width, view.camera.height)?,
         gaussians: shapes[0][0],
         rest: shapes[5][1],
     };
@@ -243,9 +256,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
     let chunks = frame.chunks(lists.count);
     let carried = gpu.allocate("pixels between chunks", if chunks > 1 { 2 * frame.pixels() } else { 0 })?;
     for chunk in 0..chunks {
-        frame
-            .team
-            .launch(&gpu, RASTERIZE_BACKWARD)
+        Launch::new(&gpu.client, Kernel::new(RASTERIZE_BACKWARD).blending(frame.team))
             .reads(&lists.starts)
             .reads(&lists.order)
             .reads(&lists.gaussians)
@@ -300,7 +311,7 @@ mod tests {
     use light4gs_data::Camera;
 
     use super::super::context::tests::gpu;
-    use super::super::team::{TEAM_OF_FEW, TEAM_OF_MANY, TEAM_WITHOUT_SUBGROUPS};
+    use super::super::team::Communication::{SubgroupOfFew, SubgroupOfMany, WorkgroupMemory};
     use super::*;
 
     const COUNT: usize = 300;
@@ -343,23 +354,22 @@ mod tests {
     #[test]
     fn every_team_draws_the_same() {
         let gpu = gpu();
-        let chosen = Team::choose(&gpu, SIZE[0], SIZE[1]).unwrap();
+        let chosen = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
         let expected = run(&gpu, chosen);
         assert!(expected[0].iter().any(|value| *value > 1.0), "the scene is empty");
-        let mut teams =
-            vec![(32, TEAM_WITHOUT_SUBGROUPS, 16), (32, TEAM_WITHOUT_SUBGROUPS, 8), (8, TEAM_WITHOUT_SUBGROUPS, 8)];
-        if chosen.includes != TEAM_WITHOUT_SUBGROUPS {
+        let mut teams = vec![(32, WorkgroupMemory, 16), (32, WorkgroupMemory, 8), (8, WorkgroupMemory, 8)];
+        if chosen.communication != WorkgroupMemory {
             let cells: &[u32] = if chosen.members <= 16 { &[8, 16] } else { &[16] };
             for cell in cells {
-                teams.extend([(chosen.members, TEAM_OF_FEW, *cell), (chosen.members, TEAM_OF_MANY, *cell)]);
+                teams.extend([(chosen.members, SubgroupOfFew, *cell), (chosen.members, SubgroupOfMany, *cell)]);
             }
         }
-        for (members, includes, cell) in teams {
+        for (members, communication, cell) in teams {
             // Each invocation has its pixels in groups of four.
             if cell * cell / members < 4 || members < cell {
                 continue;
             }
-            let team = Team { members, includes, cell };
+            let team = Team { members, communication, cell };
             for (k, (found, expected)) in run(&gpu, team).iter().zip(&expected).enumerate() {
                 let largest = expected.iter().fold(0.0f32, |m, v| m.max(v.abs()));
                 let pairs = found.iter().zip(expected);

@@ -1,9 +1,9 @@
-// A team is a workgroup of TEAM invocations that blends one cell. Here its members communicate through workgroup
-// memory: for adapters without subgroup operations, or whose subgroups have no fixed size.
+// The members of a team communicate through workgroup memory: for adapters without subgroup operations, or whose
+// subgroups have no fixed size. `team_uniform` is in `agreed.wgsl`.
 
 var<workgroup> lent: array<vec4<f32>, 3 * TEAM>;
 var<workgroup> exchanged: array<vec4<f32>, TEAM>;
-var<workgroup> agreed: u32;
+var<workgroup> votes: array<u32, TEAM>;
 
 // Makes three vectors of every member readable for the team, until the next call.
 fn team_share(a: vec4<f32>, b: vec4<f32>, c: vec4<f32>, lane: u32) {
@@ -31,15 +31,15 @@ fn team_sum(value: vec4<f32>, lane: u32) -> vec4<f32> {
     return sum;
 }
 
+// The first member counts the votes. It has read all of them before anybody leaves `team_uniform`, and votes again.
 fn team_any(condition: bool, lane: u32) -> bool {
-    return team_sum(vec4<f32>(f32(condition)), lane).x > 0.0;
-}
-
-// A value that is the same for all members, in a form of which the compiler knows this.
-fn team_uniform(value: u32, lane: u32) -> u32 {
+    votes[lane] = u32(condition);
     workgroupBarrier();
+    var any = 0u;
     if (lane == 0u) {
-        agreed = value;
+        for (var member = 0u; member < TEAM; member++) {
+            any |= votes[member];
+        }
     }
-    return workgroupUniformLoad(&agreed);
+    return team_uniform(any, lane) != 0u;
 }

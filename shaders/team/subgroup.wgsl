@@ -1,5 +1,5 @@
-// A team is a workgroup of TEAM invocations that blends one cell. Here it is exactly one subgroup. `team_sum` is in
-// `team_sum_of_few.wgsl` and `team_sum_of_many.wgsl`.
+// The members of a team communicate through subgroup operations: it is exactly one subgroup. `team_uniform` is in
+// `agreed.wgsl`, `team_sum` in `sum_of_few.wgsl` and `sum_of_many.wgsl`.
 
 var<private> held: array<vec4<f32>, 3>;
 
@@ -16,10 +16,5 @@ fn team_read(which: u32, member: u32) -> vec4<f32> {
 }
 
 fn team_any(condition: bool, lane: u32) -> bool {
-    return subgroupAny(condition);
-}
-
-// A value that is the same for all members, in a form of which the compiler knows this.
-fn team_uniform(value: u32, lane: u32) -> u32 {
-    return value;
+    return team_uniform(u32(subgroupAny(condition)), lane) != 0u;
 }
