@@ -29,8 +29,8 @@ export async function serve(files) {
 export const bundle = () => readFileSync(`${dist}/light4gs-player.js`);
 export const sceneBytes = () => readFileSync(scenePath);
 
-/** Chromium without a window, drawing in software. */
-export async function launch() {
+/** Chromium without a window, drawing in software; with more flags. */
+export async function launch(flags = []) {
   const executablePath = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"].find(existsSync);
   if (!executablePath) throw new Error("there is no Chromium; on Debian: apt-get install chromium");
   return chromium.launch({
@@ -38,7 +38,7 @@ export async function launch() {
     args: [
       "--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking",
       "--disable-component-update", "--disable-sync", "--use-gl=angle", "--use-angle=swiftshader",
-      "--enable-unsafe-swiftshader", "--js-flags=--expose-gc", "--enable-precise-memory-info",
+      "--enable-unsafe-swiftshader", "--js-flags=--expose-gc", "--enable-precise-memory-info", ...flags,
     ],
   });
 }

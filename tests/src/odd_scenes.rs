@@ -1,7 +1,9 @@
 //! Scenes that nobody would make on purpose: Gaussians that can only just be drawn, and Gaussians that cannot.
 
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor, TensorData};
+use glam::Vec3;
 use light4gs_data::Camera;
+use light4gs_model::GaussianTensors;
 
 use crate::random::Random;
 use crate::splat_scene::{ATTRIBUTES, MEANS, OPACITIES, QUATS, SCALES, SH_DC, SplatScene, WIDTHS, image_of};
@@ -79,4 +81,33 @@ pub fn poison(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Ra
     let component = random.below(WIDTHS[attribute]);
     scene.row_mut(attribute, i)[component] = value;
     format!("{value} in {}[{component}]", ATTRIBUTES[attribute])
+}
+
+/// Side of the image of [`dots`], one cell.
+const SIDE: u32 = 8;
+
+/// Faint dots, each in the middle of one pixel of an image that is one cell, no two at one depth: no result depends on
+/// the last bit.
+pub fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
+    let camera = Camera::look_at(Vec3::new(0.3, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIDE, SIDE);
+    let place = |i: usize| {
+        let pixel = i as u32 % (SIDE * SIDE);
+        let across = ((pixel % SIDE) as f32 + 0.5 - camera.cx) / camera.fx;
+        let down = ((pixel / SIDE) as f32 + 0.5 - camera.cy) / camera.fy;
+        let depth = 2.0 + 1e-4 * i as f32;
+        (camera.rotation.transpose() * (Vec3::new(across, down, 1.0) * depth - camera.translation)).to_array()
+    };
+    let means: Vec<f32> = (0..count).flat_map(place).collect();
+    let quats = [1.0, 0.0, 0.0, 0.0].repeat(count);
+    let gaussians = GaussianTensors {
+        means: Tensor::from_data(TensorData::new(means, [count, 3]), device),
+        quats: Tensor::from_data(TensorData::new(quats, [count, 4]), device),
+        log_scales: Tensor::full([count, 3], -7.0, device),
+        // An alpha of 0.0055: above 1/255 in its pixel, below it in the next.
+        opacity_logits: Tensor::full([count, 1], -5.2, device),
+        sh_dc: Tensor::zeros([count, 1, 3], device),
+        sh_rest: Tensor::zeros([count, 15, 3], device),
+        further: Vec::new(),
+    };
+    (gaussians, camera)
 }

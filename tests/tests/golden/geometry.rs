@@ -74,7 +74,7 @@ fn scales_of(golden: &Golden, prefix: &str) -> usize {
     (0..).find(|s| !golden.has(&format!("{prefix}scale{s}.plane0"))).unwrap()
 }
 
-fn hexplane_of(golden: &Golden, prefix: &str, device: &Device) -> FeaturePlanes {
+pub(super) fn hexplane_of(golden: &Golden, prefix: &str, device: &Device) -> FeaturePlanes {
     let scales = scales_of(golden, prefix);
     let names = (0..scales).flat_map(|s| (0..6).map(move |p| format!("{prefix}scale{s}.plane{p}")));
     let planes = names.map(|name| golden.tensor::<3>(&name, device)).collect();

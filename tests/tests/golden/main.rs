@@ -4,6 +4,7 @@ mod context;
 mod dnerf;
 mod entropy;
 mod geometry;
+mod launches;
 mod metrics;
 mod raster;
 mod training;

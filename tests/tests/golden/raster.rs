@@ -8,7 +8,7 @@ use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, device
 use light4gs_tests::raster::{Leaves, camera_of};
 
 /// `[3, H, W]` to `[H, W, 3]`.
-fn channels_last(values: &[f32]) -> Vec<f32> {
+pub(super) fn channels_last(values: &[f32]) -> Vec<f32> {
     let pixels = values.len() / 3;
     (0..pixels).flat_map(|p| (0..3).map(move |c| (p, c))).map(|(p, c)| values[c * pixels + p]).collect()
 }
@@ -120,7 +120,7 @@ fn rasterizer_corner_cases() {
     check_camera(&golden, "cam0", "grad_autograd", false);
 }
 
-const SCORES: [(&str, PixelContribution); 4] = [
+pub(super) const SCORES: [(&str, PixelContribution); 4] = [
     ("count", PixelContribution::PixelCount),
     ("sum_T_alpha", PixelContribution::BlendingWeight),
     ("sum_T_opacity", PixelContribution::TransmittanceOpacity),
@@ -142,7 +142,7 @@ fn check_scores(golden: &Golden, what: &str, prefix: &str, significance: &Signif
     SCORES.map(check).into()
 }
 
-fn significance_scene(case: &str) -> (Golden, Vec<Camera>) {
+pub(super) fn significance_scene(case: &str) -> (Golden, Vec<Camera>) {
     let golden = Golden::open(case);
     let cameras = (0..)
         .map(|k| format!("cam{k}"))
@@ -215,7 +215,7 @@ fn least_significant_rows_with_ties() {
 }
 
 /// The scene's activated attributes, converted back to raw ones.
-fn raw_gaussians(golden: &Golden, device: &Device) -> GaussianTensors {
+pub(super) fn raw_gaussians(golden: &Golden, device: &Device) -> GaussianTensors {
     let Leaves { means, quats, scales, opacities, sh, .. } = Leaves::read(golden, device);
     let [_, coefficients, _] = sh.dims();
     GaussianTensors {

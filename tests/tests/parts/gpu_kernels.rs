@@ -1,12 +1,11 @@
 //! Kernels of the wgpu back end in cases that the other tests of back ends leave out: functions far into their tails,
 //! and lists that are longer than one launch can process.
 
-use burn::tensor::{Device, Tensor, TensorData};
-use glam::Vec3;
-use light4gs_data::Camera;
+use burn::tensor::{Device, Tensor};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::{GaussianTensors, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
+use light4gs_model::{HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
+use light4gs_tests::odd_scenes::dots;
 
 /// Values and gradient of a function, at places far into the tails and on both sides of the bound.
 fn run(function: fn(Tensor<1>) -> Tensor<1>, device: Device, count: usize) -> [Vec<f32>; 2] {
@@ -40,34 +39,6 @@ fn values_and_gradients_are_those_of_the_cpu() {
             }
         }
     }
-}
-
-const SIDE: u32 = 8;
-
-/// Faint dots, each in the middle of one pixel of an image that is one cell, no two at one depth: no result depends on
-/// the last bit.
-fn dots(count: usize, device: &Device) -> (GaussianTensors, Camera) {
-    let camera = Camera::look_at(Vec3::new(0.3, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIDE, SIDE);
-    let place = |i: usize| {
-        let pixel = i as u32 % (SIDE * SIDE);
-        let across = ((pixel % SIDE) as f32 + 0.5 - camera.cx) / camera.fx;
-        let down = ((pixel / SIDE) as f32 + 0.5 - camera.cy) / camera.fy;
-        let depth = 2.0 + 1e-4 * i as f32;
-        (camera.rotation.transpose() * (Vec3::new(across, down, 1.0) * depth - camera.translation)).to_array()
-    };
-    let means: Vec<f32> = (0..count).flat_map(place).collect();
-    let quats = [1.0, 0.0, 0.0, 0.0].repeat(count);
-    let gaussians = GaussianTensors {
-        means: Tensor::from_data(TensorData::new(means, [count, 3]), device),
-        quats: Tensor::from_data(TensorData::new(quats, [count, 4]), device),
-        log_scales: Tensor::full([count, 3], -7.0, device),
-        // An alpha of 0.0055: above 1/255 in its pixel, below it in the next.
-        opacity_logits: Tensor::full([count, 1], -5.2, device),
-        sh_dc: Tensor::zeros([count, 1, 3], device),
-        sh_rest: Tensor::zeros([count, 15, 3], device),
-        further: Vec::new(),
-    };
-    (gaussians, camera)
 }
 
 /// No Gaussian, one Gaussian, and more Gaussians in one cell than one launch processes.
