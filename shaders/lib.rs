@@ -130,6 +130,8 @@ pub mod include {
         SPLAT = "include/splat";
         /// What a team agrees on, in a form of which every compiler knows that it is the same for all members.
         TEAM_AGREED = "team/agreed";
+        /// What a team agrees on, for Mesa's software driver, where the other way is slow.
+        TEAM_TRUSTED = "team/trusted";
         /// A team whose members communicate through subgroup operations.
         TEAM_SUBGROUP = "team/subgroup";
         /// Sum over a small team that is a subgroup: member by member, the same order in every run.

@@ -1,5 +1,5 @@
 // The members of a team communicate through subgroup operations: it is exactly one subgroup. `team_uniform` is in
-// `agreed.wgsl`, `team_sum` in `sum_of_few.wgsl` and `sum_of_many.wgsl`.
+// `agreed.wgsl` or `trusted.wgsl`, `team_sum` in `sum_of_few.wgsl` and `sum_of_many.wgsl`.
 
 var<private> held: array<vec4<f32>, 3>;
 

@@ -31,7 +31,12 @@ impl Gpu {
 
     /// Iterations that a loop may have. Mesa's software driver ends any loop after 65535, without an error.
     pub(super) fn longest_loop(&self) -> usize {
-        if self.client.properties().identity.physical.is_none() { 60_000 } else { u32::MAX as usize }
+        if self.is_mesas_software() { 60_000 } else { u32::MAX as usize }
+    }
+
+    /// Whether this is Mesa's software driver.
+    pub(super) fn is_mesas_software(&self) -> bool {
+        self.client.properties().identity.physical.is_none()
     }
 
     /// A buffer for `count` values of four bytes, at least one.

@@ -58,6 +58,9 @@ fn team_of_subgroups(gpu: &Gpu) -> Result<Option<Team>, GpuError> {
             team = None;
         }
     }
+    if team.is_some_and(|team| team.members == Team::OF_MESA.members) && gpu.is_mesas_software() {
+        team = Some(Team::OF_MESA);
+    }
     found.insert(device, team);
     Ok(team)
 }

@@ -2,7 +2,9 @@
 
 use std::cell::Cell;
 
-use light4gs_shaders::include::{TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW, TEAM_SUM_OF_MANY, TEAM_WORKGROUP};
+use light4gs_shaders::include::{
+    TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW, TEAM_SUM_OF_MANY, TEAM_TRUSTED, TEAM_WORKGROUP,
+};
 
 /// Intersections of a cell that one launch blends. Mesa's software driver ends any loop after 65535 iterations, and a
 /// graphics driver may stop a launch that runs for seconds.
@@ -17,6 +19,10 @@ pub enum Communication {
     SubgroupOfFew,
     /// Through subgroup operations; sums are taken by halves, which is best for large teams.
     SubgroupOfMany,
+    /// As [`Communication::SubgroupOfFew`], for Mesa's software driver, where a barrier takes long: that control flow is the
+    /// same in a subgroup is not proved to the compiler. Browsers take such a kernel only after `diagnostic(off,
+    /// subgroup_uniformity);`.
+    SubgroupOfMesa,
 }
 
 impl Communication {
@@ -25,6 +31,7 @@ impl Communication {
         match self {
             Self::WorkgroupMemory => &[TEAM_AGREED, TEAM_WORKGROUP],
             Self::SubgroupOfFew => &[TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW],
+            Self::SubgroupOfMesa => &[TEAM_TRUSTED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW],
             Self::SubgroupOfMany => &[TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_MANY],
         }
     }
@@ -54,9 +61,12 @@ impl Team {
         Self { members: 64, communication: Communication::SubgroupOfMany, cell: 16 },
     ];
 
+    /// The team for Mesa's software driver with subgroups of eight.
+    pub const OF_MESA: Self = Self { members: 8, communication: Communication::SubgroupOfMesa, cell: 8 };
+
     /// Every team that this program can choose.
     pub fn all() -> impl Iterator<Item = Self> {
-        Self::OF_SUBGROUPS.into_iter().chain([Self::WITHOUT_SUBGROUPS])
+        Self::OF_SUBGROUPS.into_iter().chain([Self::OF_MESA, Self::WITHOUT_SUBGROUPS])
     }
 
     /// Sides of the cells of [`Team::all`], each once.
