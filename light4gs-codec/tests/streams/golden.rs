@@ -17,8 +17,8 @@ fn float32_reads_and_writes_as_it_did() {
 }
 
 /// Compressed streams that were written once, each with the scene that it decoded to then, as a stream without loss: two
-/// with a hexplane, one with control nodes.
-const COMPRESSED: [(Profile, &[u8], &[u8]); 3] = [
+/// with a hexplane, two with control nodes.
+const COMPRESSED: [(Profile, &[u8], &[u8]); 4] = [
     (
         Profile::Compact,
         include_bytes!("../../../tests/golden-streams/compact.l4gs"),
@@ -30,11 +30,14 @@ const COMPRESSED: [(Profile, &[u8], &[u8]); 3] = [
         include_bytes!("../../../tests/golden-streams/paper.decoded.l4gs"),
     ),
     (Profile::Compact, NODES, include_bytes!("../../../tests/golden-streams/nodes.decoded.l4gs")),
+    (Profile::Compact, LIFETIMES, include_bytes!("../../../tests/golden-streams/lifetimes.decoded.l4gs")),
 ];
 
 /// Twelve control nodes, and 150 Gaussians that follow them or stand still. Only a model can make it:
 /// `tests/tests/parts/control_nodes/golden.rs`.
 const NODES: &[u8] = include_bytes!("../../../tests/golden-streams/nodes.l4gs");
+/// The same with Gaussians that come and go.
+const LIFETIMES: &[u8] = include_bytes!("../../../tests/golden-streams/lifetimes.l4gs");
 /// Frames of the streams at some times: name, time, checksum.
 const FRAMES: &str = include_str!("../../../tests/golden-streams/frames.txt");
 const TIMES: [f32; 5] = [0.0, 0.25, 0.37, 0.5, 1.0];
@@ -76,8 +79,13 @@ fn frames(name: &str, bytes: &[u8], most_bytes: u64) -> String {
 #[test]
 fn frames_are_those_that_were_shown() {
     for most_bytes in [0, 1 << 20] {
-        let streams =
-            [("float32", FLOAT32), ("compact", COMPRESSED[0].1), ("paper", COMPRESSED[1].1), ("nodes", NODES)];
+        let streams = [
+            ("float32", FLOAT32),
+            ("compact", COMPRESSED[0].1),
+            ("paper", COMPRESSED[1].1),
+            ("nodes", NODES),
+            ("lifetimes", LIFETIMES),
+        ];
         let found = streams.map(|(name, bytes)| frames(name, bytes, most_bytes)).concat();
         assert_eq!(found, FRAMES);
     }
@@ -89,6 +97,22 @@ fn the_golden_nodes_have_stillness_and_move() {
     let motion = scene.motion.network.as_ref().unwrap();
     assert!(motion.sources.contains(&MotionSource::Attribute("stillness".into())));
     assert_ne!(scene.positions_at(0.2).unwrap(), scene.positions_at(0.8).unwrap());
+}
+
+/// Of the Gaussians with lifetimes there are some at the beginning that are gone at the end, and the other way around.
+#[test]
+fn the_golden_lifetimes_come_and_go() {
+    let scene = decode(LIFETIMES).unwrap();
+    let motion = scene.motion.network.as_ref().unwrap();
+    assert!(motion.sources.contains(&MotionSource::Attribute("lifetime".into())));
+    let evaluator = MotionEvaluator::new(&scene).unwrap();
+    let [begin, end] = [0.0, 1.0].map(|time| {
+        let mut moved = scene.gaussians.clone();
+        evaluator.apply(&scene.gaussians, time, 0..moved.len(), &mut moved);
+        moved.opacity_logits
+    });
+    let gone = |before: &[f32], after: &[f32]| before.iter().zip(after).filter(|(a, b)| **a - **b > 3.0).count();
+    assert!(gone(&begin, &end) > 5 && gone(&end, &begin) > 5, "{} {}", gone(&begin, &end), gone(&end, &begin));
 }
 
 #[test]
@@ -105,9 +129,12 @@ fn write_golden_streams() {
         write(&format!("{}.decoded.l4gs", profile.name()), &encode(&encoded.decoded).unwrap());
         shown += &frames(profile.name(), &encoded.bytes, 0);
     }
-    let nodes = std::fs::read(format!("{FOLDER}/nodes.l4gs")).unwrap();
-    write("nodes.decoded.l4gs", &encode(&decode(&nodes).unwrap()).unwrap());
-    write("frames.txt", (shown + &frames("nodes", &nodes, 0)).as_bytes());
+    for name in ["nodes", "lifetimes"] {
+        let bytes = std::fs::read(format!("{FOLDER}/{name}.l4gs")).unwrap();
+        write(&format!("{name}.decoded.l4gs"), &encode(&decode(&bytes).unwrap()).unwrap());
+        shown += &frames(name, &bytes, 0);
+    }
+    write("frames.txt", shown.as_bytes());
 }
 
 /// A decoder for this one stream, written from `docs/format.md` alone.

@@ -9,12 +9,14 @@ mod common;
 
 use common::compression::{ALL_PARTS, ShKind, compact_shape, input, scene, sh_networks, tiny};
 
-const NODES: &[u8] = include_bytes!("../../../golden-streams/nodes.l4gs");
+const NODES: [&[u8]; 2] =
+    [include_bytes!("../../../golden-streams/nodes.l4gs"), include_bytes!("../../../golden-streams/lifetimes.l4gs")];
 
 /// Streams that together contain everything: without loss, in both profiles, with every model of the spherical
-/// harmonics, with control nodes, with many Gaussians, with long frequency tables.
+/// harmonics, with control nodes and lifetimes, with many Gaussians, with long frequency tables.
 pub(crate) fn streams() -> Vec<Parts> {
-    let mut streams = vec![encode(&common::sample()).expect("sound"), NODES.to_vec()];
+    let mut streams = vec![encode(&common::sample()).expect("sound")];
+    streams.extend(NODES.map(<[u8]>::to_vec));
     let mut add = |scene: &_, input: &_| streams.push(encode_compressed(scene, input).expect("sound").bytes);
     for profile in [Profile::Compact, Profile::Paper] {
         let (scene, input) = tiny(profile);

@@ -1,4 +1,4 @@
-//! The golden stream of control nodes, damaged field by field: what is refused names its field, and what is not can be
+//! The golden streams of control nodes, damaged field by field: what is refused names its field, and what is not can be
 //! played.
 
 use light4gs_codec::{MotionEvaluator, decode};
@@ -12,6 +12,7 @@ static ALLOCATOR: CountingAllocator = CountingAllocator;
 
 const CODED: &[u8] = include_bytes!("../../../golden-streams/nodes.l4gs");
 const FLOAT32: &[u8] = include_bytes!("../../../golden-streams/nodes.decoded.l4gs");
+const LIFETIMES: &[u8] = include_bytes!("../../../golden-streams/lifetimes.l4gs");
 /// The number of the section.
 const MOTION: u16 = 4;
 
@@ -179,7 +180,7 @@ fn error(decoder: &Decoder, bytes: &[u8], what: &dyn std::fmt::Debug) -> Option<
 #[test]
 fn every_field_that_lies_is_named() {
     let decoder = Decoder::on_this_thread();
-    for bytes in [CODED, FLOAT32] {
+    for bytes in [CODED, FLOAT32, LIFETIMES] {
         let mut parts = Parts::of(bytes);
         let fields = fields(&parts.section(MOTION).expect("a motion").payload);
         assert!(fields.len() > 300, "{} fields", fields.len());

@@ -1,6 +1,6 @@
-//! The golden stream of control nodes: how it was made, and that the model reads it as the codec does.
+//! The golden streams of control nodes: how they were made, and that the model reads them as the codec does.
 //!
-//! The codec's own tests compare what it decodes to, and its frames, bit by bit (`light4gs-codec/tests/streams/golden.rs`).
+//! The codec's own tests compare what they decode to, and their frames, bit by bit (`light4gs-codec/tests/streams/golden.rs`).
 
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
@@ -12,7 +12,9 @@ use light4gs_tests::golden::{assert_close, values_of};
 use light4gs_train::compression::{Compression, ConfiguredModels, encode};
 use light4gs_train::config::Config;
 
-const GOLDEN: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams/nodes.l4gs");
+const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams");
+/// Names, and whether Gaussians come and go.
+const STREAMS: [(&str, bool); 2] = [("nodes", false), ("lifetimes", true)];
 const GAUSSIANS: usize = 150;
 
 /// Everything that differs between Gaussians and nodes, far from its start.
@@ -25,6 +27,7 @@ impl ParameterMapper for Shaken {
             ("rotations", 0.3),
             ("log_radii", 0.2),
             ("stillness", 6.0),
+            ("lifetime", 1.2),
             ("quats", 0.5),
             ("sh", 0.2),
         ];
@@ -48,31 +51,39 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 }
 
 #[test]
-#[ignore = "writes the golden stream anew, which only a change of the format may ask for"]
+#[ignore = "writes the golden streams anew, which only a change of the format may ask for"]
 fn write_golden_nodes() {
     let device = Device::flex().autodiff();
-    let keys = ["model.field=nodes", "model.nodes.count=12", "model.nodes.radius=0.25", "model.sh_degree=1"];
-    let config = Config::load("dnerf-cpu", &keys.map(str::to_owned)).unwrap();
-    let scene = scene(&config, &device);
-    let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
-    let profile = config.compression.profile.coded().unwrap();
-    let meta = SceneMeta { name: "nodes".into(), ..SceneMeta::default() };
-    let encoded = encode(&scene, &compression, meta, &config.compression, profile, None, &device).unwrap();
-    std::fs::write(GOLDEN, encoded.bytes).unwrap();
+    for (name, lifetime) in STREAMS {
+        let keys = ["model.field=nodes", "model.nodes.count=12", "model.nodes.radius=0.25", "model.sh_degree=1"];
+        let mut keys = keys.map(str::to_owned).to_vec();
+        keys.push(format!("model.nodes.lifetime={lifetime}"));
+        let config = Config::load("dnerf-cpu", &keys).unwrap();
+        let scene = scene(&config, &device);
+        let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
+        let profile = config.compression.profile.coded().unwrap();
+        let meta = SceneMeta { name: name.into(), ..SceneMeta::default() };
+        let encoded = encode(&scene, &compression, meta, &config.compression, profile, None, &device).unwrap();
+        std::fs::write(format!("{FOLDER}/{name}.l4gs"), encoded.bytes).unwrap();
+    }
 }
 
 #[test]
 fn the_model_reads_the_golden_nodes_as_the_codec_does() {
-    let data = decode(&std::fs::read(GOLDEN).unwrap()).unwrap();
-    let evaluator = MotionEvaluator::new(&data).unwrap();
-    let scene: DynamicScene = DynamicScene::from_arrays(&data, &Device::flex()).unwrap();
-    assert_eq!(scene.to_arrays(data.meta.clone()).unwrap(), data);
-    for time in [0.0, 0.37, 1.0] {
-        let mut exact = data.gaussians.clone();
-        evaluator.apply(&data.gaussians, time, 0..exact.len(), &mut exact);
-        assert!(exact.means != data.gaussians.means, "nothing moves");
-        let moved = scene.at(time);
-        assert_close("means", exact.means.as_flattened(), &values_of(&moved.means), 1e-4);
-        assert_close("quats", exact.quats.as_flattened(), &values_of(&moved.quats), 1e-4);
+    for (name, lifetime) in STREAMS {
+        let data = decode(&std::fs::read(format!("{FOLDER}/{name}.l4gs")).unwrap()).unwrap();
+        let evaluator = MotionEvaluator::new(&data).unwrap();
+        let scene: DynamicScene = DynamicScene::from_arrays(&data, &Device::flex()).unwrap();
+        assert_eq!(scene.to_arrays(data.meta.clone()).unwrap(), data);
+        for time in [0.0, 0.37, 1.0] {
+            let mut exact = data.gaussians.clone();
+            evaluator.apply(&data.gaussians, time, 0..exact.len(), &mut exact);
+            assert!(exact.means != data.gaussians.means, "nothing moves");
+            assert_eq!(exact.opacity_logits != data.gaussians.opacity_logits, lifetime, "{name}: what fades");
+            let moved = scene.at(time);
+            assert_close("means", exact.means.as_flattened(), &values_of(&moved.means), 1e-4);
+            assert_close("quats", exact.quats.as_flattened(), &values_of(&moved.quats), 1e-4);
+            assert_close("opacities", &exact.opacity_logits, &values_of(&moved.opacity_logits), 1e-4);
+        }
     }
 }
