@@ -30,7 +30,7 @@ if (!file) {
 const run = (...args) => execFileSync(program, args, { encoding: "utf8" });
 const at = (name) => path.join(folder, name);
 fs.mkdirSync(folder, { recursive: true });
-for (const name of ["scene.ply", "scene.glb"]) run("export", file, "--out", at(name), "--device", "flex");
+for (const name of ["scene.ply", "scene.glb"]) run("export", file, "--out", at(name), "--time", "0", "--device", "flex");
 run("render", file, "--out", at("own"), "--path", "frozen", "--frames", `${VIEWS}`, "--width", `${SIZE}`, "--device", "flex");
 const info = JSON.parse(run("info", file, "--json"));
 

@@ -11,7 +11,7 @@ use fourdgs::GaussianSet;
 use fourdgs::keyframe_delta_file::{KeyframeDeltaOptions, Sample, write_sequence};
 use fourdgs::quantization::Profile;
 
-use super::glb::srgb_to_linear;
+use super::conventions::{srgb_to_linear, unit_xyzw};
 use crate::atomic::write_atomically;
 use crate::error::DataError;
 use crate::ply::GaussianPly;
@@ -56,18 +56,13 @@ fn population(sample: &MotionSample, duration: f64) -> Sample {
         let [r, g, b] = dc.map(|value| srgb_to_linear((value * SH_C0 + 0.5).clamp(0.0, 1.0)));
         [r, g, b, 1.0 / (1.0 + (-logit).exp())]
     };
-    let rotation = |quat: &[f32; 4]| {
-        let [w, x, y, z] = *quat;
-        let length = (w * w + x * x + y * y + z * z).sqrt();
-        if length > 0.0 { [x / length, y / length, z / length, w / length] } else { [0.0, 0.0, 0.0, 1.0] }
-    };
     Sample {
         t0: sample.begin,
         ids: (0..count as i64).collect(),
         gaussians: GaussianSet {
             positions: means.concat(),
             scales: log_scales.iter().flatten().map(|scale| scale.exp()).collect(),
-            rotations: quats.iter().flat_map(rotation).collect(),
+            rotations: quats.iter().flat_map(|quat| unit_xyzw(*quat)).collect(),
             colors: sh_dc.iter().zip(opacity_logits).flat_map(color).collect(),
             motions: vec![0.0; 3 * count],
             mu_t: vec![sample.begin as f32; count],

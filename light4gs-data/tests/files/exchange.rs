@@ -2,7 +2,9 @@
 
 use std::path::Path;
 
-use light4gs_data::{GaussianPly, GlbOptions, MotionSample, glb_bytes, write_four_dgs, write_glb};
+use light4gs_data::{
+    GaussianPly, GlbOptions, Influence, Joint, JointPose, MotionSample, Skin, glb_bytes, write_four_dgs, write_glb,
+};
 use serde_json::Value;
 
 fn example(count: usize) -> GaussianPly {
@@ -31,25 +33,34 @@ fn chunks(bytes: &[u8]) -> (Value, &[u8]) {
     (serde_json::from_slice(&bytes[20..20 + json]).unwrap(), &bytes[28 + json..])
 }
 
-/// Rows of an attribute; its accessor and buffer view are checked against glTF's rules.
-fn rows(json: &Value, binary: &[u8], name: &str, kind: &str) -> Vec<Vec<f32>> {
-    let primitive = &json["meshes"][0]["primitives"][0];
-    let accessor =
-        &json["accessors"][primitive["attributes"][name].as_u64().unwrap_or_else(|| panic!("{name}")) as usize];
-    assert_eq!(
-        (accessor["type"].as_str().unwrap(), accessor["componentType"].as_u64().unwrap()),
-        (kind, 5126),
-        "{name}"
-    );
+/// Rows of an accessor, which is checked against glTF's rules.
+fn accessor_rows(json: &Value, binary: &[u8], number: &Value, kind: &str, target: Option<u64>) -> Vec<Vec<f32>> {
+    let accessor = &json["accessors"][number.as_u64().expect("the number of an accessor") as usize];
+    assert_eq!(accessor["type"].as_str().unwrap(), kind);
     let view = &json["bufferViews"][accessor["bufferView"].as_u64().unwrap() as usize];
-    let width = ["SCALAR", "VEC2", "VEC3", "VEC4"].iter().position(|known| *known == kind).unwrap() + 1;
-    let (begin, length) =
-        (view["byteOffset"].as_u64().unwrap() as usize, view["byteLength"].as_u64().unwrap() as usize);
+    let width = match kind {
+        "SCALAR" => 1,
+        "MAT4" => 16,
+        vector => vector[3..].parse().unwrap(),
+    };
+    let whole = |key: &str| view[key].as_u64().unwrap() as usize;
+    let (begin, length) = (whole("byteOffset"), whole("byteLength"));
+    let bytes = &binary[begin..begin + length];
+    let values: Vec<f32> = match accessor["componentType"].as_u64().unwrap() {
+        5121 => bytes.iter().map(|byte| f32::from(*byte)).collect(),
+        5123 => bytes.as_chunks().0.iter().map(|bytes| f32::from(u16::from_le_bytes(*bytes))).collect(),
+        5126 => bytes.as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect(),
+        other => panic!("component type {other}"),
+    };
     let count = accessor["count"].as_u64().unwrap() as usize;
-    assert_eq!((begin % 4, length, view["target"].as_u64()), (0, 4 * width * count, Some(34962)), "{name}");
-    let values: Vec<f32> =
-        binary[begin..begin + length].as_chunks().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    assert_eq!((begin % 4, length % 4, values.len(), view["target"].as_u64()), (0, 0, width * count, target));
     values.chunks_exact(width).map(<[f32]>::to_vec).collect()
+}
+
+/// Rows of an attribute.
+fn rows(json: &Value, binary: &[u8], name: &str, kind: &str) -> Vec<Vec<f32>> {
+    let attributes = &json["meshes"][0]["primitives"][0]["attributes"];
+    accessor_rows(json, binary, &attributes[name], kind, Some(34962))
 }
 
 fn assert_near(found: &[Vec<f32>], expected: impl Iterator<Item = Vec<f32>>) {
@@ -66,7 +77,7 @@ fn a_glb_follows_the_extension() {
     let gaussians = example(7);
     for degree in 0..=3u8 {
         let options = GlbOptions { sh_degree: degree, z_is_up: degree == 1 };
-        let bytes = glb_bytes(Path::new("a.glb"), &gaussians, &options).unwrap();
+        let bytes = glb_bytes(Path::new("a.glb"), &gaussians, None, &options).unwrap();
         let (json, binary) = chunks(&bytes);
         assert_eq!(json["asset"]["version"], "2.0");
         assert_eq!(json["extensionsUsed"], serde_json::json!(["KHR_gaussian_splatting"]));
@@ -115,8 +126,9 @@ fn a_glb_follows_the_extension() {
 fn what_a_glb_cannot_hold_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("a.glb");
-    let message =
-        |gaussians: &GaussianPly, options: &GlbOptions| write_glb(&path, gaussians, options).unwrap_err().to_string();
+    let message = |gaussians: &GaussianPly, options: &GlbOptions| {
+        write_glb(&path, gaussians, None, options).unwrap_err().to_string()
+    };
     let empty = message(&example(0), &GlbOptions::default());
     assert!(empty.contains("a.glb") && empty.contains("no Gaussians"), "{empty}");
     let mut odd = example(3);
@@ -126,10 +138,169 @@ fn what_a_glb_cannot_hold_is_refused() {
     assert!(!path.exists());
     let mut still = example(2);
     still.quats[0] = [0.0; 4];
-    write_glb(&path, &still, &GlbOptions::default()).unwrap();
+    write_glb(&path, &still, None, &GlbOptions::default()).unwrap();
     let bytes = std::fs::read(&path).unwrap();
     let (json, binary) = chunks(&bytes);
     assert_eq!(rows(&json, binary, "KHR_gaussian_splatting:ROTATION", "VEC4")[0], [0.0, 0.0, 0.0, 1.0]);
+}
+
+/// Joints on a line that move up; each Gaussian follows its number of them.
+fn skin(joints: usize, gaussians: usize) -> Skin {
+    let joint = |index: usize| {
+        let pose = |up: f32| JointPose { position: [index as f32, up, 0.0], rotation: [2.0, 0.0, up, 0.0] };
+        Joint { anchor: [index as f32, 0.0, 0.0], poses: vec![pose(0.0), pose(0.25), pose(1.0)] }
+    };
+    let mut all: Vec<Joint> = (0..joints - 1).map(joint).collect();
+    all.push(Joint { anchor: [0.0; 3], poses: Vec::new() });
+    let weights = |gaussian: usize| {
+        let follows = |joint: usize| if joint <= gaussian % joints { 1.0 + (joint as f32 * 1.7).sin() } else { 0.0 };
+        (0..joints).map(follows).collect::<Vec<f32>>()
+    };
+    let influences = (0..gaussians).map(|gaussian| Influence::strongest(&weights(gaussian))).collect();
+    Skin::new(all, vec![0.0, 0.5, 2.0], influences).unwrap()
+}
+
+/// What glTF demands of skins and animations, for few joints and for more than a byte counts.
+#[test]
+fn a_skin_follows_the_specification() {
+    for (joints, sets, component) in [(3, 1, 5121), (20, 2, 5121), (256, 2, 5121), (257, 2, 5123)] {
+        let gaussians = example(joints);
+        let z_is_up = joints == 20;
+        let options = GlbOptions { sh_degree: 0, z_is_up };
+        let bytes = glb_bytes(Path::new("a.glb"), &gaussians, Some(&skin(joints, joints)), &options).unwrap();
+        let (json, binary) = chunks(&bytes);
+        let numbers = |number: &Value, kind: &str| accessor_rows(&json, binary, number, kind, None);
+
+        // The Gaussians are those at rest, and the joints have a root beside them that is turned as they are.
+        assert_near(&rows(&json, binary, "POSITION", "VEC3"), gaussians.means.iter().map(|mean| mean.to_vec()));
+        let nodes = json["nodes"].as_array().unwrap();
+        assert_eq!(json["scenes"][0]["nodes"], serde_json::json!([0, 1]));
+        assert_eq!((&nodes[0]["mesh"], &nodes[0]["skin"]), (&Value::from(0), &Value::from(0)));
+        assert_eq!((nodes[0].get("rotation").is_some(), nodes[0].get("rotation")), (z_is_up, nodes[1].get("rotation")));
+        let skin = &json["skins"][0];
+        assert_eq!((&skin["joints"], &skin["skeleton"]), (&nodes[1]["children"], &Value::from(1)));
+        let own: Vec<usize> = serde_json::from_value(skin["joints"].clone()).unwrap();
+        assert_eq!(own, (2..nodes.len()).collect::<Vec<_>>());
+        assert_eq!(own.len(), joints);
+        let matrices = numbers(&skin["inverseBindMatrices"], "MAT4");
+        assert_eq!(matrices.len(), joints);
+        assert!(matrices.iter().all(|matrix| [3, 7, 11, 15].map(|at| matrix[at]) == [0.0, 0.0, 0.0, 1.0]));
+        assert_eq!(matrices[1][12..15], [-1.0, 0.0, 0.0]);
+
+        let all = json["accessors"].as_array().unwrap();
+        let attributes = &json["meshes"][0]["primitives"][0]["attributes"];
+        assert!(
+            attributes.get(format!("JOINTS_{sets}")).is_none() && attributes.get(format!("WEIGHTS_{sets}")).is_none()
+        );
+        let mut followed = vec![Vec::new(); joints];
+        for set in 0..sets {
+            let name = format!("JOINTS_{set}");
+            assert_eq!(all[attributes[&name].as_u64().unwrap() as usize]["componentType"], component);
+            let weights = rows(&json, binary, &format!("WEIGHTS_{set}"), "VEC4");
+            for (row, (joints, weights)) in rows(&json, binary, &name, "VEC4").into_iter().zip(weights).enumerate() {
+                followed[row].extend(joints.into_iter().zip(weights));
+            }
+        }
+        for (row, followed) in followed.iter().enumerate() {
+            let used = followed.iter().filter(|(_, weight)| *weight > 0.0).count();
+            let sum: f32 = followed.iter().map(|(_, weight)| weight).sum();
+            assert!((sum - 1.0).abs() < 2e-7 * used as f32, "{row}: {sum}");
+            assert!(followed.windows(2).all(|pair| pair[0].1 >= pair[1].1), "{row}: {followed:?}");
+            assert!(followed[used..].iter().all(|pair| *pair == (0.0, 0.0)), "{row}: {followed:?}");
+            let mut joints_of: Vec<u32> = followed[..used].iter().map(|(joint, _)| *joint as u32).collect();
+            joints_of.sort_unstable();
+            joints_of.dedup();
+            assert_eq!(joints_of.len(), used, "{row}: a joint twice");
+            assert!(joints_of.iter().all(|joint| *joint as usize <= row));
+        }
+
+        let animation = &json["animations"][0];
+        let (channels, samplers) =
+            (animation["channels"].as_array().unwrap(), animation["samplers"].as_array().unwrap());
+        // The last joint never moves.
+        assert_eq!((channels.len(), samplers.len()), (2 * (joints - 1), 2 * (joints - 1)));
+        for channel in channels {
+            let sampler = &samplers[channel["sampler"].as_u64().unwrap() as usize];
+            assert_eq!(numbers(&sampler["input"], "SCALAR"), [[0.0], [0.5], [2.0]]);
+            let input = &all[sampler["input"].as_u64().unwrap() as usize];
+            assert_eq!((&input["min"], &input["max"]), (&serde_json::json!([0.0]), &serde_json::json!([2.0])));
+            assert_eq!(sampler["interpolation"], "LINEAR");
+            let node = channel["target"]["node"].as_u64().unwrap() as usize;
+            assert!(own.contains(&node) && node < nodes.len() - 1);
+            let path = channel["target"]["path"].as_str().unwrap();
+            let output = numbers(&sampler["output"], if path == "rotation" { "VEC4" } else { "VEC3" });
+            // A joint's own pose is the first one.
+            let at_first: Vec<f32> = serde_json::from_value(nodes[node][path].clone()).unwrap();
+            assert_near(&output[..1], [at_first].into_iter());
+            match path {
+                "translation" => assert_eq!(output[2], [(node - 2) as f32, 1.0, 0.0]),
+                "rotation" => {
+                    let parts = [0.0, 0.2_f32.sqrt(), 0.0, 0.8_f32.sqrt()];
+                    assert_near(&output[2..], [parts.to_vec()].into_iter());
+                }
+                other => panic!("{other}"),
+            }
+        }
+    }
+}
+
+/// Four joints, or eight where four would lose more than 1 %; what is kept sums to 1.
+#[test]
+fn the_strongest_joints_are_kept() {
+    let kept = |weights: &[f32]| Influence::strongest(weights).iter().collect::<Vec<_>>();
+    assert_eq!(kept(&[0.0, 2.0, 0.0, 6.0]), [(3, 0.75), (1, 0.25)]);
+    assert_eq!(kept(&[0.25, 0.25, 0.25, 0.24, 0.001, 0.001, 0.001, 0.001, 0.001]).len(), 4);
+    assert_eq!(kept(&[0.25, 0.25, 0.25, 0.24, 0.003, 0.003, 0.003, 0.003, 0.003]).len(), 8);
+    assert_eq!(kept(&[1.0; 30]), (0..8).map(|joint| (joint, 0.125)).collect::<Vec<_>>());
+}
+
+#[test]
+fn positions_of_a_skin_are_those_between_keyframes() {
+    let pose = |position, rotation| JointPose { position, rotation };
+    // Moves by 1 along x and turns by a right angle about z, around (1, 0, 0).
+    let half = 0.5_f32.sqrt();
+    let poses = vec![pose([1.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]), pose([2.0, 0.0, 0.0], [-half, 0.0, 0.0, -half])];
+    let joints = vec![Joint { anchor: [1.0, 0.0, 0.0], poses }, Joint { anchor: [0.0; 3], poses: Vec::new() }];
+    let influences = [[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|weights| Influence::strongest(&weights));
+    let skin = Skin::new(joints, vec![0.0, 1.0], influences.to_vec()).unwrap();
+    let means = [[2.0, 0.0, 3.0]; 3];
+    let expected = |moment: f32, x: f32, y: f32| {
+        let found = skin.positions(&means, moment);
+        let rows: Vec<Vec<f32>> = found.iter().map(|row| row.to_vec()).collect();
+        let moved = vec![x, y, 3.0];
+        let mean = vec![(x + 2.0) / 2.0, y / 2.0, 3.0];
+        rows.iter().flatten().zip([moved, vec![2.0, 0.0, 3.0], mean].iter().flatten()).for_each(|(found, expected)| {
+            assert!((found - expected).abs() < 1e-3, "{moment}: {rows:?}");
+        });
+    };
+    expected(0.0, 2.0, 0.0);
+    expected(0.5, 1.5 + half, half);
+    expected(1.0, 2.0, 1.0);
+    expected(7.0, 2.0, 1.0);
+}
+
+#[test]
+fn a_skin_that_contradicts_itself_is_refused() {
+    let joint = |poses: usize| {
+        let pose = JointPose { position: [0.0; 3], rotation: [1.0, 0.0, 0.0, 0.0] };
+        Joint { anchor: [0.0; 3], poses: vec![pose; poses] }
+    };
+    let one = || vec![Influence::strongest(&[1.0, 1.0])];
+    let message = |joints: Vec<Joint>, seconds: Vec<f32>| Skin::new(joints, seconds, one()).unwrap_err().to_string();
+    assert!(message(Vec::new(), vec![0.0]).contains("0 joints, expected 1 to 65536"));
+    assert!(message(vec![joint(2); 2], vec![0.0]).contains("2 poses, expected one for each of 1 keyframes"));
+    assert!(message(vec![joint(1)], vec![0.0]).contains("joint 1, expected less than 1"));
+    for seconds in [vec![], vec![0.0, 0.0], vec![-1.0], vec![f32::NAN], vec![0.0, f32::NAN]] {
+        assert!(message(vec![joint(0); 2], seconds).contains("ascending"));
+    }
+    let skin = Skin::new(vec![joint(1); 2], vec![0.0], one()).unwrap();
+    let options = GlbOptions::default();
+    let error = |gaussians: &GaussianPly, skin: &Skin| {
+        glb_bytes(Path::new("a.glb"), gaussians, Some(skin), &options).unwrap_err().to_string()
+    };
+    assert!(error(&example(3), &skin).contains("of 1 Gaussians, expected 3"));
+    let odd = Skin::new(vec![joint(1); 2], vec![0.0], vec![Influence::strongest(&[0.0, f32::NAN])]).unwrap();
+    assert!(error(&example(1), &odd).contains("NaN"));
 }
 
 #[test]

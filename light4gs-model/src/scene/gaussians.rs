@@ -1,5 +1,6 @@
 //! The static set of Gaussians.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use burn::module::{Module, Param, ParamId};
@@ -125,6 +126,20 @@ impl GaussianTensors {
                 })
                 .collect(),
         }
+    }
+
+    /// The Gaussians of some rows, with all attributes.
+    ///
+    /// # Panics
+    /// If there are not so many rows.
+    pub fn rows(self, rows: Range<usize>) -> Self {
+        struct Rows(Range<usize>);
+        impl AttributeMapper for Rows {
+            fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
+                values.narrow(0, self.0.start, self.0.len())
+            }
+        }
+        self.map(&mut Rows(rows))
     }
 
     /// A further attribute by name, `[N, width]`.

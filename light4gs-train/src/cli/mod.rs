@@ -80,7 +80,7 @@ enum Command {
     #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
     Info(container::Info),
     /// Write the Gaussians for other programs: PLY files at successive times, a single time as .ply or .glb, the motion
-    /// as .4dgs; or the scene as a page that plays it.
+    /// as .4dgs, that of control nodes as .glb; or the scene as a page that plays it.
     #[command(
         after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
     )]

@@ -1,5 +1,6 @@
 //! The program as its users run it: commands, damaged inputs, kills, resumed runs, studies.
 
+mod animated_glb;
 mod command_line;
 mod hostile_runs;
 #[cfg(unix)]

@@ -4,6 +4,7 @@ mod golden;
 
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
+use glam::{Quat, Vec3};
 use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, SceneMeta, decode, encode};
 use light4gs_data::PointCloud;
@@ -86,6 +87,40 @@ fn the_codec_moves_gaussians_as_the_model_does() {
             }
             let again = DynamicScene::<BuiltInField>::from_arrays(&data, &device).unwrap();
             assert_eq!(again.to_arrays(SceneMeta::default()).unwrap(), data, "{name}");
+        }
+    }
+}
+
+/// Another program that skins by weights and places of the nodes finds the Gaussians where the model has them.
+#[test]
+fn weights_and_places_of_the_nodes_are_those_of_skinning() {
+    for (name, device) in devices() {
+        for config in configurations() {
+            let scene = map_parameters(scene(config.clone(), &device), &mut Shaken);
+            let canonical = scene.gaussians.tensors();
+            let weights = values_of(&scene.field.weights(&canonical));
+            let weights: Vec<&[f32]> = weights.chunks_exact(config.nodes + 1).collect();
+            let some = values_of(&scene.field.weights(&canonical.rows(7..20)));
+            assert_close("weights of some rows", &some, &weights[7..20].concat(), 1e-6);
+            let anchors = values_of(&scene.field.world_anchors());
+            let means = values_of(&scene.gaussians.means.val());
+            for time in [0.0, 0.37, 1.0] {
+                let (places, quats) = scene.field.places(time);
+                let (places, quats) = (values_of(&places), values_of(&quats));
+                let by_node = |mean: Vec3, node: usize| {
+                    let [w, x, y, z] = quats.as_chunks().0[node];
+                    let [anchor, place] = [&anchors, &places].map(|all| Vec3::from_slice(&all[3 * node..]));
+                    Quat::from_xyzw(x, y, z, w) * (mean - anchor) + place
+                };
+                let moved = means.as_chunks().0.iter().zip(&weights).flat_map(|(mean, weights)| {
+                    assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{name}: {weights:?}");
+                    assert!(config.stillness.is_some() || weights[config.nodes] == 0.0);
+                    let mean = Vec3::from_array(*mean);
+                    let of_nodes: Vec3 = (0..config.nodes).map(|node| by_node(mean, node) * weights[node]).sum();
+                    (of_nodes + mean * weights[config.nodes]).to_array()
+                });
+                assert_close(name, &moved.collect::<Vec<f32>>(), &values_of(&scene.at(time).means), 1e-5);
+            }
         }
     }
 }

@@ -12,12 +12,14 @@
 //! | `lifetime` | what comes and goes |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
+//! | `weights` | how much each Gaussian follows each node, as numbers |
 
 mod lifetime;
 mod placement;
 mod regularizer;
 mod stream;
 mod trajectory;
+mod weights;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -145,6 +147,21 @@ impl NodesField {
         self.translations.dims()[0]
     }
 
+    /// Moved positions and quaternions `[N, 7]`, from what each node does to the space around it.
+    fn skinned(&self, canonical: &GaussianTensors, poses: Tensor<2>) -> Tensor<2> {
+        let stillness = canonical.further(STILLNESS).cloned();
+        let stillness = stillness
+            .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
+        skin(SkinningInputs {
+            means: canonical.means.clone(),
+            quats: canonical.quats.clone(),
+            stillness,
+            anchors: self.world_anchors(),
+            precisions: self.precisions(),
+            poses,
+        })
+    }
+
     /// Knots that so many training times ask for.
     fn knots_of(config: &NodesFieldConfig, times: usize) -> usize {
         let segments = (times as f64 / config.times_a_knot).ceil() as usize;
@@ -173,17 +190,7 @@ impl DeformationField for NodesField {
     /// Weights take positions as constants: a Gaussian does not move only to follow another node.
     fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
         let Poses { matrices, offsets, quats } = self.poses(time);
-        let stillness = canonical.further(STILLNESS).cloned();
-        let stillness = stillness
-            .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
-        let moved = skin(SkinningInputs {
-            means: canonical.means.clone(),
-            quats: canonical.quats.clone(),
-            stillness,
-            anchors: self.world_anchors(),
-            precisions: self.precisions(),
-            poses: Tensor::cat(vec![matrices, offsets, quats], 1),
-        });
+        let moved = self.skinned(&canonical, Tensor::cat(vec![matrices, offsets, quats], 1));
         let part = |columns: Range<usize>| moved.clone().slice(s![.., columns]);
         let opacity_logits = match canonical.further(LIFETIME) {
             Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),

@@ -67,8 +67,8 @@ pub(super) fn continued(knots: Tensor<2>, low: f32, high: f32) -> Tensor<2> {
 }
 
 impl NodesField {
-    /// `[B, 3]`, world units.
-    pub(super) fn world_anchors(&self) -> Tensor<2> {
+    /// `[B, 3]`: where the nodes are before anything moves, world units.
+    pub fn world_anchors(&self) -> Tensor<2> {
         self.anchors.val() * self.unit.val().unsqueeze()
     }
 
@@ -96,6 +96,13 @@ impl NodesField {
         let turned = (matrices.clone().reshape([nodes, 3, 3]) * anchors.clone().reshape([nodes, 1, 3])).sum_dim(2);
         let offsets = (anchors + translations - turned.reshape([nodes, 3])) * self.unit.val().unsqueeze();
         Poses { matrices, offsets, quats }
+    }
+
+    /// Where the nodes are at a time, `[B, 3]`, world units, and how they are turned, `[B, 4]`: unit quaternions (w, x, y, z). What is
+    /// at x before anything moves goes with a node from the [anchor](Self::world_anchors) a to the place p as `R (x - a) + p`.
+    pub fn places(&self, time: f32) -> (Tensor<2>, Tensor<2>) {
+        let (translations, quats) = self.motion(time);
+        ((self.anchors.val() + translations) * self.unit.val().unsqueeze(), quats)
     }
 
     pub(super) fn device(&self) -> Device {

@@ -1,13 +1,18 @@
 //! `export`.
 
+mod skin;
+
 use std::io::Write;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_codec::{GaussianArrays, read_info};
+use light4gs_codec::{GaussianArrays, SceneMeta, read_info};
 use light4gs_data::{DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb};
+use light4gs_model::{BuiltInField, STILLNESS};
 use light4gs_web::page::{Content, page};
 
+use self::skin::{Distances, NodesMotion};
 use super::check_output;
 use super::limits::LimitsArgument;
 use super::limits::most::{MOST_FRAMES, frame_count};
@@ -20,13 +25,16 @@ use crate::evaluation::DecodedScene;
 
 /// Most cameras of each split in a page: enough to choose from, few enough to send.
 const MOST_CAMERAS: usize = 60;
+/// Frames a second, so that times of frames are different numbers.
+const FPS: RangeInclusive<f64> = 1e-3..=1e5;
 
 #[derive(Debug, Args)]
 pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
     /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or an existing
-    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs.
+    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs. A scene of
+    /// control nodes becomes a .glb with its whole motion (skin and animation), unless --time asks for a single time.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
     /// One file that plays the scene in a browser without any other file.
@@ -35,13 +43,13 @@ pub(super) struct Export {
     /// Dataset whose cameras the page offers; by default that of the run whose folder holds the file.
     #[arg(long, requires = "html")]
     scene: Option<PathBuf>,
-    /// Number of frames over time 0 to 1; by default as many as the file was made from.
+    /// Number of frames over time 0 to 1, keyframes in a .glb; by default as many as the file was made from.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MOST_FRAMES)), allow_negative_numbers = true)]
     frames: Option<u32>,
-    /// The time of a .ply or .glb file, in [0, 1].
-    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
-    time: f32,
-    /// Frames a second of a .4dgs file; by default those of the source, or 30.
+    /// A single time, in [0, 1], for a .ply or .glb file; 0 where one is needed and none is given.
+    #[arg(long, allow_negative_numbers = true, conflicts_with_all = ["frames", "fps"])]
+    time: Option<f32>,
+    /// Frames a second of a .4dgs or of a .glb that moves; by default those of the source, or 30.
     #[arg(long, allow_negative_numbers = true)]
     fps: Option<f32>,
     /// In a .glb: the scene's z axis points up, as in Blender. glTF's y axis does.
@@ -85,8 +93,8 @@ impl Target {
 
 impl Export {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        if !(0.0..=1.0).contains(&self.time) {
-            return Err(TrainError::Input(format!("--time must be in [0, 1], not {}", self.time)));
+        if let Some(time) = self.time.filter(|time| !(0.0..=1.0).contains(time)) {
+            return Err(TrainError::Input(format!("--time must be in [0, 1], not {time}")));
         }
         match (&self.html, &self.out) {
             (Some(html), _) => self.write_page(html),
@@ -119,6 +127,8 @@ impl Export {
         let frames = frame_count(meta, self.frames)?;
         let times = || (0..frames).map(|k| if frames == 1 { 0.0 } else { k as f32 / (frames - 1) as f32 });
         let out = path.display();
+        let gaussians = &decoded.data.gaussians;
+        let single_time = self.time.unwrap_or(0.0);
         match target {
             Target::PlySequence => {
                 std::fs::create_dir_all(path).map_err(DataError::io("create", path))?;
@@ -128,33 +138,56 @@ impl Export {
                 say(format_args!("wrote {frames} PLY files to {out}"))
             }
             Target::Ply => {
-                at(self.time).write(path)?;
+                at(single_time).write(path)?;
                 say(format_args!("wrote {out}"))
             }
             Target::Glb => {
-                let options = GlbOptions { sh_degree: decoded.data.gaussians.sh_degree, z_is_up: self.z_up };
-                write_glb(path, &at(self.time), &options)?;
-                say(format_args!("wrote {out}{}", left_out(&decoded.data.gaussians)))
+                let options = GlbOptions { sh_degree: gaussians.sh_degree, z_is_up: self.z_up };
+                let nodes = match &decoded.model.field {
+                    BuiltInField::Nodes(nodes) if self.time.is_none() => nodes,
+                    _ => {
+                        write_glb(path, &at(single_time), None, &options)?;
+                        return say(format_args!("wrote {out}{}", left_out(gaussians, &[])));
+                    }
+                };
+                let motion = NodesMotion { scene: &decoded.model, nodes, keyframes: frames, fps: self.fps(meta)? };
+                let skin = motion.skin()?;
+                write_glb(path, &plain_gaussians(gaussians.clone()), Some(&skin), &options)?;
+                let (joints, seconds) = (skin.joints(), skin.duration());
+                let Distances { mean, largest } = motion.distances(&skin);
+                let left_out = left_out(gaussians, &[STILLNESS]);
+                say(format_args!(
+                    "wrote {out} ({joints} joints, {frames} keyframes in {seconds:.2} s; centers are off by {mean:.5} in \
+                     the mean, by {largest:.5} at most){left_out}"
+                ))
             }
             Target::FourDgs => {
-                let source = Some(meta.fps).filter(|fps| *fps > 0.0);
-                let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
-                if !(fps > 0.0 && fps.is_finite()) {
-                    return Err(TrainError::Input(format!("--fps must be a positive number, not {fps}")));
-                }
+                let fps = self.fps(meta)?;
                 let sample = |(k, time): (usize, f32)| MotionSample { begin: k as f64 / fps, gaussians: at(time) };
                 let samples: Vec<MotionSample> = times().enumerate().map(sample).collect();
                 write_four_dgs(path, &samples, f64::from(frames) / fps)?;
-                let left_out = left_out(&decoded.data.gaussians);
+                let left_out = left_out(gaussians, &[]);
                 say(format_args!("wrote {out} ({frames} samples, {fps} a second){left_out}"))
             }
         }
     }
+
+    /// Frames a second: as requested, or those of the source, or 30.
+    fn fps(&self, meta: &SceneMeta) -> Result<f64, TrainError> {
+        let source = Some(meta.fps).filter(|fps| *fps > 0.0);
+        let fps = f64::from(self.fps.or(source).unwrap_or(30.0));
+        if FPS.contains(&fps) {
+            Ok(fps)
+        } else {
+            Err(TrainError::Input(format!("--fps must be {} to {}, not {fps}", FPS.start(), FPS.end())))
+        }
+    }
 }
 
-/// A text with the attributes that a file of another program cannot hold.
-fn left_out(gaussians: &GaussianArrays) -> String {
-    let names: Vec<&str> = gaussians.further.iter().map(|attribute| attribute.name.as_str()).collect();
+/// A text with the attributes that a file of another program cannot hold: all but those that it has in another way.
+fn left_out(gaussians: &GaussianArrays, held: &[&str]) -> String {
+    let names = gaussians.further.iter().map(|attribute| attribute.name.as_str());
+    let names: Vec<&str> = names.filter(|name| !held.contains(name)).collect();
     if names.is_empty() { String::new() } else { format!(", without the attributes {}", names.join(", ")) }
 }
 

@@ -1,0 +1,52 @@
+//! How much each Gaussian follows each node, as numbers: for programs that do the skinning themselves.
+
+use burn::tensor::{Tensor, s};
+
+use super::{NodesField, tensor};
+use crate::kernels::skinning::POSE;
+use crate::scene::GaussianTensors;
+
+/// Nodes whose weights one call of the kernel gives.
+const GROUP: usize = 3;
+/// Where a pose's quaternion begins.
+const QUATERNION: usize = 12;
+
+impl NodesField {
+    /// `[N, B + 1]`: how much each Gaussian follows each node, and in the last column how much it stands still. Rows sum to 1.
+    /// They do not depend on the time.
+    ///
+    /// ```
+    /// use burn::tensor::Device;
+    /// use light4gs_data::PointCloud;
+    /// use light4gs_model::{DynamicSceneConfig, GaussiansConfig, NodesField, NodesFieldConfig};
+    ///
+    /// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0]], colors: vec![[0.5; 3]; 2] };
+    /// let config = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), NodesFieldConfig::new());
+    /// let scene = config.init(&cloud, &Device::flex());
+    /// let weights = scene.field.weights(&scene.gaussians.tensors());
+    /// assert_eq!(weights.dims(), [2, scene.field.nodes() + 1]);
+    /// ```
+    pub fn weights(&self, canonical: &GaussianTensors) -> Tensor<2> {
+        let (count, nodes, device) = (canonical.means.dims()[0], self.nodes(), self.device());
+        let unturned = Tensor::from_floats([[1.0, 0.0, 0.0, 0.0]], &device).repeat_dim(0, count);
+        let unturned = GaussianTensors { quats: unturned, ..canonical.clone() };
+        // The kernel that skins is asked, so that there is one softmax: if three nodes have the imaginary units as quaternions
+        // and all others 0, the blended quaternion has their weights, and before them that of standing still.
+        let blended = |first: usize| {
+            let mut poses = vec![0.0; nodes * POSE];
+            for (part, node) in (first..nodes).take(GROUP).enumerate() {
+                poses[node * POSE + QUATERNION + 1 + part] = 1.0;
+            }
+            self.skinned(&unturned, tensor(poses, [nodes, POSE], &device)).slice(s![.., 3..7])
+        };
+        let mut columns = Vec::new();
+        let mut still = None;
+        for first in (0..nodes).step_by(GROUP) {
+            let weights = blended(first);
+            columns.push(weights.clone().slice(s![.., 1..1 + GROUP.min(nodes - first)]));
+            still = Some(weights.slice(s![.., 0..1]));
+        }
+        columns.extend(still);
+        Tensor::cat(columns, 1)
+    }
+}
