@@ -27,6 +27,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.profile.begin_step();
         if stage == Stage::Fine {
             self.begin_motion_step(iteration);
+            self.refine_motion(iteration)?;
         }
         let indices = self.batch(stage, iteration)?;
         let batch = indices.len();
@@ -95,8 +96,14 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// The frames of an iteration, by their indices in the training split.
     fn batch(&self, stage: Stage, iteration: usize) -> Result<Vec<usize>, TrainError> {
+        self.sampled(&self.batch_request(stage, iteration))
+    }
+
+    /// The frames that the sampler gives for a request, by their indices in the training split.
+    pub(super) fn sampled(&self, request: &BatchRequest) -> Result<Vec<usize>, TrainError> {
         let frames = &self.data.train;
-        let indices = self.sampler.batch(&self.batch_request(stage, iteration));
+        let (stage, iteration) = (request.stage, request.iteration);
+        let indices = self.sampler.batch(request);
         let problem = match indices.iter().find(|index| **index >= frames.len()) {
             Some(index) => format!("frame {index} of {}", frames.len()),
             None if indices.is_empty() => "no frame".to_owned(),

@@ -9,7 +9,7 @@ use light4gs_codec::MotionArrays;
 use super::hexplane::HexPlaneField;
 use super::nodes::NodesField;
 use super::still::StillField;
-use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
+use super::{DeformationField, FinePosition, LearningRate, PositionGradients, Renewed, SceneAtRest};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
@@ -86,6 +86,19 @@ macro_rules! built_in_fields {
 
             fn begin_step(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
                 each!(self, field => field.begin_step(scene, position));
+            }
+
+            fn refinement_views(&self, position: &FinePosition) -> usize {
+                each!(self, field => field.refinement_views(position))
+            }
+
+            fn refine(
+                &mut self,
+                scene: &SceneAtRest<'_>,
+                views: &[PositionGradients],
+                position: &FinePosition,
+            ) -> Vec<Renewed> {
+                each!(self, field => field.refine(scene, views, position))
             }
 
             fn regularizer(&self, scene: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {

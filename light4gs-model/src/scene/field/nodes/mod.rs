@@ -9,6 +9,7 @@
 //! |---|---|
 //! | `trajectory` | splines over time, and the nodes' poses at a time |
 //! | `placement` | where the nodes are when motion begins |
+//! | `relocation` | nodes that move to where motion is not explained, while training |
 //! | `lifetime` | what comes and goes |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
@@ -17,6 +18,7 @@
 mod lifetime;
 mod placement;
 mod regularizer;
+mod relocation;
 mod stream;
 mod trajectory;
 mod weights;
@@ -32,7 +34,7 @@ use light4gs_codec::MotionArrays;
 pub use lifetime::LIFETIME;
 use trajectory::Poses;
 
-use super::{DeformationField, FinePosition, LearningRate, SceneAtRest};
+use super::{DeformationField, FinePosition, LearningRate, PositionGradients, Renewed, SceneAtRest};
 use crate::ops::skinning::{SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
@@ -88,6 +90,15 @@ pub struct NodesFieldConfig {
     /// How much faster than the usual rate anchors (as shares of the scene's extent) and logarithms of radii are learned.
     #[config(default = 5.0)]
     pub anchor_rate: f64,
+    /// Nodes that do little are moved to where motion is not explained, every so many iterations; 0: they never are.
+    #[config(default = 0)]
+    pub relocation_interval: usize,
+    /// The share of the fine stage after which nodes are no longer moved.
+    #[config(default = 0.67)]
+    pub relocation_until: f64,
+    /// At most this share of the nodes is moved at a time.
+    #[config(default = 0.0625)]
+    pub relocation_share: f64,
 }
 
 /// `B` nodes on trajectories of `K` knots. Lengths are shares of `unit`.
@@ -215,6 +226,19 @@ impl DeformationField for NodesField {
             self.translations = continued(&self.translations);
             self.rotations = continued(&self.rotations);
         }
+    }
+
+    fn refinement_views(&self, position: &FinePosition) -> usize {
+        self.relocation_views(position)
+    }
+
+    fn refine(
+        &mut self,
+        scene: &SceneAtRest<'_>,
+        views: &[PositionGradients],
+        position: &FinePosition,
+    ) -> Vec<Renewed> {
+        self.relocate(scene, views, position)
     }
 
     fn regularizer(&self, _: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {

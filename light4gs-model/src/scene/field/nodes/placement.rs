@@ -6,7 +6,7 @@ use super::{MOST_NODES, NodesField, numbers, tensor};
 use crate::scene::field::{FinePosition, SceneAtRest};
 
 /// Least radius of a node, as a share of the scene's extent.
-const LEAST_RADIUS: f32 = 5e-3;
+pub(super) const LEAST_RADIUS: f32 = 5e-3;
 
 impl NodesField {
     /// The same with nodes at points of the scene that are far from each other, on trajectories that do not move yet.
@@ -44,7 +44,7 @@ impl NodesField {
     }
 }
 
-fn square(a: &[f32; 3], b: &[f32; 3]) -> f32 {
+pub(super) fn square(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
 }
 
