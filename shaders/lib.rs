@@ -83,13 +83,15 @@ shaders! {
     /// Adds up every Gaussian's sums over its cells.
     SIGNIFICANCE_GATHER = "splatting" / "significance_gather" [];
     /// Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
-    SKINNING = "skinning" / "skinning" [EXPONENTIAL, QUATERNION, POSE];
-    /// First of three parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
+    SKINNING = "skinning" / "skinning" [EXPONENTIAL, QUATERNION, POSE, AFFINITY];
+    /// One of the parts of skinning's derivative: the gradients of the Gaussians' affinities.
+    SKINNING_AFFINITIES = "skinning" / "skinning_affinities" [EXPONENTIAL, POSE, AFFINITY];
+    /// First of the parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
     SKINNING_BACKWARD = "skinning" / "skinning_backward" [QUATERNION, POSE];
-    /// Last of three parts of skinning's derivative: adds up the slices, in their order.
+    /// Last of the parts of skinning's derivative: adds up the slices, in their order.
     SKINNING_GATHER = "skinning" / "skinning_gather" [];
-    /// Second of three parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
-    SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE];
+    /// One of the parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
+    SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE, AFFINITY];
     /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
     SUBGROUPS = "elementwise" / "subgroups" [];
 }
@@ -103,6 +105,8 @@ pub mod include {
     }
 
     wgsl! {
+        /// What the affinities of a Gaussian and a node add to the logit of its weight.
+        AFFINITY = "include/affinity";
         /// Finite numbers, and sums of products term by term.
         ARITHMETIC = "include/arithmetic";
         /// The steps of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian

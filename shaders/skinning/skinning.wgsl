@@ -22,9 +22,10 @@ struct Parameters {
 @group(0) @binding(7) var<storage, read_write> blended: array<vec4<f32>>;
 @group(0) @binding(8) var<uniform> parameters: Parameters;
 
-fn exponent_of(mean: vec3<f32>, node: u32) -> f32 {
-    let offset = mean - vec3<f32>(anchors[3u * node], anchors[3u * node + 1u], anchors[3u * node + 2u]);
-    return -precisions[node] * dot(offset, offset);
+fn exponent_of(mean: vec3<f32>, i: u32, node: u32) -> f32 {
+    let at = (3u + AFFINITIES) * node;
+    let offset = mean - vec3<f32>(anchors[at], anchors[at + 1u], anchors[at + 2u]);
+    return affinity_between(i, node) - precisions[node] * dot(offset, offset);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -38,11 +39,12 @@ fn main(
         return;
     }
     let mean = vec3<f32>(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
-    var largest = stillness[i];
+    let own_stillness = stillness[(1u + AFFINITIES) * i];
+    var largest = own_stillness;
     for (var node = 0u; node < parameters.nodes; node++) {
-        largest = max(largest, exponent_of(mean, node));
+        largest = max(largest, exponent_of(mean, i, node));
     }
-    let still = exponential(stillness[i] - largest);
+    let still = exponential(own_stillness - largest);
     var sum = still;
     var pose = Pose(
         vec4<f32>(still, 0.0, 0.0, 0.0),
@@ -51,7 +53,7 @@ fn main(
         vec4<f32>(still, 0.0, 0.0, 0.0),
     );
     for (var node = 0u; node < parameters.nodes; node++) {
-        let weight = exponential(exponent_of(mean, node) - largest);
+        let weight = exponential(exponent_of(mean, i, node) - largest);
         let at = 16u * node;
         sum += weight;
         pose.row_x += weight * vec4<f32>(poses[at], poses[at + 1u], poses[at + 2u], poses[at + 9u]);

@@ -1,4 +1,4 @@
-// First of three parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
+// First of the parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
 //
 // One invocation owns one Gaussian. Reads it, its blended pose (see `skinning.wgsl`) and `upstream` [N, 7]. Writes the gradients of
 // mean, quaternion and stillness, and four vectors of `handed`:
@@ -60,7 +60,7 @@ fn main(
         vec4<f32>(1.0, 0.0, 0.0, 0.0),
     );
     let inner = inner_product(pose, mean, by_position, by_turn);
-    of_stillness[i] = sums.z * (inner_product(still, mean, by_position, by_turn) - inner);
+    of_stillness[(1u + AFFINITIES) * i] = sums.z * (inner_product(still, mean, by_position, by_turn) - inner);
     handed[4u * i] = vec4<f32>(by_position, inner);
     handed[4u * i + 1u] = by_turn;
     handed[4u * i + 2u] = vec4<f32>(mean, sums.x);

@@ -1,7 +1,8 @@
-// Last of three parts of skinning's derivative: adds up the slices, in their order.
+// Last of the parts of skinning's derivative: adds up the slices, in their order.
 //
-// One invocation owns one of the twenty numbers of a node. Reads the sums of `skinning_nodes.wgsl`. Writes the gradients of anchors
-// [B, 3], precisions [B, 1] and poses [B, 16], each from its place in `gradients`.
+// One invocation owns one of the SUMS numbers of a node: twenty, and four more where there are affinities. Reads the sums of
+// `skinning_nodes.wgsl`. Writes the gradients of anchors [B, 3 + AFFINITIES], precisions [B, 1] and poses [B, 16], each from its
+// place in `gradients`.
 
 struct Parameters {
     nodes: u32,
@@ -23,7 +24,7 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let own = flat_group(group, groups) * WORKGROUP + lane;
-    let stride = 20u * parameters.nodes;
+    let stride = SUMS * parameters.nodes;
     if (own >= stride) {
         return;
     }
@@ -31,11 +32,15 @@ fn main(
     for (var slice = 0u; slice < parameters.slices; slice++) {
         sum += sums[slice * stride + own];
     }
-    let node = own / 20u;
-    let k = own % 20u;
-    var at = parameters.anchors + 3u * node + k;
+    let node = own / SUMS;
+    let k = own % SUMS;
+    var at = parameters.anchors + (3u + AFFINITIES) * node + k;
     if (k == 3u) {
         at = parameters.precisions + node;
+    } else if (k >= 20u + AFFINITIES) {
+        return;
+    } else if (k >= 20u) {
+        at = parameters.anchors + (3u + AFFINITIES) * node + k - 17u;
     } else if (k > 3u) {
         at = parameters.poses + 16u * node + k - 4u;
     }

@@ -1,8 +1,8 @@
-// Second of three parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
+// One of the parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
 //
 // One invocation owns one node and one slice, and adds up the Gaussians of the slice in their order; neighbors have the same slice, so
 // that they read the same Gaussian at the same time. Reads what Gaussians hand over (see `skinning_backward.wgsl`) and the nodes.
-// Writes `sums`, twenty a node and slice: anchor (3), precision (1), pose (16).
+// Writes `sums`, SUMS a node and slice: anchor (3), precision (1), pose (16), and affinities where there are any.
 
 struct Parameters {
     count: u32,
@@ -15,8 +15,9 @@ struct Parameters {
 @group(0) @binding(1) var<storage, read_write> anchors: array<f32>;
 @group(0) @binding(2) var<storage, read_write> precisions: array<f32>;
 @group(0) @binding(3) var<storage, read_write> poses: array<f32>;
-@group(0) @binding(4) var<storage, read_write> sums: array<vec4<f32>>;
-@group(0) @binding(5) var<uniform> parameters: Parameters;
+@group(0) @binding(4) var<storage, read_write> stillness: array<f32>;
+@group(0) @binding(5) var<storage, read_write> sums: array<vec4<f32>>;
+@group(0) @binding(6) var<uniform> parameters: Parameters;
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -32,7 +33,8 @@ fn main(
     }
     let end = min(begin + parameters.slice, parameters.count);
     let node = own % parameters.nodes;
-    let anchor = vec3<f32>(anchors[3u * node], anchors[3u * node + 1u], anchors[3u * node + 2u]);
+    let place = (3u + AFFINITIES) * node;
+    let anchor = vec3<f32>(anchors[place], anchors[place + 1u], anchors[place + 2u]);
     let sharpness = precisions[node];
     let at = 16u * node;
     let pose = Pose(
@@ -48,24 +50,33 @@ fn main(
     var of_row_y = vec4<f32>(0.0);
     var of_row_z = vec4<f32>(0.0);
     var of_turn = vec4<f32>(0.0);
+    var of_affinities = vec4<f32>(0.0);
     for (var i = begin; i < end; i++) {
         let by_position = handed[4u * i];
         let by_turn = handed[4u * i + 1u];
         let mean = handed[4u * i + 2u];
         let offset = mean.xyz - anchor;
         let squared = dot(offset, offset);
-        let weight = exponential(-sharpness * squared - mean.w) * handed[4u * i + 3u].x;
-        let place = vec4<f32>(mean.xyz, 1.0);
+        let exponent = affinity_between(i, node) - sharpness * squared;
+        let weight = exponential(exponent - mean.w) * handed[4u * i + 3u].x;
+        let point = vec4<f32>(mean.xyz, 1.0);
         let by_logit = weight * (inner_product(pose, mean.xyz, by_position.xyz, by_turn) - by_position.w);
         of_place += by_logit * vec4<f32>(offset, squared);
-        of_row_x += weight * by_position.x * place;
-        of_row_y += weight * by_position.y * place;
-        of_row_z += weight * by_position.z * place;
+        of_row_x += weight * by_position.x * point;
+        of_row_y += weight * by_position.y * point;
+        of_row_z += weight * by_position.z * point;
         of_turn += weight * by_turn;
+        for (var k = 0u; k < AFFINITIES; k++) {
+            of_affinities[k] += by_logit * stillness[(1u + AFFINITIES) * i + 1u + k];
+        }
     }
-    sums[5u * own] = of_place * vec4<f32>(vec3<f32>(2.0 * sharpness), -1.0);
-    sums[5u * own + 1u] = vec4<f32>(of_row_x.xyz, of_row_y.x);
-    sums[5u * own + 2u] = vec4<f32>(of_row_y.yz, of_row_z.xy);
-    sums[5u * own + 3u] = vec4<f32>(of_row_z.z, of_row_x.w, of_row_y.w, of_row_z.w);
-    sums[5u * own + 4u] = of_turn;
+    let at_sums = SUMS / 4u * own;
+    sums[at_sums] = of_place * vec4<f32>(vec3<f32>(2.0 * sharpness), -1.0);
+    sums[at_sums + 1u] = vec4<f32>(of_row_x.xyz, of_row_y.x);
+    sums[at_sums + 2u] = vec4<f32>(of_row_y.yz, of_row_z.xy);
+    sums[at_sums + 3u] = vec4<f32>(of_row_z.z, of_row_x.w, of_row_y.w, of_row_z.w);
+    sums[at_sums + 4u] = of_turn;
+    if (AFFINITIES > 0u) {
+        sums[at_sums + 5u] = of_affinities;
+    }
 }

@@ -26,9 +26,9 @@ pub(crate) struct SkinningSlices<'a> {
     pub(crate) means: &'a [f32],
     /// `[N, 4]`
     pub(crate) quats: &'a [f32],
-    /// `[N, 1]`
+    /// `[N, W]`: stillness, then affinities
     pub(crate) stillness: &'a [f32],
-    /// `[B, 3]`
+    /// `[B, 2 + W]`: anchors, then affinities
     pub(crate) anchors: &'a [f32],
     /// `[B, 1]`
     pub(crate) precisions: &'a [f32],
@@ -37,36 +37,68 @@ pub(crate) struct SkinningSlices<'a> {
 }
 
 impl SkinningSlices<'_> {
+    /// `W`: one more than there are affinities.
+    pub(crate) fn width(&self) -> usize {
+        self.anchors.len() / self.precisions.len() - 2
+    }
+
+    /// Gaussians.
+    pub(crate) fn count(&self) -> usize {
+        self.means.len() / 3
+    }
+
     /// The nodes, each with its numbers next to each other.
-    pub(crate) fn nodes(&self) -> Vec<Node> {
-        let rows = self.anchors.as_chunks::<3>().0.iter().zip(self.poses.as_chunks::<POSE>().0);
-        let nodes = rows.zip(self.precisions).map(|((anchor, pose), precision)| Node {
-            anchor: *anchor,
-            sharpness: -precision * std::f32::consts::LOG2_E,
-            pose: *pose,
+    pub(crate) fn nodes<const W: usize>(&self) -> Vec<Node<W>> {
+        let rows = self.anchors.chunks_exact(2 + W).zip(self.poses.as_chunks::<POSE>().0);
+        let nodes = rows.zip(self.precisions).map(|((place, pose), precision)| {
+            let mut affinities = [0.0; W];
+            affinities[1..].copy_from_slice(&place[3..]);
+            Node {
+                anchor: [place[0], place[1], place[2]],
+                affinities,
+                sharpness: -precision * std::f32::consts::LOG2_E,
+                pose: *pose,
+            }
         });
         nodes.collect()
     }
 }
 
 /// A node at one time.
-pub(crate) struct Node {
+pub(crate) struct Node<const W: usize> {
     anchor: [f32; 3],
+    /// Behind a zero in the place of the stillness.
+    pub(crate) affinities: [f32; W],
     /// Exponent of 2 a unit of squared distance.
     sharpness: f32,
     pub(crate) pose: [f32; POSE],
 }
 
-impl Node {
-    /// Offsets from the anchor, their squared length, and the exponent of 2 of the weight before the softmax.
+impl<const W: usize> Node<W> {
+    /// Offsets from the anchor, their squared length, and the exponent of 2 of the weight before the softmax. `scaled` are the
+    /// Gaussians' stillness and affinities as exponents of 2.
     #[inline(always)]
-    pub(crate) fn reach<L: Lanes>(&self, mean: &[L; 3]) -> ([L; 3], L, L) {
+    pub(crate) fn reach<L: Lanes>(&self, mean: &[L; 3], scaled: &[L; W]) -> ([L; 3], L, L) {
         let x = mean[0].sub(L::splat(self.anchor[0]));
         let y = mean[1].sub(L::splat(self.anchor[1]));
         let z = mean[2].sub(L::splat(self.anchor[2]));
         let squared = x.mul_add(x, y.mul_add(y, z.mul(z)));
-        ([x, y, z], squared, squared.mul(L::splat(self.sharpness)))
+        let mut exponent = squared.mul(L::splat(self.sharpness));
+        for k in 1..W {
+            exponent = scaled[k].mul_add(L::splat(self.affinities[k]), exponent);
+        }
+        ([x, y, z], squared, exponent)
     }
+}
+
+/// Numbers as exponents of 2.
+#[inline(always)]
+pub(crate) fn as_exponents<L: Lanes, const W: usize>(numbers: &[L; W]) -> [L; W] {
+    let mut scaled = [L::splat(0.0); W];
+    for k in 0..W {
+        scaled[k] = numbers[k].mul(L::splat(std::f32::consts::LOG2_E));
+    }
+    scaled
 }
 
 /// What eight Gaussians make of the nodes.
@@ -152,7 +184,7 @@ pub(crate) fn position<L: Lanes>(pose: &[L; POSE], mean: &[L; 3]) -> [L; 3] {
 
 /// Sums over the nodes of weight times the eight numbers of the pose from `first` on.
 #[inline(always)]
-fn half_of_pose<L: Lanes>(weights: &[Block], nodes: &[Node], first: usize) -> [L; POSE / 2] {
+fn half_of_pose<L: Lanes, const W: usize>(weights: &[Block], nodes: &[Node<W>], first: usize) -> [L; POSE / 2] {
     let mut sums = [L::splat(0.0); POSE / 2];
     for (weight, node) in weights.iter().zip(nodes) {
         let weight = L::load(weight);
@@ -166,8 +198,8 @@ fn half_of_pose<L: Lanes>(weights: &[Block], nodes: &[Node], first: usize) -> [L
 /// Pose of the node that stands still.
 pub(crate) const STILL: [f32; POSE] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
-struct Forward<'a> {
-    nodes: &'a [Node],
+struct Forward<'a, const W: usize> {
+    nodes: &'a [Node<W>],
     means: &'a [f32],
     quats: &'a [f32],
     stillness: &'a [f32],
@@ -175,21 +207,22 @@ struct Forward<'a> {
     blended: &'a mut [BlendedGroup],
 }
 
-impl LaneKernel for Forward<'_> {
+impl<const W: usize> LaneKernel for Forward<'_, W> {
     type Output = ();
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let mut weights = vec![[0.0; LANES]; self.nodes.len()];
-        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES)).zip(self.stillness.chunks(LANES));
+        let inputs =
+            self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES)).zip(self.stillness.chunks(W * LANES));
         let outputs = self.moved.chunks_mut(MOVED * LANES).zip(self.blended);
         for (((means, quats), stillness), (moved, blended)) in inputs.zip(outputs) {
             let mean = columns::<L, 3>(means);
-            let [stillness] = columns::<L, 1>(stillness);
-            let still_exponent = stillness.mul(L::splat(std::f32::consts::LOG2_E));
+            let scaled = as_exponents(&columns::<L, W>(stillness));
+            let still_exponent = scaled[0];
             let mut largest = still_exponent;
             for (node, weight) in self.nodes.iter().zip(&mut weights) {
-                let (_, _, exponent) = node.reach(&mean);
+                let (_, _, exponent) = node.reach(&mean, &scaled);
                 largest = largest.max(exponent);
                 exponent.store(weight);
             }
@@ -203,7 +236,7 @@ impl LaneKernel for Forward<'_> {
             let inverse_sum = L::splat(1.0).div(sum);
             let mut pose = [L::splat(0.0); POSE];
             for first in [0, POSE / 2] {
-                let half = half_of_pose::<L>(&weights, self.nodes, first);
+                let half = half_of_pose::<L, W>(&weights, self.nodes, first);
                 for k in 0..POSE / 2 {
                     let with_still = still.mul_add(L::splat(STILL[first + k]), half[k]);
                     pose[first + k] = with_still.mul(inverse_sum);
@@ -224,14 +257,24 @@ impl LaneKernel for Forward<'_> {
 
 /// Positions and quaternions `[N, 7]`, and what the backward pass wants to see again.
 pub(crate) fn skin(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
-    let nodes = inputs.nodes();
-    let count = inputs.stillness.len();
+    match inputs.width() {
+        1 => skin_with::<1>(inputs),
+        2 => skin_with::<2>(inputs),
+        3 => skin_with::<3>(inputs),
+        4 => skin_with::<4>(inputs),
+        _ => skin_with::<5>(inputs),
+    }
+}
+
+fn skin_with<const W: usize>(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
+    let nodes = inputs.nodes::<W>();
+    let count = inputs.count();
     let mut moved = vec![0.0; MOVED * count];
     let mut blended = vec![BlendedGroup::default(); count.div_ceil(LANES)];
     let chunks = (
         inputs.means.par_chunks(3 * CHUNK),
         inputs.quats.par_chunks(4 * CHUNK),
-        inputs.stillness.par_chunks(CHUNK),
+        inputs.stillness.par_chunks(W * CHUNK),
         moved.par_chunks_mut(MOVED * CHUNK),
         blended.par_chunks_mut(CHUNK / LANES),
     );

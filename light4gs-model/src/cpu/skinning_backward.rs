@@ -15,7 +15,9 @@
 use rayon::prelude::*;
 
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
-use super::skinning::{BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, columns, product, to_rows, weight};
+use super::skinning::{
+    BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, product, to_rows, weight,
+};
 use crate::kernels::skinning::{MOVED, POSE};
 
 /// Tasks at most, so that their sums take no more memory than some thousand Gaussians.
@@ -27,9 +29,9 @@ pub(crate) struct SkinningGradients {
     pub(crate) means: Vec<f32>,
     /// `[N, 4]`
     pub(crate) quats: Vec<f32>,
-    /// `[N, 1]`
+    /// `[N, W]`
     pub(crate) stillness: Vec<f32>,
-    /// `[B, 3]`
+    /// `[B, 2 + W]`
     pub(crate) anchors: Vec<f32>,
     /// `[B, 1]`
     pub(crate) precisions: Vec<f32>,
@@ -38,8 +40,10 @@ pub(crate) struct SkinningGradients {
 }
 
 /// What eight Gaussians hand to all nodes.
-struct Handed {
+struct Handed<const W: usize> {
     mean: [Block; 3],
+    /// Stillness and affinities.
+    stillness: [Block; W],
     /// `F`: derivatives by the blended pose.
     by_pose: [Block; POSE],
     /// `F · P`
@@ -50,21 +54,24 @@ struct Handed {
 
 /// Sums over Gaussians for one node.
 #[derive(Clone, Copy)]
-struct NodeSums {
+struct NodeSums<const W: usize> {
     pose: [f32; POSE],
     /// Of the logit's gradient times the offset from the anchor.
     offset: [f32; 3],
     /// Of the logit's gradient times the squared distance.
     squared: f32,
+    /// Of the logit's gradient times the Gaussian's affinities.
+    affinities: [f32; W],
 }
 
-impl NodeSums {
-    const ZERO: Self = Self { pose: [0.0; POSE], offset: [0.0; 3], squared: 0.0 };
+impl<const W: usize> NodeSums<W> {
+    const ZERO: Self = Self { pose: [0.0; POSE], offset: [0.0; 3], squared: 0.0, affinities: [0.0; W] };
 
     fn add(&mut self, other: &Self) {
         let add = |to: &mut [f32], from: &[f32]| to.iter_mut().zip(from).for_each(|(to, from)| *to += from);
         add(&mut self.pose, &other.pose);
         add(&mut self.offset, &other.offset);
+        add(&mut self.affinities, &other.affinities);
         self.squared += other.squared;
     }
 }
@@ -82,10 +89,11 @@ fn inner_product<L: Lanes>(by_pose: &[Block; POSE], pose: &[L; POSE]) -> L {
 }
 
 /// One task: a range of Gaussians.
-struct Backward<'a> {
-    nodes: &'a [Node],
+struct Backward<'a, const W: usize> {
+    nodes: &'a [Node<W>],
     means: &'a [f32],
     quats: &'a [f32],
+    stillness: &'a [f32],
     blended: &'a [BlendedGroup],
     /// `[N, 7]`
     upstream: &'a [f32],
@@ -96,11 +104,12 @@ struct Backward<'a> {
 
 /// The gradients of eight Gaussians, and what they hand to the nodes.
 #[inline(always)]
-fn hand<L: Lanes>(
-    [means, quats, upstream]: [&[f32]; 3],
+fn hand<L: Lanes, const W: usize>(
+    [means, quats, stillness, upstream]: [&[f32]; 4],
     blended: &BlendedGroup,
-    [of_means, of_quats, of_stillness]: [&mut [f32]; 3],
-) -> Handed {
+    [of_means, of_quats]: [&mut [f32]; 2],
+    of_stillness: &mut [Block; W],
+) -> Handed<W> {
     let mean = columns::<L, 3>(means);
     let quat = columns::<L, 4>(quats);
     let upstream = columns::<L, MOVED>(upstream);
@@ -134,6 +143,7 @@ fn hand<L: Lanes>(
     by_pose[12..].copy_from_slice(&by_blended_quat);
     let mut handed = Handed {
         mean: [[0.0; LANES]; 3],
+        stillness: [[0.0; LANES]; W],
         by_pose: [[0.0; LANES]; POSE],
         product: [0.0; LANES],
         largest: blended.largest,
@@ -141,6 +151,12 @@ fn hand<L: Lanes>(
     };
     for i in 0..3 {
         mean[i].store(&mut handed.mean[i]);
+    }
+    if W > 1 {
+        let stillness = columns::<L, W>(stillness);
+        for k in 1..W {
+            stillness[k].store(&mut handed.stillness[k]);
+        }
     }
     for k in 0..POSE {
         by_pose[k].store(&mut handed.by_pose[k]);
@@ -152,18 +168,29 @@ fn hand<L: Lanes>(
         still[k] = L::splat(STILL[k]);
     }
     let of_still = inner_product(&handed.by_pose, &still).sub(product);
-    to_rows(&[L::load(&blended.still).mul(of_still)], of_stillness);
+    L::load(&blended.still).mul(of_still).store(&mut of_stillness[0]);
     handed
 }
 
-/// What a chunk of Gaussians adds to the gradients of a node. `weights` is room for one block a group.
+/// What a chunk of Gaussians adds to the gradients of a node, and what the node adds to those of their affinities. `weights` is
+/// room for one block a group.
 #[inline(always)]
-fn sums<L: Lanes>(node: &Node, handed: &[Handed], weights: &mut [Block]) -> NodeSums {
+fn sums<L: Lanes, const W: usize>(
+    node: &Node<W>,
+    handed: &[Handed<W>],
+    weights: &mut [Block],
+    of_stillness: &mut [[Block; W]],
+) -> NodeSums<W> {
+    let mut affinity_sums = [L::splat(0.0); W];
     let mut offset_sums = [L::splat(0.0); 3];
     let mut squared_sum = L::splat(0.0);
-    for (group, place) in handed.iter().zip(weights.iter_mut()) {
+    for ((group, place), of_stillness) in handed.iter().zip(weights.iter_mut()).zip(of_stillness) {
         let mean = [L::load(&group.mean[0]), L::load(&group.mean[1]), L::load(&group.mean[2])];
-        let (offset, squared, exponent) = node.reach(&mean);
+        let mut stillness = [L::splat(0.0); W];
+        for k in 1..W {
+            stillness[k] = L::load(&group.stillness[k]);
+        }
+        let (offset, squared, exponent) = node.reach(&mean, &as_exponents(&stillness));
         let weight = weight(exponent, L::load(&group.largest)).mul(L::load(&group.inverse_sum));
         weight.store(place);
         let mut pose = [L::splat(0.0); POSE];
@@ -175,6 +202,11 @@ fn sums<L: Lanes>(node: &Node, handed: &[Handed], weights: &mut [Block]) -> Node
             offset_sums[i] = by_logit.mul_add(offset[i], offset_sums[i]);
         }
         squared_sum = by_logit.mul_add(squared, squared_sum);
+        for k in 1..W {
+            affinity_sums[k] = by_logit.mul_add(stillness[k], affinity_sums[k]);
+            let of_affinity = by_logit.mul_add(L::splat(node.affinities[k]), L::load(&of_stillness[k]));
+            of_affinity.store(&mut of_stillness[k]);
+        }
     }
     let mut sums = NodeSums::ZERO;
     // In two halves, as forward.
@@ -194,28 +226,43 @@ fn sums<L: Lanes>(node: &Node, handed: &[Handed], weights: &mut [Block]) -> Node
         sums.offset[i] = offset_sums[i].sum();
     }
     sums.squared = squared_sum.sum();
+    for k in 1..W {
+        sums.affinities[k] = affinity_sums[k].sum();
+    }
     sums
 }
 
-impl LaneKernel for Backward<'_> {
-    type Output = Vec<NodeSums>;
+impl<const W: usize> LaneKernel for Backward<'_, W> {
+    type Output = Vec<NodeSums<W>>;
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let mut totals = vec![NodeSums::ZERO; self.nodes.len()];
         let mut handed = Vec::with_capacity(CHUNK / LANES);
         let mut weights = vec![[0.0; LANES]; CHUNK / LANES];
+        let mut of_stillness = vec![[[0.0; LANES]; W]; CHUNK / LANES];
         let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
+        let inputs = inputs.zip(self.stillness.chunks(W * LANES));
         let inputs = inputs.zip(self.upstream.chunks(MOVED * LANES)).zip(self.blended);
         let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_quats.chunks_mut(4 * LANES));
-        let outputs = outputs.zip(self.of_stillness.chunks_mut(LANES));
+        let mut rows_of_stillness = self.of_stillness.chunks_mut(W * LANES);
         let last = self.blended.len() - 1;
-        for (group, (input, output)) in inputs.zip(outputs).enumerate() {
-            let ((((means, quats), upstream), blended), ((of_means, of_quats), of_stillness)) = (input, output);
-            handed.push(hand::<L>([means, quats, upstream], blended, [of_means, of_quats, of_stillness]));
+        for (group, (input, (of_means, of_quats))) in inputs.zip(outputs).enumerate() {
+            let ((((means, quats), stillness), upstream), blended) = input;
+            let of_stillness_here = &mut of_stillness[handed.len()];
+            *of_stillness_here = [[0.0; LANES]; W];
+            let inputs = [means, quats, stillness, upstream];
+            handed.push(hand::<L, W>(inputs, blended, [of_means, of_quats], of_stillness_here));
             if handed.len() == CHUNK / LANES || group == last {
                 for (node, total) in self.nodes.iter().zip(&mut totals) {
-                    total.add(&sums::<L>(node, &handed, &mut weights));
+                    total.add(&sums::<L, W>(node, &handed, &mut weights, &mut of_stillness));
+                }
+                for (blocks, rows) in of_stillness.iter().take(handed.len()).zip(&mut rows_of_stillness) {
+                    let mut columns = [L::splat(0.0); W];
+                    for k in 0..W {
+                        columns[k] = L::load(&blocks[k]);
+                    }
+                    to_rows(&columns, rows);
                 }
                 handed.clear();
             }
@@ -226,28 +273,47 @@ impl LaneKernel for Backward<'_> {
 
 /// Gradients of all inputs from `upstream [N, 7]`.
 pub(crate) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
-    let nodes = inputs.nodes();
-    let count = inputs.stillness.len();
+    match inputs.width() {
+        1 => skin_backward_with::<1>(inputs, blended, upstream),
+        2 => skin_backward_with::<2>(inputs, blended, upstream),
+        3 => skin_backward_with::<3>(inputs, blended, upstream),
+        4 => skin_backward_with::<4>(inputs, blended, upstream),
+        _ => skin_backward_with::<5>(inputs, blended, upstream),
+    }
+}
+
+fn skin_backward_with<const W: usize>(
+    inputs: &SkinningSlices,
+    blended: &[BlendedGroup],
+    upstream: &[f32],
+) -> SkinningGradients {
+    let nodes = inputs.nodes::<W>();
+    let count = inputs.count();
     let task = count.div_ceil(MOST_TASKS).max(1).next_multiple_of(CHUNK);
-    let (mut means, mut quats, mut stillness) = (vec![0.0; 3 * count], vec![0.0; 4 * count], vec![0.0; count]);
+    let (mut means, mut quats, mut stillness) = (vec![0.0; 3 * count], vec![0.0; 4 * count], vec![0.0; W * count]);
     let tasks = (
         inputs.means.par_chunks(3 * task),
         inputs.quats.par_chunks(4 * task),
+        inputs.stillness.par_chunks(W * task),
         blended.par_chunks(task / LANES),
         upstream.par_chunks(MOVED * task),
         means.par_chunks_mut(3 * task),
         quats.par_chunks_mut(4 * task),
-        stillness.par_chunks_mut(task),
+        stillness.par_chunks_mut(W * task),
     );
-    let parts = tasks.into_par_iter().map(|(means, quats, blended, upstream, of_means, of_quats, of_stillness)| {
-        dispatch(Backward { nodes: &nodes, means, quats, blended, upstream, of_means, of_quats, of_stillness })
-    });
-    let parts: Vec<Vec<NodeSums>> = parts.collect();
-    let mut totals = vec![NodeSums::ZERO; nodes.len()];
+    let parts =
+        tasks.into_par_iter().map(|(means, quats, stillness, blended, upstream, of_means, of_quats, of_stillness)| {
+            let nodes = &nodes;
+            dispatch(Backward { nodes, means, quats, stillness, blended, upstream, of_means, of_quats, of_stillness })
+        });
+    let parts: Vec<Vec<NodeSums<W>>> = parts.collect();
+    let mut totals = vec![NodeSums::<W>::ZERO; nodes.len()];
     for part in &parts {
         totals.iter_mut().zip(part).for_each(|(total, part)| total.add(part));
     }
-    let of_anchors = totals.iter().zip(inputs.precisions).flat_map(|(sums, p)| sums.offset.map(|sum| 2.0 * p * sum));
+    let of_anchors = totals.iter().zip(inputs.precisions).flat_map(|(sums, p)| {
+        sums.offset.map(|sum| 2.0 * p * sum).into_iter().chain(sums.affinities[1..].iter().copied())
+    });
     SkinningGradients {
         means,
         quats,

@@ -5,27 +5,38 @@ use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
-use light4gs_shaders::{SKINNING, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES};
+use light4gs_shaders::{SKINNING, SKINNING_AFFINITIES, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
 
 use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
-use crate::kernels::skinning::{MOVED, POSE, SkinningKernels, SkinningTensors};
+use crate::kernels::skinning::{MOST_AFFINITIES, MOVED, POSE, SkinningKernels, SkinningTensors};
 
 /// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five and four vectors.
 const BLENDED: usize = 20;
 const HANDED: usize = 16;
-/// Sums that a node has of each slice of the Gaussians.
-const SUMS: usize = POSE + 3 + 1;
 
 /// Gaussians of a slice, unless there are so many slices then that their sums take more memory than they are worth.
 const SLICE: usize = 64;
 const MOST_SLICES: usize = 256;
 
-/// The kernels of this file.
+/// The kernels of this file, for every number of affinities.
 pub(super) fn kernels() -> Vec<Kernel> {
-    [SKINNING, SKINNING_BACKWARD, SKINNING_NODES, SKINNING_GATHER].map(Kernel::new).into()
+    let of_all = |affinities| {
+        [SKINNING, SKINNING_BACKWARD, SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities))
+    };
+    let of_some = |affinities| kernel(SKINNING_AFFINITIES, affinities);
+    (0..=MOST_AFFINITIES).flat_map(of_all).chain((1..=MOST_AFFINITIES).map(of_some)).collect()
+}
+
+fn kernel(shader: Shader, affinities: usize) -> Kernel {
+    Kernel::new(shader).constant("AFFINITIES", affinities as u32).constant("SUMS", sums_of(affinities) as u32)
+}
+
+/// Sums that a node has of each slice of the Gaussians, in fours.
+fn sums_of(affinities: usize) -> usize {
+    POSE + 3 + 1 + affinities.next_multiple_of(4)
 }
 
 /// State between forward and backward.
@@ -33,8 +44,10 @@ pub(super) fn kernels() -> Vec<Kernel> {
 pub struct GpuSaved {
     count: usize,
     nodes: usize,
+    affinities: usize,
     means: Handle,
     quats: Handle,
+    stillness: Handle,
     anchors: Handle,
     precisions: Handle,
     poses: Handle,
@@ -48,10 +61,11 @@ fn words(values: &[usize]) -> Vec<u32> {
 fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
     let gpu = Gpu::of(&tensors.means)?;
     let (count, nodes) = (tensors.means.shape()[0], tensors.anchors.shape()[0]);
+    let affinities = tensors.stillness.shape()[1] - 1;
     let [means, quats, stillness, anchors, precisions, poses] = tensors.into_array().map(buffer_of);
     let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
-    Launch::new(&gpu.client, SKINNING)
+    Launch::new(&gpu.client, kernel(SKINNING, affinities))
         .reads(&means)
         .reads(&quats)
         .reads(&stillness)
@@ -63,17 +77,17 @@ fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSave
         .uniform(&words(&[count, nodes]))
         .invocations(count)?;
     let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
-    Ok((output, GpuSaved { count, nodes, means, quats, anchors, precisions, poses, blended }))
+    Ok((output, GpuSaved { count, nodes, affinities, means, quats, stillness, anchors, precisions, poses, blended }))
 }
 
 fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let GpuSaved { count, nodes, means, quats, anchors, precisions, poses, blended } = saved;
+    let GpuSaved { count, nodes, affinities, means, quats, stillness, anchors, precisions, poses, blended } = saved;
     let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
     let of_means = gpu.allocate("gradients of means", 3 * count)?;
     let of_quats = gpu.allocate("gradients of quats", 4 * count)?;
-    let of_stillness = gpu.allocate("gradients of stillness", count)?;
-    Launch::new(&gpu.client, SKINNING_BACKWARD)
+    let of_stillness = gpu.allocate("gradients of stillness and affinities", (1 + affinities) * count)?;
+    Launch::new(&gpu.client, kernel(SKINNING_BACKWARD, affinities))
         .reads(&means)
         .reads(&quats)
         .reads(&blended)
@@ -84,27 +98,40 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
         .writes(&of_stillness)
         .uniform(&words(&[count]))
         .invocations(count)?;
+    if affinities > 0 {
+        Launch::new(&gpu.client, kernel(SKINNING_AFFINITIES, affinities))
+            .reads(&handed)
+            .reads(&anchors)
+            .reads(&precisions)
+            .reads(&poses)
+            .reads(&stillness)
+            .updates(&of_stillness)
+            .uniform(&words(&[count, nodes]))
+            .invocations(count)?;
+    }
 
     let slice = count.div_ceil(MOST_SLICES).clamp(SLICE, gpu.longest_loop());
     let slices = count.div_ceil(slice);
-    let sums = gpu.allocate("sums of slices", SUMS * nodes * slices)?;
-    Launch::new(&gpu.client, SKINNING_NODES)
+    let of_node = sums_of(affinities);
+    let sums = gpu.allocate("sums of slices", of_node * nodes * slices)?;
+    Launch::new(&gpu.client, kernel(SKINNING_NODES, affinities))
         .reads(&handed)
         .reads(&anchors)
         .reads(&precisions)
         .reads(&poses)
+        .reads(&stillness)
         .writes(&sums)
         .uniform(&words(&[count, nodes, slice]))
         .invocations(slices * nodes)?;
 
-    let places = Places::new(&[3 * nodes, nodes, POSE * nodes]);
+    let places = Places::new(&[(3 + affinities) * nodes, nodes, POSE * nodes]);
     let of_nodes = gpu.allocate("gradients of nodes", places.total)?;
     let uniform = [&[nodes, slices], places.starts.as_slice()].concat();
-    Launch::new(&gpu.client, SKINNING_GATHER)
+    Launch::new(&gpu.client, kernel(SKINNING_GATHER, affinities))
         .reads(&sums)
         .writes(&of_nodes)
         .uniform(&words(&uniform))
-        .invocations(SUMS * nodes)?;
+        .invocations(of_node * nodes)?;
 
     let of_gaussians = |handle: &Handle, columns: usize| {
         gpu.tensor(first_words(handle, columns * count), Shape::from([count, columns]))
@@ -113,8 +140,8 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
     Ok(SkinningTensors {
         means: of_gaussians(&of_means, 3),
         quats: of_gaussians(&of_quats, 4),
-        stillness: of_gaussians(&of_stillness, 1),
-        anchors: of_nodes(0, 3),
+        stillness: of_gaussians(&of_stillness, 1 + affinities),
+        anchors: of_nodes(0, 3 + affinities),
         precisions: of_nodes(1, 1),
         poses: of_nodes(2, POSE),
     })

@@ -10,6 +10,9 @@ pub(crate) const POSE: usize = 16;
 /// Numbers of a moved Gaussian: position (3), quaternion (4).
 pub(crate) const MOVED: usize = 7;
 
+/// Most affinities of a Gaussian and of a node.
+pub const MOST_AFFINITIES: usize = 4;
+
 /// The differentiable inputs, or their gradients, in the order that gradients are registered in.
 #[derive(ExtensionType)]
 pub struct SkinningTensors<B: Backend> {
@@ -17,9 +20,9 @@ pub struct SkinningTensors<B: Backend> {
     pub means: FloatTensor<B>,
     /// `[N, 4]` as (w, x, y, z), of any length.
     pub quats: FloatTensor<B>,
-    /// `[N, 1]`, logits of the node that stands still.
+    /// `[N, 1 + H]`, logits of the node that stands still, then affinities.
     pub stillness: FloatTensor<B>,
-    /// `[B, 3]`, world units.
+    /// `[B, 3 + H]`, world units, then affinities.
     pub anchors: FloatTensor<B>,
     /// `[B, 1]`, `1 / (2 r²)` of the nodes' radii r.
     pub precisions: FloatTensor<B>,

@@ -20,7 +20,7 @@ use super::{for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::skinning::{BlendedGroup, SkinningSlices, skin as skin_slices};
 use crate::cpu::skinning_backward::skin_backward;
 use crate::kernels::skinning::{INPUTS, MOVED, POSE};
-pub use crate::kernels::skinning::{SkinningKernels, SkinningTensors};
+pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTensors};
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -95,11 +95,12 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) ->
         let rows = values.len() / columns;
         B::from_values(values, [rows, columns])
     };
+    let width = slices(&saved.inputs).width();
     SkinningTensors {
         means: matrix(gradients.means, 3),
         quats: matrix(gradients.quats, 4),
-        stillness: matrix(gradients.stillness, 1),
-        anchors: matrix(gradients.anchors, 3),
+        stillness: matrix(gradients.stillness, width),
+        anchors: matrix(gradients.anchors, 2 + width),
         precisions: matrix(gradients.precisions, 1),
         poses: matrix(gradients.poses, POSE),
     }
@@ -142,9 +143,10 @@ pub struct SkinningInputs {
     pub means: Tensor<2>,
     /// `[N, 4]`: their orientations at rest as quaternions (w, x, y, z), of any length.
     pub quats: Tensor<2>,
-    /// `[N, 1]`: logit of the node that stands still, for each Gaussian.
+    /// `[N, 1 + H]`: logit of the node that stands still, for each Gaussian, then its H affinities, 0 to
+    /// [`MOST_AFFINITIES`].
     pub stillness: Tensor<2>,
-    /// `[B, 3]`: where the nodes are at rest, world units.
+    /// `[B, 3 + H]`: where the nodes are at rest, world units, then their own affinities.
     pub anchors: Tensor<2>,
     /// `[B, 1]`: `1 / (2 r²)` of the nodes' radii r.
     pub precisions: Tensor<2>,
@@ -157,7 +159,7 @@ pub struct SkinningInputs {
 /// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized.
 ///
 /// ```text
-/// w   = softmax over b of (-precision_b |mean - anchor_b|², and stillness for the node that stands still)
+/// w   = softmax over b of (affinities · affinities_b - precision_b |mean - anchor_b|², and stillness for the node that stands still)
 /// A   = Σ w_b R_b + w_still I,   t = Σ w_b t_b,   q = Σ w_b q_b + w_still (1, 0, 0, 0)
 /// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product)
 /// ```
@@ -197,8 +199,10 @@ pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
     assert!(nodes > 0, "anchors must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
     assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");
-    assert_eq!(stillness.dims(), [count, 1], "stillness must be [N, 1]");
-    assert_eq!(anchors.dims(), [nodes, 3], "anchors must be [B, 3]");
+    let affinities = stillness.dims()[1].saturating_sub(1);
+    assert!(affinities <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
+    assert_eq!(stillness.dims(), [count, 1 + affinities], "stillness must be [N, 1 + H]");
+    assert_eq!(anchors.dims(), [nodes, 3 + affinities], "anchors must be [B, 3 + H]");
     assert_eq!(precisions.dims(), [nodes, 1], "precisions must be [B, 1]");
     assert_eq!(poses.dims(), [nodes, POSE], "poses must be [B, 16]");
     Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {

@@ -1,8 +1,8 @@
 //! `[model]`: what is trained.
 
 use light4gs_model::{
-    BuiltInFieldConfig, DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig, MOST_NODES,
-    NodesFieldConfig,
+    BuiltInFieldConfig, DeformationField, DynamicSceneConfig, GaussiansConfig, HexPlaneFieldConfig, MOST_AFFINITIES,
+    MOST_NODES, NodesFieldConfig,
 };
 
 use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole};
@@ -116,6 +116,10 @@ keys! {
         /// Every Gaussian learns when it is there: its opacity is multiplied by a bell curve over time. From the iteration on
         /// at which the sampler's window holds all times.
         lifetime: bool = nodes().lifetime; Flag, "ours", "every Gaussian learns when it is there";
+        /// Numbers by which every Gaussian learns which nodes it follows beyond its place: a foot and the floor under it need
+        /// not move together.
+        affinities: usize = nodes().affinities; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS",
+            "numbers by which every Gaussian learns which nodes it follows beyond its place";
         /// Weight of the term that keeps neighboring nodes in place as seen from each other.
         rigidity: f64 = nodes().rigidity; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
@@ -183,6 +187,7 @@ impl ModelConfig {
             opacity: table.opacity,
             stillness: table.stillness.then_some(table.stillness_start),
             lifetime: table.lifetime,
+            affinities: table.affinities,
             rigidity: table.rigidity,
             smoothness: table.smoothness,
             translation_rate: table.translation_rate,

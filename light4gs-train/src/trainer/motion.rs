@@ -11,7 +11,6 @@ use rand::Rng;
 
 use super::Trainer;
 use super::learning_rates::GroupRates;
-use super::views::ViewPass;
 use crate::compression::EntropyModels;
 use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
@@ -62,15 +61,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let stage = Stage::Fine;
         let indices = self.sampled(&BatchRequest { batch_size, ..self.batch_request(stage, iteration) })?;
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
-        let pass = ViewPass {
-            stage,
-            iteration,
-            splatter: self.splatter(stage, iteration),
-            images: &*self.images,
-            device: &self.device,
-            loss: &*self.loss,
-            batch: 1,
-        };
+        let pass = self.view_pass(stage, iteration, 1);
         let means = &self.state.scene.gaussians.means;
         let mut views = Vec::with_capacity(frames.len());
         // As many at a time as in a step, for their memory.

@@ -6,7 +6,6 @@ use light4gs_model::DeformationField;
 
 use super::Trainer;
 use super::learning_rates::GroupRates;
-use super::views::ViewPass;
 use crate::compression::EntropyModels;
 use crate::density::{GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::divergence::{NotFinite, not_finite_in};
@@ -35,15 +34,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
         let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
-        let pass = ViewPass {
-            stage,
-            iteration,
-            splatter: self.splatter(stage, iteration),
-            images: &*self.images,
-            device: &self.device,
-            loss: &*self.loss,
-            batch,
-        };
+        let pass = self.view_pass(stage, iteration, batch);
         let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
         let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
         let mut gradients = GradientSums::default();

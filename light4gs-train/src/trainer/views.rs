@@ -6,7 +6,9 @@ use light4gs_data::Frame;
 use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
+use super::Trainer;
 use super::profile::Profile;
+use crate::compression::EntropyModels;
 use crate::dataset::ImageSource;
 use crate::density::ViewStatistics;
 use crate::error::TrainError;
@@ -62,6 +64,21 @@ impl ViewPools {
     /// No pools: one view after the other.
     pub(super) fn none() -> Self {
         Self(Vec::new())
+    }
+}
+
+impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
+    /// A pass over views of an iteration whose loss is the mean of `batch` views.
+    pub(super) fn view_pass(&self, stage: Stage, iteration: usize, batch: usize) -> ViewPass<'_> {
+        ViewPass {
+            stage,
+            iteration,
+            splatter: self.splatter(stage, iteration),
+            images: &*self.images,
+            device: &self.device,
+            loss: &*self.loss,
+            batch,
+        }
     }
 }
 

@@ -8,32 +8,42 @@ use light4gs_tests::golden::{assert_close_relative, cpu_devices, devices, values
 use light4gs_tests::random::Random;
 
 const INPUTS: [&str; 6] = ["means", "quats", "stillness", "anchors", "precisions", "poses"];
-const COLUMNS: [usize; 6] = [3, 4, 1, 3, 1, 16];
 /// The node that stands still.
 const STILL: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
-/// Inputs in the order of [`INPUTS`], row by row.
+/// Inputs in the order of [`INPUTS`], row by row. With H affinities, a row of the stillness has `1 + H` numbers, and one of the
+/// anchors `3 + H`.
 #[derive(Clone)]
-struct Case([Vec<f64>; 6]);
+struct Case {
+    inputs: [Vec<f64>; 6],
+    affinities: usize,
+}
 
 impl Case {
     /// Gaussians and nodes in a box; poses of any numbers, since nothing asks for rotations.
-    fn random(count: usize, nodes: usize, random: &mut Random) -> Self {
+    fn random(count: usize, nodes: usize, affinities: usize, random: &mut Random) -> Self {
         let mut uniform = |count: usize, low: f64, high: f64| (0..count).map(|_| random.uniform(low, high)).collect();
-        Self([
+        let inputs = [
             uniform(3 * count, -1.0, 1.0),
             uniform(4 * count, -1.0, 1.0),
-            uniform(count, -3.0, 1.0),
-            uniform(3 * nodes, -1.0, 1.0),
+            uniform((1 + affinities) * count, -3.0, 1.0),
+            uniform((3 + affinities) * nodes, -1.0, 1.0),
             uniform(nodes, 0.5, 6.0),
             uniform(16 * nodes, -1.0, 1.0),
-        ])
+        ];
+        Self { inputs, affinities }
+    }
+
+    /// Columns of the inputs.
+    fn columns(&self) -> [usize; 6] {
+        [3, 4, 1 + self.affinities, 3 + self.affinities, 1, 16]
     }
 
     fn leaves(&self, device: &Device) -> [Tensor<2>; 6] {
         std::array::from_fn(|k| {
-            let values: Vec<f32> = self.0[k].iter().map(|value| *value as f32).collect();
-            let shape = [values.len() / COLUMNS[k], COLUMNS[k]];
+            let values: Vec<f32> = self.inputs[k].iter().map(|value| *value as f32).collect();
+            let columns = self.columns()[k];
+            let shape = [values.len() / columns, columns];
             Tensor::from_data(TensorData::new(values, shape), device).require_grad()
         })
     }
@@ -56,16 +66,18 @@ impl Case {
 
     /// Every number of the output in float64, with weights as if the Gaussians were at `weighed` `[N, 3]`.
     fn twin(&self, weighed: &[f64]) -> Vec<f64> {
-        let [means, quats, stillness, anchors, precisions, poses] = &self.0;
+        let [means, quats, stillness, anchors, precisions, poses] = &self.inputs;
+        let [_, _, own, place, ..] = self.columns();
         let mut moved = Vec::new();
-        for i in 0..stillness.len() {
+        for i in 0..stillness.len() / own {
             let mut logits: Vec<f64> = (0..precisions.len())
                 .map(|b| {
-                    let squared: f64 = (0..3).map(|k| (weighed[3 * i + k] - anchors[3 * b + k]).powi(2)).sum();
-                    -precisions[b] * squared
+                    let squared: f64 = (0..3).map(|k| (weighed[3 * i + k] - anchors[place * b + k]).powi(2)).sum();
+                    let liked = (0..self.affinities).map(|k| stillness[own * i + 1 + k] * anchors[place * b + 3 + k]);
+                    liked.sum::<f64>() - precisions[b] * squared
                 })
                 .collect();
-            logits.push(stillness[i]);
+            logits.push(stillness[own * i]);
             let largest = logits.iter().copied().fold(f64::NEG_INFINITY, f64::max);
             let sum: f64 = logits.iter().map(|logit| (logit - largest).exp()).sum();
             let mut pose = [0.0; 16];
@@ -92,9 +104,16 @@ impl Case {
 fn plain(inputs: SkinningInputs) -> Tensor<2> {
     let SkinningInputs { means, quats, stillness, anchors, precisions, poses } = inputs;
     let device = means.device();
-    let offsets = means.clone().detach().unsqueeze_dim::<3>(1) - anchors.unsqueeze_dim::<3>(0);
+    let affinities = stillness.dims()[1] - 1;
+    let places = anchors.clone().narrow(1, 0, 3);
+    let offsets = means.clone().detach().unsqueeze_dim::<3>(1) - places.unsqueeze_dim::<3>(0);
     let squared = offsets.powi_scalar(2).sum_dim(2).squeeze_dim::<2>(2);
-    let weights = softmax(Tensor::cat(vec![-squared * precisions.transpose(), stillness], 1), 1);
+    let mut logits = -squared * precisions.transpose();
+    if affinities > 0 {
+        let liked = stillness.clone().narrow(1, 1, affinities).matmul(anchors.narrow(1, 3, affinities).transpose());
+        logits = logits + liked;
+    }
+    let weights = softmax(Tensor::cat(vec![logits, stillness.narrow(1, 0, 1)], 1), 1);
     let still = Tensor::<1>::from_floats(STILL.map(|value| value as f32), &device).unsqueeze::<2>();
     let pose = weights.matmul(Tensor::cat(vec![poses, still], 0));
     let [p, m, q] = [pose.split(1, 1), means.split(1, 1), quats.split(1, 1)];
@@ -121,10 +140,13 @@ fn plain(inputs: SkinningInputs) -> Tensor<2> {
 const SIZES: [[usize; 2]; 7] = [[1, 1], [7, 1], [8, 512], [300, 5], [259, 130], [1000, 32], [20_000, 3]];
 
 fn cases() -> impl Iterator<Item = (String, Case, Vec<f64>)> {
-    SIZES.into_iter().enumerate().map(|(seed, [count, nodes])| {
-        let mut random = Random::new(300 + seed as u64);
-        let case = Case::random(count, nodes, &mut random);
-        (format!("{count} Gaussians, {nodes} nodes"), case, random.normals(7 * count))
+    SIZES.into_iter().enumerate().flat_map(|(seed, [count, nodes])| {
+        [0, 1, 2, 3, 4].map(|affinities| {
+            let mut random = Random::new(300 + seed as u64);
+            let case = Case::random(count, nodes, affinities, &mut random);
+            let what = format!("{count} Gaussians, {nodes} nodes, {affinities} affinities");
+            (what, case, random.normals(7 * count))
+        })
     })
 }
 
@@ -153,10 +175,10 @@ fn where_all_weights_but_one_are_lost() {
     let mut random = Random::new(310);
     for (place, precision) in [(1.0, 4000.0), (100.0, 1.0), (3000.0, 5.0)] {
         for stillness in [-1e9, 1e4] {
-            let mut case = Case::random(60, 9, &mut random);
-            case.0[0].iter_mut().for_each(|value| *value = f64::from((*value * place) as f32));
-            case.0[2].fill(stillness);
-            case.0[4].fill(precision);
+            let mut case = Case::random(60, 9, 0, &mut random);
+            case.inputs[0].iter_mut().for_each(|value| *value = f64::from((*value * place) as f32));
+            case.inputs[2].fill(stillness);
+            case.inputs[4].fill(precision);
             let weights = random.normals(7 * 60);
             let what = format!("at {place}, precision {precision}, stillness {stillness}");
             // Where all exponents are 1e8, float32 decides which node is the nearest by rounding: there only numbers are asked for.
@@ -186,11 +208,13 @@ fn assert_alike_when_far(what: &str, found: &(Vec<f32>, [Vec<f32>; 6]), expected
 #[test]
 fn gradients_against_differences_of_the_twin() {
     const STEP: f64 = 1e-6;
-    for (seed, [count, nodes]) in [[5, 1], [11, 3], [9, 6]].into_iter().enumerate() {
+    for (seed, [count, nodes, affinities]) in
+        [[5, 1, 0], [11, 3, 0], [9, 6, 0], [9, 6, 2], [10, 5, 4]].into_iter().enumerate()
+    {
         let mut random = Random::new(320 + seed as u64);
-        let case = Case::random(count, nodes, &mut random);
+        let case = Case::random(count, nodes, affinities, &mut random);
         let weights = random.normals(7 * count);
-        let weighed = &case.0[0];
+        let weighed = &case.inputs[0];
         let loss = |case: &Case| -> f64 {
             case.twin(weighed).iter().zip(&weights).map(|(value, weight)| value * weight).sum()
         };
@@ -199,12 +223,12 @@ fn gradients_against_differences_of_the_twin() {
             let along = |i: usize| {
                 let at = |step: f64| {
                     let mut moved = case.clone();
-                    moved.0[k][i] += step;
+                    moved.inputs[k][i] += step;
                     loss(&moved)
                 };
                 ((at(STEP) - at(-STEP)) / (2.0 * STEP)) as f32
             };
-            (0..case.0[k].len()).map(along).collect()
+            (0..case.inputs[k].len()).map(along).collect()
         });
         let expected = (output, gradients);
         for (name, device) in devices() {
@@ -247,7 +271,7 @@ fn a_second_run_gives_the_same_bits() {
 #[test]
 fn tensors_may_lie_in_memory_as_they_like() {
     let mut random = Random::new(330);
-    let case = Case::random(50, 6, &mut random);
+    let case = Case::random(50, 6, 2, &mut random);
     let weights = random.normals(7 * 50);
     for (name, device) in devices() {
         let expected = case.run(&device, &weights, skin);
@@ -257,10 +281,10 @@ fn tensors_may_lie_in_memory_as_they_like() {
             let nodes = Tensor::cat(vec![poses.transpose(), precisions.transpose(), anchors.transpose()], 0);
             let rows = |first: usize, last: usize| nodes.clone().narrow(0, first, last - first).transpose();
             skin(SkinningInputs {
-                means: gaussians.clone().narrow(1, 1, 3),
-                quats: gaussians.clone().narrow(1, 4, 4),
-                stillness: gaussians.narrow(1, 0, 1),
-                anchors: rows(17, 20),
+                means: gaussians.clone().narrow(1, 3, 3),
+                quats: gaussians.clone().narrow(1, 6, 4),
+                stillness: gaussians.narrow(1, 0, 3),
+                anchors: rows(17, 22),
                 precisions: rows(16, 17),
                 poses: rows(0, 16),
             })
@@ -271,7 +295,7 @@ fn tensors_may_lie_in_memory_as_they_like() {
 
 #[test]
 fn no_gaussian_is_no_error() {
-    let case = Case::random(0, 3, &mut Random::new(350));
+    let case = Case::random(0, 3, 0, &mut Random::new(350));
     for (name, device) in devices() {
         let (moved, gradients) = case.run(&device, &[], skin);
         assert!(moved.is_empty(), "{name}");
@@ -283,7 +307,7 @@ fn no_gaussian_is_no_error() {
 #[test]
 #[should_panic(expected = "precisions must be [B, 1]")]
 fn a_wrong_shape_is_named() {
-    let mut case = Case::random(5, 3, &mut Random::new(340));
-    case.0[4].push(1.0);
+    let mut case = Case::random(5, 3, 0, &mut Random::new(340));
+    case.inputs[4].push(1.0);
     case.run(&Device::flex(), &[0.0; 35], skin);
 }

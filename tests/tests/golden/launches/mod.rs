@@ -14,7 +14,7 @@ use light4gs_model::gpu::{Communication, RecordedLaunch, Team, record, with_team
 use light4gs_model::ops::adam::{AdamStep, adam_step};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::ops::skinning::{SkinningInputs, skin};
+use light4gs_model::ops::skinning::{MOST_AFFINITIES, SkinningInputs, skin};
 use light4gs_model::{PlaneTensors, Significance, Splatter};
 use light4gs_tests::golden::{Golden, values_of};
 use light4gs_tests::odd_scenes::dots;
@@ -196,25 +196,27 @@ fn planes(transcript: &mut Transcript) {
 }
 
 fn skinning(transcript: &mut Transcript) {
-    let mut random = Random::new(8);
-    let ((), launches) = record(|| {
-        let device = device().autodiff();
-        let mut tensor = |rows: usize, columns: usize, low: f64, high: f64| {
-            let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(low, high) as f32).collect();
-            Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
-        };
-        let (gaussians, nodes) = (777, 21);
-        let moved = skin(SkinningInputs {
-            means: tensor(gaussians, 3, -1.0, 1.0),
-            quats: tensor(gaussians, 4, -1.0, 1.0),
-            stillness: tensor(gaussians, 1, -3.0, 1.0),
-            anchors: tensor(nodes, 3, -1.0, 1.0),
-            precisions: tensor(nodes, 1, 0.5, 6.0),
-            poses: tensor(nodes, 16, -1.0, 1.0),
+    for affinities in [0, MOST_AFFINITIES] {
+        let mut random = Random::new(8);
+        let ((), launches) = record(|| {
+            let device = device().autodiff();
+            let mut tensor = |rows: usize, columns: usize, low: f64, high: f64| {
+                let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(low, high) as f32).collect();
+                Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
+            };
+            let (gaussians, nodes) = (777, 21);
+            let moved = skin(SkinningInputs {
+                means: tensor(gaussians, 3, -1.0, 1.0),
+                quats: tensor(gaussians, 4, -1.0, 1.0),
+                stillness: tensor(gaussians, 1 + affinities, -3.0, 1.0),
+                anchors: tensor(nodes, 3 + affinities, -1.0, 1.0),
+                precisions: tensor(nodes, 1, 0.5, 6.0),
+                poses: tensor(nodes, 16, -1.0, 1.0),
+            });
+            (moved.clone() * moved).sum().backward();
         });
-        (moved.clone() * moved).sum().backward();
-    });
-    transcript.add("skinning", launches, Vec::new());
+        transcript.add(&format!("skinning, {affinities} affinities"), launches, Vec::new());
+    }
 }
 
 /// The entropy models' functions far into their tails, and a step of the optimizer.

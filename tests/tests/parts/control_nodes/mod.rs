@@ -24,7 +24,8 @@ struct Shaken;
 
 impl ParameterMapper for Shaken {
     fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let shaken = ["translations", "rotations", "log_radii", "stillness", "lifetime", "quats"];
+        let shaken =
+            ["translations", "rotations", "log_radii", "stillness", "lifetime", "quats", "affinity", "affinities"];
         if !shaken.iter().any(|name| path.ends_with(name)) {
             return parameter;
         }
@@ -48,13 +49,15 @@ fn many(gaussians: usize, config: NodesFieldConfig, device: &Device) -> DynamicS
     scene
 }
 
-fn configurations() -> [NodesFieldConfig; 4] {
+fn configurations() -> [NodesFieldConfig; 6] {
     let config = NodesFieldConfig::new;
     [
         config().with_nodes(9),
         config().with_nodes(9).with_stillness(None),
         config().with_nodes(1).with_times_a_knot(20.0),
         config().with_nodes(5).with_lifetime(true),
+        config().with_nodes(9).with_affinities(2),
+        config().with_nodes(7).with_affinities(3).with_stillness(None).with_lifetime(true),
     ]
 }
 
@@ -204,7 +207,8 @@ fn other_networks_are_refused() {
         spoil(motion.network.layers_mut().nth(index).unwrap());
     };
     let [anchors, translations, rotations, radii] = [0, 1, 2, 3];
-    refused("layers, expected 4", &|motion| {
+    refused("6 layers, expected 4 or 5", &|motion| {
+        motion.network.constant(Value(0), 1, vec![1.0]);
         motion.network.constant(Value(0), 1, vec![1.0]);
     });
     refused("0 nodes, expected 1 to 512", &|motion| layer(motion, radii, &|layer| layer.outputs = 0));
@@ -225,6 +229,21 @@ fn other_networks_are_refused() {
     refused("weights of the logarithms", &|motion| layer(motion, radii, &|layer| layer.weight[0] = f32::NAN));
     refused("biases of the translations", &|motion| layer(motion, translations, &|layer| layer.bias[0] = 1.0));
     refused("biases of the rotations", &|motion| layer(motion, rotations, &|layer| layer.bias[0] = f32::INFINITY));
+    let with_affinities = self::scene(NodesFieldConfig::new().with_nodes(4).with_affinities(2), &Device::flex());
+    let affinities = |spoil: &dyn Fn(&mut Layer)| {
+        let mut arrays = with_affinities.field.to_arrays().unwrap();
+        layer(arrays.network.as_mut().unwrap(), 4, spoil);
+        NodesField::from_arrays(&arrays, None, &Device::flex()).unwrap_err().to_string()
+    };
+    for (expected, error) in [
+        ("0 affinities, expected 1 to 4", affinities(&|layer| layer.inputs = 0)),
+        ("4294967295 affinities", affinities(&|layer| layer.inputs = u32::MAX)),
+        ("of the affinities are [4, 4, 1], expected [4, 4, 8]", affinities(&|layer| layer.weight.truncate(1))),
+        ("of the affinities are [4294967295, 4", affinities(&|layer| layer.outputs = u32::MAX)),
+        ("one of the biases of the affinities is 1", affinities(&|layer| layer.bias[0] = 1.0)),
+    ] {
+        assert!(error.contains(expected), "{error}");
+    }
     let others = "operations, sources or outputs are others";
     refused(others, &|motion| drop(motion.network.nodes.pop()));
     refused(others, &|motion| drop(motion.sources.pop()));

@@ -10,11 +10,13 @@
 //! | `trajectory` | splines over time, and the nodes' poses at a time |
 //! | `placement` | where the nodes are when motion begins |
 //! | `relocation` | nodes that move to where motion is not explained, while training |
+//! | `affinity` | which nodes a Gaussian follows beyond its place |
 //! | `lifetime` | what comes and goes |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
 //! | `weights` | how much each Gaussian follows each node, as numbers |
 
+mod affinity;
 mod lifetime;
 mod placement;
 mod regularizer;
@@ -31,10 +33,12 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData, s};
 use light4gs_codec::MotionArrays;
 
+pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
 use trajectory::Poses;
 
 use super::{DeformationField, FinePosition, LearningRate, PositionGradients, Renewed, SceneAtRest};
+pub use crate::ops::skinning::MOST_AFFINITIES;
 use crate::ops::skinning::{SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
@@ -74,6 +78,9 @@ pub struct NodesFieldConfig {
     /// Every Gaussian learns when it is there.
     #[config(default = false)]
     pub lifetime: bool,
+    /// Numbers by which each Gaussian learns which nodes it follows beyond its place; 0 to [`MOST_AFFINITIES`].
+    #[config(default = 0)]
+    pub affinities: usize,
     /// Weight of the term that keeps neighboring nodes in place as seen from each other, for distances as shares of the
     /// scene's extent.
     #[config(default = 1.0)]
@@ -125,6 +132,8 @@ pub struct NodesField {
     translations: Param<Tensor<2>>,
     /// `[K, 4 B]`, the four of a node behind each other: how it is turned, a quaternion (w, x, y, z) less (1, 0, 0, 0).
     rotations: Param<Tensor<2>>,
+    /// `[B, H]`: the nodes' own affinities, where Gaussians have any.
+    affinities: Option<Param<Tensor<2>>>,
     /// `[1]`, a constant: the scene's extent, world units.
     unit: Param<Tensor<1>>,
     #[module(skip)]
@@ -142,6 +151,7 @@ impl NodesField {
             log_radii: zeros([nodes, 1]),
             translations: zeros([knots, 3 * nodes]),
             rotations: zeros([knots, 4 * nodes]),
+            affinities: (config.affinities > 0).then(|| zeros([nodes, config.affinities])),
             unit: Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false),
             config,
             fades: true,
@@ -163,11 +173,18 @@ impl NodesField {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
             .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
+        let (stillness, anchors) = match (canonical.further(AFFINITY), &self.affinities) {
+            (Some(own), Some(of_nodes)) => (
+                Tensor::cat(vec![stillness, own.clone()], 1),
+                Tensor::cat(vec![self.world_anchors(), of_nodes.val()], 1),
+            ),
+            _ => (stillness, self.world_anchors()),
+        };
         skin(SkinningInputs {
             means: canonical.means.clone(),
             quats: canonical.quats.clone(),
             stillness,
-            anchors: self.world_anchors(),
+            anchors,
             precisions: self.precisions(),
             poses,
         })
@@ -190,7 +207,9 @@ impl DeformationField for NodesField {
             let attribute = Attribute::new(STILLNESS, 1).with_start(vec![logit as f32]).constant();
             attribute.with_learning_rate(STILLNESS_RATE).with_step(STILLNESS_STEP)
         };
-        config.stillness.map(row).into_iter().chain(config.lifetime.then(lifetime::attribute)).collect()
+        let affinity = (config.affinities > 0).then(|| affinity::attribute(config.affinities));
+        let lifetime = config.lifetime.then(lifetime::attribute);
+        config.stillness.map(row).into_iter().chain(affinity).chain(lifetime).collect()
     }
 
     /// One node that does not move, until there is a cloud to make more from.

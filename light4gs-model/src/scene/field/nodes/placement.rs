@@ -2,7 +2,7 @@
 
 use burn::module::Param;
 
-use super::{MOST_NODES, NodesField, numbers, tensor};
+use super::{MOST_NODES, NodesField, affinity, numbers, tensor};
 use crate::scene::field::{FinePosition, SceneAtRest};
 
 /// Least radius of a node, as a share of the scene's extent.
@@ -25,6 +25,10 @@ impl NodesField {
         let mut placed = Self::zeros(config.clone(), nodes, Self::knots_of(config, position.times), &device);
         placed.anchors = Param::from_tensor(tensor(anchors.concat(), [nodes, 3], &device));
         placed.log_radii = Param::from_tensor(tensor(radii, [nodes, 1], &device));
+        if config.affinities > 0 {
+            let own = affinity::of_nodes(nodes, config.affinities, position.seed, &device);
+            placed.affinities = Some(Param::from_tensor(own));
+        }
         placed.unit = Param::from_tensor(placed.unit.val() * unit).set_require_grad(false);
         placed
     }

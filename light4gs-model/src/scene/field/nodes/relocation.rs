@@ -14,7 +14,7 @@ use burn::tensor::activation::sigmoid;
 use burn::tensor::{Tensor, TensorData};
 
 use super::placement::{LEAST_RADIUS, square};
-use super::{NodesField, STILLNESS, numbers};
+use super::{AFFINITY, NodesField, STILLNESS, numbers};
 use crate::scene::field::{FinePosition, PositionGradients, Renewed, SceneAtRest};
 
 /// Views whose gradients are looked at.
@@ -40,6 +40,10 @@ struct Skinned {
     stillness: Vec<f32>,
     anchors: Vec<[f32; 3]>,
     precisions: Vec<f32>,
+    /// Affinities, none or so many of each Gaussian and of each node.
+    affinities: usize,
+    of_gaussians: Vec<f32>,
+    of_nodes: Vec<f32>,
 }
 
 /// The nodes that count for a Gaussian, with their weights.
@@ -53,8 +57,13 @@ impl Skinned {
     /// The weights of a Gaussian if some nodes were not there, and the logarithm of the sum by which the softmax divides.
     fn weights(&self, gaussian: usize, without: impl Fn(usize) -> bool) -> (Weights, f32) {
         let place = &self.means[gaussian];
-        let logit = |(anchor, precision): (&[f32; 3], &f32)| -precision * square(place, anchor);
-        let logits = self.anchors.iter().zip(&self.precisions).map(logit).chain([self.stillness[gaussian]]);
+        let columns = |row: usize| row * self.affinities..(row + 1) * self.affinities;
+        let own = &self.of_gaussians[columns(gaussian)];
+        let logit = |node: usize| {
+            let affinity: f32 = own.iter().zip(&self.of_nodes[columns(node)]).map(|(own, other)| own * other).sum();
+            affinity - self.precisions[node] * square(place, &self.anchors[node])
+        };
+        let logits = (0..self.nodes()).map(logit).chain([self.stillness[gaussian]]);
         let mut weights: Weights = logits.enumerate().filter(|(node, _)| !without(*node)).collect();
         let largest = weights.iter().map(|(_, logit)| *logit).fold(f32::MIN, f32::max);
         weights.iter_mut().for_each(|(_, weight)| *weight = (*weight - largest).exp());
@@ -192,6 +201,7 @@ impl NodesField {
         let [old_translations, old_rotations] = [&self.translations, &self.rotations].map(|knots| numbers(knots.val()));
         let (mut anchors, mut log_radii) = (numbers(self.anchors.val()), numbers(self.log_radii.val()));
         let (mut translations, mut rotations) = (old_translations.clone(), old_rotations.clone());
+        let mut affinities = skinned.of_nodes.clone();
         for (node, Wanting { gaussian, radius }) in moved {
             let (weights, _) = skinned.weights(*gaussian, |_| false);
             let place = &skinned.means[*gaussian];
@@ -214,6 +224,9 @@ impl NodesField {
                     translations[(knot * nodes + node) * 3 + axis] = own + rest;
                 }
             }
+            for at in 0..skinned.affinities {
+                affinities[node * skinned.affinities + at] = blend(&skinned.of_nodes, skinned.affinities, 0, at);
+            }
             for knot in 0..knots {
                 for component in 0..4 {
                     rotations[(knot * nodes + node) * 4 + component] = blend(&old_rotations, 4, knot, component);
@@ -229,6 +242,9 @@ impl NodesField {
         set(&mut self.log_radii, log_radii);
         set(&mut self.translations, translations);
         set(&mut self.rotations, rotations);
+        if let Some(parameter) = &mut self.affinities {
+            set(parameter, affinities);
+        }
     }
 
     /// The numbers of some nodes.
@@ -238,7 +254,10 @@ impl NodesField {
             let places = (0..rows).flat_map(|row| moved.iter().map(move |node| row * nodes + node));
             Renewed { path, elements: places.flat_map(|place| place * width..(place + 1) * width).collect() }
         };
-        vec![of("anchors", 1, 3), of("log_radii", 1, 1), of("translations", knots, 3), of("rotations", knots, 4)]
+        let affinities = self.affinities.as_ref().map(|all| of("affinities", 1, all.dims()[1]));
+        let others =
+            [of("anchors", 1, 3), of("log_radii", 1, 1), of("translations", knots, 3), of("rotations", knots, 4)];
+        others.into_iter().chain(affinities).collect()
     }
 
     fn poses_at(&self, time: f32) -> PosesAt {
@@ -265,6 +284,9 @@ impl NodesField {
             stillness,
             anchors: numbers(self.world_anchors()).as_chunks::<3>().0.to_vec(),
             precisions: numbers(self.precisions()),
+            affinities: self.config.affinities,
+            of_gaussians: tensors.further(AFFINITY).map(|all| numbers(all.clone())).unwrap_or_default(),
+            of_nodes: self.affinities.as_ref().map(|all| numbers(all.val())).unwrap_or_default(),
         }
     }
 }

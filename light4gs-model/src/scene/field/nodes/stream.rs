@@ -9,7 +9,10 @@ use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network};
 
 use super::trajectory::{DIAGONAL, ELEMENTS, FACTORS, OTHERS};
-use super::{LIFETIME, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, lifetime, numbers, tensor};
+use super::{
+    AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, lifetime,
+    numbers, tensor,
+};
 use crate::scene::ModelError;
 use crate::scene::field::DeformationField;
 
@@ -166,6 +169,7 @@ impl NodesField {
             Value(network.inputs.len() as u32 - 1)
         };
         let stillness = still.then(|| input(STILLNESS, 1));
+        let affinity = self.affinities.as_ref().map(|all| (all, input(AFFINITY, all.dims()[1] as u32)));
         let lifetime = self.config.lifetime.then(|| [input("opacity_logits", 1), input(LIFETIME, 2)]);
         let mut description = Description { network, nodes };
         let anchors = numbers(self.world_anchors().transpose());
@@ -177,6 +181,11 @@ impl NodesField {
         let log_radii = self.log_radii.val() + self.unit.val().log().unsqueeze();
         let log_radii = description.network.constant(time, 1, numbers(log_radii));
         let mut logits = description.logits(means, anchors, log_radii);
+        if let Some((affinities, affinity)) = affinity {
+            let layer = Layer::linear(numbers(affinities.val()), vec![0.0; nodes]);
+            let liking = description.network.layer(affinity, layer);
+            logits = description.node(Operation::Add, &[logits, liking]);
+        }
         let mut all = poses;
         if let Some(stillness) = stillness {
             all = description.with_identity(poses);
@@ -216,9 +225,16 @@ impl NodesField {
         let wrong = |what: String| ModelError::Motion(format!("the network is not that of control nodes: {what}"));
         let motion = arrays.network.as_ref().ok_or_else(|| wrong("there is none".to_owned()))?;
         let layers: Vec<&Layer> = motion.network.layers().collect();
-        let &[anchors, translations, rotations, log_radii] = layers.as_slice() else {
-            return Err(wrong(format!("{} layers, expected 4", layers.len())));
+        let (&[anchors, translations, rotations, log_radii] | &[anchors, translations, rotations, log_radii, _]) =
+            layers.as_slice()
+        else {
+            return Err(wrong(format!("{} layers, expected 4 or 5", layers.len())));
         };
+        let affinities = layers.get(4);
+        let width = affinities.map_or(0, |layer| layer.inputs as usize);
+        if affinities.is_some() && !(1..=MOST_AFFINITIES).contains(&width) {
+            return Err(wrong(format!("{width} affinities, expected 1 to {MOST_AFFINITIES}")));
+        }
         // A file may come from anybody: sizes first.
         let (nodes, knots) = (log_radii.outputs as usize, translations.inputs as usize);
         if !(1..=MOST_NODES).contains(&nodes) {
@@ -232,7 +248,10 @@ impl NodesField {
             ("translations", translations, 3, knots),
             ("rotations", rotations, 4, knots),
             ("logarithms of radii", log_radii, 1, 1),
-        ] {
+        ]
+        .into_iter()
+        .chain(affinities.map(|layer| ("affinities", *layer, 1, width)))
+        {
             let found = [layer.outputs as usize, layer.bias.len(), layer.weight.len()];
             let expected = [components * nodes, components * nodes, components * nodes * inputs];
             if found != expected {
@@ -246,19 +265,25 @@ impl NodesField {
             ("weights of the logarithms of radii", &log_radii.weight),
             ("biases of the translations", &translations.bias),
             ("biases of the rotations", &rotations.bias),
-        ] {
+        ]
+        .into_iter()
+        .chain(affinities.map(|layer| ("biases of the affinities", &layer.bias)))
+        {
             if let Some(number) = numbers.iter().find(|number| **number != 0.0) {
                 return Err(wrong(format!("one of the {name} is {number}, expected 0")));
             }
         }
         let [still, lives] = [STILLNESS, LIFETIME].map(|name| motion.sources.contains(&source(name)));
         let config = NodesFieldConfig::new().with_nodes(nodes);
-        let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives);
+        let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives).with_affinities(width);
         let mut field = Self::zeros(config, nodes, knots, device);
         field.anchors = Param::from_tensor(tensor(anchors.bias.clone(), [3, nodes], device).transpose());
         field.log_radii = Param::from_tensor(tensor(log_radii.bias.clone(), [nodes, 1], device));
         field.translations = Param::from_tensor(by_node(translations, nodes, device));
         field.rotations = Param::from_tensor(by_node(rotations, nodes, device));
+        if let Some(layer) = affinities {
+            field.affinities = Some(Param::from_tensor(tensor(layer.weight.clone(), [nodes, width], device)));
+        }
         // Then everything but the numbers: the operations are those of such a field.
         let own = field.describe();
         let same = own.network.is_some_and(|own| {
