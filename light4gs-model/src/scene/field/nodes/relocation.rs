@@ -280,7 +280,7 @@ impl NodesField {
         };
         Skinned {
             means,
-            opacities: numbers(sigmoid(tensors.opacity_logits)),
+            opacities: numbers(sigmoid(tensors.opacity_logits.clone())),
             stillness,
             anchors: numbers(self.world_anchors()).as_chunks::<3>().0.to_vec(),
             precisions: numbers(self.precisions()),
