@@ -9,15 +9,18 @@ use crate::stage::Stage;
 
 keys! {
     /// Frames of a window of time that widens until it holds all. Fast objects then move little between what is known and
-    /// what is new. The coarse stage sees the first window.
+    /// what is new. On request all times are seen first, so that the field finds where objects are: a survey. The coarse stage sees
+    /// what the fine stage begins with.
     pub struct WideningWindow {
+        /// The share of the fine stage for which all times are seen before the first window.
+        survey: f64 = 0.0; SHARE, "ours";
         /// The middle of the first window.
         center: f64 = 0.5; SHARE, "ours";
         /// Different times in the first window.
         times: usize = 12; Whole { least: 1, most: 1_000_000 }, "ours";
-        /// The share of the fine stage for which the first window stays.
+        /// The share of the rest for which the first window stays.
         held: f64 = 0.07; SHARE, "ours";
-        /// The share of the fine stage after which all times are seen.
+        /// The share of the rest after which all times are seen.
         open: f64 = 0.6; SHARE, "ours";
         /// The share of the draws that go to the newest times while the window widens.
         newest: f64 = 0.3; SHARE, "ours";
@@ -29,10 +32,14 @@ keys! {
 impl WideningWindow {
     /// How far the window is open, between the first one (0) and all (1).
     fn share(&self, request: &BatchRequest) -> f64 {
-        if request.stage == Stage::Coarse {
-            return 0.0;
+        let done = match request.stage {
+            Stage::Coarse => 0.0,
+            Stage::Fine => request.iteration as f64 / request.iterations.max(1) as f64,
+        };
+        if done < self.survey {
+            return 1.0;
         }
-        let done = request.iteration as f64 / request.iterations.max(1) as f64;
+        let done = (done - self.survey) / (1.0 - self.survey).max(f64::EPSILON);
         if done >= self.open {
             1.0
         } else if done <= self.held {
@@ -127,6 +134,17 @@ mod tests {
         assert!(found.windows(2).all(|pair| pair[1][0] <= pair[0][0] && pair[1][1] >= pair[0][1]));
         assert!(found[30][0] > 0.1 && found[30][0] < 0.4, "{:?}", found[30]);
         assert_eq!(found[59..], [[0.0, 1.0]; 41]);
+    }
+
+    /// All times first, then a window that widens over what is left of the stage.
+    #[test]
+    fn a_survey_comes_before_the_window() {
+        let sampler = WideningWindow { times: 5, survey: 0.5, ..WideningWindow::default() };
+        let found = windows(&sampler, &[1, 49, 50, 53, 65, 79, 80]);
+        assert_eq!([found[0], found[1]], [[0.0, 1.0]; 2]);
+        assert_eq!([found[2], found[3]], [[0.45, 0.55]; 2]);
+        assert!(found[4][0] > 0.1 && found[4][0] < 0.4, "{:?}", found[4]);
+        assert!(found[5][0] > 0.0 && found[6] == [0.0, 1.0], "{found:?}");
     }
 
     /// A window that is held for longer than it is closed opens when it has to, and not before.

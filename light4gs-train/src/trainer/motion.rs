@@ -28,11 +28,13 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     fn fine_position(&self, iteration: usize) -> FinePosition {
         let seed = generator(self.config.seed, Purpose::Motion, Stage::Fine, iteration).random();
         self.device.seed(seed);
+        let window = |iteration| self.sampler.window(&self.batch_request(Stage::Fine, iteration));
         FinePosition {
             iteration,
             iterations: self.config.train.iterations(Stage::Fine),
             times: self.stage_frames.of(Stage::Fine).times.len(),
-            window: self.sampler.window(&self.batch_request(Stage::Fine, iteration)),
+            window: window(iteration),
+            window_before: window(iteration.saturating_sub(1)),
             seed,
         }
     }

@@ -11,10 +11,16 @@ fn killed_and_resumed_runs_are_bit_identical() {
     killed_and_resumed(&TINY_COMPRESSION);
 }
 
-/// Nodes are made when motion begins, as many as there are Gaussians for, and knots that were not seen are continued.
+/// Nodes are made when motion begins, as many as there are Gaussians for; ways of objects are found by a survey, and knots that
+/// were not seen are continued.
 #[test]
 fn killed_and_resumed_runs_of_control_nodes_are_bit_identical() {
-    let nodes = ["model.field=nodes", "train.sampling=widening_window", "train.widening_window.times=3"];
+    let nodes = [
+        "model.field=nodes",
+        "train.sampling=widening_window",
+        "train.widening_window.times=3",
+        "train.widening_window.survey=0.3",
+    ];
     killed_and_resumed(&TINY_COMPRESSION.into_iter().chain(nodes).collect::<Vec<&str>>());
 }
 

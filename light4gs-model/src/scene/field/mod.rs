@@ -198,14 +198,26 @@ pub struct FinePosition {
     pub iterations: usize,
     /// Different times that the training frames have.
     pub times: usize,
-    /// From the earliest to the latest time that the sampler shows at this iteration or has shown before it.
+    /// From the earliest to the latest time that the sampler shows at this iteration.
     pub window: [f32; 2],
+    /// The same at the iteration before.
+    pub window_before: [f32; 2],
     /// Seed for random numbers. It depends only on the run's seed and the iteration, so that a resumed run draws the
     /// same. Before a field is called, the device's own generator is seeded with it as well.
     pub seed: u64,
 }
 
 impl FinePosition {
+    /// Whether the window holds all times.
+    pub fn shows_all(&self) -> bool {
+        holds_all(self.window)
+    }
+
+    /// Whether the window held all times before, and does so no longer: a survey has ended.
+    pub fn narrows(&self) -> bool {
+        holds_all(self.window_before) && !holds_all(self.window)
+    }
+
     /// A time in the window, another one in each iteration.
     pub fn random_time(&self) -> f32 {
         let [low, high] = self.window;
@@ -213,6 +225,10 @@ impl FinePosition {
         let share = (self.seed >> 40) as f32 / (1 << 24) as f32;
         low + share * (high - low)
     }
+}
+
+fn holds_all([low, high]: [f32; 2]) -> bool {
+    low <= 0.0 && high >= 1.0
 }
 
 /// The learning rate of a parameter: Adam's rate, interpolated log-linearly from the beginning of the stage to its end.

@@ -45,7 +45,14 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
     let cloud = PointCloud::random(GAUSSIANS, 1.0, 24);
     let mut scene: DynamicScene = config.model.build().init(&cloud, device);
     let DynamicScene { gaussians, coordinates, field, .. } = &mut scene;
-    let position = FinePosition { iteration: 0, iterations: 100, times: 20, window: [0.0, 1.0], seed: 24 };
+    let position = FinePosition {
+        iteration: 0,
+        iterations: 100,
+        times: 20,
+        window: [0.0, 1.0],
+        window_before: [0.0, 1.0],
+        seed: 24,
+    };
     field.begin_motion(&SceneAtRest { gaussians, coordinates, extent: 2.0 }, &position);
     map_parameters(scene, &mut Shaken)
 }

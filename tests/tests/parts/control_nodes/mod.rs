@@ -2,6 +2,7 @@
 
 mod golden;
 mod relocation;
+mod survey;
 
 use burn::module::Param;
 use burn::tensor::{Device, Distribution, Tensor};
@@ -16,7 +17,8 @@ use light4gs_model::{
 };
 use light4gs_tests::golden::{assert_close, devices, values_of};
 
-const POSITION: FinePosition = FinePosition { iteration: 0, iterations: 100, times: 20, window: [0.0, 1.0], seed: 7 };
+const POSITION: FinePosition =
+    FinePosition { iteration: 0, iterations: 100, times: 20, window: [0.0, 1.0], window_before: [0.0, 1.0], seed: 7 };
 const EXTENT: f32 = 3.0;
 
 /// Trajectories, radii and stillness far from their start.

@@ -10,18 +10,22 @@
 //! | `trajectory` | splines over time, and the nodes' poses at a time |
 //! | `placement` | where the nodes are when motion begins |
 //! | `relocation` | nodes that move to where motion is not explained, while training |
+//! | `survey` | what all times have shown before a window widens |
 //! | `affinity` | which nodes a Gaussian follows beyond its place |
 //! | `lifetime` | what comes and goes |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
+//! | `plain` | nodes, Gaussians and poses as plain numbers |
 //! | `weights` | how much each Gaussian follows each node, as numbers |
 
 mod affinity;
 mod lifetime;
 mod placement;
+mod plain;
 mod regularizer;
 mod relocation;
 mod stream;
+mod survey;
 mod trajectory;
 mod weights;
 
@@ -134,6 +138,8 @@ pub struct NodesField {
     rotations: Param<Tensor<2>>,
     /// `[B, H]`: the nodes' own affinities, where Gaussians have any.
     affinities: Option<Param<Tensor<2>>>,
+    /// `[1 + K, 3 B]`, constants: after a survey, the middle of each node's object before anything moves, and knots of its way.
+    ways: Option<Param<Tensor<2>>>,
     /// `[1]`, a constant: the scene's extent, world units.
     unit: Param<Tensor<1>>,
     #[module(skip)]
@@ -152,6 +158,7 @@ impl NodesField {
             translations: zeros([knots, 3 * nodes]),
             rotations: zeros([knots, 4 * nodes]),
             affinities: (config.affinities > 0).then(|| zeros([nodes, config.affinities])),
+            ways: None,
             unit: Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false),
             config,
             fades: true,
@@ -233,18 +240,23 @@ impl DeformationField for NodesField {
         *self = self.placed(scene, position);
     }
 
-    /// Knots that no training view has shown yet go on as those before them did.
-    fn begin_step(&mut self, _: &SceneAtRest<'_>, position: &FinePosition) {
-        let [low, high] = position.window;
-        self.fades = low <= 0.0 && high >= 1.0;
-        if !self.fades {
-            let continued = |knots: &Param<Tensor<2>>| {
-                let value = trajectory::continued(knots.val(), low, high);
-                Param::initialized(knots.id, value.detach().require_grad())
-            };
-            self.translations = continued(&self.translations);
-            self.rotations = continued(&self.rotations);
+    /// Knots that the window does not show go on as those before them did, on the ways that objects were found on if all times
+    /// were shown before.
+    fn begin_step(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
+        self.fades = position.shows_all();
+        if self.fades {
+            return;
         }
+        if position.narrows() {
+            self.survey(scene, position.window);
+        }
+        let [low, high] = position.window;
+        let renewed =
+            |knots: &Param<Tensor<2>>, value: Tensor<2>| Param::initialized(knots.id, value.detach().require_grad());
+        self.rotations = renewed(&self.rotations, trajectory::continued(self.rotations.val(), low, high));
+        let translations = self.translations_beyond(low, high);
+        let translations = translations.unwrap_or_else(|| trajectory::continued(self.translations.val(), low, high));
+        self.translations = renewed(&self.translations, translations);
     }
 
     fn refinement_views(&self, position: &FinePosition) -> usize {
@@ -285,6 +297,10 @@ impl DeformationField for NodesField {
             return Err(ModelError::Motion(format!("{nodes} nodes with {knots} knots, {expected}")));
         }
         *self = Self::zeros(self.config.clone(), nodes, knots, &self.anchors.device());
+        if shapes.contains_key("ways") {
+            let zeros = Tensor::zeros([1 + knots, 3 * nodes], &self.anchors.device());
+            self.ways = Some(Param::from_tensor(zeros).set_require_grad(false));
+        }
         Ok(())
     }
 

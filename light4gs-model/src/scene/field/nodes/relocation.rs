@@ -10,11 +10,12 @@
 //! The number of nodes does not change, and a moved node begins with the motion that its new place has already.
 
 use burn::module::Param;
-use burn::tensor::activation::sigmoid;
 use burn::tensor::{Tensor, TensorData};
 
 use super::placement::{LEAST_RADIUS, square};
-use super::{AFFINITY, NodesField, STILLNESS, numbers};
+use super::plain::{PosesAt, Skinned, Weights};
+use super::trajectory::knots_through;
+use super::{NodesField, numbers, tensor};
 use crate::scene::field::{FinePosition, PositionGradients, Renewed, SceneAtRest};
 
 /// Views whose gradients are looked at.
@@ -25,74 +26,12 @@ const CHEAP: f32 = 0.25;
 const SAMPLED: usize = 1500;
 const TIMES: usize = 6;
 const CANDIDATES: usize = 500;
-/// Smallest weight, and the smallest logit of one, with which a node counts.
-const LEAST_WEIGHT: f32 = 1e-3;
+/// Smallest logit with which a node counts.
 const LEAST_LOGIT: f32 = -6.0;
 /// Smallest sum of weights by which a mean is divided.
 const LEAST_SUM: f32 = 1e-6;
 /// Fewer nodes than this stay where they are.
 const FEWEST: usize = 5;
-
-/// Gaussians and nodes at rest as plain numbers, world units.
-struct Skinned {
-    means: Vec<[f32; 3]>,
-    opacities: Vec<f32>,
-    stillness: Vec<f32>,
-    anchors: Vec<[f32; 3]>,
-    precisions: Vec<f32>,
-    /// Affinities, none or so many of each Gaussian and of each node.
-    affinities: usize,
-    of_gaussians: Vec<f32>,
-    of_nodes: Vec<f32>,
-}
-
-/// The nodes that count for a Gaussian, with their weights.
-type Weights = Vec<(usize, f32)>;
-
-impl Skinned {
-    fn nodes(&self) -> usize {
-        self.anchors.len()
-    }
-
-    /// The weights of a Gaussian if some nodes were not there, and the logarithm of the sum by which the softmax divides.
-    fn weights(&self, gaussian: usize, without: impl Fn(usize) -> bool) -> (Weights, f32) {
-        let place = &self.means[gaussian];
-        let columns = |row: usize| row * self.affinities..(row + 1) * self.affinities;
-        let own = &self.of_gaussians[columns(gaussian)];
-        let logit = |node: usize| {
-            let affinity: f32 = own.iter().zip(&self.of_nodes[columns(node)]).map(|(own, other)| own * other).sum();
-            affinity - self.precisions[node] * square(place, &self.anchors[node])
-        };
-        let logits = (0..self.nodes()).map(logit).chain([self.stillness[gaussian]]);
-        let mut weights: Weights = logits.enumerate().filter(|(node, _)| !without(*node)).collect();
-        let largest = weights.iter().map(|(_, logit)| *logit).fold(f32::MIN, f32::max);
-        weights.iter_mut().for_each(|(_, weight)| *weight = (*weight - largest).exp());
-        let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
-        weights.retain(|(_, weight)| *weight > LEAST_WEIGHT * sum);
-        weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
-        (weights, largest + sum.ln())
-    }
-}
-
-/// Matrices and offsets of all nodes at a time, and behind them those of standing still.
-struct PosesAt(Vec<[f32; 12]>);
-
-impl PosesAt {
-    fn moved(&self, node: usize, point: &[f32; 3]) -> [f32; 3] {
-        let pose = &self.0[node];
-        std::array::from_fn(|row| {
-            let [x, y, z] = point;
-            pose[3 * row] * x + pose[3 * row + 1] * y + pose[3 * row + 2] * z + pose[9 + row]
-        })
-    }
-
-    fn blended(&self, weights: &Weights, point: &[f32; 3]) -> [f32; 3] {
-        weights.iter().fold([0.0; 3], |sum, (node, weight)| {
-            let place = self.moved(*node, point);
-            std::array::from_fn(|axis| sum[axis] + weight * place[axis])
-        })
-    }
-}
 
 /// A node's new place: that of a Gaussian, and its radius, world units.
 struct Wanting {
@@ -202,6 +141,7 @@ impl NodesField {
         let (mut anchors, mut log_radii) = (numbers(self.anchors.val()), numbers(self.log_radii.val()));
         let (mut translations, mut rotations) = (old_translations.clone(), old_rotations.clone());
         let mut affinities = skinned.of_nodes.clone();
+        let mut ways = self.ways.as_ref().map(|ways| numbers(ways.val())).unwrap_or_default();
         for (node, Wanting { gaussian, radius }) in moved {
             let (weights, _) = skinned.weights(*gaussian, |_| false);
             let place = &skinned.means[*gaussian];
@@ -224,6 +164,11 @@ impl NodesField {
                     translations[(knot * nodes + node) * 3 + axis] = own + rest;
                 }
             }
+            // It belongs to the object of the node that its place follows most.
+            let most = weights.iter().filter(|(from, _)| *from < nodes).max_by(|a, b| a.1.total_cmp(&b.1));
+            if let Some((from, _)) = most {
+                ways.chunks_exact_mut(3 * nodes).for_each(|row| row.copy_within(3 * from..3 * from + 3, 3 * node));
+            }
             for at in 0..skinned.affinities {
                 affinities[node * skinned.affinities + at] = blend(&skinned.of_nodes, skinned.affinities, 0, at);
             }
@@ -245,6 +190,9 @@ impl NodesField {
         if let Some(parameter) = &mut self.affinities {
             set(parameter, affinities);
         }
+        if let Some(parameter) = &mut self.ways {
+            *parameter = Param::from_tensor(tensor(ways, parameter.dims(), &device)).set_require_grad(false);
+        }
     }
 
     /// The numbers of some nodes.
@@ -258,36 +206,6 @@ impl NodesField {
         let others =
             [of("anchors", 1, 3), of("log_radii", 1, 1), of("translations", knots, 3), of("rotations", knots, 4)];
         others.into_iter().chain(affinities).collect()
-    }
-
-    fn poses_at(&self, time: f32) -> PosesAt {
-        let poses = self.poses(time);
-        let (matrices, offsets) = (numbers(poses.matrices), numbers(poses.offsets));
-        let rows = matrices.as_chunks::<9>().0.iter().zip(offsets.as_chunks::<3>().0);
-        let pose = |(matrix, offset): (&[f32; 9], &[f32; 3])| {
-            std::array::from_fn(|at| if at < 9 { matrix[at] } else { offset[at - 9] })
-        };
-        let still = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-        PosesAt(rows.map(pose).chain([still]).collect())
-    }
-
-    fn plain_numbers(&self, scene: &SceneAtRest<'_>) -> Skinned {
-        let tensors = scene.gaussians.tensors();
-        let means: Vec<[f32; 3]> = numbers(tensors.means.clone()).as_chunks::<3>().0.to_vec();
-        let stillness = match tensors.further(STILLNESS) {
-            Some(logits) => numbers(logits.clone()),
-            None => vec![super::NEVER_STILL; means.len()],
-        };
-        Skinned {
-            means,
-            opacities: numbers(sigmoid(tensors.opacity_logits.clone())),
-            stillness,
-            anchors: numbers(self.world_anchors()).as_chunks::<3>().0.to_vec(),
-            precisions: numbers(self.precisions()),
-            affinities: self.config.affinities,
-            of_gaussians: tensors.further(AFFINITY).map(|all| numbers(all.clone())).unwrap_or_default(),
-            of_nodes: self.affinities.as_ref().map(|all| numbers(all.val())).unwrap_or_default(),
-        }
     }
 }
 
@@ -356,47 +274,4 @@ fn pull(place: &[f32; 3], radius: f32, means: &[[f32; 3]], rows: &[(Weights, f32
         }
     }
     sums.iter().map(|(sum, by_chance)| (square(sum, &[0.0; 3]) - by_chance).max(0.0).sqrt()).sum()
-}
-
-/// The knots of the uniform cubic B-spline through values at the ends of its segments, without curvature at both ends.
-fn knots_through(values: &[f32]) -> Vec<f32> {
-    // At the end of a segment (k[j-1] + 4 k[j] + k[j+1]) / 6 is the value. Without curvature, the first and the last such knot
-    // are their values; Thomas's algorithm finds those between.
-    let last = values.len() - 1;
-    let mut knots = values.to_vec();
-    let mut factors = vec![0.0; values.len()];
-    for j in 1..last {
-        let pivot = 4.0 - factors[j - 1];
-        factors[j] = 1.0 / pivot;
-        knots[j] = (6.0 * values[j] - knots[j - 1]) / pivot;
-    }
-    for j in (1..last).rev() {
-        knots[j] -= factors[j] * knots[j + 1];
-    }
-    let (before, after) = (2.0 * knots[0] - knots[1], 2.0 * knots[last] - knots[last - 1]);
-    [vec![before], knots, vec![after]].concat()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_spline_goes_through_values() {
-        for values in [vec![1.0, -3.0], vec![0.0, 1.0, -2.0, 0.5, 0.25], (0..40).map(|j| (j as f32).sin()).collect()] {
-            let knots = knots_through(&values);
-            assert_eq!(knots.len(), values.len() + 2);
-            for (near, value) in knots.windows(3).zip(&values) {
-                assert!(((near[0] + 4.0 * near[1] + near[2]) / 6.0 - value).abs() < 1e-5, "{knots:?}");
-            }
-        }
-    }
-
-    #[test]
-    fn a_line_has_knots_on_it() {
-        assert_eq!(knots_through(&[1.0, 2.0, 3.0, 4.0]).len(), 6);
-        for (knot, expected) in knots_through(&[1.0, 2.0, 3.0, 4.0]).into_iter().zip([0.0, 1.0, 2.0, 3.0, 4.0, 5.0]) {
-            assert!((knot - expected).abs() < 1e-5);
-        }
-    }
 }

@@ -42,18 +42,33 @@ pub(super) fn basis(time: f32, knots: usize) -> Vec<f32> {
 /// How much of the last difference between two knots there is in the next one, where a trajectory is continued.
 const DAMPING: f32 = 0.9;
 
+/// The first and the last of so many knots that the times from `low` to `high` touch, but for the outermost two: these have next
+/// to no weight at the ends, so they are continued as well.
+pub(super) fn touched(knots: usize, low: f32, high: f32) -> (usize, usize) {
+    let segment = |time: f32| ((time.clamp(0.0, 1.0) * (knots - 3) as f32) as usize).min(knots - 4);
+    (segment(low) + 1, segment(high) + 2)
+}
+
+/// How much of what there is at a knot is left so many knots farther on.
+pub(super) fn not_damped(knots: usize) -> f32 {
+    DAMPING.powi(knots as i32)
+}
+
+/// The knot that counts most at a time.
+pub(super) fn knot_at(time: f32, knots: usize) -> usize {
+    (time.clamp(0.0, 1.0) * (knots - 3) as f32 + 1.0).round() as usize
+}
+
 /// Knots `[K, C]` of which only those count that the times from `low` to `high` touch: the others continue them, ever slower.
 pub(super) fn continued(knots: Tensor<2>, low: f32, high: f32) -> Tensor<2> {
     let [count, _] = knots.dims();
-    let segment = |time: f32| ((time.clamp(0.0, 1.0) * (count - 3) as f32) as usize).min(count - 4);
-    // The outermost touched knot has next to no weight at the end of the window, so it is continued as well.
-    let (first, last) = (segment(low) + 1, segment(high) + 2);
+    let (first, last) = touched(count, low, high);
     let row = |knot: usize| knots.clone().slice(s![knot..knot + 1, ..]);
     let beyond = |at: usize, inner: usize, count: usize| -> Vec<Tensor<2>> {
         let difference = row(at) - row(inner);
         let mut step = 0.0;
         let shares = (1..=count).map(|power| {
-            step += DAMPING.powi(power as i32);
+            step += not_damped(power);
             step
         });
         shares.map(|share| row(at) + difference.clone() * share).collect()
@@ -64,6 +79,25 @@ pub(super) fn continued(knots: Tensor<2>, low: f32, high: f32) -> Tensor<2> {
     let after = count - 1 - last;
     all.extend(if high < 1.0 { beyond(last, last - 1, after) } else { (last + 1..count).map(row).collect() });
     Tensor::cat(all, 0)
+}
+
+/// The knots of the uniform cubic B-spline through values at the ends of its segments, without curvature at both ends.
+pub(super) fn knots_through(values: &[f32]) -> Vec<f32> {
+    // At the end of a segment (k[j-1] + 4 k[j] + k[j+1]) / 6 is the value. Without curvature, the first and the last such knot
+    // are their values; Thomas's algorithm finds those between.
+    let last = values.len() - 1;
+    let mut knots = values.to_vec();
+    let mut factors = vec![0.0; values.len()];
+    for j in 1..last {
+        let pivot = 4.0 - factors[j - 1];
+        factors[j] = 1.0 / pivot;
+        knots[j] = (6.0 * values[j] - knots[j - 1]) / pivot;
+    }
+    for j in (1..last).rev() {
+        knots[j] -= factors[j] * knots[j + 1];
+    }
+    let (before, after) = (2.0 * knots[0] - knots[1], 2.0 * knots[last] - knots[last - 1]);
+    [vec![before], knots, vec![after]].concat()
 }
 
 impl NodesField {
@@ -143,5 +177,24 @@ mod tests {
         assert!((values[7] - 6.9).abs() < 1e-6 && (values[8] - 7.71).abs() < 1e-5, "{values:?}");
         assert!((values[2] - 2.1).abs() < 1e-6 && (values[1] - 1.29).abs() < 1e-5, "{values:?}");
         assert_eq!(numbers(continued(knots.clone(), 0.0, 1.0)), numbers(knots));
+    }
+
+    #[test]
+    fn a_spline_goes_through_values() {
+        for values in [vec![1.0, -3.0], vec![0.0, 1.0, -2.0, 0.5, 0.25], (0..40).map(|j| (j as f32).sin()).collect()] {
+            let knots = knots_through(&values);
+            assert_eq!(knots.len(), values.len() + 2);
+            for (near, value) in knots.windows(3).zip(&values) {
+                assert!(((near[0] + 4.0 * near[1] + near[2]) / 6.0 - value).abs() < 1e-5, "{knots:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_line_has_knots_on_it() {
+        assert_eq!(knots_through(&[1.0, 2.0, 3.0, 4.0]).len(), 6);
+        for (knot, expected) in knots_through(&[1.0, 2.0, 3.0, 4.0]).into_iter().zip([0.0, 1.0, 2.0, 3.0, 4.0, 5.0]) {
+            assert!((knot - expected).abs() < 1e-5);
+        }
     }
 }
