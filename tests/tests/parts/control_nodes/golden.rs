@@ -13,8 +13,8 @@ use light4gs_train::compression::{Compression, ConfiguredModels, encode};
 use light4gs_train::config::Config;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams");
-/// Names, and whether Gaussians come and go.
-const STREAMS: [(&str, bool); 2] = [("nodes", false), ("lifetimes", true)];
+/// Names, whether Gaussians come and go, and how many affinities they have.
+const STREAMS: [(&str, bool, usize); 3] = [("nodes", false, 0), ("lifetimes", true, 0), ("affinities", false, 2)];
 const GAUSSIANS: usize = 150;
 
 /// Everything that differs between Gaussians and nodes, far from its start.
@@ -28,6 +28,7 @@ impl ParameterMapper for Shaken {
             ("log_radii", 0.2),
             ("stillness", 6.0),
             ("lifetime", 1.2),
+            ("affinity", 1.0),
             ("quats", 0.5),
             ("sh", 0.2),
         ];
@@ -61,10 +62,11 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 #[ignore = "writes the golden streams anew, which only a change of the format may ask for"]
 fn write_golden_nodes() {
     let device = Device::flex().autodiff();
-    for (name, lifetime) in STREAMS {
+    for (name, lifetime, affinities) in STREAMS {
         let keys = ["model.field=nodes", "model.nodes.count=12", "model.nodes.radius=0.25", "model.sh_degree=1"];
         let mut keys = keys.map(str::to_owned).to_vec();
         keys.push(format!("model.nodes.lifetime={lifetime}"));
+        keys.push(format!("model.nodes.affinities={affinities}"));
         let config = Config::load("dnerf-cpu", &keys).unwrap();
         let scene = scene(&config, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
@@ -77,7 +79,7 @@ fn write_golden_nodes() {
 
 #[test]
 fn the_model_reads_the_golden_nodes_as_the_codec_does() {
-    for (name, lifetime) in STREAMS {
+    for (name, lifetime, _) in STREAMS {
         let data = decode(&std::fs::read(format!("{FOLDER}/{name}.l4gs")).unwrap()).unwrap();
         let evaluator = MotionEvaluator::new(&data).unwrap();
         let scene: DynamicScene = DynamicScene::from_arrays(&data, &Device::flex()).unwrap();
