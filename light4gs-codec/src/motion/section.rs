@@ -5,7 +5,7 @@ use crate::{
     budget::Budget,
     bytes::{Reader, Section, Writer, sections::Encoding},
     network::{
-        tensors::{read_tensors, write_tensors},
+        tensors::{StoredTensor, read_tensors, write_tensors},
         weights::{TensorLength, WeightPrecision},
     },
 };
@@ -47,10 +47,11 @@ pub(crate) fn write(
         writer.block(name.as_bytes());
         writer.varint(shape.len() as u64);
         shape.iter().for_each(|&side| writer.varint(side.into()));
-        tensors.push(values.clone());
+        let row = shape.last().map_or(1, |side| *side as usize);
+        tensors.push(StoredTensor { values: values.clone(), row });
     }
     let mut decoded = motion.clone();
-    set_tensors(&mut decoded, write_tensors(SECTION, &tensors, precision, writer)?);
+    set_tensors(&mut decoded, write_tensors(SECTION, tensors, precision, writer)?);
     Ok(decoded)
 }
 

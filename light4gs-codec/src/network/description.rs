@@ -5,7 +5,7 @@ use crate::{
     CodecError, Limits,
     bytes::{Reader, Writer},
     limits::at_most,
-    network::weights::TensorLength,
+    network::{tensors::StoredTensor, weights::TensorLength},
 };
 
 const LINEAR: u8 = 0;
@@ -153,8 +153,13 @@ impl Network {
     }
 
     /// The weights as a stream holds them: weight and bias of each layer, without masked numbers.
-    pub(crate) fn stored_tensors(&self) -> Vec<Vec<f32>> {
-        self.layers().flat_map(|layer| [stored_weight(layer), layer.bias.clone()]).collect()
+    pub(crate) fn stored_tensors(&self) -> Vec<StoredTensor> {
+        let weight = |layer: &Layer| {
+            let values = stored_weight(layer);
+            StoredTensor { row: values.len() / (layer.outputs as usize).max(1), values }
+        };
+        let bias = |layer: &Layer| StoredTensor { row: layer.bias.len(), values: layer.bias.clone() };
+        self.layers().flat_map(|layer| [weight(layer), bias(layer)]).collect()
     }
 
     /// Sets the weights from the form that a stream holds, of lengths [`Network::tensor_lengths`].

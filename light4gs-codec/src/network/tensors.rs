@@ -14,18 +14,29 @@ use crate::{
 /// A tensor's name in messages.
 const NAME: &str = "weights";
 
+/// Numbers that a section holds.
+#[derive(Clone, Debug)]
+pub(crate) struct StoredTensor {
+    pub(crate) values: Vec<f32>,
+    /// Length of a row, see [`WeightTensor::row`].
+    pub(crate) row: usize,
+}
+
 /// Appends tensors, as float32 where there is no precision; returns them as a decoder gets them.
 pub(crate) fn write_tensors(
     section: &'static str,
-    tensors: &[Vec<f32>],
+    tensors: Vec<StoredTensor>,
     precision: Option<WeightPrecision>,
     writer: &mut Writer,
 ) -> Result<Vec<Vec<f32>>, CodecError> {
     let Some(precision) = precision else {
-        tensors.iter().for_each(|values| writer.f32s(values));
-        return Ok(tensors.to_vec());
+        tensors.iter().for_each(|tensor| writer.f32s(&tensor.values));
+        return Ok(tensors.into_iter().map(|tensor| tensor.values).collect());
     };
-    let tensors: Vec<_> = tensors.iter().map(|values| WeightTensor { name: NAME, values, precision }).collect();
+    let tensors: Vec<_> = tensors
+        .iter()
+        .map(|StoredTensor { values, row }| WeightTensor { name: NAME, values, row: *row, precision })
+        .collect();
     let EncodedWeights { bytes, tensors } = weights::encode(section, &tensors)?;
     writer.bytes.extend(bytes);
     Ok(tensors)
@@ -58,8 +69,8 @@ pub(crate) fn write_weights(
     precision: Option<WeightPrecision>,
     writer: &mut Writer,
 ) -> Result<(), CodecError> {
-    let tensors: Vec<_> = networks.iter().flat_map(|network| network.stored_tensors()).collect();
-    let mut decoded = write_tensors(section, &tensors, precision, writer)?.into_iter();
+    let tensors = networks.iter().flat_map(|network| network.stored_tensors()).collect();
+    let mut decoded = write_tensors(section, tensors, precision, writer)?.into_iter();
     networks.iter_mut().for_each(|network| network.set_stored_tensors(&mut decoded));
     Ok(())
 }

@@ -1,15 +1,16 @@
 //! Compact coding of network weights (docs/design.md).
 //!
-//! Each tensor is quantized uniformly, by a step of its own, and the integers are coded adaptively; the context of a
-//! weight is the magnitude of the weights before it. Names and lengths are not in the bytes: the reader of a network
-//! knows its shape before it reads the weights.
+//! Each tensor is quantized uniformly, by a step of its own, and the integers are coded adaptively, as differences from
+//! what the weights before them predict: nothing, the same again, or a straight line (for splines, whose knots are rows
+//! of a layer). The context of a weight is the magnitude of the differences before it. Names and lengths are not in the
+//! bytes: the reader of a network knows its shape before it reads the weights.
 //!
 //! ```
 //! use light4gs_codec::{Limits, network_weights::{self, TensorLength, WeightPrecision, WeightTensor}};
 //!
 //! let encoded = network_weights::encode("deformation", &[
-//!     WeightTensor { name: "trunk.0.weight", values: &[0.5, -0.25, 0.1], precision: WeightPrecision::Bits(10) },
-//!     WeightTensor { name: "trunk.0.bias", values: &[0.0], precision: WeightPrecision::Step(1e-4) },
+//!     WeightTensor { name: "trunk.0.weight", values: &[0.5, -0.25, 0.1], row: 3, precision: WeightPrecision::Bits(10) },
+//!     WeightTensor { name: "trunk.0.bias", values: &[0.0], row: 1, precision: WeightPrecision::Step(1e-4) },
 //! ])?;
 //! let lengths = [
 //!     TensorLength { name: "trunk.0.weight", length: 3 },
@@ -21,7 +22,7 @@
 //! ```
 //!
 //! The bytes are one range-coded stream: for each tensor that is not empty its step as the 32 raw bits of a float32, 0
-//! for a tensor of zeros, and then its integers. Zeros at the end fill it up to one byte for 256 weights, so that a
+//! for a tensor of zeros, then how its integers are predicted, and then these. Zeros at the end fill it up to one byte for 256 weights, so that a
 //! reader can check a length against the bytes.
 
 use crate::{
@@ -43,6 +44,10 @@ const WEIGHT_NANOSECONDS: u64 = 300;
 const LAST_LEVEL: usize = 24;
 /// Fractional bits of the expected magnitude.
 const FRACTION: u32 = 4;
+/// The highest order of a prediction.
+const MOST_ORDER: u32 = 2;
+/// Bits of the length of a row.
+const ROW_BITS: u32 = 16;
 /// The largest weight, so that rounding up to the last level cannot reach infinity.
 const LARGEST_WEIGHT: f32 = 1e30;
 
@@ -75,6 +80,8 @@ pub struct WeightTensor<'a> {
     pub name: &'a str,
     /// Its numbers, in an order that the reader knows too.
     pub values: &'a [f32],
+    /// Length of a row: prediction begins anew with each. A tensor that is one row has its own length, or more.
+    pub row: usize,
     /// How finely it is quantized.
     pub precision: WeightPrecision,
 }
@@ -145,11 +152,19 @@ pub(crate) fn decode_within(
     let mut quantized: Vec<_> = lengths
         .iter()
         // At most 256 times the number of bytes, so it fits.
-        .map(|tensor| Quantized { step: 0.0, indices: vec![0; tensor.length as usize] })
+        .map(|tensor| Quantized {
+            step: 0.0,
+            prediction: Prediction::default(),
+            indices: vec![0; tensor.length as usize],
+        })
         .collect();
     code(&mut BitDecoder::new(bytes), &mut quantized)
         .map_err(|_| CodecError::invalid(section, "weights", "damaged or cut short", "a range-coded stream"))?;
     for (tensor, TensorLength { name, .. }) in quantized.iter().zip(lengths) {
+        if tensor.prediction.order > MOST_ORDER {
+            let field = format!("prediction of {name}");
+            return Err(CodecError::invalid(section, field, tensor.prediction.order, format!("at most {MOST_ORDER}")));
+        }
         if tensor.step != 0.0 {
             check_step(section, name, tensor.step)?;
         }
@@ -166,12 +181,46 @@ pub(crate) fn decode_within(
 struct Quantized {
     /// 0 where all integers are 0.
     step: f32,
+    prediction: Prediction,
     indices: Vec<i32>,
+}
+
+/// What the integers of a tensor are expected to be.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Prediction {
+    /// 0: zero; 1: the integer before; 2: on a line with the two before.
+    order: u32,
+    /// It begins anew after so many integers; in the stream only where the order is not 0.
+    row: u32,
+}
+
+impl Prediction {
+    /// The prediction of an integer from those before it.
+    fn of(self, before: &[i32]) -> i32 {
+        let known = before.len().checked_rem(self.row as usize).unwrap_or(before.len());
+        match (self.order.min(known as u32), before) {
+            (2, [.., older, last]) => last.wrapping_add(last.wrapping_sub(*older)),
+            (1, [.., last]) => *last,
+            _ => 0,
+        }
+    }
+
+    /// The one with which integers take the fewest bits, by a rough count.
+    fn best(indices: &[i32], row: usize) -> Self {
+        // A row that the stream cannot say is as good as none.
+        let row = u32::try_from(row).ok().filter(|row| *row < 1 << ROW_BITS).unwrap_or(0);
+        let bits = |prediction: &Self| -> u32 {
+            let difference = |at: usize| indices[at].wrapping_sub(prediction.of(&indices[..at])).unsigned_abs();
+            (0..indices.len()).map(|at| 2 * (32 - difference(at).leading_zeros())).sum()
+        };
+        let all = (0..=MOST_ORDER).map(|order| Self { order, row: if order == 0 { 0 } else { row } });
+        all.min_by_key(bits).unwrap_or_default()
+    }
 }
 
 impl Quantized {
     fn of(section: &'static str, tensor: &WeightTensor<'_>) -> Result<Self, CodecError> {
-        let WeightTensor { name, values, precision } = *tensor;
+        let WeightTensor { name, values, precision, .. } = *tensor;
         if let Some(index) = values.iter().position(|value| !value.is_finite()) {
             return Err(CodecError::NonFinite { section, field: name.to_owned(), index, value: values[index] });
         }
@@ -196,7 +245,7 @@ impl Quantized {
                 CodecError::invalid(section, name, format!("{largest:e}"), expected)
             })?;
         let zeros = indices.iter().all(|&index| index == 0);
-        Ok(Self { step: if zeros { 0.0 } else { step }, indices })
+        Ok(Self { step: if zeros { 0.0 } else { step }, prediction: Prediction::best(&indices, tensor.row), indices })
     }
 
     fn values(&self) -> Vec<f32> {
@@ -220,11 +269,18 @@ fn code(coder: &mut impl BitCoder, tensors: &mut [Quantized]) -> Result<(), Dama
         if tensor.step == 0.0 {
             continue;
         }
+        let Prediction { order, row } = &mut tensor.prediction;
+        *order = coder.raw(2, *order);
+        if *order > 0 {
+            *row = coder.raw(ROW_BITS, *row);
+        }
         let mut expected = ExpectedMagnitude::default();
-        for index in &mut tensor.indices {
+        for at in 0..tensor.indices.len() {
             coder.check()?;
-            *index = integers.code(coder, expected.level(), *index);
-            expected.learn(index.unsigned_abs());
+            let predicted = tensor.prediction.of(&tensor.indices[..at]);
+            let difference = integers.code(coder, expected.level(), tensor.indices[at].wrapping_sub(predicted));
+            tensor.indices[at] = predicted.wrapping_add(difference);
+            expected.learn(difference.unsigned_abs());
         }
     }
     coder.check()

@@ -9,7 +9,8 @@ use proptest::prelude::*;
 const SECTION: &str = "deformation";
 
 fn encode(tensors: &[Vec<f32>], precision: WeightPrecision) -> Result<EncodedWeights, CodecError> {
-    let tensors: Vec<_> = tensors.iter().map(|values| WeightTensor { name: "layer", values, precision }).collect();
+    let row = 7;
+    let tensors: Vec<_> = tensors.iter().map(|values| WeightTensor { name: "layer", values, row, precision }).collect();
     network_weights::encode(SECTION, &tensors)
 }
 
@@ -55,6 +56,22 @@ fn zeros_and_nothing_take_next_to_nothing() {
     assert_eq!(round_trip(&[vec![], vec![]], WeightPrecision::Bits(8)).bytes, []);
     assert_eq!(round_trip(&[vec![0.0; 10_000], vec![-0.0]], WeightPrecision::Bits(8)).bytes.len(), 40);
     assert_eq!(round_trip(&[vec![1e-6; 300]], WeightPrecision::Step(0.1)).tensors, [[0.0; 300]]);
+}
+
+/// Knots of splines, a row each: a straight line is next to free, whatever its values are.
+#[test]
+fn what_is_smooth_along_a_row_takes_few_bytes() {
+    let row = 28;
+    let knot = |i: usize| ((i / row) as f32 * 0.7).sin() + (i % row) as f32 * 0.1 * ((i / row) as f32).cos();
+    let values: Vec<f32> = (0..60 * row).map(knot).collect();
+    let bytes = |row: usize| {
+        let tensor = WeightTensor { name: "knots", values: &values, row, precision: WeightPrecision::Bits(10) };
+        let encoded = network_weights::encode(SECTION, &[tensor]).unwrap();
+        assert_eq!(decode(&encoded.bytes, [values.len()]).unwrap(), encoded.tensors);
+        encoded.bytes.len()
+    };
+    assert!(bytes(row) < 520, "{}", bytes(row));
+    assert!(bytes(row) < bytes(values.len()), "{} {}", bytes(row), bytes(values.len()));
 }
 
 #[test]

@@ -159,7 +159,7 @@ fn weights(lengths: &[u64], random: &mut Random) -> Vec<u8> {
         _ => (0.0, WeightPrecision::Bits(8)),
     };
     let values: Vec<Vec<f32>> = lengths.iter().map(|&length| vec![value; length as usize]).collect();
-    let tensors: Vec<_> = values.iter().map(|values| WeightTensor { name: "w", values, precision }).collect();
+    let tensors: Vec<_> = values.iter().map(|values| WeightTensor { name: "w", values, row: 16, precision }).collect();
     network_weights::encode("bomb", &tensors).map_or_else(|_| vec![0; 1 << 13], |encoded| encoded.bytes)
 }
 
