@@ -38,7 +38,7 @@ impl DatasetLayout for DNerf {
     }
 
     fn preset(&self) -> Option<&'static str> {
-        Some("dnerf-cpu")
+        Some("dnerf-cpu+nodes")
     }
 
     fn detect(&self, root: &Path) -> bool {

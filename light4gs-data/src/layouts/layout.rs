@@ -20,8 +20,8 @@ pub trait DatasetLayout: Send + Sync {
     /// The file or files by which the layout is recognized, for the message when a folder holds no known one.
     fn signature(&self) -> &'static str;
 
-    /// The preset of `light4gs-train` that fits datasets of this layout: `light4gs train` takes it where no
-    /// configuration is named. `None` if the user must name one.
+    /// The preset of `light4gs-train` that fits datasets of this layout, or several joined by `+`: `light4gs train`
+    /// takes it where no configuration is named. `None` if the user must name one.
     fn preset(&self) -> Option<&'static str> {
         None
     }

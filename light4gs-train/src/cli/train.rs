@@ -44,7 +44,7 @@ pub(super) struct Train {
     /// Folder of the dataset.
     scene: PathBuf,
     /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as
-    /// dnerf-cpu.
+    /// dnerf-cpu+nodes.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,
     /// Layout of the dataset; without it, it is found by content (see docs/data.md).

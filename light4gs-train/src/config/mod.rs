@@ -98,7 +98,7 @@ impl Config {
         layers::resolve(&Origin::Preset(name.to_owned()), &[], &[])
     }
 
-    /// The name of the preset that fits datasets of a layout.
+    /// The preset that fits datasets of a layout, or several joined by `+`, as [`Config::load`] takes them.
     ///
     /// # Errors
     /// [`ConfigError::NoPreset`] for a layout that has none.

@@ -89,7 +89,7 @@ fn every_layout_has_a_preset() {
     for name in layouts.names() {
         let layout = layouts.by_name(name).expect("a known layout");
         let preset = Config::preset_of(layout).unwrap_or_else(|error| panic!("{error}"));
-        let config = Config::from_preset(preset).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let config = Config::load(preset, &[]).unwrap_or_else(|error| panic!("{name}: {error}"));
         assert!(
             config.data.layout.is_none_or(|layout| layout == name),
             "the preset {preset} is for another layout than {name}"
