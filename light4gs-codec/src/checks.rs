@@ -25,7 +25,7 @@ use crate::{
     planes, stream,
 };
 
-pub use crate::steps::{LEAST_STEP, attribute_step, nearest_plane_steps, plane_step, sh_step};
+pub use crate::steps::{LEAST_STEP, attribute_step, nearest_plane_steps, nearest_sh_step, plane_step, sh_step};
 
 /// Refuses feature planes that no stream can hold, or that cannot be coded: too many channels or scales, illegal sizes.
 ///

@@ -35,8 +35,6 @@ pub fn plane_step(step: f32) -> Result<(), CodecError> {
 
 /// The nearest steps that [`plane_step`] accepts. Learned steps have no other bounds.
 pub fn nearest_plane_steps(steps: PerGroup) -> PerGroup {
-    // NaN becomes the smallest step; `clamp` would keep NaN.
-    let nearest = |step: f32| if step > LEAST_STEP { step.min(LARGEST_STEP) } else { LEAST_STEP };
     PerGroup { space_only: nearest(steps.space_only), space_time: nearest(steps.space_time) }
 }
 
@@ -46,6 +44,16 @@ pub fn nearest_plane_steps(steps: PerGroup) -> PerGroup {
 /// As [`plane_step`].
 pub fn sh_step(step: f32) -> Result<(), CodecError> {
     check_step(Section::Sh.name(), "step", step, LEAST_STEP)
+}
+
+/// The nearest step that [`sh_step`] accepts.
+pub fn nearest_sh_step(step: f32) -> f32 {
+    nearest(step)
+}
+
+// NaN becomes the smallest step; `clamp` would keep NaN.
+fn nearest(step: f32) -> f32 {
+    if step > LEAST_STEP { step.min(LARGEST_STEP) } else { LEAST_STEP }
 }
 
 /// Refuses a step of one of the [`AttributeSteps`](crate::attributes::AttributeSteps), by the attribute's name.

@@ -8,6 +8,7 @@
 //! | [`Significance`] | how much each Gaussian contributes over views and times | III-B |
 //! | [`context`] | the bits of every value of the planes: the multiscale hexplane [`ContextModel`] | III-C |
 //! | [`sh`] | the bits of every spherical harmonic: four models behind [`ShEntropy`] | III-D |
+//! | [`AttributeEntropy`] | the bits of the other attributes of Gaussians, and their learned steps | |
 //! | [`entropy`] | the components of these models: densities, convolutions over planes, quantization steps ([`AdaptiveQuantization`]) | III-D |
 //! | [`parameters`] | every float parameter of a module with its path | |
 //! | [`ops`] | custom operations with hand-written derivatives | |
@@ -26,6 +27,7 @@
     allow(dead_code, unused_imports, unused_variables, unused_mut, unreachable_code)
 )]
 
+mod attribute_entropy;
 pub mod context;
 mod cpu;
 pub mod entropy;
@@ -42,6 +44,7 @@ mod significance;
 pub mod spherical_harmonics;
 mod splatter;
 
+pub use attribute_entropy::{AttributeEntropy, CodedAttribute};
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;

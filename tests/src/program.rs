@@ -34,9 +34,10 @@ pub const TINY: [&str; 15] = [
 ];
 
 /// Overrides that turn on everything that compresses, in a tiny run.
-pub const TINY_COMPRESSION: [&str; 6] = [
+pub const TINY_COMPRESSION: [&str; 7] = [
     "compression.rate.lambda=0.05",
     "compression.rate.from=12",
+    "compression.rate.attributes=true",
     "compression.rate.planes_until=44",
     "compression.steps.adaptive_from=20",
     "train.prune.fraction=0.2",

@@ -41,6 +41,7 @@ mod steps;
 use neighbors::{NEIGHBORS, nearest_before};
 pub(crate) use position_grid::check_positions;
 use position_grid::{PositionGrid, morton_cell};
+pub use quantized::typical_size;
 use quantized::{Quantized, join};
 pub use section::AttributeInfo;
 pub(crate) use section::{Head, check};

@@ -185,7 +185,7 @@ fn check_finite(field: &str, values: &[f32]) -> Result<(), CodecError> {
 }
 
 /// The median over the Gaussians of the geometric mean of the scales, in world units; 1 where there are none.
-fn typical_size(log_scales: &[[f32; 3]]) -> f32 {
+pub fn typical_size(log_scales: &[[f32; 3]]) -> f32 {
     let mut logarithms: Vec<f32> = log_scales.iter().map(|[x, y, z]| x / 3.0 + y / 3.0 + z / 3.0).collect();
     if logarithms.is_empty() {
         return 1.0;

@@ -131,6 +131,9 @@ pub static QUATS: &Attribute = &BUILT_IN[2];
 /// Opacities before the sigmoid.
 pub static OPACITY_LOGITS: &Attribute = &BUILT_IN[3];
 
+/// Spherical harmonics beyond degree 0.
+pub static SH_REST: &Attribute = &BUILT_IN[5];
+
 /// The attributes of every Gaussian of every scene, in the order of [`Gaussians`](crate::Gaussians).
 pub static BUILT_IN: [Attribute; 6] = [
     built_in(

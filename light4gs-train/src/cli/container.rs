@@ -41,7 +41,8 @@ pub(super) struct Encode {
     #[arg(long)]
     out: PathBuf,
     /// Changes one key below `compression` for this file; may be given more than once. Where keys of `context`, `steps`
-    /// or `sh` change, the entropy models are fitted again to the finished scene.
+    /// or `sh` change, the entropy models are fitted again to the finished scene. Where keys of `attributes` change,
+    /// steps that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
@@ -78,10 +79,14 @@ impl Encode {
         }
         let (old, new) = (&config.compression, &changed.compression);
         let same_models = old.context == new.context && old.steps == new.steps && old.sh == new.sh;
+        let mut compression = checkpoint.compression.clone().filter(|_| same_models);
+        if let Some(models) = compression.as_mut().filter(|_| old.attributes != new.attributes) {
+            models.attributes = None;
+        }
         let images = image_store(&config);
         let trained = TrainedScene {
             scene: &checkpoint.scene,
-            compression: checkpoint.compression.as_ref().filter(|_| same_models),
+            compression: compression.as_ref(),
             models: &ConfiguredModels,
             config: &changed,
             data: &data,

@@ -140,7 +140,7 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     DynamicScene::<F>::from_arrays(&data, &inner)?;
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
     let images =
-        match (searches(settings, trained.compression.is_none()) && profile == Profile::Compact, trained.images) {
+        match (searches(settings, trained.compression) && profile == Profile::Compact, trained.images) {
             (false, _) => None,
             (true, Some(images)) => {
                 let error = mean_squared_error(&render(&data), &views, images)?;
@@ -178,10 +178,11 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
 }
 
 /// Whether the search for steps needs renderings. Steps of planes and harmonics can change only before models are
-/// fitted.
-fn searches(settings: &CompressionConfig, fits: bool) -> bool {
+/// fitted; those of other attributes unless they were learned.
+fn searches<C: Module, S: Module>(settings: &CompressionConfig, trained: Option<&Compression<C, S>>) -> bool {
     let fitted = settings.steps.search_tolerance > 0.0 || settings.sh.search_tolerance > 0.0;
-    settings.attributes.search_tolerance > 0.0 || (fits && fitted)
+    let learned = trained.is_some_and(|models| models.attributes.is_some());
+    (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
 }
 
 fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Compression<C, S>) -> Vec<PlaneRecord> {

@@ -7,6 +7,7 @@ use light4gs_codec::{
     CodecError, CompressionInput, CompressionReport, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
     ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
 };
+use light4gs_model::attributes::SH_REST;
 use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +96,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let compression = &mut compression.valid();
     let data = scene.to_arrays(meta)?;
     let mut input = compression_input(compression, scene, &data, config, profile)?;
-    if let (Some(images), Profile::Compact) = (images, input.profile)
+    if let (Some(images), Profile::Compact, None) = (images, input.profile, &compression.attributes)
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
@@ -168,11 +169,15 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     if let Some(models) = &mut compression.planes {
         models.context.base_mut().update_quantiles();
     }
+    let mut attributes = config.attributes.steps_of(scene.gaussians.attributes());
+    if let Some(models) = &compression.attributes {
+        attributes = models.steps(attributes, &data.gaussians.log_scales);
+    }
     Ok(CompressionInput {
         profile,
         planes: compression.plane_coding(scene)?,
         sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
-        attributes: config.attributes.steps_of(scene.gaussians.attributes()),
+        attributes,
         weights: WeightPrecisions {
             motion: WeightPrecision::Bits(config.weights.deformation_bits),
             context_model: WeightPrecision::Bits(config.weights.context_bits),
@@ -198,7 +203,11 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     fn sh_coding(&self, gaussians: &GaussianArrays, step: f32) -> Result<ShCoding, CodecError> {
         match &self.sh {
             Some(sh) => sh.to_coding(&gaussians.sh_rest),
-            None => counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step),
+            None => {
+                let learned = self.attributes.as_ref().and_then(|models| models.step(&SH_REST.name));
+                let step = learned.map_or(step, checks::nearest_sh_step);
+                counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step)
+            }
         }
     }
 

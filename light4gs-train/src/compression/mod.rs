@@ -27,8 +27,10 @@ pub use rate::{NoisyScene, Rate};
 
 use burn::module::Module;
 use burn::tensor::Device;
+use light4gs_model::attributes::Coding;
 use light4gs_model::{
-    AdaptiveQuantization, AdaptiveQuantizationConfig, ContextModel, FeaturePlanes, PlaneEntropy, ShEntropyModel,
+    AdaptiveQuantization, AdaptiveQuantizationConfig, Attribute, AttributeEntropy, CodedAttribute, ContextModel,
+    DeformationField, DynamicScene, FeaturePlanes, Gaussians, PlaneEntropy, ShEntropyModel,
 };
 
 use crate::config::{CompressionConfig, Config};
@@ -40,8 +42,10 @@ pub struct Compression<C: Module = ContextModel, S: Module = ShEntropyModel> {
     /// Those of the feature planes, if the deformation field has any.
     pub planes: Option<PlaneModels<C>>,
     /// That of the spherical harmonics beyond degree 0; models are made for degree 3. Lower degrees are coded with the
-    /// frequencies of their symbols, and are not in the rate.
+    /// frequencies of their symbols; in the rate they are among the attributes.
     pub sh: Option<S>,
+    /// That of the other attributes of the Gaussians, if the rate includes them.
+    pub attributes: Option<AttributeEntropy>,
 }
 
 /// The entropy model and the steps of feature planes.
@@ -64,14 +68,22 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     pub fn of_run<E: EntropyModels<Planes = C, Sh = S>>(
         models: &E,
         config: &Config,
-        planes: Option<&FeaturePlanes>,
+        scene: &DynamicScene<impl DeformationField>,
         device: &Device,
     ) -> Result<Option<Self>, TrainError> {
-        let trains = config.compression.rate.lambda > 0.0;
-        if trains { Self::new(models, config, planes, device).map(Some) } else { Ok(None) }
+        if config.compression.rate.lambda <= 0.0 {
+            return Ok(None);
+        }
+        let mut compression = Self::new(models, config, scene.planes(), device)?;
+        if config.compression.rates_attributes() {
+            let coded = coded_attributes(config, &scene.gaussians, compression.sh.is_some());
+            compression.attributes = Some(AttributeEntropy::new(coded, device));
+        }
+        Ok(Some(compression))
     }
 
-    /// Untrained models for scenes of a configuration whose deformation field has these planes.
+    /// Untrained models for scenes of a configuration whose deformation field has these planes, without one of the
+    /// attributes: it can only be trained with the scene.
     ///
     /// # Errors
     /// [`TrainError::Input`] if there is no such model, for example if the model of the spherical harmonics reads
@@ -92,13 +104,20 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         };
         let planes = planes.map(plane_models).transpose()?;
         let sh = (config.model.sh_degree == 3).then(|| models.sh(sh, feature_size, device)).transpose()?;
-        Ok(Self { planes, sh })
+        Ok(Self { planes, sh, attributes: None })
     }
 
     /// Initializes the context model with the statistics of planes.
     pub fn start_from(&mut self, planes: Option<&FeaturePlanes>) {
         if let (Some(models), Some(planes)) = (&mut self.planes, planes) {
             models.context.base_mut().start_from(&planes.tensors(), &models.quantization.steps_without_gradient());
+        }
+    }
+
+    /// Initializes the model of the attributes with the values of Gaussians.
+    pub fn start_attributes_from(&mut self, gaussians: &Gaussians) {
+        if let Some(attributes) = &mut self.attributes {
+            attributes.start_from(&gaussians.tensors());
         }
     }
 
@@ -110,6 +129,23 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             models.quantization.no_finer_than(&quantization_config(config));
         }
     }
+}
+
+/// The attributes of Gaussians whose steps are learned: those that are quantized, and show in an image. Spherical
+/// harmonics are among them unless they have a model of their own.
+fn coded_attributes(config: &Config, gaussians: &Gaussians, sh_has_model: bool) -> Vec<CodedAttribute> {
+    let steps = config.compression.attributes.steps_of(gaussians.attributes());
+    let coded = |attribute: &Attribute| {
+        let width = attribute.width.of(gaussians.sh_degree());
+        let step = match attribute.coding {
+            Coding::Harmonics if sh_has_model || width == 0 => None,
+            Coding::Harmonics => Some(config.compression.sh.step as f32),
+            Coding::Quantized(_) => steps.of(&attribute.name),
+            Coding::Float32 => None,
+        };
+        step.map(|step| CodedAttribute { name: attribute.name.to_string(), width, step })
+    };
+    gaussians.attributes().filter(|attribute| !attribute.optional).filter_map(coded).collect()
 }
 
 fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {

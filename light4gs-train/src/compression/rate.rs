@@ -3,7 +3,7 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::{
-    BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps, PlaneTensors,
+    Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps, PlaneTensors,
     ShKnown,
 };
 use rand::Rng;
@@ -22,7 +22,10 @@ pub struct NoisyScene<F: DeformationField = BuiltInField> {
     pub steps: Option<PlaneSteps>,
 }
 
-/// Estimated bits of a file's planes and spherical harmonics.
+/// Bits of 10^6 bytes.
+const BITS_A_MEGABYTE: f64 = 8e6;
+
+/// Estimated bits of a file's planes, spherical harmonics and other attributes.
 #[derive(Clone, Debug)]
 pub struct Rate {
     /// `[1]`: of all planes, latents included; 0 for frozen planes.
@@ -33,16 +36,23 @@ pub struct Rate {
     pub sh: Option<Tensor<1>>,
     /// Number of those values.
     pub sh_symbols: usize,
+    /// `[1]`: of the other attributes of the Gaussians, if they are in the rate.
+    pub attributes: Option<Tensor<1>>,
 }
 
 impl Rate {
-    /// `[1]`: megabytes (10^6) in the file.
+    /// `[1]`: megabytes (10^6) of planes and spherical harmonics in the file.
     pub fn megabytes(self) -> Tensor<1> {
         let bits = match self.sh {
             Some(sh) => self.planes + sh,
             None => self.planes,
         };
-        bits / 8e6
+        bits / BITS_A_MEGABYTE
+    }
+
+    /// `[1]`: megabytes of the other attributes, if they are in the rate.
+    pub fn attribute_megabytes(&self) -> Option<Tensor<1>> {
+        self.attributes.clone().map(|bits| bits / BITS_A_MEGABYTE)
     }
 
     /// `[1]`: bits per plane symbol plus bits per symbol of the spherical harmonics, as the paper weights them.
@@ -56,13 +66,13 @@ impl Rate {
 }
 
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
-    /// The scene with uniform noise as wide as the steps. With `learn_steps` the steps get gradients; with `with_sh`
-    /// the spherical harmonics have noise too.
+    /// The scene with uniform noise as wide as the steps. With `learn_steps` the steps get gradients; with
+    /// `with_gaussians` the Gaussians have noise too, in the attributes that have an entropy model.
     pub fn noisy<F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
         learn_steps: bool,
-        with_sh: bool,
+        with_gaussians: bool,
     ) -> NoisyScene<F> {
         let mut noisy = scene.clone();
         let steps = match (&self.planes, noisy.planes_mut()) {
@@ -76,27 +86,34 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             }
             _ => None,
         };
-        NoisyScene { scene: self.with_noisy_sh(noisy, with_sh), steps }
+        NoisyScene { scene: self.with_noisy_gaussians(noisy, with_gaussians), steps }
     }
 
     /// The same for a scene with frozen planes.
     pub fn noisy_beside_frozen_planes<F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
-        with_sh: bool,
+        with_gaussians: bool,
     ) -> NoisyScene<F> {
         let mut scene = scene.clone();
         for plane in scene.planes_mut().into_iter().flat_map(|planes| &mut planes.planes) {
             *plane = plane.clone().set_require_grad(false);
         }
-        NoisyScene { scene: self.with_noisy_sh(scene, with_sh), steps: None }
+        NoisyScene { scene: self.with_noisy_gaussians(scene, with_gaussians), steps: None }
     }
 
     /// Also begins a new tape.
-    fn with_noisy_sh<F: DeformationField>(&self, scene: DynamicScene<F>, with_sh: bool) -> DynamicScene<F> {
+    fn with_noisy_gaussians<F: DeformationField>(&self, scene: DynamicScene<F>, noisy: bool) -> DynamicScene<F> {
         let device = scene.gaussians.means.device();
         let mut scene = scene.fork(&device);
-        if let Some(sh) = self.sh.as_ref().filter(|_| with_sh) {
+        if !noisy {
+            return scene;
+        }
+        if let Some(attributes) = &self.attributes {
+            let noisy = attributes.add_noise(scene.gaussians.tensors());
+            scene.gaussians.set_tensors(noisy.map(&mut Leaves));
+        }
+        if let Some(sh) = &self.sh {
             let noisy = sh.add_noise(scene.gaussians.sh_rest.val().set_require_grad(false));
             replace(&mut scene.gaussians.sh_rest, noisy);
         }
@@ -109,7 +126,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         &self,
         noisy: &NoisyScene<F>,
         fraction: f64,
-        with_sh: bool,
+        with_gaussians: bool,
         generator: &mut impl Rng,
     ) -> Rate {
         let scene = &noisy.scene;
@@ -125,11 +142,14 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &sh_rest.device()));
 
         let [count, coefficients, colors] = sh_rest.dims();
-        let sh = self.sh.as_ref().filter(|_| with_sh && count > 0).map(|sh| {
+        let mut rows = |count: usize| {
             let chosen = sample(generator, count, fraction);
             let share = count as f64 / chosen.len() as f64;
             let rows: Vec<i64> = chosen.iter().map(|row| *row as i64).collect();
-            let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &sh_rest.device());
+            (Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &sh_rest.device()), share)
+        };
+        let sh = self.sh.as_ref().filter(|_| with_gaussians && count > 0).map(|sh| {
+            let (rows, share) = rows(count);
             let known = match sh.tables() {
                 // Models with tables need none of these, and what is not computed does not stay on the tape.
                 Some(_) => ShKnown::nothing(&rows.device()),
@@ -138,7 +158,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             sh.bits(sh_rest.clone().select(0, rows), &known).sum() * share
         });
         let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
-        Rate { planes: plane_bits, plane_symbols, sh, sh_symbols: count * coefficients * colors }
+        let attributes = self.attributes.as_ref().filter(|_| with_gaussians && count > 0);
+        let attributes = attributes.map(|model| model.bits(scene.gaussians.tensors(), Some(rows(count).0)));
+        Rate { planes: plane_bits, plane_symbols, sh, sh_symbols: count * coefficients * colors, attributes }
     }
 }
 
@@ -172,6 +194,15 @@ impl<F: DeformationField> NoisyScene<F> {
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
         let planes = 0..self.scene.planes().map_or(0, |planes| planes.planes.len());
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()
+    }
+}
+
+/// Makes every attribute a leaf of a new tape.
+struct Leaves;
+
+impl AttributeMapper for Leaves {
+    fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
+        values.detach().require_grad()
     }
 }
 

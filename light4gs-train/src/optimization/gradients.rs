@@ -39,7 +39,8 @@ impl GradientSums {
         self.sums.remove(&parameter)
     }
 
-    fn add_one(&mut self, parameter: ParamId, gradient: Tensor<1>) {
+    /// Adds a parameter's gradient, flattened.
+    pub fn add_one(&mut self, parameter: ParamId, gradient: Tensor<1>) {
         let sum = match self.sums.remove(&parameter) {
             Some(sum) => sum + gradient,
             None => gradient,

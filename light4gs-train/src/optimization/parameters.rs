@@ -16,15 +16,15 @@ pub enum ParameterGroup {
     Deformation,
     /// The entropy model of the planes.
     Context,
-    /// The entropy model of the spherical harmonics.
+    /// The entropy models of the spherical harmonics and of the other attributes.
     ShModel,
-    /// Logarithms of the planes' quantization steps.
+    /// Logarithms of learned quantization steps.
     Steps,
 }
 
 /// Beginning of a path, a name that must occur later in it (or nothing), and the group. The first matching line
 /// decides. Parameters without a match, such as the scene's coordinates, are not trained.
-const GROUPS: [(&str, &str, ParameterGroup); 6] = [
+const GROUPS: [(&str, &str, ParameterGroup); 8] = [
     ("gaussians", "", ParameterGroup::Attribute),
     // The planes of any field: `field.hexplane.planes.3` for the built-in one.
     ("field", "planes", ParameterGroup::Planes),
@@ -32,6 +32,8 @@ const GROUPS: [(&str, &str, ParameterGroup); 6] = [
     ("compression.planes.context", "", ParameterGroup::Context),
     ("compression.planes.quantization", "", ParameterGroup::Steps),
     ("compression.sh", "", ParameterGroup::ShModel),
+    ("compression.attributes.log_steps", "", ParameterGroup::Steps),
+    ("compression.attributes", "", ParameterGroup::ShModel),
 ];
 
 impl ParameterGroup {

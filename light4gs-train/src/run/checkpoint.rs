@@ -182,7 +182,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             let wrong = || failed(format!("metadata `{MAPPING}` is `{text}`, expected nine numbers"));
             scene.coordinates = scene.coordinates.with_mapping(parsed_mapping(text).ok_or_else(wrong)?);
         }
-        let mut compression = Compression::of_run(models, config, scene.planes(), device)?;
+        let mut compression = Compression::of_run(models, config, &scene, device)?;
         let count = gaussian_count(&file, &scene.gaussians);
         if count == 0 {
             let means = MEANS.path();

@@ -280,7 +280,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         device.seed(self.config.seed);
         let scene = self.scene().init(&self.data.points, device);
         let state = Checkpoint {
-            compression: Compression::of_run(&self.models, &self.config, scene.planes(), device)?,
+            compression: Compression::of_run(&self.models, &self.config, &scene, device)?,
             scene,
             adam: Adam::default(),
             density: Default::default(),

@@ -1,8 +1,11 @@
 //! Quantization noise and the rate in a training step (paper III-C to III-E, IV-B).
 
-use burn::module::Module;
+use std::collections::HashMap;
+
+use burn::module::{Module, Param, ParamId};
 use burn::tensor::Tensor;
-use light4gs_model::{DeformationField, DynamicScene};
+use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
+use light4gs_model::{AttributeEntropy, CodedAttribute, DeformationField, DynamicScene};
 
 use super::Trainer;
 use crate::compression::{Compression, EntropyModels, NoisyScene, freeze_planes};
@@ -24,12 +27,16 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if stage == Stage::Coarse || iteration < from {
             return Ok(None);
         }
-        let with_sh = self.sh_rate_is_active(iteration);
+        let with_gaussians = self.gaussian_rate_is_active(iteration);
+        let first_with_gaussians = with_gaussians && !self.gaussian_rate_is_active(iteration - 1);
         let frozen = self.planes_are_frozen(stage, iteration);
         let Some(compression) = self.state.compression.as_mut() else { return Ok(None) };
         let scene = &mut self.state.scene;
         if iteration == from {
             compression.start_from(scene.planes());
+        }
+        if first_with_gaussians {
+            compression.start_attributes_from(&scene.gaussians);
         }
         if frozen && iteration == config.rate.planes_until + 1 {
             let frozen = freeze_planes(scene, compression, config, &self.device)?;
@@ -40,8 +47,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         seed_device(&self.device, *seed, stage, iteration);
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
         Ok(Some(match frozen {
-            true => compression.noisy_beside_frozen_planes(scene, with_sh),
-            false => compression.noisy(scene, learn_steps, with_sh),
+            true => compression.noisy_beside_frozen_planes(scene, with_gaussians),
+            false => compression.noisy(scene, learn_steps, with_gaussians),
         }))
     }
 
@@ -52,9 +59,10 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         stage == Stage::Fine && until > 0 && iteration > until && self.state.compression.is_some()
     }
 
-    /// Whether the rate includes the spherical harmonics, as it does after the end of densification.
-    fn sh_rate_is_active(&self, iteration: usize) -> bool {
-        self.density.is_over(Stage::Fine, iteration.saturating_sub(1))
+    /// Whether the rate includes the attributes of the Gaussians, as it does after the end of densification.
+    fn gaussian_rate_is_active(&self, iteration: usize) -> bool {
+        let from = self.config.compression.rate.from.max(1);
+        iteration >= from && self.density.is_over(Stage::Fine, iteration - 1)
     }
 
     /// Adds the gradients of the rate, in the iterations in which it is due, and the gradients of the steps through the
@@ -66,23 +74,26 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         gradients: &mut GradientSums,
     ) -> Option<Tensor<1>> {
         let config = &self.config.compression.rate;
-        let with_sh = self.sh_rate_is_active(iteration);
+        let with_gaussians = self.gaussian_rate_is_active(iteration);
         let compression = self.state.compression.as_mut()?;
         let mut value = None;
         let mut steps = vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())];
-        // With frozen planes, or none, and without the spherical harmonics there is no rate: constants have no
-        // gradient.
-        let anything = noisy.steps.is_some() || (with_sh && compression.sh.is_some());
+        // With frozen planes, or none, and without the Gaussians there is no rate: constants have no gradient.
+        let models_gaussians = compression.sh.is_some() || compression.attributes.is_some();
+        let anything = noisy.steps.is_some() || (with_gaussians && models_gaussians);
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
             let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
-            let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_sh, &mut generator);
+            let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);
+            let interval = config.interval as f64;
+            let attributes = rate.attribute_megabytes().map(|rate| rate * (config.attribute_lambda * interval));
             let term = match config.weighting {
                 RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
                 // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
                 // on the interval.
-                RateWeighting::Megabytes => rate.megabytes() * (config.lambda * config.interval as f64),
+                RateWeighting::Megabytes => rate.megabytes() * (config.lambda * interval),
             };
+            let term = attributes.into_iter().fold(term, |sum, part| sum + part);
             value = Some(term.clone().inner());
             let mut tape = term.backward();
             steps = noisy.step_gradients(&tape);
@@ -91,6 +102,10 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         }
         if let Some(term) = steps_term(noisy, &self.state.scene, compression, steps, gradients) {
             gradients.add_module(&*compression, &mut term.backward());
+        }
+        if let Some(attributes) = compression.attributes.as_ref().filter(|_| with_gaussians) {
+            let gradient = gradient_through_noise(noisy, &self.state.scene, attributes, gradients);
+            gradients.add_one(attributes.log_steps.id, gradient);
         }
         self.profile.lap("rate");
         value
@@ -123,6 +138,34 @@ fn steps_term<F: DeformationField, C: Module, S: Module>(
         step.clone() * Tensor::from_inner(gradient.unwrap_or_else(|| step.inner().zeros_like()))
     });
     terms.reduce(|sum, term| sum + term)
+}
+
+/// The gradient of the logarithms of the attributes' steps through the noise, `[A]`: the noise, which is in proportion
+/// to the step, times the gradient of the noisy values. `gradients` are those of views and rate.
+fn gradient_through_noise<F: DeformationField>(
+    noisy: &NoisyScene<F>,
+    scene: &DynamicScene<F>,
+    attributes: &AttributeEntropy,
+    gradients: &GradientSums,
+) -> Tensor<1> {
+    #[derive(Default)]
+    struct Values(HashMap<String, (ParamId, Tensor<1>)>);
+    impl ParameterVisitor for Values {
+        fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>) {
+            let values = parameter.val().inner().reshape([-1]);
+            self.0.insert(path.rsplit('.').next().unwrap_or(path).to_owned(), (parameter.id, values));
+        }
+    }
+    let (mut exact, mut with_noise) = (Values::default(), Values::default());
+    visit_parameters(&scene.gaussians, &mut exact);
+    visit_parameters(&noisy.scene.gaussians, &mut with_noise);
+    let part = |attribute: &CodedAttribute| -> Option<Tensor<1>> {
+        let (id, exact) = exact.0.get(&attribute.name)?;
+        let (_, with_noise) = with_noise.0.get(&attribute.name)?;
+        Some(((with_noise.clone() - exact.clone()) * gradients.get(*id)?).sum())
+    };
+    let none = || Tensor::zeros([1], &scene.gaussians.means.device().inner());
+    Tensor::cat(attributes.attributes().iter().map(|attribute| part(attribute).unwrap_or_else(none)).collect(), 0)
 }
 
 #[cfg(test)]

@@ -1,6 +1,7 @@
 //! Tests of several crates together in one process: back ends against each other, modules against the codec,
 //! derivatives, imports, all legal configurations.
 
+mod attribute_entropy;
 mod back_ends_agree;
 mod compression;
 mod context_model;

@@ -1,0 +1,211 @@
+//! The bits of the attributes of Gaussians, and their learned quantization steps (docs/design.md).
+//!
+//! The codec codes attributes adaptively, from neighbors and from channels before (`light4gs_codec::attributes`). No
+//! such coder has a gradient. In training a density for each channel stands for it, and for positions the information
+//! of a set of points. Every attribute has one learned step.
+
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Distribution, Int, Tensor};
+use light4gs_codec::attributes::{AttributeSteps, typical_size};
+
+use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
+use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
+use crate::ops::lower_bound::lower_bound;
+use crate::scene::attributes::{Attribute, MEANS};
+use crate::scene::{AttributeMapper, GaussianTensors};
+
+/// Logistics of a channel's density.
+const COMPONENTS: usize = 3;
+/// The spread of a channel that has the same value everywhere, in steps: its density must have some width.
+const LEAST_SPREAD: f64 = 0.5;
+
+/// An attribute whose bits are in the rate.
+#[derive(Clone, Debug)]
+pub struct CodedAttribute {
+    /// Its name in the table of attributes.
+    pub name: String,
+    /// Numbers for each Gaussian.
+    pub width: usize,
+    /// Its step at the beginning; that of the positions in units of the typical Gaussian's size, as in
+    /// [`AttributeSteps`].
+    pub step: f32,
+}
+
+/// Densities and steps of the quantized attributes.
+#[derive(Module, Debug)]
+pub struct AttributeEntropy {
+    /// A channel for each number of each attribute except the positions, in the order of the attributes.
+    pub mixture: LogisticMixture,
+    /// `[A]`: natural logarithms of the steps. That of the positions is in world units once
+    /// [`AttributeEntropy::start_from`] has been called.
+    pub log_steps: Param<Tensor<1>>,
+    #[module(skip)]
+    attributes: Vec<CodedAttribute>,
+}
+
+impl AttributeEntropy {
+    /// An untrained model of these attributes.
+    ///
+    /// # Panics
+    /// If a step is not positive.
+    pub fn new(attributes: Vec<CodedAttribute>, device: &Device) -> Self {
+        assert!(attributes.iter().all(|attribute| attribute.step > 0.0), "steps must be positive: {attributes:?}");
+        let log_steps: Vec<f32> = attributes.iter().map(|attribute| attribute.step.ln()).collect();
+        let channels = attributes.iter().filter(|attribute| has_density(&attribute.name)).map(|a| a.width).sum();
+        Self {
+            mixture: LogisticMixtureConfig::new(channels).with_components(COMPONENTS).init(device),
+            log_steps: Param::from_tensor(Tensor::from_floats(log_steps.as_slice(), device)),
+            attributes,
+        }
+    }
+
+    /// Begins at the values of these Gaussians: densities as wide as their channels, and a step of the positions that
+    /// suits the Gaussians' size.
+    pub fn start_from(&mut self, gaussians: &GaussianTensors) {
+        let size = size_of(gaussians);
+        let factors = self.attributes.iter().map(|attribute| if has_density(&attribute.name) { 1.0 } else { size });
+        let factors: Vec<f32> = factors.map(f32::ln).collect();
+        let steps = off_tape(self.log_steps.val());
+        let factors = Tensor::<1>::from_floats(factors.as_slice(), &steps.device());
+        replace(&mut self.log_steps, steps + factors);
+
+        let values = self.channels(gaussians.clone().inner());
+        let least = self.widths(&|log_steps| off_tape(log_steps).exp()) * LEAST_SPREAD;
+        // [C, 1].
+        let means = values.clone().mean_dim(1);
+        let spreads = (values - means.clone()).square().mean_dim(1).sqrt().max_pair(least);
+        // A logistic's standard deviation is its scale times 1.81; the components are a factor of 2.5 apart.
+        let scales: Vec<f32> = (0..COMPONENTS).map(|k| (0.55 * 2.5f32.powi(k as i32 - 1)).ln()).collect();
+        let scales = Tensor::<1>::from_floats(scales.as_slice(), &means.device()).unsqueeze::<2>();
+        replace(&mut self.mixture.means, means.repeat_dim(1, COMPONENTS));
+        replace(&mut self.mixture.log_scales, spreads.log() + scales);
+    }
+
+    /// The Gaussians with uniform noise as wide as the steps, off the tape.
+    pub fn add_noise(&self, gaussians: GaussianTensors) -> GaussianTensors {
+        struct Noise<'a>(&'a AttributeEntropy, Tensor<1>);
+        impl AttributeMapper for Noise<'_> {
+            fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
+                let values = if values.device().is_autodiff() { values.set_require_grad(false) } else { values };
+                let Some(place) = self.0.place(&attribute.name) else { return values };
+                let noise = Tensor::random(values.dims(), Distribution::Uniform(-0.5, 0.5), &values.device());
+                values + noise * self.1.clone().narrow(0, place, 1).unsqueeze::<D>()
+            }
+        }
+        let steps = self.log_steps.val().set_require_grad(false).exp();
+        gaussians.map(&mut Noise(self, steps))
+    }
+
+    /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.
+    /// Differentiable in the Gaussians, the steps and the densities. With `rows`, the densities see only these rows, and the result is
+    /// an estimate for all.
+    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<Tensor<1, Int>>) -> Tensor<1> {
+        let count = gaussians.means.dims()[0];
+        let positions = self.position_bits(gaussians.means.clone());
+        let (gaussians, share) = match rows {
+            Some(rows) => {
+                let share = count as f64 / rows.dims()[0].max(1) as f64;
+                (gaussians.map(&mut Rows(rows)), share)
+            }
+            None => (gaussians, 1.0),
+        };
+        let widths = self.widths(&Tensor::exp);
+        let likelihood = self.mixture.interval_likelihood(self.channels(gaussians), widths);
+        positions + bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum() * share
+    }
+
+    /// What a set of points takes that are uniform in their box: their cells one by one, without the order. It depends
+    /// on the step only.
+    fn position_bits(&self, means: Tensor<2>) -> Tensor<1> {
+        let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &means.device()) };
+        let count = means.dims()[0].max(1) as f64;
+        let means = if means.device().is_autodiff() { means.set_require_grad(false) } else { means };
+        // [1, 3].
+        let extent = means.clone().max_dim(0) - means.min_dim(0);
+        let step = self.log_steps.val().narrow(0, place, 1).exp().unsqueeze::<2>();
+        let cells = (extent / step + 1.0).log().sum() * (count * std::f64::consts::LOG2_E);
+        // Stirling's formula for the orders that are not told apart.
+        cells - count * (count.log2() - std::f64::consts::LOG2_E)
+    }
+
+    /// The steps as the codec takes them: those of `given` for attributes without a learned one.
+    pub fn steps(&self, given: AttributeSteps, log_scales: &[[f32; 3]]) -> AttributeSteps {
+        let steps = self.step_values();
+        let learned = self.attributes.iter().zip(steps).filter(|(attribute, _)| given.of(&attribute.name).is_some());
+        let relative = |name: &str, step: f32| if has_density(name) { step } else { step / typical_size(log_scales) };
+        learned.fold(given.clone(), |all, (attribute, step)| all.with(&attribute.name, relative(&attribute.name, step))).clamped()
+    }
+
+    /// The learned step of an attribute by name, if it has one.
+    pub fn step(&self, attribute: &str) -> Option<f32> {
+        self.place(attribute).map(|place| self.step_values()[place])
+    }
+
+    /// The attributes, in the order of [`AttributeEntropy::log_steps`].
+    pub fn attributes(&self) -> &[CodedAttribute] {
+        &self.attributes
+    }
+
+    fn step_values(&self) -> Vec<f32> {
+        self.log_steps.val().into_data().iter::<f32>().map(f32::exp).collect()
+    }
+
+    fn place(&self, attribute: &str) -> Option<usize> {
+        self.attributes.iter().position(|coded| coded.name == attribute)
+    }
+
+    /// The channels' steps, `[C, 1]`, by a function of all logarithms.
+    fn widths(&self, of: &dyn Fn(Tensor<1>) -> Tensor<1>) -> Tensor<2> {
+        let steps = of(self.log_steps.val());
+        let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
+        let columns = attributes.map(|(place, attribute)| steps.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
+        Tensor::cat(columns.collect(), 0).unsqueeze_dim(1)
+    }
+
+    /// All numbers with a density, `[C, N]`.
+    fn channels(&self, gaussians: GaussianTensors) -> Tensor<2> {
+        struct Collect<'a>(&'a AttributeEntropy, Vec<Option<Tensor<2>>>);
+        impl AttributeMapper for Collect<'_> {
+            fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
+                if let Some(place) = self.0.place(&attribute.name).filter(|_| has_density(&attribute.name)) {
+                    let shape = [values.dims()[0], self.0.attributes[place].width];
+                    self.1[place] = Some(values.clone().reshape(shape));
+                }
+                values
+            }
+        }
+        let mut found = Collect(self, vec![None; self.attributes.len()]);
+        let _ = gaussians.map(&mut found);
+        Tensor::cat(found.1.into_iter().flatten().collect(), 1).transpose()
+    }
+}
+
+/// Positions are coded as a set; every other number has a density.
+fn has_density(attribute: &str) -> bool {
+    attribute != MEANS.name
+}
+
+/// The typical size of Gaussians, as the codec computes it.
+fn size_of(gaussians: &GaussianTensors) -> f32 {
+    let numbers: Vec<f32> = gaussians.log_scales.clone().into_data().iter().collect();
+    typical_size(numbers.as_chunks().0)
+}
+
+fn off_tape<const D: usize>(values: Tensor<D>) -> Tensor<D> {
+    if values.device().is_autodiff() { values.inner() } else { values }
+}
+
+/// A new value for a parameter, which is trained as before.
+fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
+    let learns = parameter.is_require_grad();
+    let value = if parameter.val().device().is_autodiff() { Tensor::from_inner(value) } else { value };
+    *parameter = Param::initialized(parameter.id, value.set_require_grad(learns));
+}
+
+struct Rows(Tensor<1, Int>);
+
+impl AttributeMapper for Rows {
+    fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
+        values.select(0, self.0.clone())
+    }
+}
