@@ -133,7 +133,9 @@ impl AttributeEntropy {
         let steps = self.step_values();
         let learned = self.attributes.iter().zip(steps).filter(|(attribute, _)| given.of(&attribute.name).is_some());
         let relative = |name: &str, step: f32| if has_density(name) { step } else { step / typical_size(log_scales) };
-        learned.fold(given.clone(), |all, (attribute, step)| all.with(&attribute.name, relative(&attribute.name, step))).clamped()
+        learned
+            .fold(given.clone(), |all, (attribute, step)| all.with(&attribute.name, relative(&attribute.name, step)))
+            .clamped()
     }
 
     /// The learned step of an attribute by name, if it has one.
@@ -158,7 +160,8 @@ impl AttributeEntropy {
     fn widths(&self, of: &dyn Fn(Tensor<1>) -> Tensor<1>) -> Tensor<2> {
         let steps = of(self.log_steps.val());
         let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
-        let columns = attributes.map(|(place, attribute)| steps.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
+        let columns =
+            attributes.map(|(place, attribute)| steps.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
         Tensor::cat(columns.collect(), 0).unsqueeze_dim(1)
     }
 

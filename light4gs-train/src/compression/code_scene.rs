@@ -139,15 +139,14 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     // A field that cannot be decoded is refused here, before anything is fitted.
     DynamicScene::<F>::from_arrays(&data, &inner)?;
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
-    let images =
-        match (searches(settings, trained.compression) && profile == Profile::Compact, trained.images) {
-            (false, _) => None,
-            (true, Some(images)) => {
-                let error = mean_squared_error(&render(&data), &views, images)?;
-                Some(SearchImages { render: &render, error })
-            }
-            (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0) }),
-        };
+    let images = match (searches(settings, trained.compression) && profile == Profile::Compact, trained.images) {
+        (false, _) => None,
+        (true, Some(images)) => {
+            let error = mean_squared_error(&render(&data), &views, images)?;
+            Some(SearchImages { render: &render, error })
+        }
+        (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0) }),
+    };
     let (compression, fit_seconds, settings) = match (trained.compression, &images) {
         (Some(compression), _) => (compression.clone(), None, settings.clone()),
         (None, images) => {

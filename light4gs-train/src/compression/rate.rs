@@ -3,8 +3,8 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::{
-    Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps, PlaneTensors,
-    ShKnown,
+    Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy,
+    PlaneSteps, PlaneTensors, ShKnown,
 };
 use rand::Rng;
 use rand::seq::index;

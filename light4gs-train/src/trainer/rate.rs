@@ -84,7 +84,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
             let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
-            let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);
+            let rate =
+                compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);
             let interval = config.interval as f64;
             let attributes = rate.attribute_megabytes().map(|rate| rate * (config.attribute_lambda * interval));
             let term = match config.weighting {
