@@ -75,7 +75,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             return Ok(None);
         }
         let mut compression = Self::new(models, config, scene.planes(), device)?;
-        if config.compression.rates_attributes() {
+        if config.compression.rate.attributes {
             let coded = coded_attributes(config, &scene.gaussians, compression.sh.is_some());
             compression.attributes = Some(AttributeEntropy::new(coded, device));
         }

@@ -44,13 +44,6 @@ choice! {
     }
 }
 
-impl CompressionConfig {
-    /// Whether the rate includes the attributes of the Gaussians other than the spherical harmonics.
-    pub fn rates_attributes(&self) -> bool {
-        self.rate.attributes && self.profile == FileProfile::Compact
-    }
-}
-
 impl FileProfile {
     /// The codec's profile; none where nothing is entropy coded.
     pub fn coded(self) -> Option<Profile> {
@@ -79,9 +72,9 @@ keys! {
             Flag, "ours, for the ablation", "false = the rate trains only the planes' entropy model";
         /// The same for the spherical harmonics.
         sh: bool = true; Flag, "ours, for the ablation", "the same for the spherical harmonics";
-        /// The other attributes of the Gaussians have noise, a rate and learned steps too, once densification is over,
-        /// in the `compact` profile. Spherical harmonics of degree 1 or 2 are among them. Off: the encoder searches for
-        /// their steps.
+        /// The other attributes of the Gaussians have noise, a rate and learned steps too, once densification is over.
+        /// Spherical harmonics of degree 1 or 2 are among them. Off: the encoder searches for their steps. Only the
+        /// `compact` profile quantizes them in the file; the `paper` profile quantizes only the spherical harmonics.
         attributes: bool = false; Flag, "ours, after HAC++", "the same for the other attributes, with a lambda of their own";
         /// What a megabyte of these attributes weighs in the loss.
         attribute_lambda: f64 = 0.03; WEIGHT, "ours", "of loss for a megabyte";
