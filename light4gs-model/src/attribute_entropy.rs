@@ -2,7 +2,9 @@
 //!
 //! The codec codes attributes adaptively, from neighbors and from channels before (`light4gs_codec::attributes`). No
 //! such coder has a gradient. In training a density for each channel stands for it, and for positions the information
-//! of a set of points. Every attribute has one learned step.
+//! of a set of points, which the codec's splitting of counts comes close to (Devillers and Gandoin 2000). Every attribute
+//! has one learned step. A rate on all attributes with learned steps is after HAC++ (Chen et al. 2025), which modulates
+//! the steps of each Gaussian besides.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Distribution, Int, Tensor};
@@ -36,9 +38,10 @@ pub struct CodedAttribute {
 pub struct AttributeEntropy {
     /// A channel for each number of each attribute except the positions, in the order of the attributes.
     pub mixture: LogisticMixture,
-    /// `[A]`: natural logarithms of the steps. That of the positions is in world units once
-    /// [`AttributeEntropy::start_from`] has been called.
+    /// `[A]`: natural logarithms of the steps. That of the positions is in units of `size`.
     pub log_steps: Param<Tensor<1>>,
+    /// `[1]`, not trained: the typical size of the Gaussians that the model was started from, world units; 0 before.
+    pub size: Param<Tensor<1>>,
     #[module(skip)]
     attributes: Vec<CodedAttribute>,
 }
@@ -55,22 +58,18 @@ impl AttributeEntropy {
         Self {
             mixture: LogisticMixtureConfig::new(channels).with_components(COMPONENTS).init(device),
             log_steps: Param::from_tensor(Tensor::from_floats(log_steps.as_slice(), device)),
+            size: Param::from_tensor(Tensor::zeros([1], device)),
             attributes,
         }
     }
 
-    /// Begins at the values of these Gaussians: densities as wide as their channels, and a step of the positions that
-    /// suits the Gaussians' size.
+    /// Begins at the values of these Gaussians: densities as wide as their channels, and positions in units of the
+    /// Gaussians' size.
     pub fn start_from(&mut self, gaussians: &GaussianTensors) {
-        let size = size_of(gaussians);
-        let factors = self.attributes.iter().map(|attribute| if has_density(&attribute.name) { 1.0 } else { size });
-        let factors: Vec<f32> = factors.map(f32::ln).collect();
-        let steps = off_tape(self.log_steps.val());
-        let factors = Tensor::<1>::from_floats(factors.as_slice(), &steps.device());
-        replace(&mut self.log_steps, steps + factors);
-
+        let size = Tensor::from_floats([size_of(gaussians)], &off_tape(self.size.val()).device());
+        replace(&mut self.size, size);
         let values = self.channels(gaussians.clone().inner());
-        let least = self.widths(&|log_steps| off_tape(log_steps).exp()) * LEAST_SPREAD;
+        let least = self.widths(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
         // [C, 1].
         let means = values.clone().mean_dim(1);
         let spreads = (values - means.clone()).square().mean_dim(1).sqrt().max_pair(least);
@@ -81,24 +80,30 @@ impl AttributeEntropy {
         replace(&mut self.mixture.log_scales, spreads.log() + scales);
     }
 
+    /// Whether [`AttributeEntropy::start_from`] has been called. Before that, there are no learned steps.
+    pub fn is_started(&self) -> bool {
+        self.size.val().into_scalar::<f32>() > 0.0
+    }
+
     /// The Gaussians with uniform noise as wide as the steps, off the tape.
     pub fn add_noise(&self, gaussians: GaussianTensors) -> GaussianTensors {
-        struct Noise<'a>(&'a AttributeEntropy, Tensor<1>);
+        struct Noise<'a>(&'a AttributeEntropy);
         impl AttributeMapper for Noise<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
-                let values = if values.device().is_autodiff() { values.set_require_grad(false) } else { values };
+                let values = untracked(values);
                 let Some(place) = self.0.place(&attribute.name) else { return values };
                 let noise = Tensor::random(values.dims(), Distribution::Uniform(-0.5, 0.5), &values.device());
-                values + noise * self.1.clone().narrow(0, place, 1).unsqueeze::<D>()
+                let step = untracked(self.0.log_steps.val()).narrow(0, place, 1).exp();
+                let step = if has_density(&attribute.name) { step } else { step * untracked(self.0.size.val()) };
+                values + noise * step.unsqueeze::<D>()
             }
         }
-        let steps = self.log_steps.val().set_require_grad(false).exp();
-        gaussians.map(&mut Noise(self, steps))
+        gaussians.map(&mut Noise(self))
     }
 
     /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.
-    /// Differentiable in the Gaussians, the steps and the densities. With `rows`, the densities see only these rows, and the result is
-    /// an estimate for all.
+    /// Differentiable in the Gaussians, the steps and the densities. With `rows`, the densities see only these rows, and
+    /// the result is an estimate for all.
     pub fn bits(&self, gaussians: GaussianTensors, rows: Option<Tensor<1, Int>>) -> Tensor<1> {
         let count = gaussians.means.dims()[0];
         let positions = self.position_bits(gaussians.means.clone());
@@ -109,7 +114,7 @@ impl AttributeEntropy {
             }
             None => (gaussians, 1.0),
         };
-        let widths = self.widths(&Tensor::exp);
+        let widths = self.widths(self.log_steps.val().exp());
         let likelihood = self.mixture.interval_likelihood(self.channels(gaussians), widths);
         positions + bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum() * share
     }
@@ -119,26 +124,29 @@ impl AttributeEntropy {
     fn position_bits(&self, means: Tensor<2>) -> Tensor<1> {
         let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &means.device()) };
         let count = means.dims()[0].max(1) as f64;
-        let means = if means.device().is_autodiff() { means.set_require_grad(false) } else { means };
-        // [1, 3].
-        let extent = means.clone().max_dim(0) - means.min_dim(0);
+        let means = untracked(means);
+        // [1, 3], in units of the size.
+        let extent = (means.clone().max_dim(0) - means.min_dim(0)) / untracked(self.size.val()).unsqueeze::<2>();
         let step = self.log_steps.val().narrow(0, place, 1).exp().unsqueeze::<2>();
         let cells = (extent / step + 1.0).log().sum() * (count * std::f64::consts::LOG2_E);
         // Stirling's formula for the orders that are not told apart.
         cells - count * (count.log2() - std::f64::consts::LOG2_E)
     }
 
-    /// The steps as the codec takes them: those of `given` for attributes without a learned one.
+    /// The steps as the codec takes them, for Gaussians with these logarithms of scales: those of `given` for attributes
+    /// without a learned one.
     pub fn steps(&self, given: AttributeSteps, log_scales: &[[f32; 3]]) -> AttributeSteps {
         let steps = self.step_values();
         let learned = self.attributes.iter().zip(steps).filter(|(attribute, _)| given.of(&attribute.name).is_some());
-        let relative = |name: &str, step: f32| if has_density(name) { step } else { step / typical_size(log_scales) };
+        // The Gaussians' size has changed since the model was started.
+        let change = self.size.val().into_scalar::<f32>() / typical_size(log_scales);
+        let relative = |name: &str, step: f32| if has_density(name) { step } else { step * change };
         learned
             .fold(given.clone(), |all, (attribute, step)| all.with(&attribute.name, relative(&attribute.name, step)))
             .clamped()
     }
 
-    /// The learned step of an attribute by name, if it has one.
+    /// The learned step of an attribute by name, if it has one; that of the positions in units of `size`.
     pub fn step(&self, attribute: &str) -> Option<f32> {
         self.place(attribute).map(|place| self.step_values()[place])
     }
@@ -156,9 +164,8 @@ impl AttributeEntropy {
         self.attributes.iter().position(|coded| coded.name == attribute)
     }
 
-    /// The channels' steps, `[C, 1]`, by a function of all logarithms.
-    fn widths(&self, of: &dyn Fn(Tensor<1>) -> Tensor<1>) -> Tensor<2> {
-        let steps = of(self.log_steps.val());
+    /// The channels' steps, `[C, 1]`, from those of the attributes.
+    fn widths(&self, steps: Tensor<1>) -> Tensor<2> {
         let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
         let columns =
             attributes.map(|(place, attribute)| steps.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
@@ -194,6 +201,12 @@ fn size_of(gaussians: &GaussianTensors) -> f32 {
     typical_size(numbers.as_chunks().0)
 }
 
+/// The same values as constants of later operations.
+fn untracked<const D: usize>(values: Tensor<D>) -> Tensor<D> {
+    if values.device().is_autodiff() { values.set_require_grad(false) } else { values }
+}
+
+/// The same values on the back end below autodiff.
 fn off_tape<const D: usize>(values: Tensor<D>) -> Tensor<D> {
     if values.device().is_autodiff() { values.inner() } else { values }
 }

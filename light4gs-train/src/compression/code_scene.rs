@@ -7,12 +7,12 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_codec::{PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
-use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
+use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
 use serde::{Deserialize, Serialize};
 
 use super::{
     BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, SearchImages,
-    encode, fit, plane_and_sh_step_search,
+    ShModel, encode, fit, plane_and_sh_step_search,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
@@ -178,9 +178,9 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
 
 /// Whether the search for steps needs renderings. Steps of planes and harmonics can change only before models are
 /// fitted; those of other attributes unless they were learned.
-fn searches<C: Module, S: Module>(settings: &CompressionConfig, trained: Option<&Compression<C, S>>) -> bool {
+fn searches<C: PlaneEntropy, S: ShModel>(settings: &CompressionConfig, trained: Option<&Compression<C, S>>) -> bool {
     let fitted = settings.steps.search_tolerance > 0.0 || settings.sh.search_tolerance > 0.0;
-    let learned = trained.is_some_and(|models| models.attributes.is_some());
+    let learned = trained.is_some_and(|models| models.learned_attributes().is_some());
     (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
 }
 

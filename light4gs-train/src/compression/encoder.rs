@@ -96,7 +96,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let compression = &mut compression.valid();
     let data = scene.to_arrays(meta)?;
     let mut input = compression_input(compression, scene, &data, config, profile)?;
-    if let (Some(images), Profile::Compact, None) = (images, input.profile, &compression.attributes)
+    if let (Some(images), Profile::Compact, None) = (images, input.profile, compression.learned_attributes())
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
@@ -170,7 +170,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         models.context.base_mut().update_quantiles();
     }
     let mut attributes = config.attributes.steps_of(scene.gaussians.attributes());
-    if let Some(models) = &compression.attributes {
+    if let Some(models) = compression.learned_attributes() {
         attributes = models.steps(attributes, &data.gaussians.log_scales);
     }
     Ok(CompressionInput {
@@ -204,7 +204,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         match &self.sh {
             Some(sh) => sh.to_coding(&gaussians.sh_rest),
             None => {
-                let learned = self.attributes.as_ref().and_then(|models| models.step(&SH_REST.name));
+                let learned = self.learned_attributes().and_then(|models| models.step(&SH_REST.name));
                 let step = learned.map_or(step, checks::nearest_sh_step);
                 counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step)
             }

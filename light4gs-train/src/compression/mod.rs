@@ -121,6 +121,11 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         }
     }
 
+    /// The model of the attributes once it has learned anything: a scene of an earlier iteration is coded without it.
+    pub(crate) fn learned_attributes(&self) -> Option<&AttributeEntropy> {
+        self.attributes.as_ref().filter(|attributes| attributes.is_started())
+    }
+
     /// Keeps learned steps in the range that a configuration allows.
     pub fn bound_steps(&mut self, config: &Config) {
         if let Some(models) = &mut self.planes

@@ -197,12 +197,12 @@ impl<F: DeformationField> NoisyScene<F> {
     }
 }
 
-/// Makes every attribute a leaf of a new tape.
+/// Makes every attribute, which is on no tape, a leaf of a new one.
 struct Leaves;
 
 impl AttributeMapper for Leaves {
     fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
-        values.detach().require_grad()
+        values.require_grad()
     }
 }
 

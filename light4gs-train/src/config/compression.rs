@@ -156,7 +156,7 @@ keys! {
         refine: bool = false; Flag, "ours; paper: yes", "finer steps help training frames only";
         /// Every scale has a pair of steps of its own.
         per_scale: bool = quantization().per_scale; Flag, "ours";
-        /// Learning rate of the steps' logarithms.
+        /// Learning rate of the logarithms of these steps, and of those of attributes.
         learning_rate: f64 = 2e-3; RATE, "ours";
         /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
         /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
@@ -175,7 +175,7 @@ keys! {
             "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";
         /// Quantization step of the spherical harmonics beyond degree 0.
         step: f64 = 0.02; STEP, "paper";
-        /// Learning rate of that model at the first step.
+        /// Learning rate of that model, and of the densities of other attributes, at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// The same at the end of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";

@@ -33,7 +33,7 @@ const GROUPS: [(&str, &str, ParameterGroup); 8] = [
     ("compression.planes.quantization", "", ParameterGroup::Steps),
     ("compression.sh", "", ParameterGroup::ShModel),
     ("compression.attributes.log_steps", "", ParameterGroup::Steps),
-    ("compression.attributes", "", ParameterGroup::ShModel),
+    ("compression.attributes.mixture", "", ParameterGroup::ShModel),
 ];
 
 impl ParameterGroup {

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 
 use burn::module::{Module, Param, ParamId};
 use burn::tensor::Tensor;
+use light4gs_model::attributes::attribute_of_path;
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 use light4gs_model::{AttributeEntropy, CodedAttribute, DeformationField, DynamicScene};
 
@@ -153,13 +154,13 @@ fn gradient_through_noise<F: DeformationField>(
     struct Values(HashMap<String, (ParamId, Tensor<1>)>);
     impl ParameterVisitor for Values {
         fn visit<const D: usize>(&mut self, path: &str, parameter: &Param<Tensor<D>>) {
-            let values = parameter.val().inner().reshape([-1]);
-            self.0.insert(path.rsplit('.').next().unwrap_or(path).to_owned(), (parameter.id, values));
+            let Some(name) = attribute_of_path(path) else { return };
+            self.0.insert(name.to_owned(), (parameter.id, parameter.val().inner().reshape([-1])));
         }
     }
     let (mut exact, mut with_noise) = (Values::default(), Values::default());
-    visit_parameters(&scene.gaussians, &mut exact);
-    visit_parameters(&noisy.scene.gaussians, &mut with_noise);
+    visit_parameters(scene, &mut exact);
+    visit_parameters(&noisy.scene, &mut with_noise);
     let part = |attribute: &CodedAttribute| -> Option<Tensor<1>> {
         let (id, exact) = exact.0.get(&attribute.name)?;
         let (_, with_noise) = with_noise.0.get(&attribute.name)?;
@@ -177,6 +178,44 @@ mod tests {
     use super::*;
     use crate::compression::ConfiguredModels;
     use crate::config::Config;
+
+    /// The steps of the attributes get the derivative by the width of the same noise.
+    #[test]
+    fn the_noise_passes_gradients_on_to_the_steps_of_attributes() {
+        let device = Device::flex().autodiff();
+        let mut config = Config::default();
+        config.model.sh_degree = 1;
+        (config.compression.rate.lambda, config.compression.rate.attributes) = (0.01, true);
+        let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
+        let scene = config.model.build().init(&cloud, &device);
+        let mut compression = Compression::of_run(&ConfiguredModels, &config, &scene, &device).unwrap().unwrap();
+        assert!(compression.learned_attributes().is_none());
+        compression.start_attributes_from(&scene.gaussians);
+        let noisy = compression.noisy(&scene, false, true);
+        // A different derivative for every number, and the same as a sum over noise of any width.
+        let sum = |scene: &DynamicScene| {
+            let gaussians = scene.gaussians.tensors();
+            gaussians.means.sin().sum() + gaussians.quats.powi_scalar(3).sum() + gaussians.sh_rest.exp().sum()
+        };
+        let mut gradients = GradientSums::default();
+        gradients.add_module(&noisy.scene, &mut sum(&noisy.scene).backward());
+        let attributes = compression.learned_attributes().unwrap();
+        let found: Vec<f32> =
+            gradient_through_noise(&noisy, &scene, attributes, &gradients).into_data().iter().collect();
+
+        let (exact, noise) = (scene.gaussians.tensors().inner(), noisy.scene.gaussians.tensors().inner());
+        let wider = |exact: Tensor<2>, noisy: Tensor<2>, change: f64| exact.clone() + (noisy - exact) * change.exp();
+        let value = |change: f64, of: &dyn Fn(f64) -> Tensor<1>| of(change).into_scalar::<f64>();
+        let means = |change| wider(exact.means.clone(), noise.means.clone(), change).sin().sum();
+        let quats = |change| wider(exact.quats.clone(), noise.quats.clone(), change).powi_scalar(3).sum();
+        for (name, of) in [("means", &means as &dyn Fn(f64) -> Tensor<1>), ("quats", &quats)] {
+            let place = attributes.attributes().iter().position(|coded| coded.name == name).unwrap();
+            let difference = (value(0.1, of) - value(-0.1, of)) / 0.2;
+            let found = f64::from(found[place]);
+            assert!((found - difference).abs() < 0.02 * difference.abs() + 1e-4, "{name}: {found}, {difference}");
+            assert!(difference.abs() > 1e-3, "{name}: {difference}");
+        }
+    }
 
     /// With planes on a separate tape, the steps get the same gradients as on a common one.
     #[test]

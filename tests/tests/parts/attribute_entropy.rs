@@ -119,7 +119,9 @@ fn noise_is_as_wide_as_the_steps() {
     let model = model(&device, &gaussians.tensors());
     let noisy = model.add_noise(gaussians.tensors());
     let check = |name: &str, exact: Vec<f32>, noisy: Vec<f32>| {
-        let step = model.step(name).unwrap();
+        // Positions are in units of the Gaussians' size.
+        let unit = if name == "means" { values_of(&model.size.val())[0] } else { 1.0 };
+        let step = unit * model.step(name).unwrap();
         let errors: Vec<f32> = exact.iter().zip(&noisy).map(|(a, b)| (a - b) / step).collect();
         assert!(errors.iter().all(|error| error.abs() <= 0.501), "{name}");
         let variance = errors.iter().map(|error| error * error).sum::<f32>() / errors.len() as f32;
