@@ -64,7 +64,7 @@ mod tests {
             let bytes = std::fs::read(format!("{root}/tests/golden-streams/{name}.l4gs")).expect("a golden stream");
             format!("{:016x}", super::digest(&light4gs_codec::decode(&bytes).expect("a scene")))
         };
-        let compressed = ["compact", "paper", "nodes", "lifetimes", "affinities"];
+        let compressed = ["compact", "paper", "nodes", "lifetimes", "affinities", "shading"];
         let names = compressed.into_iter().flat_map(|name| [name.to_owned(), format!("{name}.decoded")]);
         let names = std::iter::once("float32".to_owned()).chain(names);
         let found: String = names.map(|name| format!("{name} {}\n", digest_of(&name))).collect();

@@ -1,7 +1,7 @@
 // Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
 //
 // One invocation owns one Gaussian and meets all nodes twice: first for the largest exponent, then for the blended pose. Reads
-// Gaussians and nodes. Writes `moved` [N, 7]: position, quaternion. Saves five vectors of `blended` for the backward pass:
+// Gaussians and nodes. Writes `moved` [N, 10]: position, quaternion, turned vector. Saves five vectors of `blended` for the backward pass:
 //
 //   0, 1, 2: rows of the blended matrix, each with its component of the blended offset
 //   3: the blended quaternion
@@ -13,7 +13,7 @@ struct Parameters {
 }
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
-@group(0) @binding(1) var<storage, read_write> quats: array<f32>;
+@group(0) @binding(1) var<storage, read_write> orientations: array<f32>;
 @group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
 @group(0) @binding(3) var<storage, read_write> anchors: array<f32>;
 @group(0) @binding(4) var<storage, read_write> precisions: array<f32>;
@@ -67,14 +67,18 @@ fn main(
     pose.row_z *= inverse_sum;
     pose.turn *= inverse_sum;
 
-    let quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
+    let own = 7u * i;
+    let quat = vec4<f32>(orientations[own], orientations[own + 1u], orientations[own + 2u], orientations[own + 3u]);
+    let vector = vec3<f32>(orientations[own + 4u], orientations[own + 5u], orientations[own + 6u]);
     let position = position_in(pose, mean);
     let turned = hamilton_product(pose.turn, quat);
+    let turned_vector = vector_in(pose, vector);
     for (var k = 0u; k < 3u; k++) {
-        moved[7u * i + k] = position[k];
+        moved[10u * i + k] = position[k];
+        moved[10u * i + 7u + k] = turned_vector[k];
     }
     for (var k = 0u; k < 4u; k++) {
-        moved[7u * i + 3u + k] = turned[k];
+        moved[10u * i + 3u + k] = turned[k];
     }
     blended[5u * i] = pose.row_x;
     blended[5u * i + 1u] = pose.row_y;

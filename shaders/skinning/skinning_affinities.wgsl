@@ -26,16 +26,16 @@ fn main(
     if (i >= parameters.count) {
         return;
     }
-    let by_position = handed[4u * i];
-    let by_turn = handed[4u * i + 1u];
-    let mean = handed[4u * i + 2u];
-    let inverse_sum = handed[4u * i + 3u].x;
+    let by_position = handed[5u * i];
+    let mean = handed[5u * i + 2u];
+    let by_vector = handed[5u * i + 3u];
+    let own = Turning(mean.xyz, handed[5u * i + 4u].xyz, by_position.xyz, by_vector.xyz, handed[5u * i + 1u]);
     var sums = vec4<f32>(0.0);
     for (var node = 0u; node < parameters.nodes; node++) {
         let place = (3u + AFFINITIES) * node;
         let offset = mean.xyz - vec3<f32>(anchors[place], anchors[place + 1u], anchors[place + 2u]);
         let exponent = affinity_between(i, node) - precisions[node] * dot(offset, offset);
-        let weight = exponential(exponent - mean.w) * inverse_sum;
+        let weight = exponential(exponent - mean.w) * by_vector.w;
         let at = 16u * node;
         let pose = Pose(
             vec4<f32>(poses[at], poses[at + 1u], poses[at + 2u], poses[at + 9u]),
@@ -43,7 +43,7 @@ fn main(
             vec4<f32>(poses[at + 6u], poses[at + 7u], poses[at + 8u], poses[at + 11u]),
             vec4<f32>(poses[at + 12u], poses[at + 13u], poses[at + 14u], poses[at + 15u]),
         );
-        let by_logit = weight * (inner_product(pose, mean.xyz, by_position.xyz, by_turn) - by_position.w);
+        let by_logit = weight * (inner_product(pose, own) - by_position.w);
         for (var k = 0u; k < AFFINITIES; k++) {
             sums[k] += by_logit * anchors[place + 3u + k];
         }

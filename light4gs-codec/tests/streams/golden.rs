@@ -17,8 +17,8 @@ fn float32_reads_and_writes_as_it_did() {
 }
 
 /// Compressed streams that were written once, each with the scene that it decoded to then, as a stream without loss: two
-/// with a hexplane, three with control nodes.
-const COMPRESSED: [(Profile, &[u8], &[u8]); 5] = [
+/// with a hexplane, four with control nodes.
+const COMPRESSED: [(Profile, &[u8], &[u8]); 6] = [
     (
         Profile::Compact,
         include_bytes!("../../../tests/golden-streams/compact.l4gs"),
@@ -32,6 +32,7 @@ const COMPRESSED: [(Profile, &[u8], &[u8]); 5] = [
     (Profile::Compact, NODES, include_bytes!("../../../tests/golden-streams/nodes.decoded.l4gs")),
     (Profile::Compact, LIFETIMES, include_bytes!("../../../tests/golden-streams/lifetimes.decoded.l4gs")),
     (Profile::Compact, AFFINITIES, include_bytes!("../../../tests/golden-streams/affinities.decoded.l4gs")),
+    (Profile::Compact, SHADING, include_bytes!("../../../tests/golden-streams/shading.decoded.l4gs")),
 ];
 
 /// Twelve control nodes, and 150 Gaussians that follow them or stand still. Only a model can make it:
@@ -41,6 +42,8 @@ const NODES: &[u8] = include_bytes!("../../../tests/golden-streams/nodes.l4gs");
 const LIFETIMES: &[u8] = include_bytes!("../../../tests/golden-streams/lifetimes.l4gs");
 /// The same with Gaussians that follow nodes beyond their place.
 const AFFINITIES: &[u8] = include_bytes!("../../../tests/golden-streams/affinities.l4gs");
+/// The same with Gaussians whose brightness changes as they turn.
+const SHADING: &[u8] = include_bytes!("../../../tests/golden-streams/shading.l4gs");
 /// Frames of the streams at some times: name, time, checksum.
 const FRAMES: &str = include_str!("../../../tests/golden-streams/frames.txt");
 const TIMES: [f32; 5] = [0.0, 0.25, 0.37, 0.5, 1.0];
@@ -89,6 +92,7 @@ fn frames_are_those_that_were_shown() {
             ("nodes", NODES),
             ("lifetimes", LIFETIMES),
             ("affinities", AFFINITIES),
+            ("shading", SHADING),
         ];
         let found = streams.map(|(name, bytes)| frames(name, bytes, most_bytes)).concat();
         assert_eq!(found, FRAMES);
@@ -112,6 +116,17 @@ fn the_golden_affinities_count() {
     let affinity = others.gaussians.further.iter_mut().find(|further| further.name == "affinity").unwrap();
     affinity.values.fill(0.0);
     assert_ne!(others.positions_at(0.2).unwrap(), scene.positions_at(0.2).unwrap());
+}
+
+#[test]
+fn the_golden_shading_changes_colors() {
+    let scene = decode(SHADING).unwrap();
+    let motion = scene.motion.network.as_ref().unwrap();
+    assert!(motion.sources.contains(&MotionSource::Attribute("shading".into())));
+    let evaluator = MotionEvaluator::new(&scene).unwrap();
+    let mut moved = scene.gaussians.clone();
+    evaluator.apply(&scene.gaussians, 0.25, 0..moved.len(), &mut moved);
+    assert!(moved.sh_dc != scene.gaussians.sh_dc && moved.sh_rest == scene.gaussians.sh_rest);
 }
 
 /// Of the Gaussians with lifetimes there are some at the beginning that are gone at the end, and the other way around.
@@ -144,7 +159,7 @@ fn write_golden_streams() {
         write(&format!("{}.decoded.l4gs", profile.name()), &encode(&encoded.decoded).unwrap());
         shown += &frames(profile.name(), &encoded.bytes, 0);
     }
-    for name in ["nodes", "lifetimes", "affinities"] {
+    for name in ["nodes", "lifetimes", "affinities", "shading"] {
         let bytes = std::fs::read(format!("{FOLDER}/{name}.l4gs")).unwrap();
         write(&format!("{name}.decoded.l4gs"), &encode(&decode(&bytes).unwrap()).unwrap());
         shown += &frames(name, &bytes, 0);

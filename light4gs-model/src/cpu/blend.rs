@@ -1,5 +1,8 @@
-//! Front-to-back traversal of one tile's splats, eight pixels of a row at a time, for blending, its derivative and the
-//! significance scores.
+//! Front-to-back traversal of one tile's splats, eight pixels at a time, for blending, its derivative and the significance
+//! scores.
+//!
+//! Eight pixels are four columns of two rows: most splats are a few pixels wide, and fewer such groups cover one than rows of
+//! eight would.
 //!
 //! Only groups of eight pixels are visited that the splat's alpha can reach and that still take splats. The traversal
 //! ends when all pixels have stopped. So the cost is proportional to the pixels that are blended. For each pixel, front
@@ -18,19 +21,32 @@ use super::project::Splat;
 use super::tiles::TileLists;
 use crate::kernels::splat::View;
 
-/// Groups of eight pixels in a tile's row.
-const ACROSS: usize = TILE / LANES;
-/// Groups in a tile: group `g` holds the pixels from column `g / TILE · LANES` on of row `g % TILE`.
-pub(crate) const GROUPS: usize = TILE * ACROSS;
+/// Columns of a group of eight pixels.
+pub(crate) const WIDTH: usize = 4;
+/// Its rows.
+const HEIGHT: usize = LANES / WIDTH;
+/// Groups of a tile next to each other, and below each other.
+const ACROSS: usize = TILE / WIDTH;
+const DOWN: usize = TILE / HEIGHT;
+/// Groups in a tile, column by column.
+pub(crate) const GROUPS: usize = ACROSS * DOWN;
 // Sets of groups are 32-bit masks.
 const _: () = assert!(GROUPS <= u32::BITS as usize);
+// The rows of groups are examined all at once.
+const _: () = assert!(DOWN == LANES);
 
 /// One value for every pixel of a tile, by group.
 pub(crate) type TilePlane = [[f32; LANES]; GROUPS];
 
+/// Group and lanes of four pixels next to each other, from the tile's upper left corner; `x` is a multiple of four.
+pub(crate) fn group_and_lanes(x: usize, y: usize) -> (usize, std::ops::Range<usize>) {
+    let (group, first) = group_and_lane(x, y);
+    (group, first..first + WIDTH)
+}
+
 /// Group and lane of a pixel, from the tile's upper left corner.
-pub(crate) fn group_and_lane(x: usize, y: usize) -> (usize, usize) {
-    (x / LANES * TILE + y, x % LANES)
+fn group_and_lane(x: usize, y: usize) -> (usize, usize) {
+    (x / WIDTH * DOWN + y / HEIGHT, y % HEIGHT * WIDTH + x % WIDTH)
 }
 
 /// The contribution of one splat to eight pixels.
@@ -59,8 +75,18 @@ pub(crate) trait TileVisitor<L: Lanes> {
 
     fn begin(&self, splat: &Splat) -> Self::Splat;
     fn visit(&mut self, splat: &mut Self::Splat, contribution: &Contribution<L>);
-    /// `n` counts the tile's splats from the front.
+    /// `n` counts the tile's splats from the front. It is not called for a splat that was not visited.
     fn end(&mut self, n: usize, splat: Self::Splat);
+}
+
+/// The groups of a tile in which a splat's alpha is not below the threshold, a set for each of its splats from the front.
+pub(crate) enum Hits<'a> {
+    /// Nobody asks.
+    Unasked,
+    /// Each splat's set is appended.
+    Found(&'a mut Vec<u32>),
+    /// They were found before, so that only these groups are visited.
+    Known(&'a [u32]),
 }
 
 /// Passes all splats of a tile to the visitor. Returns the remaining transmittance; its sign is set where a pixel has
@@ -71,11 +97,13 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     view: &View,
     tile: usize,
     visitor: &mut V,
+    mut hits: Hits,
 ) -> TilePlane {
     let (column, row) = (tile % view.tiles_across(), tile / view.tiles_across());
     let origin = [(column * TILE) as f32, (row * TILE) as f32];
-    let pixels_x: [L; ACROSS] = consecutive(origin[0]);
-    let rows_y: [L; ACROSS] = consecutive(origin[1]);
+    let pixels_x: [L; ACROSS] = pixels(|group, lane| origin[0] + (group * WIDTH + lane % WIDTH) as f32);
+    let pixels_y: [L; DOWN] = pixels(|group, lane| origin[1] + (group * HEIGHT + lane / WIDTH) as f32);
+    let rows_y = rows::<L>(origin[1]);
     let mut transmittance = initial_transmittance(view, column, row);
     // A bit for every group with a pixel that still takes splats.
     let mut live = transmittance
@@ -88,14 +116,20 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
             break;
         }
         let splat = &lists.splats[i as usize];
+        let mut groups = match &hits {
+            Hits::Known(sets) => sets[n],
+            _ => reached(splat, origin[0], &rows_y),
+        };
+        groups &= live;
+        let mut hit_groups = 0;
         let ellipse = Ellipse::<L>::new(splat);
         let mut state = visitor.begin(splat);
-        let mut groups = live & reached(splat, origin[0], &rows_y);
         while groups != 0 {
             let group = groups.trailing_zeros() as usize;
             groups &= groups - 1;
-            let dy = splat.y - (origin[1] + (group % TILE) as f32);
-            let Footprint { dx, alpha, free, hit } = ellipse.footprint(pixels_x[group / TILE], dy);
+            let footprint = ellipse.footprint(pixels_x[group / DOWN], pixels_y[group % DOWN]);
+            let Footprint { dx, dy, alpha, free, hit } = footprint;
+            hit_groups |= u32::from(hit.signs() != 0) << group;
             let t = L::load(&transmittance[group]);
             let weight = t.mul(alpha);
             let after = t.sub(weight);
@@ -108,11 +142,15 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
                 live &= !(1 << group);
             }
             let weight = taken.and(weight);
-            let contribution =
-                Contribution { group, dx, dy: L::splat(dy), alpha, transmittance: t, weight, taken, free };
+            let contribution = Contribution { group, dx, dy, alpha, transmittance: t, weight, taken, free };
             visitor.visit(&mut state, &contribution);
         }
-        visitor.end(n, state);
+        if hit_groups != 0 {
+            visitor.end(n, state);
+        }
+        if let Hits::Found(sets) = &mut hits {
+            sets.push(hit_groups);
+        }
     }
     transmittance
 }
@@ -120,16 +158,18 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
 /// The splat's exponent, with each value in all lanes.
 struct Ellipse<L> {
     x: L,
+    y: L,
     opacity: L,
     /// Factors of dx², dx dy and dy² in the base-2 logarithm of the Gaussian.
     xx: L,
-    xy: f32,
-    yy: f32,
+    xy: L,
+    yy: L,
 }
 
 /// A splat at eight pixels.
 struct Footprint<L> {
     dx: L,
+    dy: L,
     alpha: L,
     free: L,
     /// Mask: alpha is not below the threshold.
@@ -143,60 +183,75 @@ impl<L: Lanes> Ellipse<L> {
         let [a, b, c] = splat.conic;
         Self {
             x: L::splat(splat.x),
+            y: L::splat(splat.y),
             opacity: L::splat(splat.opacity),
             xx: L::splat(-0.5 * LOG2_E * a),
-            xy: -LOG2_E * b,
-            yy: -0.5 * LOG2_E * c,
+            xy: L::splat(-LOG2_E * b),
+            yy: L::splat(-0.5 * LOG2_E * c),
         }
     }
 
     #[inline(always)]
-    fn footprint(&self, pixels_x: L, dy: f32) -> Footprint<L> {
-        let dx = self.x.sub(pixels_x);
-        let power = self.xx.mul_add(dx, L::splat(self.xy * dy)).mul_add(dx, L::splat(self.yy * dy * dy));
+    fn footprint(&self, pixels_x: L, pixels_y: L) -> Footprint<L> {
+        let (dx, dy) = (self.x.sub(pixels_x), self.y.sub(pixels_y));
+        let power = self.xx.mul_add(dx, self.xy.mul(dy)).mul_add(dx, self.yy.mul(dy).mul(dy));
         let raw = self.opacity.mul(power.exp2());
         let alpha = raw.min(L::splat(MAX_ALPHA));
         let hit = alpha.at_least(L::splat(MIN_ALPHA)).and(L::splat(0.0).at_least(power));
-        Footprint { dx, alpha, free: L::splat(MAX_ALPHA).at_least(raw), hit }
+        Footprint { dx, dy, alpha, free: L::splat(MAX_ALPHA).at_least(raw), hit }
     }
 }
 
-/// A bit for every group that the splat's alpha can reach, for all rows of the tile at once.
+/// A bit for every group that the splat's alpha can reach, for all rows of the tile at once. `rows_y` are the rows of all
+/// groups, first the upper ones.
 #[inline(always)]
-fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; ACROSS]) -> u32 {
+fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; HEIGHT]) -> u32 {
     let [a, b, _] = splat.conic;
     // In a row, the form has its minimum at dx = -b dy / a, where it is dy² / variance. A small margin is added, since
     // the pixels evaluate the form with other rounding.
     let (inverse_a, inverse_variance) = (L::splat(1.0 / a), L::splat(-1.0 / splat.variance[1]));
     let (reach, skew) = (L::splat(splat.reach * 1.002 + 1e-2), L::splat(b / a));
     let (x, y) = (L::splat(splat.x - origin_x), L::splat(splat.y));
-    let mut bits = 0;
-    for half in 0..ACROSS {
-        let dy = y.sub(rows_y[half]);
+    let nowhere = L::splat(f32::INFINITY);
+    // The columns that are reached in each row: from infinity on in a row that is not.
+    let (mut low, mut high) = ([nowhere; HEIGHT], [nowhere; HEIGHT]);
+    for row in 0..HEIGHT {
+        let dy = y.sub(rows_y[row]);
         let left = dy.mul(dy).mul_add(inverse_variance, reach);
         let half_width = left.max(L::splat(0.0)).mul(inverse_a).sqrt().mul_add(L::splat(1.001), L::splat(0.05));
         let center = skew.mul_add(dy, x);
-        let (low, high) = (center.sub(half_width), center.add(half_width));
-        let row_reached = left.at_least(L::splat(0.0));
-        for group in 0..ACROSS {
-            let first = (group * LANES) as f32;
-            let last = first + (LANES - 1) as f32;
-            let columns = high.at_least(L::splat(first)).and(L::splat(last).at_least(low));
-            bits |= row_reached.and(columns).signs() << (group * TILE + half * LANES);
+        low[row] = left.at_least(L::splat(0.0)).select(center.sub(half_width), nowhere);
+        high[row] = center.add(half_width);
+    }
+    let mut bits = 0;
+    for group in 0..ACROSS {
+        let first = (group * WIDTH) as f32;
+        let last = first + (WIDTH - 1) as f32;
+        let mut columns = L::splat(0.0);
+        for row in 0..HEIGHT {
+            let here = high[row].at_least(L::splat(first)).and(L::splat(last).at_least(low[row]));
+            columns = columns.or(here);
         }
+        bits |= columns.signs() << (group * DOWN);
     }
     bits
 }
 
-/// `first, first + 1, ...` over all lanes.
+/// A coordinate of the pixels of each group along one side of the tile, by group and lane.
 #[inline(always)]
-fn consecutive<L: Lanes>(first: f32) -> [L; ACROSS] {
-    let mut vectors = [L::splat(0.0); ACROSS];
-    for (k, vector) in vectors.iter_mut().enumerate() {
-        let values: [f32; LANES] = std::array::from_fn(|lane| first + (k * LANES + lane) as f32);
+fn pixels<L: Lanes, const N: usize>(coordinate: impl Fn(usize, usize) -> f32) -> [L; N] {
+    let mut vectors = [L::splat(0.0); N];
+    for (group, vector) in vectors.iter_mut().enumerate() {
+        let values: [f32; LANES] = std::array::from_fn(|lane| coordinate(group, lane));
         *vector = L::load(&values);
     }
     vectors
+}
+
+/// The rows of all groups from the row `first` on: their upper ones, then their lower ones.
+#[inline(always)]
+fn rows<L: Lanes>(first: f32) -> [L; HEIGHT] {
+    pixels(|row, group| first + (group * HEIGHT + row) as f32)
 }
 
 /// Pixels outside the image have stopped from the beginning.
@@ -229,7 +284,7 @@ mod tests {
     impl LaneKernel for Reached<'_> {
         type Output = u32;
         fn run<L: Lanes>(self) -> u32 {
-            reached(self.0, self.1[0], &consecutive::<L>(self.1[1]))
+            reached(self.0, self.1[0], &rows::<L>(self.1[1]))
         }
     }
 

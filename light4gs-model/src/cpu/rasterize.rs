@@ -3,7 +3,7 @@
 use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
 
-use super::blend::{Contribution, GROUPS, TilePlane, TileVisitor, group_and_lane, walk};
+use super::blend::{Contribution, GROUPS, Hits, TilePlane, TileVisitor, WIDTH, group_and_lanes, walk};
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use super::project::Splat;
 use super::tiles::TileLists;
@@ -20,6 +20,8 @@ pub(crate) struct TilePixels {
     pub(crate) color: [TilePlane; 3],
     pub(crate) depth: TilePlane,
     pub(crate) transmittance: TilePlane,
+    /// For each of the tile's splats from the front, the groups of pixels that it hits.
+    pub(crate) hits: Vec<u32>,
 }
 
 impl<L: Lanes> TileVisitor<L> for TilePixels {
@@ -59,8 +61,10 @@ impl LaneKernel for RasterizeTile<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) -> TilePixels {
-        let mut pixels = TilePixels { color: [EMPTY; 3], depth: EMPTY, transmittance: EMPTY };
-        let left = walk::<L, _>(self.lists, self.view, self.tile, &mut pixels);
+        let mut hits = Vec::with_capacity(self.lists.tile_range(self.tile).len());
+        let mut pixels = TilePixels { color: [EMPTY; 3], depth: EMPTY, transmittance: EMPTY, hits: Vec::new() };
+        let left = walk::<L, _>(self.lists, self.view, self.tile, &mut pixels, Hits::Found(&mut hits));
+        pixels.hits = hits;
         pixels.transmittance = left.map(|lanes| lanes.map(f32::abs));
         pixels
     }
@@ -89,15 +93,20 @@ pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
         .zip(depth.par_chunks_mut(width))
         .enumerate()
         .for_each(|(y, ((image, alpha), depth))| {
-            for x in 0..width {
+            let pixels = image.chunks_mut(3 * WIDTH).zip(alpha.chunks_mut(WIDTH)).zip(depth.chunks_mut(WIDTH));
+            for (run, ((image, alpha), depth)) in pixels.enumerate() {
+                let x = run * WIDTH;
                 let tile = &tiles[y / TILE * view.tiles_across() + x / TILE];
-                let (group, lane) = group_and_lane(x % TILE, y % TILE);
-                let t = tile.transmittance[group][lane];
-                for c in 0..3 {
-                    image[3 * x + c] = tile.color[c][group][lane] + t * view.background[c];
+                let (group, lanes) = group_and_lanes(x % TILE, y % TILE);
+                let [red, green, blue] = tile.color.each_ref().map(|plane| &plane[group][lanes.clone()]);
+                let transmittance = &tile.transmittance[group][lanes.clone()];
+                for (k, pixel) in image.chunks_mut(3).enumerate() {
+                    for (channel, color) in [red, green, blue].into_iter().enumerate() {
+                        pixel[channel] = color[k] + transmittance[k] * view.background[channel];
+                    }
                 }
-                alpha[x] = 1.0 - t;
-                depth[x] = tile.depth[group][lane];
+                alpha.iter_mut().zip(transmittance).for_each(|(alpha, t)| *alpha = 1.0 - t);
+                depth.iter_mut().zip(&tile.depth[group][lanes]).for_each(|(to, from)| *to = *from);
             }
         });
     rendering
@@ -110,14 +119,18 @@ pub(crate) fn tile_of(rendering: &[f32], view: &View, column: usize, row: usize)
     let (alpha, depth) = rest.split_at(width * height);
     let mut planes = [EMPTY; CHANNELS];
     for y in row * TILE..((row + 1) * TILE).min(height) {
-        for x in column * TILE..((column + 1) * TILE).min(width) {
-            let (group, lane) = group_and_lane(x % TILE, y % TILE);
-            let pixel = y * width + x;
-            for c in 0..3 {
-                planes[c][group][lane] = image[3 * pixel + c];
+        let end = ((column + 1) * TILE).min(width);
+        for x in (column * TILE..end).step_by(WIDTH) {
+            let (group, lanes) = group_and_lanes(x % TILE, y % TILE);
+            let pixels = y * width + x..y * width + (x + WIDTH).min(end);
+            let lanes = lanes.start..lanes.start + pixels.len();
+            for (k, pixel) in image[3 * pixels.start..3 * pixels.end].chunks_exact(3).enumerate() {
+                for (channel, value) in pixel.iter().enumerate() {
+                    planes[channel][group][lanes.start + k] = *value;
+                }
             }
-            planes[3][group][lane] = alpha[pixel];
-            planes[4][group][lane] = depth[pixel];
+            planes[3][group][lanes.clone()].copy_from_slice(&alpha[pixels.clone()]);
+            planes[4][group][lanes].copy_from_slice(&depth[pixels]);
         }
     }
     planes

@@ -8,7 +8,7 @@
 
 use rayon::prelude::*;
 
-use super::blend::{Contribution, GROUPS, TilePlane, TileVisitor, walk};
+use super::blend::{Contribution, GROUPS, Hits, TilePlane, TileVisitor, walk};
 use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use super::project::{GaussianSlices, Splat, SplatGradient, project_backward};
 use super::rasterize::{CHANNELS, TilePixels, tile_of};
@@ -38,7 +38,8 @@ impl LaneKernel for BackwardTile<'_> {
         let (column, row) = (self.tile % view.tiles_across(), self.tile / view.tiles_across());
         let upstream = tile_of(self.upstream, view, column, row);
         let rest = total_value::<L>(self.pixels, &upstream, view.background);
-        walk::<L, _>(self.lists, view, self.tile, &mut Differentiate { upstream, rest, sums: self.sums });
+        let mut visitor = Differentiate { upstream, rest, sums: self.sums };
+        walk::<L, _>(self.lists, view, self.tile, &mut visitor, Hits::Known(&self.pixels.hits));
     }
 }
 
@@ -100,12 +101,10 @@ impl<L: Lanes> TileVisitor<L> for Differentiate<'_> {
     #[inline(always)]
     fn end(&mut self, n: usize, splat: Accumulator<L>) {
         let sums = &mut self.sums[n];
-        for k in 0..4 {
-            sums[k] = splat.linear[k].sum();
-        }
-        for k in 0..6 {
-            sums[4 + k] = splat.moments[k].sum();
-        }
+        let Accumulator { linear: l, moments: m, .. } = splat;
+        sums[..LANES].copy_from_slice(&L::sums(&[l[0], l[1], l[2], l[3], m[0], m[1], m[2], m[3]]));
+        sums[LANES] = m[4].sum();
+        sums[LANES + 1] = m[5].sum();
     }
 }
 

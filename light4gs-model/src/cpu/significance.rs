@@ -5,7 +5,7 @@
 
 use rayon::prelude::*;
 
-use super::blend::{Contribution, TileVisitor, walk};
+use super::blend::{Contribution, Hits, TileVisitor, walk};
 use super::lanes::{LaneKernel, Lanes, dispatch};
 use super::project::Splat;
 use super::tiles::TileLists;
@@ -28,7 +28,7 @@ impl LaneKernel for SignificanceTile<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        walk::<L, _>(self.lists, self.view, self.tile, &mut Score(self.sums));
+        walk::<L, _>(self.lists, self.view, self.tile, &mut Score(self.sums), Hits::Unasked);
     }
 }
 

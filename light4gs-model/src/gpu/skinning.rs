@@ -11,11 +11,11 @@ use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
-use crate::kernels::skinning::{MOST_AFFINITIES, MOVED, POSE, SkinningKernels, SkinningTensors};
+use crate::kernels::skinning::{MOST_AFFINITIES, MOVED, ORIENTATION, POSE, SkinningKernels, SkinningTensors};
 
-/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five and four vectors.
+/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five vectors each.
 const BLENDED: usize = 20;
-const HANDED: usize = 16;
+const HANDED: usize = 20;
 
 /// Gaussians of a slice, unless there are so many slices then that their sums take more memory than they are worth.
 const SLICE: usize = 64;
@@ -46,7 +46,7 @@ pub struct GpuSaved {
     nodes: usize,
     affinities: usize,
     means: Handle,
-    quats: Handle,
+    orientations: Handle,
     stillness: Handle,
     anchors: Handle,
     precisions: Handle,
@@ -62,12 +62,12 @@ fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSave
     let gpu = Gpu::of(&tensors.means)?;
     let (count, nodes) = (tensors.means.shape()[0], tensors.anchors.shape()[0]);
     let affinities = tensors.stillness.shape()[1] - 1;
-    let [means, quats, stillness, anchors, precisions, poses] = tensors.into_array().map(buffer_of);
+    let [means, orientations, stillness, anchors, precisions, poses] = tensors.into_array().map(buffer_of);
     let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
     Launch::new(&gpu.client, kernel(SKINNING, affinities))
         .reads(&means)
-        .reads(&quats)
+        .reads(&orientations)
         .reads(&stillness)
         .reads(&anchors)
         .reads(&precisions)
@@ -77,24 +77,28 @@ fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSave
         .uniform(&words(&[count, nodes]))
         .invocations(count)?;
     let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
-    Ok((output, GpuSaved { count, nodes, affinities, means, quats, stillness, anchors, precisions, poses, blended }))
+    Ok((
+        output,
+        GpuSaved { count, nodes, affinities, means, orientations, stillness, anchors, precisions, poses, blended },
+    ))
 }
 
 fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let GpuSaved { count, nodes, affinities, means, quats, stillness, anchors, precisions, poses, blended } = saved;
+    let GpuSaved { count, nodes, affinities, means, orientations, stillness, anchors, precisions, poses, blended } =
+        saved;
     let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
     let of_means = gpu.allocate("gradients of means", 3 * count)?;
-    let of_quats = gpu.allocate("gradients of quats", 4 * count)?;
+    let of_orientations = gpu.allocate("gradients of orientations", ORIENTATION * count)?;
     let of_stillness = gpu.allocate("gradients of stillness and affinities", (1 + affinities) * count)?;
     Launch::new(&gpu.client, kernel(SKINNING_BACKWARD, affinities))
         .reads(&means)
-        .reads(&quats)
+        .reads(&orientations)
         .reads(&blended)
         .reads(&buffer_of(upstream))
         .writes(&handed)
         .writes(&of_means)
-        .writes(&of_quats)
+        .writes(&of_orientations)
         .writes(&of_stillness)
         .uniform(&words(&[count]))
         .invocations(count)?;
@@ -139,7 +143,7 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
     let of_nodes = |k: usize, columns: usize| gpu.tensor(places.of(&of_nodes, k), Shape::from([nodes, columns]));
     Ok(SkinningTensors {
         means: of_gaussians(&of_means, 3),
-        quats: of_gaussians(&of_quats, 4),
+        orientations: of_gaussians(&of_orientations, ORIENTATION),
         stillness: of_gaussians(&of_stillness, 1 + affinities),
         anchors: of_nodes(0, 3 + affinities),
         precisions: of_nodes(1, 1),

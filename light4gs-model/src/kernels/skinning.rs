@@ -7,8 +7,10 @@ use burn::backend::{Backend, ExtensionType};
 
 /// Numbers of a node's pose: rotation matrix row by row (9), offset (3), quaternion (4).
 pub(crate) const POSE: usize = 16;
-/// Numbers of a moved Gaussian: position (3), quaternion (4).
-pub(crate) const MOVED: usize = 7;
+/// Numbers of a Gaussian's orientation: quaternion (4), and a vector that turns along (3).
+pub(crate) const ORIENTATION: usize = 7;
+/// Numbers of a moved Gaussian: position (3), quaternion (4), turned vector (3).
+pub(crate) const MOVED: usize = 10;
 
 /// Most affinities of a Gaussian and of a node.
 pub const MOST_AFFINITIES: usize = 4;
@@ -18,8 +20,8 @@ pub const MOST_AFFINITIES: usize = 4;
 pub struct SkinningTensors<B: Backend> {
     /// `[N, 3]`, world units.
     pub means: FloatTensor<B>,
-    /// `[N, 4]` as (w, x, y, z), of any length.
-    pub quats: FloatTensor<B>,
+    /// `[N, 7]`: quaternions (w, x, y, z) of any length, then vectors that turn along.
+    pub orientations: FloatTensor<B>,
     /// `[N, 1 + H]`, logits of the node that stands still, then affinities.
     pub stillness: FloatTensor<B>,
     /// `[B, 3 + H]`, world units, then affinities.
@@ -35,11 +37,13 @@ pub(crate) const INPUTS: usize = 6;
 
 impl<B: Backend> SkinningTensors<B> {
     pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.means, self.quats, self.stillness, self.anchors, self.precisions, self.poses]
+        [self.means, self.orientations, self.stillness, self.anchors, self.precisions, self.poses]
     }
 
-    pub(crate) fn from_array([means, quats, stillness, anchors, precisions, poses]: [FloatTensor<B>; INPUTS]) -> Self {
-        Self { means, quats, stillness, anchors, precisions, poses }
+    pub(crate) fn from_array(
+        [means, orientations, stillness, anchors, precisions, poses]: [FloatTensor<B>; INPUTS],
+    ) -> Self {
+        Self { means, orientations, stillness, anchors, precisions, poses }
     }
 }
 
@@ -48,9 +52,9 @@ pub trait SkinningKernels: Backend {
     /// What the backward pass wants to see again.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// Positions and quaternions `[N, 7]`.
+    /// Positions, quaternions and vectors `[N, 10]`.
     fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the output `[N, 7]`.
+    /// Gradients of all inputs from that of the output `[N, 10]`.
     fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
 }

@@ -19,7 +19,7 @@ use super::host::{HostBackend, HostTensor};
 use super::{for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::skinning::{BlendedGroup, SkinningSlices, skin as skin_slices};
 use crate::cpu::skinning_backward::skin_backward;
-use crate::kernels::skinning::{INPUTS, MOVED, POSE};
+use crate::kernels::skinning::{INPUTS, MOVED, ORIENTATION, POSE};
 pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTensors};
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
@@ -27,7 +27,7 @@ pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTen
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait SkinningOps: Backend {
-    /// Positions and quaternions `[N, 7]`; see [`skin`].
+    /// Positions, quaternions and vectors `[N, 10]`; see [`skin`].
     fn skinning(#[extension_type] tensors: SkinningTensors<Self>) -> FloatTensor<Self>;
 }
 
@@ -77,8 +77,8 @@ pub struct CpuSaved {
 }
 
 fn slices(inputs: &[HostTensor; INPUTS]) -> SkinningSlices<'_> {
-    let [means, quats, stillness, anchors, precisions, poses] = inputs.each_ref().map(HostTensor::as_slice);
-    SkinningSlices { means, quats, stillness, anchors, precisions, poses }
+    let [means, orientations, stillness, anchors, precisions, poses] = inputs.each_ref().map(HostTensor::as_slice);
+    SkinningSlices { means, orientations, stillness, anchors, precisions, poses }
 }
 
 fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
@@ -98,7 +98,7 @@ fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) ->
     let width = slices(&saved.inputs).width();
     SkinningTensors {
         means: matrix(gradients.means, 3),
-        quats: matrix(gradients.quats, 4),
+        orientations: matrix(gradients.orientations, ORIENTATION),
         stillness: matrix(gradients.stillness, width),
         anchors: matrix(gradients.anchors, 2 + width),
         precisions: matrix(gradients.precisions, 1),
@@ -141,8 +141,8 @@ impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
 pub struct SkinningInputs {
     /// `[N, 3]`: where the Gaussians are at rest, world units.
     pub means: Tensor<2>,
-    /// `[N, 4]`: their orientations at rest as quaternions (w, x, y, z), of any length.
-    pub quats: Tensor<2>,
+    /// `[N, 7]`: their orientations at rest as quaternions (w, x, y, z), of any length, then a vector for each that turns along.
+    pub orientations: Tensor<2>,
     /// `[N, 1 + H]`: logit of the node that stands still, for each Gaussian, then its H affinities, 0 to
     /// [`MOST_AFFINITIES`].
     pub stillness: Tensor<2>,
@@ -156,12 +156,12 @@ pub struct SkinningInputs {
 }
 
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
-/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized.
+/// 2024). Returns `[N, 10]`: positions (3), quaternions (4), which are not normalized, and turned vectors (3).
 ///
 /// ```text
 /// w   = softmax over b of (affinities · affinities_b - precision_b |mean - anchor_b|², and stillness for the node that stands still)
 /// A   = Σ w_b R_b + w_still I,   t = Σ w_b t_b,   q = Σ w_b q_b + w_still (1, 0, 0, 0)
-/// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product)
+/// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product),   turned vector = A vector
 /// ```
 ///
 /// A weight of less than 2⁻⁶⁴ of the largest is 0 on the CPU.
@@ -180,7 +180,8 @@ pub struct SkinningInputs {
 /// let half = 0.5_f32.sqrt();
 /// let moved = skin(SkinningInputs {
 ///     means: rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3),
-///     quats: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 4),
+///     // Each with a vector along x.
+///     orientations: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 7),
 ///     // The first Gaussian goes with the node, the second stands still.
 ///     stillness: rows(&[-60.0, 60.0], 1),
 ///     anchors: rows(&[0.0, 0.0, 0.0], 3),
@@ -188,17 +189,18 @@ pub struct SkinningInputs {
 ///     poses: rows(&[0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half], 16),
 /// });
 /// let moved = moved.into_data().to_vec::<f32>().unwrap();
-/// assert_eq!(moved, [0.0, 1.0, 2.0, half, 0.0, 0.0, half, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
+/// assert_eq!(moved[..10], [0.0, 1.0, 2.0, half, 0.0, 0.0, half, 0.0, 1.0, 0.0]);
+/// assert_eq!(moved[10..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
 /// ```
 ///
 /// # Panics
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, quats, stillness, anchors, precisions, poses } = inputs;
+    let SkinningInputs { means, orientations, stillness, anchors, precisions, poses } = inputs;
     let (count, nodes) = (means.dims()[0], anchors.dims()[0]);
     assert!(nodes > 0, "anchors must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
-    assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");
+    assert_eq!(orientations.dims(), [count, ORIENTATION], "orientations must be [N, 7]");
     let affinities = stillness.dims()[1].saturating_sub(1);
     assert!(affinities <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
     assert_eq!(stillness.dims(), [count, 1 + affinities], "stillness must be [N, 1 + H]");
@@ -207,7 +209,7 @@ pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
     assert_eq!(poses.dims(), [nodes, POSE], "poses must be [B, 16]");
     Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {
         means: means.into_dispatch(),
-        quats: quats.into_dispatch(),
+        orientations: orientations.into_dispatch(),
         stillness: stillness.into_dispatch(),
         anchors: anchors.into_dispatch(),
         precisions: precisions.into_dispatch(),

@@ -241,7 +241,7 @@ pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningI
     let radius = 0.6 * 2.0 / (nodes as f32).cbrt();
     SkinningInputs {
         means: random(count, 3),
-        quats: random(count, 4),
+        orientations: random(count, 7),
         stillness: random(count, 1),
         anchors: random(nodes, 3),
         precisions: leaf(Tensor::full([nodes, 1], 0.5 / (radius * radius), device)),
@@ -311,7 +311,7 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
     add("hexplane forward + backward", both);
 
     let inputs = skinning_inputs(count, SKINNING_NODES, autodiff);
-    let upstream = Tensor::<2>::random([count, 7], Distribution::Default, autodiff);
+    let upstream = Tensor::<2>::random([count, 10], Distribution::Default, autodiff);
     add("skinning forward", median(device, repeats, || inputs.clone(), skin));
     let skinned = |inputs: SkinningInputs| (skin(inputs) * upstream.clone()).sum();
     add("skinning backward", median(device, repeats, || skinned(inputs.clone()), |loss| loss.backward()));

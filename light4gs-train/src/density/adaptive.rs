@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 
 use burn::tensor::{Device, Tensor};
 
-use super::clone_and_split::{DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors};
+use super::clone_and_split::{
+    DensifyMasks, SizeLimit, densify, largest_scales, least_of_largest, reset_opacity, survivors,
+};
 use super::{DensityConfig, DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::keys::Bounds::{Number, Whole};
 use crate::keys::{INTERVAL, ITERATION, MOST_GAUSSIANS, SHARE, THRESHOLD, keys};
@@ -34,7 +36,7 @@ keys! {
         grad_threshold_fine_final: f32 = 2e-4; THRESHOLD, "reference";
         /// Gaussians up to this share of the scene's extent are cloned, larger ones split in two.
         percent_dense: f32 = 0.01; Number { least: 1e-9, most: 1e9 }, "3DGS";
-        /// From this number of Gaussians on, none is cloned or split.
+        /// Most Gaussians: where more would be cloned or split, those with the largest gradients are.
         max_gaussians: usize = 360_000; Whole { least: 1, most: MOST_GAUSSIANS }, "reference";
         /// Opacity below which a Gaussian is removed, coarse stage.
         opacity_threshold: f32 = 0.005; SHARE, "3DGS";
@@ -114,10 +116,13 @@ impl AdaptiveDensityControl {
 
     fn clone_and_split(&mut self, gaussians: &mut GaussianEditor, threshold: f32, position: &TrainingPosition) {
         let Some(statistics) = &self.statistics else { return };
+        let gradients = statistics.mean_gradients();
+        // Each that is cloned or split adds one.
+        let room = self.config.max_gaussians.saturating_sub(gaussians.len());
         let masks = DensifyMasks::new(
-            &statistics.mean_gradients(),
+            &gradients,
             &largest_scales(gaussians.gaussians()),
-            threshold,
+            threshold.max(least_of_largest(&gradients, room)),
             self.config.percent_dense * position.extent,
         );
         let mut generator = position.generator();

@@ -42,6 +42,15 @@ impl DensifyMasks {
     }
 }
 
+/// The least of the `count` largest gradients: a threshold that so many reach, or more if some are equal. Infinite for none, 0 for all.
+pub fn least_of_largest(gradients: &[f32], count: usize) -> f32 {
+    match count {
+        0 => f32::INFINITY,
+        _ if count >= gradients.len() => 0.0,
+        _ => *gradients.to_vec().select_nth_unstable_by(count - 1, |a, b| b.total_cmp(a)).1,
+    }
+}
+
 /// Largest standard deviation of each Gaussian, world units, `[N]`.
 pub fn largest_scales(gaussians: &Gaussians) -> Vec<f32> {
     values(gaussians.log_scales.val().inner().max_dim(1).exp())

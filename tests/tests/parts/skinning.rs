@@ -7,7 +7,7 @@ use light4gs_model::ops::skinning::{SkinningInputs, skin};
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::random::Random;
 
-const INPUTS: [&str; 6] = ["means", "quats", "stillness", "anchors", "precisions", "poses"];
+const INPUTS: [&str; 6] = ["means", "orientations", "stillness", "anchors", "precisions", "poses"];
 /// The node that stands still.
 const STILL: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
@@ -25,7 +25,7 @@ impl Case {
         let mut uniform = |count: usize, low: f64, high: f64| (0..count).map(|_| random.uniform(low, high)).collect();
         let inputs = [
             uniform(3 * count, -1.0, 1.0),
-            uniform(4 * count, -1.0, 1.0),
+            uniform(7 * count, -1.0, 1.0),
             uniform((1 + affinities) * count, -3.0, 1.0),
             uniform((3 + affinities) * nodes, -1.0, 1.0),
             uniform(nodes, 0.5, 6.0),
@@ -36,7 +36,7 @@ impl Case {
 
     /// Columns of the inputs.
     fn columns(&self) -> [usize; 6] {
-        [3, 4, 1 + self.affinities, 3 + self.affinities, 1, 16]
+        [3, 7, 1 + self.affinities, 3 + self.affinities, 1, 16]
     }
 
     fn leaves(&self, device: &Device) -> [Tensor<2>; 6] {
@@ -56,8 +56,8 @@ impl Case {
         operation: impl Fn(SkinningInputs) -> Tensor<2>,
     ) -> (Vec<f32>, [Vec<f32>; 6]) {
         let leaves = self.leaves(&device.clone().autodiff());
-        let [means, quats, stillness, anchors, precisions, poses] = leaves.clone();
-        let moved = operation(SkinningInputs { means, quats, stillness, anchors, precisions, poses });
+        let [means, orientations, stillness, anchors, precisions, poses] = leaves.clone();
+        let moved = operation(SkinningInputs { means, orientations, stillness, anchors, precisions, poses });
         let weights: Vec<f32> = weights.iter().map(|weight| *weight as f32).collect();
         let weights = Tensor::<2>::from_data(TensorData::new(weights, moved.dims()), &moved.device());
         let gradients = (moved.clone() * weights).sum().backward();
@@ -66,7 +66,7 @@ impl Case {
 
     /// Every number of the output in float64, with weights as if the Gaussians were at `weighed` `[N, 3]`.
     fn twin(&self, weighed: &[f64]) -> Vec<f64> {
-        let [means, quats, stillness, anchors, precisions, poses] = &self.inputs;
+        let [means, orientations, stillness, anchors, precisions, poses] = &self.inputs;
         let [_, _, own, place, ..] = self.columns();
         let mut moved = Vec::new();
         for i in 0..stillness.len() / own {
@@ -91,10 +91,12 @@ impl Case {
             }
             let quat = |q: &[f64]| glam::DQuat::from_xyzw(q[1], q[2], q[3], q[0]);
             // Not `*`, which asks for unit quaternions in debug builds.
-            let (a, b) = (quat(&pose[12..]), quat(&quats[4 * i..]));
+            let (a, b) = (quat(&pose[12..]), quat(&orientations[7 * i..]));
             let (u, v) = (a.xyz(), b.xyz());
             moved.push(a.w * b.w - u.dot(v));
             moved.extend((a.w * v + b.w * u + u.cross(v)).to_array());
+            let vector = &orientations[7 * i + 4..7 * i + 7];
+            moved.extend((0..3).map(|row| (0..3).map(|k| pose[3 * row + k] * vector[k]).sum::<f64>()));
         }
         moved
     }
@@ -102,7 +104,7 @@ impl Case {
 
 /// The operation in plain ones.
 fn plain(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, quats, stillness, anchors, precisions, poses } = inputs;
+    let SkinningInputs { means, orientations, stillness, anchors, precisions, poses } = inputs;
     let device = means.device();
     let affinities = stillness.dims()[1] - 1;
     let places = anchors.clone().narrow(1, 0, 3);
@@ -116,10 +118,14 @@ fn plain(inputs: SkinningInputs) -> Tensor<2> {
     let weights = softmax(Tensor::cat(vec![logits, stillness.narrow(1, 0, 1)], 1), 1);
     let still = Tensor::<1>::from_floats(STILL.map(|value| value as f32), &device).unsqueeze::<2>();
     let pose = weights.matmul(Tensor::cat(vec![poses, still], 0));
-    let [p, m, q] = [pose.split(1, 1), means.split(1, 1), quats.split(1, 1)];
+    let [p, m, q] = [pose.split(1, 1), means.split(1, 1), orientations.split(1, 1)];
     let position = |row: usize| {
         let turned = p[3 * row].clone() * m[0].clone() + p[3 * row + 1].clone() * m[1].clone();
         turned + p[3 * row + 2].clone() * m[2].clone() + p[9 + row].clone()
+    };
+    let vector = |row: usize| {
+        let turned = p[3 * row].clone() * q[4].clone() + p[3 * row + 1].clone() * q[5].clone();
+        turned + p[3 * row + 2].clone() * q[6].clone()
     };
     let term = |a: usize, b: usize| p[12 + a].clone() * q[b].clone();
     Tensor::cat(
@@ -131,6 +137,9 @@ fn plain(inputs: SkinningInputs) -> Tensor<2> {
             term(0, 1) + term(1, 0) + term(2, 3) - term(3, 2),
             term(0, 2) - term(1, 3) + term(2, 0) + term(3, 1),
             term(0, 3) + term(1, 2) - term(2, 1) + term(3, 0),
+            vector(0),
+            vector(1),
+            vector(2),
         ],
         1,
     )
@@ -149,7 +158,7 @@ fn cases() -> impl Iterator<Item = (String, Case, Vec<f64>)> {
             let mut random = Random::new(300 + seed as u64);
             let case = Case::random(count, nodes, affinities, &mut random);
             let what = format!("{count} Gaussians, {nodes} nodes, {affinities} affinities");
-            (what, case, random.normals(7 * count))
+            (what, case, random.normals(10 * count))
         })
     })
 }
@@ -185,7 +194,7 @@ fn where_all_weights_but_one_are_lost() {
             case.inputs[0].iter_mut().for_each(|value| *value = f64::from((*value * place) as f32));
             case.inputs[2].fill(stillness);
             case.inputs[4].fill(precision);
-            let weights = random.normals(7 * 60);
+            let weights = random.normals(10 * 60);
             let what = format!("at {place}, precision {precision}, stillness {stillness}");
             // Where all exponents are 1e8, float32 decides which node is the nearest by rounding: there only numbers are asked for.
             let expected = case.run(&Device::flex(), &weights, plain);
@@ -219,7 +228,7 @@ fn gradients_against_differences_of_the_twin() {
     {
         let mut random = Random::new(320 + seed as u64);
         let case = Case::random(count, nodes, affinities, &mut random);
-        let weights = random.normals(7 * count);
+        let weights = random.normals(10 * count);
         let weighed = &case.inputs[0];
         let loss = |case: &Case| -> f64 {
             case.twin(weighed).iter().zip(&weights).map(|(value, weight)| value * weight).sum()
@@ -278,17 +287,17 @@ fn a_second_run_gives_the_same_bits() {
 fn tensors_may_lie_in_memory_as_they_like() {
     let mut random = Random::new(330);
     let case = Case::random(50, 6, 2, &mut random);
-    let weights = random.normals(7 * 50);
+    let weights = random.normals(10 * 50);
     for (name, device) in devices() {
         let expected = case.run(&device, &weights, skin);
         let found = case.run(&device, &weights, |inputs| {
-            let SkinningInputs { means, quats, stillness, anchors, precisions, poses } = inputs;
-            let gaussians = Tensor::cat(vec![stillness, means, quats], 1);
+            let SkinningInputs { means, orientations, stillness, anchors, precisions, poses } = inputs;
+            let gaussians = Tensor::cat(vec![stillness, means, orientations], 1);
             let nodes = Tensor::cat(vec![poses.transpose(), precisions.transpose(), anchors.transpose()], 0);
             let rows = |first: usize, last: usize| nodes.clone().narrow(0, first, last - first).transpose();
             skin(SkinningInputs {
                 means: gaussians.clone().narrow(1, 3, 3),
-                quats: gaussians.clone().narrow(1, 6, 4),
+                orientations: gaussians.clone().narrow(1, 6, 7),
                 stillness: gaussians.narrow(1, 0, 3),
                 anchors: rows(17, 22),
                 precisions: rows(16, 17),
@@ -315,5 +324,5 @@ fn no_gaussian_is_no_error() {
 fn a_wrong_shape_is_named() {
     let mut case = Case::random(5, 3, 0, &mut Random::new(340));
     case.inputs[4].push(1.0);
-    case.run(&Device::flex(), &[0.0; 35], skin);
+    case.run(&Device::flex(), &[0.0; 50], skin);
 }

@@ -9,14 +9,15 @@ mod common;
 
 use common::compression::{ALL_PARTS, ShKind, compact_shape, input, scene, sh_networks, tiny};
 
-const NODES: [&[u8]; 3] = [
+const NODES: [&[u8]; 4] = [
     include_bytes!("../../../golden-streams/nodes.l4gs"),
     include_bytes!("../../../golden-streams/lifetimes.l4gs"),
     include_bytes!("../../../golden-streams/affinities.l4gs"),
+    include_bytes!("../../../golden-streams/shading.l4gs"),
 ];
 
 /// Streams that together contain everything: without loss, in both profiles, with every model of the spherical
-/// harmonics, with control nodes, lifetimes and affinities, with many Gaussians, with long frequency tables.
+/// harmonics, with control nodes, lifetimes, affinities and shading, with many Gaussians, with long frequency tables.
 pub(crate) fn streams() -> Vec<Parts> {
     let mut streams = vec![encode(&common::sample()).expect("sound")];
     streams.extend(NODES.map(<[u8]>::to_vec));

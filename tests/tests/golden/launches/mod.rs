@@ -207,7 +207,7 @@ fn skinning(transcript: &mut Transcript) {
             let (gaussians, nodes) = (777, 21);
             let moved = skin(SkinningInputs {
                 means: tensor(gaussians, 3, -1.0, 1.0),
-                quats: tensor(gaussians, 4, -1.0, 1.0),
+                orientations: tensor(gaussians, 7, -1.0, 1.0),
                 stillness: tensor(gaussians, 1 + affinities, -3.0, 1.0),
                 anchors: tensor(nodes, 3 + affinities, -1.0, 1.0),
                 precisions: tensor(nodes, 1, 0.5, 6.0),

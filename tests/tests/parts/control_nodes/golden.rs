@@ -13,8 +13,13 @@ use light4gs_train::compression::{Compression, ConfiguredModels, encode};
 use light4gs_train::config::Config;
 
 const FOLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams");
-/// Names, whether Gaussians come and go, and how many affinities they have.
-const STREAMS: [(&str, bool, usize); 3] = [("nodes", false, 0), ("lifetimes", true, 0), ("affinities", false, 2)];
+/// Names, and the key that each has beside those of all.
+const STREAMS: [(&str, &str); 4] = [
+    ("nodes", "affinities=0"),
+    ("lifetimes", "lifetime=true"),
+    ("affinities", "affinities=2"),
+    ("shading", "shading=true"),
+];
 const GAUSSIANS: usize = 150;
 
 /// Everything that differs between Gaussians and nodes, far from its start.
@@ -29,6 +34,7 @@ impl ParameterMapper for Shaken {
             ("stillness", 6.0),
             ("lifetime", 1.2),
             ("affinity", 1.0),
+            ("shading", 0.5),
             ("quats", 0.5),
             ("sh", 0.2),
         ];
@@ -62,11 +68,10 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 #[ignore = "writes the golden streams anew, which only a change of the format may ask for"]
 fn write_golden_nodes() {
     let device = Device::flex().autodiff();
-    for (name, lifetime, affinities) in STREAMS {
+    for (name, own) in STREAMS {
         let keys = ["model.field=nodes", "model.nodes.count=12", "model.nodes.radius=0.25", "model.sh_degree=1"];
         let mut keys = keys.map(str::to_owned).to_vec();
-        keys.push(format!("model.nodes.lifetime={lifetime}"));
-        keys.push(format!("model.nodes.affinities={affinities}"));
+        keys.push(format!("model.nodes.{own}"));
         let config = Config::load("dnerf-cpu", &keys).unwrap();
         let scene = scene(&config, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
@@ -79,7 +84,7 @@ fn write_golden_nodes() {
 
 #[test]
 fn the_model_reads_the_golden_nodes_as_the_codec_does() {
-    for (name, lifetime, _) in STREAMS {
+    for (name, _) in STREAMS {
         let data = decode(&std::fs::read(format!("{FOLDER}/{name}.l4gs")).unwrap()).unwrap();
         let evaluator = MotionEvaluator::new(&data).unwrap();
         let scene: DynamicScene = DynamicScene::from_arrays(&data, &Device::flex()).unwrap();
@@ -88,11 +93,17 @@ fn the_model_reads_the_golden_nodes_as_the_codec_does() {
             let mut exact = data.gaussians.clone();
             evaluator.apply(&data.gaussians, time, 0..exact.len(), &mut exact);
             assert!(exact.means != data.gaussians.means, "nothing moves");
-            assert_eq!(exact.opacity_logits != data.gaussians.opacity_logits, lifetime, "{name}: what fades");
+            assert_eq!(
+                exact.opacity_logits != data.gaussians.opacity_logits,
+                name == "lifetimes",
+                "{name}: what fades"
+            );
+            assert_eq!(exact.sh_dc != data.gaussians.sh_dc, name == "shading", "{name}: what gets darker");
             let moved = scene.at(time);
             assert_close("means", exact.means.as_flattened(), &values_of(&moved.means), 1e-4);
             assert_close("quats", exact.quats.as_flattened(), &values_of(&moved.quats), 1e-4);
             assert_close("opacities", &exact.opacity_logits, &values_of(&moved.opacity_logits), 1e-4);
+            assert_close("colors", exact.sh_dc.as_flattened(), &values_of(&moved.sh_dc), 1e-4);
         }
     }
 }

@@ -5,11 +5,11 @@ mod relocation;
 mod survey;
 
 use burn::module::Param;
-use burn::tensor::{Device, Distribution, Tensor};
+use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Quat, Vec3};
 use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, SceneMeta, decode, encode};
-use light4gs_data::PointCloud;
+use light4gs_data::{PointCloud, SH_C0};
 use light4gs_model::parameters::{ParameterMapper, map_parameters};
 use light4gs_model::{
     BuiltInField, DeformationField, DynamicScene, DynamicSceneConfig, FinePosition, GaussiansConfig, MOST_KNOTS,
@@ -26,8 +26,18 @@ struct Shaken;
 
 impl ParameterMapper for Shaken {
     fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let shaken =
-            ["translations", "rotations", "log_radii", "stillness", "lifetime", "quats", "affinity", "affinities"];
+        let shaken = [
+            "translations",
+            "rotations",
+            "log_radii",
+            "stillness",
+            "lifetime",
+            "quats",
+            "affinity",
+            "affinities",
+            "shading",
+            "light",
+        ];
         if !shaken.iter().any(|name| path.ends_with(name)) {
             return parameter;
         }
@@ -51,7 +61,7 @@ fn many(gaussians: usize, config: NodesFieldConfig, device: &Device) -> DynamicS
     scene
 }
 
-fn configurations() -> [NodesFieldConfig; 6] {
+fn configurations() -> [NodesFieldConfig; 8] {
     let config = NodesFieldConfig::new;
     [
         config().with_nodes(9),
@@ -60,6 +70,8 @@ fn configurations() -> [NodesFieldConfig; 6] {
         config().with_nodes(5).with_lifetime(true),
         config().with_nodes(9).with_affinities(2),
         config().with_nodes(7).with_affinities(3).with_stillness(None).with_lifetime(true),
+        config().with_nodes(6).with_shading(true),
+        config().with_nodes(7).with_affinities(2).with_lifetime(true).with_shading(true),
     ]
 }
 
@@ -74,12 +86,43 @@ fn nothing_moves_when_motion_begins() {
     }
 }
 
+/// All Gaussians turned upside down, which face a light from above a little.
+struct UpsideDown;
+
+impl ParameterMapper for UpsideDown {
+    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let rows: &[f32] = match path.rsplit('.').next() {
+            // Half a turn about x, less (1, 0, 0, 0).
+            Some("rotations") => &[-1.0, 1.0, 0.0, 0.0],
+            Some("shading") => &[0.0, 0.0, 0.2],
+            Some("light") => &[0.0, 0.0, 2.0],
+            _ => return parameter,
+        };
+        let (dims, device) = (parameter.dims(), parameter.device());
+        let count = dims.iter().product::<usize>() / rows.len();
+        Param::from_tensor(Tensor::from_data(TensorData::new(rows.repeat(count), dims), &device))
+    }
+}
+
+/// Brightness changes by `(R v - v) · light`: with v = (0, 0, 0.2) upside down under a light of 2, by -0.8.
+#[test]
+fn what_turns_away_from_the_light_gets_darker() {
+    for (name, device) in devices() {
+        let config = NodesFieldConfig::new().with_nodes(1).with_shading(true).with_stillness(None);
+        let scene = map_parameters(scene(config, &device), &mut UpsideDown);
+        let brightness = |sh_dc: &Tensor<3>| values_of(&(sh_dc.clone() * SH_C0 + 0.5));
+        let at_rest = brightness(&scene.gaussians.sh_dc.val());
+        let expected: Vec<f32> = at_rest.iter().map(|value| 0.2 * value).collect();
+        assert_close(name, &brightness(&scene.at(0.3).sh_dc), &expected, 1e-6);
+    }
+}
+
 /// The codec runs what a file describes, and finds the Gaussians where the model has them.
 #[test]
 fn the_codec_moves_gaussians_as_the_model_does() {
     for (name, device) in devices() {
         for config in configurations() {
-            let scene = map_parameters(scene(config, &device), &mut Shaken);
+            let scene = map_parameters(scene(config.clone(), &device), &mut Shaken);
             let data = decode(&encode(&scene.to_arrays(SceneMeta::default()).unwrap()).unwrap()).unwrap();
             let evaluator = MotionEvaluator::new(&data).unwrap();
             for time in [0.0, 0.37, 1.0] {
@@ -90,6 +133,8 @@ fn the_codec_moves_gaussians_as_the_model_does() {
                 assert_close(name, exact.means.as_flattened(), &values_of(&moved.means), 1e-4);
                 assert_close(name, exact.quats.as_flattened(), &values_of(&moved.quats), 1e-4);
                 assert_close(name, &exact.opacity_logits, &values_of(&moved.opacity_logits), 1e-4);
+                assert_close(name, exact.sh_dc.as_flattened(), &values_of(&moved.sh_dc), 1e-4);
+                assert_eq!(exact.sh_dc != data.gaussians.sh_dc, config.shading, "{name}: what gets darker");
             }
             let again = DynamicScene::<BuiltInField>::from_arrays(&data, &device).unwrap();
             assert_eq!(again.to_arrays(SceneMeta::default()).unwrap(), data, "{name}");

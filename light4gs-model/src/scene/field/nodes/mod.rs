@@ -13,6 +13,7 @@
 //! | `survey` | what all times have shown before a window widens |
 //! | `affinity` | which nodes a Gaussian follows beyond its place |
 //! | `lifetime` | what comes and goes |
+//! | `shading` | what turns away from the light |
 //! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
 //! | `plain` | nodes, Gaussians and poses as plain numbers |
@@ -24,6 +25,7 @@ mod placement;
 mod plain;
 mod regularizer;
 mod relocation;
+mod shading;
 mod stream;
 mod survey;
 mod trajectory;
@@ -39,6 +41,7 @@ use light4gs_codec::MotionArrays;
 
 pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
+pub use shading::SHADING;
 use trajectory::Poses;
 
 use super::{DeformationField, FinePosition, LearningRate, PositionGradients, Renewed, SceneAtRest};
@@ -85,6 +88,9 @@ pub struct NodesFieldConfig {
     /// Numbers by which each Gaussian learns which nodes it follows beyond its place; 0 to [`MOST_AFFINITIES`].
     #[config(default = 0)]
     pub affinities: usize,
+    /// Every Gaussian learns how its brightness changes as it turns.
+    #[config(default = false)]
+    pub shading: bool,
     /// Weight of the term that keeps neighboring nodes in place as seen from each other, for distances as shares of the
     /// scene's extent.
     #[config(default = 1.0)]
@@ -138,6 +144,8 @@ pub struct NodesField {
     rotations: Param<Tensor<2>>,
     /// `[B, H]`: the nodes' own affinities, where Gaussians have any.
     affinities: Option<Param<Tensor<2>>>,
+    /// `[1, 3]`: where light comes from, where brightness changes as Gaussians turn.
+    light: Option<Param<Tensor<2>>>,
     /// `[1 + K, 3 B]`, constants: after a survey, the middle of each node's object before anything moves, and knots of its way.
     ways: Option<Param<Tensor<2>>>,
     /// `[1]`, a constant: the scene's extent, world units.
@@ -158,6 +166,7 @@ impl NodesField {
             translations: zeros([knots, 3 * nodes]),
             rotations: zeros([knots, 4 * nodes]),
             affinities: (config.affinities > 0).then(|| zeros([nodes, config.affinities])),
+            light: config.shading.then(|| shading::first_light(device)),
             ways: None,
             unit: Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false),
             config,
@@ -175,7 +184,7 @@ impl NodesField {
         self.translations.dims()[0]
     }
 
-    /// Moved positions and quaternions `[N, 7]`, from what each node does to the space around it.
+    /// Moved positions, quaternions and shadings `[N, 10]`, from what each node does to the space around it.
     fn skinned(&self, canonical: &GaussianTensors, poses: Tensor<2>) -> Tensor<2> {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
@@ -187,9 +196,11 @@ impl NodesField {
             ),
             _ => (stillness, self.world_anchors()),
         };
+        let shading = canonical.further(SHADING).cloned();
+        let shading = shading.unwrap_or_else(|| canonical.means.zeros_like());
         skin(SkinningInputs {
             means: canonical.means.clone(),
-            quats: canonical.quats.clone(),
+            orientations: Tensor::cat(vec![canonical.quats.clone(), shading], 1),
             stillness,
             anchors,
             precisions: self.precisions(),
@@ -216,7 +227,8 @@ impl DeformationField for NodesField {
         };
         let affinity = (config.affinities > 0).then(|| affinity::attribute(config.affinities));
         let lifetime = config.lifetime.then(lifetime::attribute);
-        config.stillness.map(row).into_iter().chain(affinity).chain(lifetime).collect()
+        let shading = config.shading.then(shading::attribute);
+        config.stillness.map(row).into_iter().chain(affinity).chain(lifetime).chain(shading).collect()
     }
 
     /// One node that does not move, until there is a cloud to make more from.
@@ -233,7 +245,13 @@ impl DeformationField for NodesField {
             Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),
             _ => canonical.opacity_logits.clone(),
         };
-        GaussianTensors { means: part(0..3), quats: part(3..7), opacity_logits, ..canonical }
+        let sh_dc = match (canonical.further(SHADING), &self.light) {
+            (Some(shading), Some(light)) => {
+                shading::shaded(&canonical.sh_dc, shading.clone(), part(7..10), light.val())
+            }
+            _ => canonical.sh_dc.clone(),
+        };
+        GaussianTensors { means: part(0..3), quats: part(3..7), opacity_logits, sh_dc, ..canonical }
     }
 
     fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
