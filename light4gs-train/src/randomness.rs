@@ -20,6 +20,8 @@ pub(crate) enum Purpose {
     Rate,
     /// Random numbers of a deformation field.
     Motion,
+    /// Views and pixels at which Gaussians are added.
+    GuidedSampling,
 }
 
 /// A generator for one purpose at one position, which is an iteration or a pass over the data.

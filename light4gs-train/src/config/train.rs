@@ -2,7 +2,7 @@
 
 use light4gs_model::regularizer::PlaneRegularizer;
 
-use crate::density::{DensifyConfig, PruneConfig};
+use crate::density::{DensifyConfig, GuidedSamplingConfig, PruneConfig};
 use crate::keys::Bounds::{Flag, Kind, Number, Whole};
 use crate::keys::{INTERVAL, ITERATION, ITERATIONS, RATE, WEIGHT, keys, optional};
 use crate::loss::{LossKind, Losses};
@@ -52,6 +52,8 @@ keys! {
         densify: DensifyConfig;
         /// Dropping the least significant Gaussians.
         prune: PruneConfig;
+        /// Adding Gaussians where frames are not explained.
+        guided_sampling: GuidedSamplingConfig;
         /// Weights of the space-time regularizers, used in the fine stage.
         regularizer: RegularizerConfig;
     }

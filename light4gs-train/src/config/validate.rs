@@ -4,7 +4,7 @@ use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, check_resolution};
 use light4gs_codec::{CodecError, checks};
 use serde_json::Value;
 
-use super::model::MOST_PLANE_RESOLUTION;
+use super::model::{FieldKind, MOST_PLANE_RESOLUTION};
 use super::{
     CompressionConfig, Config, ConfigError, EvalConfig, HexPlaneTable, KEYS, Key, ModelConfig, Problem, TrainConfig,
 };
@@ -15,6 +15,7 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     hexplane(&mut check, &config.model.hexplane);
     deformation(&mut check, &config.model);
     train(&mut check, &config.train);
+    guided_sampling(&mut check, config);
     compression(&mut check, &config.compression);
     eval(&mut check, &config.eval);
     if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
@@ -71,6 +72,21 @@ fn train(check: &mut Check, train: &TrainConfig) {
         check.problems.push(Problem { key, message: problem });
     }
     prune(check, &train.prune, train, density.end());
+}
+
+/// What is there for a moment only needs a lifetime.
+fn guided_sampling(check: &mut Check, config: &Config) {
+    const KEY: &str = "train.guided_sampling.iterations";
+    let (iterations, most) = (&config.train.guided_sampling.iterations, config.train.fine_iterations);
+    for iteration in iterations {
+        check.that(KEY, (1..=most).contains(iteration), || {
+            format!("has {iteration}, but the fine stage has iterations 1 to {most}")
+        });
+    }
+    let lives = config.model.field == FieldKind::Nodes && config.model.nodes.lifetime;
+    check.that(KEY, iterations.is_empty() || lives, || {
+        "asks for Gaussians that come and go: set `model.field=nodes` and `model.nodes.lifetime=true`, or no iteration".to_owned()
+    });
 }
 
 fn prune(check: &mut Check, prune: &PruneConfig, train: &TrainConfig, densification_ends: usize) {

@@ -152,3 +152,16 @@ pub fn reset_opacity(gaussians: &mut GaussianEditor) {
 fn values<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.into_data().iter::<f32>().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::least_of_largest;
+
+    #[test]
+    fn so_many_reach_the_least_of_the_largest() {
+        let gradients = [0.3, 0.1, 0.5, 0.2];
+        for (count, least) in [(0, f32::INFINITY), (1, 0.5), (2, 0.3), (3, 0.2), (4, 0.0), (9, 0.0)] {
+            assert_eq!(least_of_largest(&gradients, count), least);
+        }
+    }
+}

@@ -11,6 +11,7 @@
 mod adaptive;
 pub mod clone_and_split;
 mod editor;
+mod guided_sampling;
 mod none;
 pub mod significance;
 mod statistics;
@@ -22,6 +23,7 @@ use rand::Rng;
 
 pub use adaptive::{AdaptiveDensityConfig, AdaptiveDensityControl};
 pub use editor::GaussianEditor;
+pub use guided_sampling::GuidedSamplingConfig;
 pub use none::NoDensityControl;
 pub use significance::{
     GaussianContributions, PruneConfig, PruneScore, PruneVolume, SignificanceScore, VolumeWeightedScore,

@@ -13,6 +13,7 @@
 //! [`DensityStrategy`], [`SignificanceScore`], [`Observer`] and [`ImageSource`].
 
 mod builder;
+mod guided_sampling;
 mod learning_rates;
 mod motion;
 pub mod profile;
@@ -249,6 +250,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let begin = Instant::now();
         let mut report = self.optimize(stage, iteration)?;
         self.control_density(stage, iteration);
+        if stage == Stage::Fine && self.config.train.guided_sampling.is_due(iteration) {
+            self.sample_guided(iteration)?;
+        }
         self.state.iteration = iteration;
         self.state.seconds += begin.elapsed().as_secs_f64();
         report.gaussians = self.state.scene.gaussians.len();

@@ -36,14 +36,19 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// Every training view, or one random view for each time.
     fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
-        if !self.config.train.prune.one_camera_per_time {
-            return self.data.train.iter().collect();
+        match self.config.train.prune.one_camera_per_time {
+            true => self.one_view_per_time(Purpose::PruningViews, iteration),
+            false => self.data.train.iter().collect(),
         }
+    }
+
+    /// One random training view for each time.
+    pub(super) fn one_view_per_time(&self, purpose: Purpose, iteration: usize) -> Vec<&Frame> {
         let mut by_time: BTreeMap<u32, Vec<&Frame>> = BTreeMap::new();
         for frame in &self.data.train {
             by_time.entry(frame.time.to_bits()).or_default().push(frame);
         }
-        let mut generator = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
+        let mut generator = generator(self.config.seed, purpose, Stage::Fine, iteration);
         by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()
     }
 }

@@ -9,7 +9,7 @@ use light4gs_codec::MotionArrays;
 use super::hexplane::HexPlaneField;
 use super::nodes::NodesField;
 use super::still::StillField;
-use super::{DeformationField, FinePosition, LearningRate, PositionGradients, Renewed, SceneAtRest};
+use super::{DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
@@ -99,6 +99,10 @@ macro_rules! built_in_fields {
                 position: &FinePosition,
             ) -> Vec<Renewed> {
                 each!(self, field => field.refine(scene, views, position))
+            }
+
+            fn passing(&self, attribute: &Attribute, moment: &Moment) -> Option<Vec<f32>> {
+                each!(self, field => field.passing(attribute, moment))
             }
 
             fn regularizer(&self, scene: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {

@@ -22,7 +22,9 @@ use light4gs_codec::MotionArrays;
 pub use built_in::{BuiltInField, BuiltInFieldConfig};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use hexplane::{HexPlaneField, HexPlaneFieldConfig};
-pub use nodes::{AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS};
+pub use nodes::{
+    AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, SHADING, STILLNESS,
+};
 pub use still::StillField;
 
 use super::arrays::ModelError;
@@ -103,6 +105,13 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
         Vec::new()
     }
 
+    /// The numbers of a further attribute for a Gaussian that stands still and is there around one moment only. `None`: as
+    /// the attribute starts.
+    fn passing(&self, attribute: &Attribute, moment: &Moment) -> Option<Vec<f32>> {
+        let _ = (attribute, moment);
+        None
+    }
+
     /// The field's own term `[1]` of the loss in an iteration of the fine stage, already weighted.
     fn regularizer(&self, scene: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
         let _ = (scene, position);
@@ -169,6 +178,15 @@ pub struct SceneAtRest<'a> {
     pub coordinates: &'a SceneCoordinates,
     /// Extent of the scene, world units: 1.1 times the largest distance of a training camera from their mean.
     pub extent: f32,
+}
+
+/// When something is there that comes and goes: a bell curve over time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Moment {
+    /// Its middle, in [0, 1].
+    pub time: f32,
+    /// Its standard deviation, above 0.
+    pub deviation: f32,
 }
 
 /// How the loss of a training view depends on the positions of the Gaussians.

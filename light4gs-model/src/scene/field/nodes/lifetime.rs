@@ -5,6 +5,7 @@ use light4gs_codec::network::{Network, Operation, Value};
 
 use super::stream::affine;
 use crate::scene::Attribute;
+use crate::scene::field::Moment;
 
 /// The attribute by which a Gaussian says when it is there, `[N, 2]`: the middle, and the logarithm of the standard deviation,
 /// in the scene's time.
@@ -18,6 +19,11 @@ const STEP: f64 = 0.03;
 
 pub(super) fn attribute() -> Attribute {
     Attribute::new(LIFETIME, 2).with_start(START.to_vec()).constant().with_learning_rate(RATE).with_step(STEP)
+}
+
+/// The lifetime of what is there around a moment.
+pub(super) fn of(moment: &Moment) -> Vec<f32> {
+    vec![moment.time, moment.deviation.ln()]
 }
 
 /// Opacity logits `[N, 1]` at a time: with the opacity `1 / (1 + e)`, where `e = exp(-logit)`, and the bell curve `b`, the new

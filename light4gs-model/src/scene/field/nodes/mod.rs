@@ -44,7 +44,7 @@ pub use lifetime::LIFETIME;
 pub use shading::SHADING;
 use trajectory::Poses;
 
-use super::{DeformationField, FinePosition, LearningRate, PositionGradients, Renewed, SceneAtRest};
+use super::{DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest};
 pub use crate::ops::skinning::MOST_AFFINITIES;
 use crate::ops::skinning::{SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
@@ -61,6 +61,8 @@ pub const MOST_KNOTS: usize = 512;
 /// How fast a Gaussian's stillness is learned, and its step in a file.
 const STILLNESS_RATE: f64 = 0.02;
 const STILLNESS_STEP: f64 = 0.25;
+/// A logit of standing still whose weight is next to 1.
+const FIRMLY_STILL: f32 = 8.0;
 /// A logit of standing still whose weight is 0.
 const NEVER_STILL: f32 = -1e30;
 
@@ -288,6 +290,14 @@ impl DeformationField for NodesField {
         position: &FinePosition,
     ) -> Vec<Renewed> {
         self.relocate(scene, views, position)
+    }
+
+    fn passing(&self, attribute: &Attribute, moment: &Moment) -> Option<Vec<f32>> {
+        match &*attribute.name {
+            LIFETIME => Some(lifetime::of(moment)),
+            STILLNESS => Some(vec![FIRMLY_STILL]),
+            _ => None,
+        }
     }
 
     fn regularizer(&self, _: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
