@@ -254,7 +254,7 @@ fn other_networks_are_refused() {
         spoil(motion.network.layers_mut().nth(index).unwrap());
     };
     let [anchors, translations, rotations, radii] = [0, 1, 2, 3];
-    refused("6 layers, expected 4 or 5", &|motion| {
+    refused("6 layers, expected 4", &|motion| {
         motion.network.constant(Value(0), 1, vec![1.0]);
         motion.network.constant(Value(0), 1, vec![1.0]);
     });
@@ -288,6 +288,19 @@ fn other_networks_are_refused() {
         ("of the affinities are [4, 4, 1], expected [4, 4, 8]", affinities(&|layer| layer.weight.truncate(1))),
         ("of the affinities are [4294967295, 4", affinities(&|layer| layer.outputs = u32::MAX)),
         ("one of the biases of the affinities is 1", affinities(&|layer| layer.bias[0] = 1.0)),
+    ] {
+        assert!(error.contains(expected), "{error}");
+    }
+    let with_shading = self::scene(NodesFieldConfig::new().with_nodes(4).with_shading(true), &Device::flex());
+    let light = |spoil: &dyn Fn(&mut Layer)| {
+        let mut arrays = with_shading.field.to_arrays().unwrap();
+        layer(arrays.network.as_mut().unwrap(), 4, spoil);
+        NodesField::from_arrays(&arrays, None, &Device::flex()).unwrap_err().to_string()
+    };
+    for (expected, error) in [
+        ("the light are [1, 1, 2], expected [1, 1, 3]", light(&|layer| layer.weight.truncate(2))),
+        ("the light are [4294967295, 1", light(&|layer| layer.outputs = u32::MAX)),
+        ("one of the biases of the light is 1", light(&|layer| layer.bias[0] = 1.0)),
     ] {
         assert!(error.contains(expected), "{error}");
     }

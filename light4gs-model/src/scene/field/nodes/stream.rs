@@ -253,26 +253,22 @@ impl NodesField {
         if !(4..=MOST_KNOTS).contains(&knots) {
             return Err(wrong(format!("{knots} knots, expected 4 to {MOST_KNOTS}")));
         }
-        for (name, layer, components, inputs) in [
-            ("anchors", anchors, 3, 1),
-            ("translations", translations, 3, knots),
-            ("rotations", rotations, 4, knots),
-            ("logarithms of radii", log_radii, 1, 1),
+        for (name, layer, outputs, inputs) in [
+            ("anchors", anchors, 3 * nodes, 1),
+            ("translations", translations, 3 * nodes, knots),
+            ("rotations", rotations, 4 * nodes, knots),
+            ("logarithms of radii", log_radii, nodes, 1),
         ]
         .into_iter()
-        .chain(affinities.map(|layer| ("affinities", *layer, 1, width)))
+        .chain(affinities.map(|layer| ("affinities", *layer, nodes, width)))
+        .chain(light.map(|layer| ("light", *layer, 1, 3)))
         {
             let found = [layer.outputs as usize, layer.bias.len(), layer.weight.len()];
-            let expected = [components * nodes, components * nodes, components * nodes * inputs];
+            let expected = [outputs, outputs, outputs * inputs];
             if found != expected {
                 let what = format!("outputs, biases and weights of the {name} are {found:?}, expected {expected:?}");
                 return Err(wrong(what));
             }
-        }
-        if let Some(layer) = light
-            && [layer.outputs as usize, layer.bias.len(), layer.weight.len()] != [1, 1, 3]
-        {
-            return Err(wrong("the direction of the light is not three numbers".to_owned()));
         }
         // What we do not keep must not do anything in the codec either.
         for (name, numbers) in [
