@@ -149,7 +149,7 @@ fn main() -> Outcome {
     // file.
     let coded = trainer.encode()?;
     let (record, _) = coded.coding.expect("the profile is a coded one");
-    let [planes, _] = record.parts();
+    let [planes, ..] = record.parts();
     println!("planes: {:.0} bits expected, {:.0} in the file", planes.expected, planes.coded);
     assert!((planes.expected / planes.coded - 1.0).abs() < 0.02);
     let decoded = decode(&coded.bytes)?;

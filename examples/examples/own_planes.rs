@@ -141,7 +141,7 @@ fn main() -> Outcome {
     // Coded: the file is as large as the model expects, and contains the list of its planes.
     let coded = trainer.encode()?;
     let (record, maps) = coded.coding.expect("the profile is a coded one");
-    let [planes, _] = record.parts();
+    let [planes, ..] = record.parts();
     println!("planes: {:.0} bits expected, {:.0} in the file", planes.expected, planes.coded);
     assert!((planes.expected / planes.coded - 1.0).abs() < 0.05);
     let names: Vec<String> = info(&coded.bytes)?.planes.planes().iter().map(|plane| plane.name()).collect();

@@ -117,7 +117,7 @@ fn main() -> Outcome {
     // Coded: the file has as many bits as the training expects.
     let coded = trainer.encode()?;
     let (record, _) = coded.coding.expect("the profile is a coded one");
-    let [_, sh] = record.parts();
+    let [_, sh, _] = record.parts();
     println!("spherical harmonics: {:.0} bits expected, {:.0} in the file", sh.expected, sh.coded);
     assert!((sh.expected / sh.coded - 1.0).abs() < 0.02);
 

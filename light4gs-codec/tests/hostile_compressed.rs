@@ -186,7 +186,7 @@ fn sections_and_encodings_that_do_not_belong() {
         forge_header(&mut bytes);
         decode(&bytes).unwrap_err()
     };
-    for (section, kind) in [(0, 0), (0, 2), (1, 4), (2, 3), (3, 0), (4, 3), (5, 2)] {
+    for (section, kind) in [(0, 0), (0, 2), (1, 5), (2, 3), (3, 0), (4, 3), (5, 2)] {
         let error = entry(section, 2, kind);
         assert!(matches!(error, CodecError::UnknownKind { .. }), "{section} {kind}: {error}");
     }

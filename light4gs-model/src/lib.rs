@@ -44,7 +44,7 @@ mod significance;
 pub mod spherical_harmonics;
 mod splatter;
 
-pub use attribute_entropy::{AttributeEntropy, CodedAttribute};
+pub use attribute_entropy::{AttributeEntropy, ChannelPrediction, CodedAttribute};
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;

@@ -18,6 +18,7 @@ pub mod memory;
 pub mod metrics;
 pub mod observers;
 pub mod optimization;
+pub mod pace;
 mod randomness;
 pub mod regularizer;
 pub mod report;

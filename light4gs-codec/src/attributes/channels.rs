@@ -17,14 +17,14 @@ const LARGEST_RESIDUAL: u32 = 1 << 16;
 const MOST_BEFORE: usize = 7;
 
 /// Writes the channels of an attribute, each with a value for every Gaussian.
-pub(super) fn encode(channels: &[Vec<i32>], neighbors: &[[u32; NEIGHBORS]]) -> Vec<u8> {
+pub(crate) fn encode(channels: &[Vec<i32>], neighbors: &[[u32; NEIGHBORS]]) -> Vec<u8> {
     let mut encoder = BitEncoder::default();
     code(&mut encoder, &mut channels.to_vec(), neighbors, true).expect("an encoder is never damaged");
     encoder.finish()
 }
 
 /// Reads `count` channels.
-pub(super) fn decode(bytes: &[u8], count: usize, neighbors: &[[u32; NEIGHBORS]]) -> Result<Vec<Vec<i32>>, Damaged> {
+pub(crate) fn decode(bytes: &[u8], count: usize, neighbors: &[[u32; NEIGHBORS]]) -> Result<Vec<Vec<i32>>, Damaged> {
     let mut channels = vec![vec![0; neighbors.len()]; count];
     code(&mut BitDecoder::new(bytes), &mut channels, neighbors, false)?;
     Ok(channels)

@@ -29,8 +29,9 @@
 //! # Ok::<(), light4gs_codec::CodecError>(())
 //! ```
 
-mod channels;
+pub(crate) mod channels;
 mod neighbors;
+mod order;
 mod position_grid;
 mod positions;
 mod prediction;
@@ -38,9 +39,12 @@ mod quantized;
 mod section;
 mod steps;
 
-use neighbors::{NEIGHBORS, nearest_before};
+pub use neighbors::NEIGHBORS;
+pub(crate) use neighbors::all_nearest_before;
+pub use order::CodingOrder;
+pub use prediction::least_squares;
 pub(crate) use position_grid::check_positions;
-use position_grid::{PositionGrid, morton_cell};
+use position_grid::{PositionGrid, cell_point, morton_cell};
 pub use quantized::typical_size;
 use quantized::{Quantized, join};
 pub use section::AttributeInfo;
@@ -199,8 +203,9 @@ fn read_quantized(
     drop(codes);
     let mut numbers = Numbers::default();
     numbers.add(positions, cells.iter().flat_map(|&cell| grid.mean(cell)).collect());
-    let neighbors = nearest_before(&cells);
-    drop(cells);
+    let points: Vec<_> = cells.into_iter().map(cell_point).collect();
+    let neighbors = all_nearest_before(&points);
+    drop(points);
 
     // The integers of one attribute are freed before those of the next are read.
     for attribute in others {
@@ -226,6 +231,17 @@ fn read_quantized(
 /// As [`encode`].
 pub fn quantized(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<GaussianArrays, CodecError> {
     Ok(Quantized::of(gaussians, steps)?.reconstructed())
+}
+
+/// Asks for what reading `numbers` of quantized channels of `count` Gaussians takes, neighbors included.
+pub(crate) fn ask_for_channels(
+    section: &'static str,
+    count: u64,
+    numbers: u64,
+    budget: &Budget,
+) -> Result<(), CodecError> {
+    budget.things(section, count, GAUSSIAN_BYTES, GAUSSIAN_NANOSECONDS)?;
+    budget.things(section, numbers, NUMBER_BYTES, NUMBER_NANOSECONDS)
 }
 
 /// The bytes of an attribute.

@@ -1,31 +1,33 @@
 //! For each Gaussian, the nearest ones of those that a decoder already has.
 
 /// How many neighbors a Gaussian has.
-pub(super) const NEIGHBORS: usize = 4;
+pub const NEIGHBORS: usize = 4;
 /// How far back in Morton order they are searched. Most Gaussians that are near in space are near in this order.
 const WINDOW: usize = 64;
 
-/// For each cell the indices of the nearest cells before it, nearest first; of two equally near ones, the later first.
+/// For each point the indices of the nearest points before it, as [`nearest_before`] finds them.
+pub(crate) fn all_nearest_before(points: &[[f64; 3]]) -> Vec<[u32; NEIGHBORS]> {
+    (0..points.len()).map(|index| nearest_before(points, index)).collect()
+}
+
+/// The indices of the nearest points before one, nearest first; of two equally near ones, the later first.
 ///
-/// The first cell has no neighbors: it gets its own index, which the caller must expect. The next few cells repeat
-/// their nearest neighbor. Only integers are compared, so all machines agree.
-pub(super) fn nearest_before(cells: &[[i32; 3]]) -> Vec<[u32; NEIGHBORS]> {
-    let mut found = Vec::with_capacity(cells.len());
-    for (index, cell) in cells.iter().enumerate() {
-        let mut nearest = [(i64::MAX, index); NEIGHBORS];
-        for other in (index.saturating_sub(WINDOW)..index).rev() {
-            let [x, y, z] = [0, 1, 2].map(|axis| i64::from(cell[axis] - cells[other][axis]));
-            let candidate = (x * x + y * y + z * z, other);
-            if candidate.0 < nearest[NEIGHBORS - 1].0 {
-                let place = nearest.partition_point(|kept| kept.0 <= candidate.0);
-                nearest[place..].rotate_right(1);
-                nearest[place] = candidate;
-            }
+/// The first point has no neighbors: it gets its own index, which the caller must expect. The next few points repeat
+/// their nearest neighbor. A distance is a sum of rounded squares in a fixed order, so all machines agree.
+pub(super) fn nearest_before(points: &[[f64; 3]], index: usize) -> [u32; NEIGHBORS] {
+    let point = points[index];
+    let mut nearest = [(f64::INFINITY, index); NEIGHBORS];
+    for other in (index.saturating_sub(WINDOW)..index).rev() {
+        let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - points[other][axis]);
+        let candidate = (x * x + y * y + z * z, other);
+        if candidate.0 < nearest[NEIGHBORS - 1].0 {
+            let place = nearest.partition_point(|kept| kept.0 <= candidate.0);
+            nearest[place..].rotate_right(1);
+            nearest[place] = candidate;
         }
-        let first = nearest[0].1;
-        found.push(nearest.map(|(distance, other)| if distance == i64::MAX { first } else { other } as u32));
     }
-    found
+    let first = nearest[0].1;
+    nearest.map(|(distance, other)| if distance == f64::INFINITY { first } else { other } as u32)
 }
 
 #[cfg(test)]
@@ -34,8 +36,9 @@ mod tests {
 
     #[test]
     fn neighbors_come_before() {
-        let cells = [[0, 0, 0], [9, 0, 0], [1, 0, 0], [1, 0, 0], [8, 0, 0], [0, 0, 1]];
-        assert_eq!(nearest_before(&cells), [[0; 4], [0; 4], [0, 1, 0, 0], [2, 0, 1, 2], [1, 3, 2, 0], [0, 3, 2, 4]]);
-        assert_eq!(nearest_before(&[]), [[0; 4]; 0]);
+        let points = [[0, 0, 0], [9, 0, 0], [1, 0, 0], [1, 0, 0], [8, 0, 0], [0, 0, 1]].map(|cell| cell.map(f64::from));
+        let expected = [[0; 4], [0; 4], [0, 1, 0, 0], [2, 0, 1, 2], [1, 3, 2, 0], [0, 3, 2, 4]];
+        assert_eq!(all_nearest_before(&points), expected);
+        assert_eq!(all_nearest_before(&[]), [[0; 4]; 0]);
     }
 }

@@ -57,6 +57,15 @@ impl PositionGrid {
         from_fn(|axis| index(mean[axis], self.step, self.origin[axis]).map_or(last, |index| index.clamp(0, last)))
     }
 
+    /// The rows of positions in the order of their Morton codes, and these codes, ascending.
+    pub(super) fn sorted(&self, means: &[[f32; 3]]) -> (Vec<u32>, Vec<u64>) {
+        let codes: Vec<u64> = means.iter().map(|&mean| morton_code(self.cell(mean))).collect();
+        let mut order: Vec<u32> = (0..means.len() as u32).collect();
+        order.sort_by_key(|&index| codes[index as usize]);
+        let codes = order.iter().map(|&index| codes[index as usize]).collect();
+        (order, codes)
+    }
+
     /// The position of a cell.
     pub(super) fn mean(&self, cell: [i32; 3]) -> [f32; 3] {
         from_fn(|axis| reconstruct(cell[axis], self.step, self.origin[axis]))
@@ -96,6 +105,11 @@ pub(crate) fn check_positions(means: &[[f32; 3]]) -> Result<(), CodecError> {
             Err(CodecError::invalid(SECTION, "means", format!("{value:e} in value {index}"), expected))
         }
     }
+}
+
+/// A cell as a point, in units of the grid's step: exact, as its squared distances are.
+pub(super) fn cell_point(cell: [i32; 3]) -> [f64; 3] {
+    cell.map(f64::from)
 }
 
 /// The Morton code of a cell: the bits of its coordinates taken in turn, x highest.

@@ -78,23 +78,13 @@ impl LinearPrediction {
         if neighbors.len() < FEWEST {
             return prediction;
         }
-        let size = prediction.weights.len();
-        // Normal equations, the right side as the last column.
-        let mut equations = vec![vec![0.0; size + 1]; size];
-        let mut row = vec![0.0; size + 1];
-        for (index, near) in neighbors.iter().enumerate() {
-            for (number, input) in row.iter_mut().zip(inputs(own, before, near, index)) {
+        let exact = least_squares(prediction.weights.len(), neighbors.len(), RIDGE, |index, row| {
+            for (number, input) in row.iter_mut().zip(inputs(own, before, &neighbors[index], index)) {
                 *number = input as f64;
             }
-            row[size] = own.centered(index) as f64;
-            for (equation, &number) in equations.iter_mut().zip(&row) {
-                equation.iter_mut().zip(&row).for_each(|(sum, other)| *sum += number * other);
-            }
-        }
-        for (diagonal, equation) in equations.iter_mut().enumerate() {
-            equation[diagonal] += RIDGE * neighbors.len() as f64;
-        }
-        for (weight, exact) in prediction.weights.iter_mut().zip(solve(equations)) {
+            own.centered(index) as f64
+        });
+        for (weight, exact) in prediction.weights.iter_mut().zip(exact) {
             *weight = (exact * f64::from(1 << FRACTION)).round() as i16;
         }
         prediction
@@ -116,6 +106,30 @@ impl LinearPrediction {
         // Only damaged streams have sums beyond 32 bits.
         own.mean.wrapping_add(rounded as i32)
     }
+}
+
+/// The weights with which `inputs` numbers predict another with the least squared error, over `count` examples. `example`
+/// sets the inputs of one of them, and returns what they predict. `ridge` is added to the diagonal of the normal equations
+/// for each example, so that inputs without variation do no harm.
+pub fn least_squares(
+    inputs: usize,
+    count: usize,
+    ridge: f64,
+    mut example: impl FnMut(usize, &mut [f64]) -> f64,
+) -> Vec<f64> {
+    // The right side is the last column.
+    let mut equations = vec![vec![0.0; inputs + 1]; inputs];
+    let mut row = vec![0.0; inputs + 1];
+    for index in 0..count {
+        row[inputs] = example(index, &mut row[..inputs]);
+        for (equation, &number) in equations.iter_mut().zip(&row) {
+            equation.iter_mut().zip(&row).for_each(|(sum, other)| *sum += number * other);
+        }
+    }
+    for (diagonal, equation) in equations.iter_mut().enumerate() {
+        equation[diagonal] += ridge * count as f64;
+    }
+    solve(equations)
 }
 
 /// Solves positive definite equations whose last column is the right side, by elimination.

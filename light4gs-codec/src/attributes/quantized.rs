@@ -2,8 +2,8 @@
 
 use super::{
     AttributeInfo, AttributeSteps, BitEncoder, NEIGHBORS, Numbers, PositionGrid, SECTION, channels, check,
-    neighbors::nearest_before,
-    position_grid::{morton_cell, morton_code},
+    neighbors::all_nearest_before,
+    position_grid::{cell_point, morton_cell},
     positions,
 };
 use crate::{
@@ -52,13 +52,10 @@ impl Quantized {
         let step = steps.of(positions.name).unwrap_or(positions.step);
         let grid = PositionGrid::new(means, step * typical_size(log_scales))?;
 
-        let codes: Vec<u64> = means.iter().map(|&mean| morton_code(grid.cell(mean))).collect();
-        let mut order: Vec<u32> = (0..means.len() as u32).collect();
-        order.sort_by_key(|&index| codes[index as usize]);
+        let (order, codes) = grid.sorted(means);
         let attributes = gaussians.attributes().filter(|attribute| attribute.name != SH_REST);
         let attributes = attributes.map(|attribute| QuantizedAttribute::of(attribute, steps, &order));
         let attributes = attributes.collect::<Result<_, _>>()?;
-        let codes = order.iter().map(|&index| codes[index as usize]).collect();
         Ok(Self { grid, order, codes, attributes })
     }
 
@@ -67,7 +64,7 @@ impl Quantized {
     }
 
     pub(super) fn neighbors(&self) -> Vec<[u32; NEIGHBORS]> {
-        nearest_before(&self.cells())
+        all_nearest_before(&self.cells().into_iter().map(cell_point).collect::<Vec<_>>())
     }
 
     /// The Gaussians as a decoder gets them.

@@ -60,6 +60,8 @@ pub enum Kind {
     ShTables,
     /// Spherical harmonics with distributions that networks give.
     ShNetworks,
+    /// Spherical harmonics, coded adaptively as other attributes.
+    ShChannels,
     /// Mean, principal axes and deviations of a cloud.
     SceneCoordinatesPrincipalAxes,
     /// The same, with a mapping of their coordinates other than the paper's.
@@ -75,11 +77,12 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 10] = [
+    const ALL: [Self; 11] = [
         Self::GaussiansExplicit,
         Self::ShExplicit,
         Self::ShTables,
         Self::ShNetworks,
+        Self::ShChannels,
         Self::SceneCoordinatesPrincipalAxes,
         Self::SceneCoordinatesMapped,
         Self::MotionDescription,
@@ -95,6 +98,7 @@ impl Kind {
             Self::ShExplicit => (Section::Sh, 1),
             Self::ShTables => (Section::Sh, 2),
             Self::ShNetworks => (Section::Sh, 3),
+            Self::ShChannels => (Section::Sh, 4),
             Self::SceneCoordinatesPrincipalAxes => (Section::SceneCoordinates, 1),
             Self::SceneCoordinatesMapped => (Section::SceneCoordinates, 2),
             Self::MotionDescription => (Section::Motion, 1),
@@ -117,7 +121,7 @@ impl Kind {
             | Self::SceneCoordinatesPrincipalAxes
             | Self::SceneCoordinatesMapped
             | Self::FeaturePlanesExplicit => &[Encoding::Float32],
-            Self::ShTables | Self::FeaturePlanesContextCoded => &[Encoding::Quantized],
+            Self::ShTables | Self::ShChannels | Self::FeaturePlanesContextCoded => &[Encoding::Quantized],
             _ => &[Encoding::Float32, Encoding::Quantized],
         }
     }
@@ -127,6 +131,7 @@ impl Kind {
         match self {
             Self::GaussiansExplicit | Self::ShExplicit | Self::FeaturePlanesExplicit => "explicit",
             Self::ShTables => "tables",
+            Self::ShChannels => "channels",
             Self::ShNetworks | Self::ContextModelNetworks => "networks",
             Self::SceneCoordinatesPrincipalAxes => "principal axes",
             Self::SceneCoordinatesMapped => "mapped principal axes",

@@ -2,7 +2,7 @@
 
 use crate::{
     CodecError, FeaturePlaneArrays, FrequencyTable, GaussianArrays, Limits, Network, SceneCoordinateArrays,
-    bytes::Section, limits::at_most, sh_rest_coefficients, steps::LEAST_STEP_IN_STREAM,
+    bytes::Section, limits::at_most, sh_rest_coefficients, steps::{LEAST_STEP_IN_STREAM, check_step},
 };
 
 pub(super) const SECTION: &str = Section::Sh.name();
@@ -23,6 +23,11 @@ pub enum ShCoding {
         step: f32,
         /// Each is for some channels, in the order of the channels. Together they are for all.
         priors: Vec<ShPrior>,
+    },
+    /// As other attributes: predicted from the Gaussians before, residuals coded adaptively, without a model in the file.
+    Channels {
+        /// Quantization step; a value is index times step.
+        step: f32,
     },
 }
 
@@ -105,7 +110,7 @@ impl Conditions<'_> {
 impl ShCoding {
     pub(crate) fn step(&self) -> f32 {
         match self {
-            Self::Tables { step, .. } | Self::Networks { step, .. } => *step,
+            Self::Tables { step, .. } | Self::Networks { step, .. } | Self::Channels { step } => *step,
         }
     }
 
@@ -124,6 +129,7 @@ impl ShCoding {
                 }
                 Ok(())
             }
+            Self::Channels { step } => check_step(SECTION, "step", *step, LEAST_STEP_IN_STREAM),
             Self::Networks { priors, .. } => {
                 check_priors(priors, channels as u64, features, limits)?;
                 for (index, prior) in priors.iter().enumerate() {

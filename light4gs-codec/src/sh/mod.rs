@@ -3,6 +3,7 @@
 //! Channels are `coefficient · 3 + color`. They fall into groups by degree, 9, 15 and 21 channels, and each group has
 //! a sub-stream of its own. Within a group symbols run Gaussian by Gaussian, channel by channel.
 
+mod channels;
 pub(crate) mod coding;
 mod networks;
 pub(crate) mod section;

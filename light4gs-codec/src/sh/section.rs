@@ -1,12 +1,14 @@
 //! The bytes of the spherical harmonics beyond degree 0.
 
 use super::{
+    channels,
     coding::{Conditions, SECTION, ShCoding, ShPrior, ShSource, check_priors, prior_name},
     walk::{HarmonicsModel, walk},
 };
 use crate::{
     CodecError, Distributions, GaussianArrays, Limits, Network,
     adaptive::Damaged,
+    attributes,
     budget::Budget,
     bytes::{
         Reader, Writer, check_length,
@@ -83,10 +85,11 @@ impl ShCoding {
         match self {
             Self::Tables { .. } => Kind::ShTables,
             Self::Networks { .. } => Kind::ShNetworks,
+            Self::Channels { .. } => Kind::ShChannels,
         }
     }
 
-    /// Writes tables or networks, and returns them as a decoder gets them.
+    /// Writes step and tables or networks, and returns them as a decoder gets them.
     fn write(&self, precision: Option<WeightPrecision>, writer: &mut Writer) -> Result<Self, CodecError> {
         writer.f32(self.step());
         match self {
@@ -94,6 +97,7 @@ impl ShCoding {
                 writer.block(&write_tables(tables));
                 Ok(self.clone())
             }
+            Self::Channels { .. } => Ok(self.clone()),
             Self::Networks { step, priors } => {
                 writer.varint(priors.len() as u64);
                 for ShPrior { network, sources } in priors {
@@ -120,6 +124,9 @@ impl ShCoding {
         let limits = &budget.limits;
         let step = reader.f32("step")?;
         let channels = 3 * sh_rest_coefficients(degree);
+        if kind == Kind::ShChannels {
+            return Ok(Self::Channels { step });
+        }
         if kind == Kind::ShTables {
             let block = reader.block("tables")?;
             let tables = read_tables(SECTION, "tables", block, channels, budget)?;
@@ -176,13 +183,19 @@ pub(crate) fn write(
     let coding = coding.write(precision, writer)?;
 
     let mut values = gaussians.sh_rest.clone();
-    let mut writers: Vec<SymbolWriter> = (0..degree).map(|_| SymbolWriter::default()).collect();
-    let mut model = HarmonicsModel::new(&coding, conditions);
-    walk(&mut model, coding.step(), degree, &mut values, &mut writers).map_err(|Damaged| {
-        let found = format!("more than 4194304 steps of {}", coding.step());
+    let step = coding.step();
+    let streams = match HarmonicsModel::new(&coding, conditions) {
+        None => channels::write(conditions.gaussians, step, degree, &mut values),
+        Some(mut model) => {
+            let mut writers: Vec<SymbolWriter> = (0..degree).map(|_| SymbolWriter::default()).collect();
+            walk(&mut model, step, degree, &mut values, &mut writers)
+                .map(|()| writers.iter().map(|writer| writer.finish(model.distributions())).collect())
+        }
+    };
+    let streams = streams.map_err(|Damaged| {
+        let found = format!("more than 4194304 steps of {step}");
         CodecError::invalid(SECTION, "a value of sh_rest", found, "fewer; make the step larger")
     })?;
-    let streams: Vec<_> = writers.iter().map(|writer| writer.finish(model.distributions())).collect();
     streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
     let model = (writer.bytes.len() - start) as u64;
     streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
@@ -210,7 +223,11 @@ pub(crate) fn read(
         return Ok((head, values));
     }
     budget.stream(SECTION, bytes.len())?;
-    budget.things(SECTION, head.values(), 4, READ_NANOSECONDS)?;
+    if kind == Kind::ShChannels {
+        attributes::ask_for_channels(SECTION, head.count.into(), head.values(), budget)?;
+    } else {
+        budget.things(SECTION, head.values(), 4, READ_NANOSECONDS)?;
+    }
     let coding = ShCoding::read(&mut reader, (kind, encoding), head.degree, conditions.features(), budget)?;
     coding.check(head.degree, conditions.features(), limits)?;
     if let ShCoding::Networks { priors, .. } = &coding {
@@ -220,12 +237,13 @@ pub(crate) fn read(
 
     let lengths = (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
     let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "symbols as an encoder writes them");
-    let mut readers = Vec::new();
-    for length in lengths {
-        readers.push(SymbolReader::new(reader.take("sub-stream", length)?).map_err(damaged)?);
-    }
+    let streams: Vec<&[u8]> =
+        lengths.into_iter().map(|length| reader.take("sub-stream", length)).collect::<Result<_, _>>()?;
     reader.finish()?;
-    let mut model = HarmonicsModel::new(&coding, conditions);
+    let Some(mut model) = HarmonicsModel::new(&coding, conditions) else {
+        return Ok((head, channels::read(conditions.gaussians, coding.step(), &streams).map_err(damaged)?));
+    };
+    let mut readers = streams.into_iter().map(SymbolReader::new).collect::<Result<Vec<_>, _>>().map_err(damaged)?;
     budget.time(SECTION, model.nanoseconds().saturating_mul(u64::from(head.count).div_ceil(LANES as u64)))?;
     let mut values = vec![0.0; head.values() as usize];
     walk(&mut model, coding.step(), head.degree, &mut values, &mut readers).map_err(damaged)?;
@@ -241,8 +259,8 @@ pub(crate) fn distributions(
     limits: &Limits,
 ) -> Result<Distributions, CodecError> {
     coding.check(gaussians.sh_degree, conditions.features(), limits)?;
-    let HarmonicsModel::Networks(mut networks) = HarmonicsModel::new(coding, conditions) else {
-        return Err(CodecError::invalid(SECTION, "coding", "tables", "networks"));
+    let Some(HarmonicsModel::Networks(mut networks)) = HarmonicsModel::new(coding, conditions) else {
+        return Err(CodecError::invalid(SECTION, "coding", coding.kind().name(), "networks"));
     };
     let (values, channels) = (&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree));
     let mut all = Distributions { scales: vec![0.0; values.len()], means: vec![0.0; values.len()] };

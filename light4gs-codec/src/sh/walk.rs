@@ -23,11 +23,14 @@ pub(super) enum HarmonicsModel<'a> {
 }
 
 impl<'a> HarmonicsModel<'a> {
-    /// From a coding that has been checked.
-    pub(super) fn new(coding: &'a ShCoding, conditions: Conditions<'a>) -> Self {
+    /// From a coding that has been checked; none for one without distributions.
+    pub(super) fn new(coding: &'a ShCoding, conditions: Conditions<'a>) -> Option<Self> {
         match coding {
-            ShCoding::Tables { tables, .. } => Self::Tables(tables.iter().map(|table| table.distribution()).collect()),
-            ShCoding::Networks { priors, .. } => Self::Networks(Networks::new(priors, conditions)),
+            ShCoding::Tables { tables, .. } => {
+                Some(Self::Tables(tables.iter().map(|table| table.distribution()).collect()))
+            }
+            ShCoding::Networks { priors, .. } => Some(Self::Networks(Networks::new(priors, conditions))),
+            ShCoding::Channels { .. } => None,
         }
     }
 

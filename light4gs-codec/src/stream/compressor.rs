@@ -89,8 +89,8 @@ pub fn encode_compressed_with_limits(
     let precision = compact(input.weights.sh);
     let (sh_rest, sh) = sh::section::write(&with_rest, &input.sh, precision, conditions, limits, &mut writer)?;
     let kind = input.sh.kind();
-    // Tables are entropy coded in either profile.
-    let encoding = if kind == Kind::ShTables { Encoding::Quantized } else { encoding_of(precision) };
+    // Harmonics are entropy coded in either profile; in that of the paper, the weights of networks are not.
+    let encoding = if kind == Kind::ShNetworks { encoding_of(precision) } else { Encoding::Quantized };
     push(&mut sections, kind, encoding, writer);
 
     let expected = SceneData {

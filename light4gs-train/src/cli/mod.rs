@@ -16,6 +16,7 @@ mod study;
 mod synth;
 mod train;
 mod view;
+mod wishes;
 
 use std::path::Path;
 use std::process::ExitCode;

@@ -11,6 +11,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
+use super::wishes::Wishes;
 use crate::compression::CodingRecord;
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
@@ -59,6 +60,8 @@ pub(super) struct Train {
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
+    #[command(flatten)]
+    wishes: Wishes,
     /// Replace an existing run.
     #[arg(long)]
     overwrite: bool,
@@ -71,12 +74,13 @@ impl Train {
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
         overrides.extend(self.format.as_ref().map(|layout| format!("data.layout={layout}")));
+        let automatic = self.config.is_none();
         let preset = match (self.config, self.format) {
             (Some(config), _) => config,
             (None, Some(layout)) => Config::preset_of(Layouts::default().by_name(&layout)?)?.to_owned(),
             (None, None) => Config::preset_of(Layouts::default().detect(&self.scene)?)?.to_owned(),
         };
-        let config = Config::load(&preset, &overrides)?;
+        let config = self.wishes.config(&preset, &overrides, &self.scene, automatic, self.output.quiet)?;
         train(config, &self.scene, &self.out, self.overwrite, &self.output)
     }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use light4gs_codec::{PlaneBytes, Profile, SceneData};
+use light4gs_codec::{Kind, PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
 use serde::{Deserialize, Serialize};
@@ -67,11 +67,12 @@ impl CodedPart {
 
 impl CodingRecord {
     /// The parts that have trained models.
-    pub fn parts(&self) -> [CodedPart; 2] {
+    pub fn parts(&self) -> [CodedPart; 3] {
         let (expected, coded) = (self.estimated_bits, self.coded_bits);
         [
             CodedPart { name: "feature planes", expected: expected.planes, coded: coded.planes },
             CodedPart { name: "spherical harmonics", expected: expected.sh, coded: coded.sh },
+            CodedPart { name: "other attributes", expected: expected.attributes, coded: coded.attributes },
         ]
     }
 }
@@ -165,12 +166,27 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     let sizes = &encoded.coded.report;
     let plane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
     let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
+    let gaussians = sizes.sections.iter().filter(|(_, kind, ..)| *kind == Kind::GaussiansExplicit);
+    let gaussian_bytes: u64 = gaussians.map(|(.., bytes)| bytes).sum();
+    // Without a model of their own, spherical harmonics are among the other attributes.
+    let (sh_bytes, with_sh) = if compression.sh.is_some() { (sh_bytes, 0) } else { (0, sh_bytes) };
+    // Only this profile quantizes attributes.
+    let models_attributes = profile == Profile::Compact && compression.learned_attributes().is_some();
+    let attribute_bytes = if models_attributes { gaussian_bytes + with_sh } else { 0 };
+    let mut estimate = encoded.coded.estimate;
+    if !models_attributes {
+        estimate.attributes = 0.0;
+    }
     let record = CodingRecord {
         profile: settings.profile,
         fit_seconds,
         encode_seconds: begin.elapsed().as_secs_f64(),
-        estimated_bits: encoded.coded.estimate,
-        coded_bits: BitEstimate { planes: 8.0 * plane_bytes as f64, sh: 8.0 * sh_bytes as f64 },
+        estimated_bits: estimate,
+        coded_bits: BitEstimate {
+            planes: 8.0 * plane_bytes as f64,
+            sh: 8.0 * sh_bytes as f64,
+            attributes: 8.0 * attribute_bytes as f64,
+        },
         planes: plane_records(&encoded, &compression),
     };
     Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })

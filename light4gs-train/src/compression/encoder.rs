@@ -69,8 +69,11 @@ impl BitMap {
 pub struct BitEstimate {
     /// Of the feature planes' values and latents.
     pub planes: f64,
-    /// Of the spherical harmonics beyond degree 0.
+    /// Of the spherical harmonics beyond degree 0, if they have a model of their own.
     pub sh: f64,
+    /// Of the other attributes of the Gaussians, if they have a model.
+    #[serde(default)]
+    pub attributes: f64,
 }
 
 /// Images for the search of attribute steps: `render` renders some training views as pixel values, `error` is the mean
@@ -176,7 +179,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     Ok(CompressionInput {
         profile,
         planes: compression.plane_coding(scene)?,
-        sh: compression.sh_coding(&data.gaussians, config.sh.step as f32)?,
+        sh: compression.sh_coding(&data.gaussians, config.sh.step as f32, profile)?,
         attributes,
         weights: WeightPrecisions {
             motion: WeightPrecision::Bits(config.weights.deformation_bits),
@@ -200,15 +203,21 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         }))
     }
 
-    fn sh_coding(&self, gaussians: &GaussianArrays, step: f32) -> Result<ShCoding, CodecError> {
-        match &self.sh {
-            Some(sh) => sh.to_coding(&gaussians.sh_rest),
+    /// How the spherical harmonics are coded. What neighbors tell about them is worth more than a density that is the same
+    /// for all Gaussians: the `compact` profile does without its tables.
+    fn sh_coding(&self, gaussians: &GaussianArrays, step: f32, profile: Profile) -> Result<ShCoding, CodecError> {
+        let coding = match &self.sh {
+            Some(sh) => sh.to_coding(&gaussians.sh_rest)?,
             None => {
                 let learned = self.learned_attributes().and_then(|models| models.step(&SH_REST.name));
                 let step = learned.map_or(step, checks::nearest_sh_step);
-                counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step)
+                counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step)?
             }
-        }
+        };
+        Ok(match (coding, profile) {
+            (ShCoding::Tables { step, .. }, Profile::Compact) => ShCoding::Channels { step },
+            (coding, _) => coding,
+        })
     }
 
     /// Bits that the models expect for a decoded scene; `device` is that of the models.
@@ -232,7 +241,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             }
             _ => counted_bits(&decoded.gaussians, coding),
         };
-        Ok(BitEstimate { planes: plane_bits, sh })
+        let attributes = self.learned_attributes().filter(|_| !decoded.gaussians.is_empty());
+        let attributes = attributes.map_or(0.0, |models| models.bits(scene.gaussians.tensors(), None).into_scalar());
+        Ok(BitEstimate { planes: plane_bits, sh, attributes })
     }
 
     /// The bit maps of a decoded scene's planes.

@@ -41,8 +41,8 @@ use crate::error::TrainError;
 pub struct Compression<C: Module = ContextModel, S: Module = ShEntropyModel> {
     /// Those of the feature planes, if the deformation field has any.
     pub planes: Option<PlaneModels<C>>,
-    /// That of the spherical harmonics beyond degree 0; models are made for degree 3. Lower degrees are coded with the
-    /// frequencies of their symbols; in the rate they are among the attributes.
+    /// That of the spherical harmonics beyond degree 0; models are made for degree 3. Lower degrees have
+    /// none; in the rate they are among the attributes.
     pub sh: Option<S>,
     /// That of the other attributes of the Gaussians, if the rate includes them.
     pub attributes: Option<AttributeEntropy>,

@@ -142,14 +142,14 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &sh_rest.device()));
 
         let [count, coefficients, colors] = sh_rest.dims();
-        let mut rows = |count: usize| {
-            let chosen = sample(generator, count, fraction);
-            let share = count as f64 / chosen.len() as f64;
-            let rows: Vec<i64> = chosen.iter().map(|row| *row as i64).collect();
-            (Tensor::<1, Int>::from_data(TensorData::new(rows, [chosen.len()]), &sh_rest.device()), share)
+        let mut rows = |count: usize| -> Vec<i64> {
+            sample(generator, count, fraction).into_iter().map(|row| row as i64).collect()
         };
         let sh = self.sh.as_ref().filter(|_| with_gaussians && count > 0).map(|sh| {
-            let (rows, share) = rows(count);
+            let rows = rows(count);
+            let share = count as f64 / rows.len() as f64;
+            let data = TensorData::new(rows.clone(), [rows.len()]);
+            let rows = Tensor::<1, Int>::from_data(data, &sh_rest.device());
             let known = match sh.tables() {
                 // Models with tables need none of these, and what is not computed does not stay on the tape.
                 Some(_) => ShKnown::nothing(&rows.device()),
@@ -159,7 +159,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         });
         let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
         let attributes = self.attributes.as_ref().filter(|_| with_gaussians && count > 0);
-        let attributes = attributes.map(|model| model.bits(scene.gaussians.tensors(), Some(rows(count).0)));
+        let attributes = attributes.map(|model| model.bits(scene.gaussians.tensors(), Some(&rows(count))));
         Rate { planes: plane_bits, plane_symbols, sh, sh_symbols: count * coefficients * colors, attributes }
     }
 }

@@ -168,8 +168,8 @@ keys! {
     /// The model of the spherical harmonics beyond degree 0.
     pub struct ShConfig {
         /// Entropy model of the spherical harmonics beyond degree 0: `"factorized"`, `"mixture_of_logistics"`,
-        /// `"channel_autoregressive"` or `"hexplane_coupled"`. It is trained for degree 3. Scenes of a lower degree are
-        /// coded with the frequencies of their symbols.
+        /// `"channel_autoregressive"` or `"hexplane_coupled"`. It is trained for degree 3. Scenes of a lower degree have
+        /// none. The file in the `compact` profile does without the first two: there neighbors tell more.
         model: ShModel = ShModel(ShKind::Factorized);
             Kind { names: ShKind::NAMES, list: "light4gs-model/src/sh/mod.rs" },
             "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";

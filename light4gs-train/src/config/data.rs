@@ -20,8 +20,8 @@ keys! {
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
             "reference, Neu3D: 300", "length of the sequence; 0 = all there are";
-        /// Images are resized so that their longer side has this many pixels, keeping their shape. 0 leaves them as
-        /// they are.
+        /// Larger images are reduced so that their longer side has this many pixels, keeping their shape. 0 leaves all as
+        /// they are. `train --pixels` sets it.
         #[serde(with = "optional")]
         resolution: Option<u32> = None;
             WholeOrNone { least: 8, most: 16_384 }, "ours", "pixels of the longer side; 0 = images as they are";

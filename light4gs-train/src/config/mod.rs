@@ -20,6 +20,7 @@ mod error;
 mod eval;
 mod layering;
 mod model;
+mod scaling;
 mod train;
 mod validate;
 

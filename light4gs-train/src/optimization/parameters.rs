@@ -24,7 +24,7 @@ pub enum ParameterGroup {
 
 /// Beginning of a path, a name that must occur later in it (or nothing), and the group. The first matching line
 /// decides. Parameters without a match, such as the scene's coordinates, are not trained.
-const GROUPS: [(&str, &str, ParameterGroup); 8] = [
+const GROUPS: [(&str, &str, ParameterGroup); 9] = [
     ("gaussians", "", ParameterGroup::Attribute),
     // The planes of any field: `field.hexplane.planes.3` for the built-in one.
     ("field", "planes", ParameterGroup::Planes),
@@ -34,6 +34,7 @@ const GROUPS: [(&str, &str, ParameterGroup); 8] = [
     ("compression.sh", "", ParameterGroup::ShModel),
     ("compression.attributes.log_steps", "", ParameterGroup::Steps),
     ("compression.attributes.mixture", "", ParameterGroup::ShModel),
+    ("compression.attributes.prediction", "", ParameterGroup::ShModel),
 ];
 
 impl ParameterGroup {

@@ -66,8 +66,8 @@ fn coding_record() -> CodingRecord {
         profile: crate::config::FileProfile::Compact,
         fit_seconds: None,
         encode_seconds: 0.5,
-        estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0 },
-        coded_bits: BitEstimate { planes: 536.0, sh: 1000.0 },
+        estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0, attributes: 0.0 },
+        coded_bits: BitEstimate { planes: 536.0, sh: 1000.0, attributes: 0.0 },
         planes: vec![plane],
     }
 }

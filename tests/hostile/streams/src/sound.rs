@@ -26,6 +26,7 @@ pub(crate) fn streams() -> Vec<Parts> {
         let (scene, input) = tiny(profile);
         add(&scene, &input);
         add(&scene, &CompressionInput { sh: sh_networks(ShKind::Everything, 2, 8), ..input.clone() });
+        add(&scene, &CompressionInput { sh: ShCoding::Channels { step: 0.02 }, ..input.clone() });
         add(&scene, &CompressionInput { planes: None, ..input });
     }
     let many = scene(400, 3, 4, [8, 8, 8, 4], &[1]);

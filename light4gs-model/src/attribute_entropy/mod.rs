@@ -1,13 +1,16 @@
 //! The bits of the attributes of Gaussians, and their learned quantization steps (docs/design.md).
 //!
 //! The codec codes attributes adaptively, from neighbors and from channels before (`light4gs_codec::attributes`). No
-//! such coder has a gradient. In training a density for each channel stands for it, and for positions the information
-//! of a set of points, which the codec's splitting of counts comes close to (Devillers and Gandoin 2000). Every attribute
-//! has one learned step. A rate on all attributes with learned steps is after HAC++ (Chen et al. 2025), which modulates
-//! the steps of each Gaussian besides.
+//! such coder has a gradient. In training each channel is predicted from the same values by a linear prediction, and a
+//! density of what is left stands for the coder: so the scene learns to be predictable. For positions stands the
+//! information of a set of points, which the codec's splitting of counts comes close to (Devillers and Gandoin 2000). Every
+//! attribute has one learned step. A rate on all attributes with learned steps is after HAC++ (Chen et al. 2025), which
+//! modulates the steps of each Gaussian besides.
+
+mod prediction;
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Distribution, Int, Tensor};
+use burn::tensor::{Device, Distribution, Int, Tensor, TensorData};
 use light4gs_codec::attributes::{AttributeSteps, typical_size};
 
 use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
@@ -15,6 +18,8 @@ use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
 use crate::ops::lower_bound::lower_bound;
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
+pub use prediction::ChannelPrediction;
+use prediction::neighbor_rows;
 
 /// Logistics of a channel's density.
 const COMPONENTS: usize = 3;
@@ -36,8 +41,11 @@ pub struct CodedAttribute {
 /// Densities and steps of the quantized attributes.
 #[derive(Module, Debug)]
 pub struct AttributeEntropy {
-    /// A channel for each number of each attribute except the positions, in the order of the attributes.
+    /// The densities of what predictions leave: a channel for each number of each attribute except the positions, in the
+    /// order of the attributes.
     pub mixture: LogisticMixture,
+    /// The predictions.
+    pub prediction: ChannelPrediction,
     /// `[A]`: natural logarithms of the steps. That of the positions is in units of `size`.
     pub log_steps: Param<Tensor<1>>,
     /// `[1]`, not trained: the typical size of the Gaussians that the model was started from, world units; 0 before.
@@ -54,21 +62,30 @@ impl AttributeEntropy {
     pub fn new(attributes: Vec<CodedAttribute>, device: &Device) -> Self {
         assert!(attributes.iter().all(|attribute| attribute.step > 0.0), "steps must be positive: {attributes:?}");
         let log_steps: Vec<f32> = attributes.iter().map(|attribute| attribute.step.ln()).collect();
-        let channels = attributes.iter().filter(|attribute| has_density(&attribute.name)).map(|a| a.width).sum();
+        let widths: Vec<usize> =
+            attributes.iter().filter(|attribute| has_density(&attribute.name)).map(|a| a.width).collect();
         Self {
-            mixture: LogisticMixtureConfig::new(channels).with_components(COMPONENTS).init(device),
+            mixture: LogisticMixtureConfig::new(widths.iter().sum()).with_components(COMPONENTS).init(device),
+            prediction: ChannelPrediction::new(&widths, device),
             log_steps: Param::from_tensor(Tensor::from_floats(log_steps.as_slice(), device)),
             size: Param::from_tensor(Tensor::zeros([1], device)),
             attributes,
         }
     }
 
-    /// Begins at the values of these Gaussians: densities as wide as their channels, and positions in units of the
-    /// Gaussians' size.
+    /// Begins at the values of these Gaussians: the best predictions, densities as wide as what these leave, and positions
+    /// in units of the Gaussians' size.
     pub fn start_from(&mut self, gaussians: &GaussianTensors) {
         let size = Tensor::from_floats([size_of(gaussians)], &off_tape(self.size.val()).device());
         replace(&mut self.size, size);
-        let values = self.channels(gaussians.clone().inner());
+        let gaussians = gaussians.clone().inner();
+        let rows: Vec<i64> = (0..gaussians.means.dims()[0] as i64).collect();
+        let near = self.channels(self.neighbors(&gaussians, &rows));
+        let own = self.channels(gaussians);
+        let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
+        let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
+        replace(&mut self.prediction.weights, off_tape(weights));
+        let values = off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), own), on_tape_of(&self.size.val(), near)));
         let least = self.widths(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
         // [C, 1].
         let means = values.clone().mean_dim(1);
@@ -102,21 +119,32 @@ impl AttributeEntropy {
     }
 
     /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.
-    /// Differentiable in the Gaussians, the steps and the densities. With `rows`, the densities see only these rows, and
-    /// the result is an estimate for all.
-    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<Tensor<1, Int>>) -> Tensor<1> {
+    /// Differentiable in the Gaussians, the steps, the predictions and the densities. With `rows`, the densities see only
+    /// these rows and their neighbors, and the result is an estimate for all.
+    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> Tensor<1> {
         let count = gaussians.means.dims()[0];
         let positions = self.position_bits(gaussians.means.clone());
-        let (gaussians, share) = match rows {
-            Some(rows) => {
-                let share = count as f64 / rows.dims()[0].max(1) as f64;
-                (gaussians.map(&mut Rows(rows)), share)
+        let all: Vec<i64>;
+        let (rows, own) = match rows {
+            Some(rows) => (rows, selected(&gaussians, rows)),
+            None => {
+                all = (0..count as i64).collect();
+                (all.as_slice(), gaussians.clone())
             }
-            None => (gaussians, 1.0),
         };
+        let share = count as f64 / rows.len().max(1) as f64;
+        let near = self.channels(self.neighbors(&gaussians, rows));
+        let residuals = self.prediction.residuals(self.channels(own), near);
         let widths = self.widths(self.log_steps.val().exp());
-        let likelihood = self.mixture.interval_likelihood(self.channels(gaussians), widths);
+        let likelihood = self.mixture.interval_likelihood(residuals, widths);
         positions + bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum() * share
+    }
+
+    /// The Gaussians from which each of some rows is predicted, one after the other.
+    fn neighbors(&self, gaussians: &GaussianTensors, rows: &[i64]) -> GaussianTensors {
+        let place = self.place(&MEANS.name);
+        let step = place.map_or(0.0, |place| self.step_values()[place] * self.size.val().into_scalar::<f32>());
+        selected(gaussians, &neighbor_rows(off_tape(gaussians.means.clone()), step, rows))
     }
 
     /// What a set of points takes that are uniform in their box: their cells one by one, without the order. It depends
@@ -216,6 +244,17 @@ fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
     let learns = parameter.is_require_grad();
     let value = if parameter.val().device().is_autodiff() { Tensor::from_inner(value) } else { value };
     *parameter = Param::initialized(parameter.id, value.set_require_grad(learns));
+}
+
+/// The same values on the tape's back end of another tensor, as constants.
+fn on_tape_of<const D: usize, const E: usize>(other: &Tensor<E>, values: Tensor<D>) -> Tensor<D> {
+    if other.device().is_autodiff() { Tensor::from_inner(values) } else { values }
+}
+
+/// Rows of all attributes.
+fn selected(gaussians: &GaussianTensors, rows: &[i64]) -> GaussianTensors {
+    let data = TensorData::new(rows.to_vec(), [rows.len()]);
+    gaussians.clone().map(&mut Rows(Tensor::from_data(data, &gaussians.means.device())))
 }
 
 struct Rows(Tensor<1, Int>);

@@ -1,0 +1,52 @@
+//! The order in which Gaussians are coded.
+
+use super::{
+    neighbors::{NEIGHBORS, nearest_before},
+    position_grid::{PositionGrid, cell_point, morton_cell},
+};
+use crate::CodecError;
+
+/// Which Gaussians each one is predicted from, for a training whose rate shall know it.
+///
+/// ```
+/// use light4gs_codec::attributes::CodingOrder;
+///
+/// let order = CodingOrder::new(&[[1.0, 0.0, 0.0], [0.0; 3], [0.9, 0.0, 0.0]], 0.1)?;
+/// // Coded are the second, the third, the first.
+/// assert_eq!(order.neighbors(0), [2, 1, 2, 2]);
+/// assert_eq!(order.neighbors(1), [1; 4]);
+/// # Ok::<(), light4gs_codec::CodecError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct CodingOrder {
+    /// The rows, in order.
+    rows: Vec<u32>,
+    /// The place of each row in the order.
+    places: Vec<u32>,
+    /// Cells, in order.
+    points: Vec<[f64; 3]>,
+}
+
+impl CodingOrder {
+    /// For positions that are rounded to a grid with this step, in world units.
+    ///
+    /// # Errors
+    /// Positions that are not finite, or beyond ±1e30.
+    pub fn new(means: &[[f32; 3]], step: f32) -> Result<Self, CodecError> {
+        let (rows, codes) = PositionGrid::new(means, step)?.sorted(means);
+        let mut places = vec![0; rows.len()];
+        for (place, &row) in rows.iter().enumerate() {
+            places[row as usize] = place as u32;
+        }
+        let points = codes.into_iter().map(|code| cell_point(morton_cell(code))).collect();
+        Ok(Self { rows, places, points })
+    }
+
+    /// The rows of the nearest Gaussians that are coded before one, nearest first. The first one has its own row.
+    ///
+    /// # Panics
+    /// If there is no such row.
+    pub fn neighbors(&self, row: usize) -> [u32; NEIGHBORS] {
+        nearest_before(&self.points, self.places[row] as usize).map(|place| self.rows[place as usize])
+    }
+}

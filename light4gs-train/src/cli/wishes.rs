@@ -1,0 +1,97 @@
+//! `--pixels` and `--minutes`: what a user wishes, as keys of the configuration.
+
+use std::path::Path;
+
+use clap::Args;
+use light4gs_data::Scene;
+
+use super::output::tell;
+use crate::config::Config;
+use crate::dataset::load_options;
+use crate::error::TrainError;
+use crate::pace::Pace;
+
+/// Shorter trainings are not worth an estimate.
+const FEWEST_ESTIMATED: usize = 1000;
+/// No schedule is made shorter than this share of its preset's: nothing could be seen in such a scene.
+const SHORTEST: f64 = 0.05;
+/// No schedule is made longer than this: the quality has long stopped growing.
+const LONGEST: f64 = 50.0;
+
+#[derive(Debug, Args)]
+pub(super) struct Wishes {
+    /// Train on images whose longer side has this many pixels; smaller ones stay as they are. The number of Gaussians
+    /// follows.
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(8..=16_384))]
+    pixels: Option<u32>,
+    /// Train for about this long on this machine, whose speed is measured before the start. The number of iterations
+    /// follows.
+    #[arg(long, value_name = "NUMBER", value_parser = minutes)]
+    minutes: Option<f64>,
+}
+
+impl Wishes {
+    /// The configuration that presets, wishes and overrides give; the overrides win. Where the preset is `automatic`,
+    /// the number of Gaussians follows the images even without a wish. Says how long the training will take, unless it
+    /// is short or `quiet`.
+    pub(super) fn config(
+        &self,
+        preset: &str,
+        overrides: &[String],
+        scene: &Path,
+        automatic: bool,
+        quiet: bool,
+    ) -> Result<Config, TrainError> {
+        let mut config = Config::load(preset, overrides)?;
+        let mut wishes = Vec::new();
+        let with = |wishes: &[String]| Config::load(preset, &[wishes, overrides].concat());
+        if let Some(pixels) = self.pixels.or(config.data.resolution.filter(|_| automatic)) {
+            // Without overrides, which may name a number of Gaussians that is meant for this size.
+            let presets = Config::load(preset, &[])?;
+            let data = Scene::open(scene, &load_options(&config))?;
+            let longest = data.train.iter().map(|frame| frame.source_width.max(frame.source_height)).max().unwrap_or(0);
+            wishes = presets.for_pixels(pixels, longest.max(1));
+            config = with(&wishes)?;
+        }
+        let estimated = !quiet && config.train.coarse_iterations + config.train.fine_iterations >= FEWEST_ESTIMATED;
+        if self.minutes.is_none() && !estimated {
+            return Ok(config);
+        }
+
+        let data = Scene::open(scene, &load_options(&config))?;
+        let camera = data.train.first().map(|frame| frame.camera.clone());
+        let pace = Pace::measure(&config, data)?;
+        if let Some(minutes) = self.minutes {
+            let factor = 60.0 * minutes / pace.training_seconds(&config);
+            if !(SHORTEST..=LONGEST).contains(&factor) {
+                let [least, most] = [SHORTEST, LONGEST].map(|factor| factor * pace.training_seconds(&config) / 60.0);
+                return Err(TrainError::Input(format!(
+                    "--minutes {minutes}: this scene takes {least:.1} to {most:.0} minutes on this machine; give a number \
+                     between them, or another --pixels"
+                )));
+            }
+            wishes.extend(config.for_schedule(factor));
+            config = with(&wishes)?;
+        }
+        if !quiet && let Some(camera) = camera {
+            let Config { train, .. } = &config;
+            tell(format_args!(
+                "{}×{} pixels, at most {} Gaussians, {} + {} iterations: about {:.1} minutes of training on this machine",
+                camera.width,
+                camera.height,
+                pace.full_count,
+                train.coarse_iterations,
+                train.fine_iterations,
+                pace.training_seconds(&config) / 60.0
+            ));
+        }
+        Ok(config)
+    }
+}
+
+fn minutes(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(minutes) if (0.01..=100_000.0).contains(&minutes) => Ok(minutes),
+        _ => Err("expected minutes, from 0.01 to 100000".to_owned()),
+    }
+}
