@@ -22,7 +22,7 @@ const GROWTH: usize = 12;
 /// Training views that are looked at, spread over all of them: their images are decoded once.
 const VIEWS: usize = 12;
 /// The share of the time between the first and the last cloning after which the most Gaussians are reached.
-const GROWN: f64 = 0.5;
+const GROWN: f64 = 0.3;
 
 /// Seconds of the iterations of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]

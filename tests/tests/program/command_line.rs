@@ -179,6 +179,42 @@ fn layers_on_top() {
 }
 
 #[test]
+fn wishes_become_keys() {
+    let w = Workspace::new(PROGRAM);
+    let key = |run: &str, name: &str| -> f64 {
+        let text = fs::read_to_string(w.path(run).join("config.toml")).unwrap();
+        let line = text.lines().find_map(|line| line.strip_prefix(name)?.strip_prefix(" = "));
+        line.unwrap_or_else(|| panic!("no {name} in {text}")).parse().unwrap()
+    };
+    // The preset has 10000 Gaussians for 200 pixels.
+    assert_success(&w.train("small", &[]).args(["--pixels", "16"]).output().unwrap());
+    assert_eq!((key("small", "resolution"), key("small", "max_gaussians")), (16.0, 291.0));
+    // What is set by hand wins.
+    let overrides = ["train.densify.adaptive.max_gaussians=400"];
+    assert_success(&w.train("by-hand", &overrides).args(["--pixels", "16"]).output().unwrap());
+    assert_eq!((key("by-hand", "resolution"), key("by-hand", "max_gaussians")), (16.0, 400.0));
+
+    let arguments = ["train", "scene", "--config", "dnerf-cpu+nodes", "--pixels", "16", "--minutes", "0.2"];
+    let output = w.command(arguments).args(["--set", "device=flex", "--out", "short"]).output().unwrap();
+    assert_success(&output);
+    let told = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(told.contains("16×16 pixels") && told.contains("about 0.2 minutes"), "{told}");
+    let [coarse, fine] = ["coarse_iterations", "fine_iterations"].map(|name| key("short", name));
+    assert!(fine < 12_000.0 && told.contains(&format!("{coarse} + {fine} iterations")), "{told}");
+
+    for (wish, words) in [
+        (["--minutes", "0"], ["--minutes", "minutes"]),
+        (["--minutes", "soon"], ["--minutes", "minutes"]),
+        (["--pixels", "7"], ["--pixels", "8"]),
+        (["--minutes", "50000"], ["--minutes 50000", "between"]),
+    ] {
+        let arguments = ["train", "scene", "--config", "dnerf-cpu+nodes", "--out", "never"];
+        assert_refused(&w.command(arguments).args(wish).args(["--set", "device=flex"]).output().unwrap(), &words);
+    }
+    assert!(!w.path("never").exists());
+}
+
+#[test]
 fn a_run_is_never_overwritten_by_accident() {
     let w = trained();
     let before = fs::read(w.path("run/scene.l4gs")).unwrap();
