@@ -83,7 +83,8 @@ impl Pace {
         let rate = if config.compression.rate.lambda > 0.0 { self.with_rate / self.full } else { 1.0 };
         // Planes have a rate while Gaussians are still added.
         let planes = config.model.field == FieldKind::HexPlane;
-        let rate_from = if planes { config.compression.rate.from } else { config.compression.rate.from.max(adaptive.until) };
+        let rate_from =
+            if planes { config.compression.rate.from } else { config.compression.rate.from.max(adaptive.until) };
 
         let end = train.fine_iterations;
         let [from, until] = [adaptive.from, adaptive.until].map(|iteration| iteration.min(end) as f64);

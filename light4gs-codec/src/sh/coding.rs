@@ -2,7 +2,10 @@
 
 use crate::{
     CodecError, FeaturePlaneArrays, FrequencyTable, GaussianArrays, Limits, Network, SceneCoordinateArrays,
-    bytes::Section, limits::at_most, sh_rest_coefficients, steps::{LEAST_STEP_IN_STREAM, check_step},
+    bytes::Section,
+    limits::at_most,
+    sh_rest_coefficients,
+    steps::{LEAST_STEP_IN_STREAM, check_step},
 };
 
 pub(super) const SECTION: &str = Section::Sh.name();

@@ -85,7 +85,8 @@ impl AttributeEntropy {
         let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
         let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
         replace(&mut self.prediction.weights, off_tape(weights));
-        let values = off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), own), on_tape_of(&self.size.val(), near)));
+        let values =
+            off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), own), on_tape_of(&self.size.val(), near)));
         let least = self.widths(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
         // [C, 1].
         let means = values.clone().mean_dim(1);

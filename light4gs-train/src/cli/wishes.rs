@@ -59,7 +59,7 @@ impl Wishes {
         }
 
         let data = Scene::open(scene, &load_options(&config))?;
-        let camera = data.train.first().map(|frame| frame.camera.clone());
+        let camera = data.train.first().map(|frame| frame.camera);
         let pace = Pace::measure(&config, data)?;
         if let Some(minutes) = self.minutes {
             let factor = 60.0 * minutes / pace.training_seconds(&config);
