@@ -7,9 +7,9 @@ use common::compression::{
     reference_shape, scene, sh_networks, sh_tables, step,
 };
 use light4gs_codec::{
-    CodecError, CompressionInput, ContextModelArrays, Distributions, Encoded, Kind, LatentArrays, Network, OpenStream,
-    PerGroup, PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, decode, encode_compressed,
-    encode_planes, info,
+    CodecError, CompressionInput, ContextModelArrays, Distributions, Encoded, GaussianArrays, Kind, LatentArrays,
+    Network, OpenStream, PerGroup, PlaneCoding, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, decode,
+    encode_compressed, encode_planes, info,
     network::{LayerKind, Operation, Value},
     plane_distributions,
     plane_layout::PlaneAxes,
@@ -286,6 +286,27 @@ fn harmonics_under_networks() {
             }
         }
     }
+}
+
+/// Harmonics that are alike in places take fewer bits than their values have digits.
+#[test]
+fn harmonics_are_predicted_from_neighbors() {
+    let mut scene = scene(3000, 1, 4, [4, 4, 4, 4], &[1]);
+    let GaussianArrays { means, sh_rest, .. } = &mut scene.gaussians;
+    let mut random = Random::new(5);
+    for (mean, row) in means.iter_mut().zip(sh_rest.chunks_exact_mut(9)) {
+        *mean = [0; 3].map(|_| random.uniform());
+        // Each number spans up to a hundred steps from one end of the scene to the other, in its own way.
+        for (number, value) in row.iter_mut().enumerate() {
+            *value = ((1.0 + 0.3 * number as f32) * mean[number % 3]).sin();
+        }
+    }
+    let sh = ShCoding::Channels { step: 0.02 };
+    let encoded =
+        round_trip(&scene, &CompressionInput { sh, ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS)) });
+    let bits = 8.0 * encoded.report.sh.degrees[0] as f64 / scene.gaussians.sh_rest.len() as f64;
+    assert!(bits < 0.6 * 100_f64.log2(), "{bits} bits a number");
+    assert!(bits > 0.5, "{bits} bits a number");
 }
 
 #[test]

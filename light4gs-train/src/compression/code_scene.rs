@@ -168,8 +168,13 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
     let gaussians = sizes.sections.iter().filter(|(_, kind, ..)| *kind == Kind::GaussiansExplicit);
     let gaussian_bytes: u64 = gaussians.map(|(.., bytes)| bytes).sum();
-    // Without a model of their own, spherical harmonics are among the other attributes.
-    let (sh_bytes, with_sh) = if compression.sh.is_some() { (sh_bytes, 0) } else { (0, sh_bytes) };
+    // Spherical harmonics that are coded as other attributes are among these, unless training had a model for them, which
+    // says nothing about this coding.
+    let (sh_bytes, with_sh) = match sizes.sections.iter().any(|(_, kind, ..)| *kind == Kind::ShChannels) {
+        true if compression.sh.is_some() => (0, 0),
+        true => (0, sh_bytes),
+        false => (sh_bytes, 0),
+    };
     // Only this profile quantizes attributes.
     let models_attributes = profile == Profile::Compact && compression.learned_attributes().is_some();
     let attribute_bytes = if models_attributes { gaussian_bytes + with_sh } else { 0 };

@@ -203,21 +203,23 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         }))
     }
 
-    /// How the spherical harmonics are coded. What neighbors tell about them is worth more than a density that is the same
-    /// for all Gaussians: the `compact` profile does without its tables.
+    /// How the spherical harmonics are coded.
     fn sh_coding(&self, gaussians: &GaussianArrays, step: f32, profile: Profile) -> Result<ShCoding, CodecError> {
-        let coding = match &self.sh {
-            Some(sh) => sh.to_coding(&gaussians.sh_rest)?,
-            None => {
+        match (&self.sh, profile) {
+            (Some(sh), Profile::Compact) if is_superseded(sh) => Ok(ShCoding::Channels { step: sh.step() }),
+            (Some(sh), _) => sh.to_coding(&gaussians.sh_rest),
+            (None, _) => {
                 let learned = self.learned_attributes().and_then(|models| models.step(&SH_REST.name));
                 let step = learned.map_or(step, checks::nearest_sh_step);
-                counted_sh_coding(&gaussians.sh_rest, 3 * sh_rest_coefficients(gaussians.sh_degree), step)?
+                match profile {
+                    Profile::Compact => Ok(ShCoding::Channels { step }),
+                    Profile::Paper => {
+                        let channels = 3 * sh_rest_coefficients(gaussians.sh_degree);
+                        counted_sh_coding(&gaussians.sh_rest, channels, step)
+                    }
+                }
             }
-        };
-        Ok(match (coding, profile) {
-            (ShCoding::Tables { step, .. }, Profile::Compact) => ShCoding::Channels { step },
-            (coding, _) => coding,
-        })
+        }
     }
 
     /// Bits that the models expect for a decoded scene; `device` is that of the models.
@@ -236,7 +238,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum()
         });
         let sh = match &self.sh {
-            Some(sh) if !decoded.gaussians.is_empty() => {
+            Some(sh) if !decoded.gaussians.is_empty() && !matches!(coding, ShCoding::Channels { .. }) => {
                 sh.bits(scene.gaussians.sh_rest.val(), &known(&scene, &planes, None)).sum().into_scalar()
             }
             _ => counted_bits(&decoded.gaussians, coding),
@@ -264,6 +266,12 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         };
         Ok(maps.into_iter().enumerate().map(map).collect())
     }
+}
+
+/// Whether the `compact` profile codes spherical harmonics without this model: what neighbors tell about them is worth more
+/// than a density that is the same for all Gaussians.
+pub(super) fn is_superseded(sh: &impl ShModel) -> bool {
+    sh.tables().is_some()
 }
 
 /// Bits according to the frequency tables themselves, where no model was trained.

@@ -3,8 +3,9 @@
 use burn::tensor::Device;
 use light4gs_model::{DeformationField, DynamicScene};
 
+use super::encoder::is_superseded;
 use super::{Compression, CompressionOf, EntropyModels};
-use crate::config::Config;
+use crate::config::{Config, FileProfile};
 use crate::divergence::Divergence;
 use crate::divergence::{not_finite_parameter, remedy};
 use crate::error::TrainError;
@@ -35,8 +36,9 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
     let context = decay(settings.context.learning_rate_init, settings.context.learning_rate_final);
     let sh = decay(settings.sh.learning_rate_init, settings.sh.learning_rate_final);
     compression.start_from(scene.planes());
-    if compression.planes.is_none() && compression.sh.is_none() {
-        // Neither planes nor a model of the spherical harmonics: no model is trained.
+    let superseded = settings.profile == FileProfile::Compact && compression.sh.as_ref().is_some_and(is_superseded);
+    if compression.planes.is_none() && (compression.sh.is_none() || superseded) {
+        // Nothing is coded with a model.
         return Ok(compression);
     }
     let mut adam = Adam::default();
