@@ -1,5 +1,7 @@
 //! For each Gaussian, the nearest ones of those that a decoder already has.
 
+use crate::parallel;
+
 /// How many neighbors a Gaussian has.
 pub const NEIGHBORS: usize = 4;
 /// How far back in Morton order they are searched. Most Gaussians that are near in space are near in this order.
@@ -7,7 +9,7 @@ const WINDOW: usize = 64;
 
 /// For each point the indices of the nearest points before it, as [`nearest_before`] finds them.
 pub(crate) fn all_nearest_before(points: &[[f64; 3]]) -> Vec<[u32; NEIGHBORS]> {
-    (0..points.len()).map(|index| nearest_before(points, index)).collect()
+    parallel::map(points.len(), |index| nearest_before(points, index))
 }
 
 /// The indices of the nearest points before one, nearest first; of two equally near ones, the later first.

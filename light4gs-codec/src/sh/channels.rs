@@ -6,6 +6,7 @@ use crate::{
     GaussianArrays,
     adaptive::{Damaged, index, reconstruct},
     attributes::{NEIGHBORS, all_nearest_before, channels},
+    parallel,
 };
 
 /// The largest index on either side of zero, as for the symbols of other codings.
@@ -41,10 +42,10 @@ pub(super) fn read(gaussians: &GaussianArrays, step: f32, streams: &[&[u8]]) -> 
     let width = width(streams.len());
     let neighbors = neighbors(gaussians);
     let mut values = vec![0.0; width * neighbors.len()];
-    for (degree, bytes) in (1..).zip(streams) {
-        let (offset, count) = group(degree);
-        let indices = channels::decode(bytes, count, &neighbors)?;
-        for (number, channel) in (offset..).zip(indices) {
+    let decoded = parallel::map(streams.len(), |at| channels::decode(streams[at], group(at + 1).1, &neighbors));
+    for (degree, indices) in (1..).zip(decoded) {
+        let (offset, _) = group(degree);
+        for (number, channel) in (offset..).zip(indices?) {
             for (row, found) in values.chunks_exact_mut(width).zip(channel) {
                 row[number] = reconstruct(legal(found)?, step, 0.0);
             }
