@@ -15,7 +15,7 @@ pub(crate) fn all_nearest_before(points: &[[f64; 3]]) -> Vec<[u32; NEIGHBORS]> {
 /// The indices of the nearest points before one, nearest first; of two equally near ones, the later first.
 ///
 /// The first point has no neighbors: it gets its own index, which the caller must expect. The next few points repeat
-/// their nearest neighbor. A distance is a sum of rounded squares in a fixed order, so all machines agree.
+/// their nearest neighbor. Points that are not a finite distance away are no neighbors; where all are, it is the one before. A distance is a sum of rounded squares in a fixed order, so all machines agree.
 pub(super) fn nearest_before(points: &[[f64; 3]], index: usize) -> [u32; NEIGHBORS] {
     let point = points[index];
     let mut nearest = [(f64::INFINITY, index); NEIGHBORS];
@@ -28,7 +28,8 @@ pub(super) fn nearest_before(points: &[[f64; 3]], index: usize) -> [u32; NEIGHBO
             nearest[place] = candidate;
         }
     }
-    let first = nearest[0].1;
+    // Points from a stream may be anywhere, even nowhere.
+    let first = if nearest[0].0 == f64::INFINITY { index.saturating_sub(1) } else { nearest[0].1 };
     nearest.map(|(distance, other)| if distance == f64::INFINITY { first } else { other } as u32)
 }
 
@@ -42,5 +43,15 @@ mod tests {
         let expected = [[0; 4], [0; 4], [0, 1, 0, 0], [2, 0, 1, 2], [1, 3, 2, 0], [0, 3, 2, 4]];
         assert_eq!(all_nearest_before(&points), expected);
         assert_eq!(all_nearest_before(&[]), [[0; 4]; 0]);
+    }
+
+    /// A decoder has nothing but what comes before.
+    #[test]
+    fn neighbors_come_before_even_if_positions_are_no_numbers() {
+        let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, f64::from(f32::MAX), 0.0];
+        let points: Vec<_> = (0..200).map(|i| [odd[i % 5], odd[i / 5 % 5], odd[i / 25 % 5]]).collect();
+        for (index, near) in all_nearest_before(&points).into_iter().enumerate() {
+            assert!(near.iter().all(|&other| (other as usize) < index.max(1)), "{index}: {near:?}");
+        }
     }
 }

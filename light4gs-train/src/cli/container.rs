@@ -101,10 +101,13 @@ impl Encode {
             other => other,
         })?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
-            if let Some(seconds) = record.fit_seconds {
+            let table = coding_table(&record);
+            if let Some(seconds) = record.fit_seconds.filter(|_| table.is_some()) {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;
             }
-            say(coding_table(&record))?;
+            if let Some(table) = table {
+                say(table)?;
+            }
         }
         Ok(())
     }

@@ -12,7 +12,7 @@ use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
 use super::wishes::Wishes;
-use crate::compression::CodingRecord;
+use crate::compression::{CodedPart, CodingRecord};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
@@ -298,8 +298,8 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
     }
     say(quality_table(evaluation))?;
     say(sections_table(evaluation.sections.iter().map(|s| (s.name.as_str(), s.bytes)), evaluation.bytes))?;
-    if let Some(coding) = &evaluation.coding {
-        say(coding_table(coding))?;
+    if let Some(table) = evaluation.coding.as_ref().and_then(coding_table) {
+        say(table)?;
     }
     let [width, height] = evaluation.resolution;
     say(format_args!(
@@ -324,19 +324,23 @@ fn quality_table(evaluation: &Evaluation) -> Table {
     table
 }
 
-/// Expected and written bits of the parts that are coded with trained models.
-pub(super) fn coding_table(record: &CodingRecord) -> Table {
+/// Expected and written bits of the parts that are coded with trained models, if there are any.
+pub(super) fn coding_table(record: &CodingRecord) -> Option<Table> {
+    let parts: Vec<_> = record.parts().into_iter().filter(CodedPart::is_modeled).collect();
+    if parts.is_empty() {
+        return None;
+    }
     let mut table = Table::new([
         ("entropy coded", Align::Left),
         ("bits expected", Align::Right),
         ("bits in the file", Align::Right),
         ("difference", Align::Right),
     ]);
-    for part in record.parts() {
+    for part in parts {
         let (expected, coded) = (format!("{:.0}", part.expected), format!("{:.0}", part.coded));
         table.row([part.name.to_owned(), expected, coded, part.difference()]);
     }
-    table
+    Some(table)
 }
 
 /// Bytes and shares of a file's parts.

@@ -55,6 +55,11 @@ pub struct CodedPart {
 }
 
 impl CodedPart {
+    /// Whether anything of it is in the file under a trained model.
+    pub fn is_modeled(&self) -> bool {
+        self.coded > 0.0 || self.expected.round() > 0.0
+    }
+
     /// The difference as a share of the bits in the file. If there are none, there is no share.
     pub fn difference(&self) -> String {
         match (self.coded > 0.0, self.expected.round() > 0.0) {
@@ -66,7 +71,7 @@ impl CodedPart {
 }
 
 impl CodingRecord {
-    /// The parts that have trained models.
+    /// The parts that may have trained models.
     pub fn parts(&self) -> [CodedPart; 3] {
         let (expected, coded) = (self.estimated_bits, self.coded_bits);
         [

@@ -11,15 +11,18 @@ use super::color_map::{css_gradient, inferno};
 use super::format::{count, fixed};
 use super::html::escape;
 use super::images::data_uri;
-use crate::compression::BitMap;
+use crate::compression::{BitMap, CodedPart};
 
 pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<String, DataError> {
     let Some(CodingReport { record, bit_maps }) = coding else { return Ok(String::new()) };
+    if !record.parts().iter().any(CodedPart::is_modeled) {
+        return Ok(String::new());
+    }
     let mut html = String::from(
         "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Part</th><th scope=\"col\" class=\"number\">Bits expected</th>\
          <th scope=\"col\" class=\"number\">Bits in the file</th><th scope=\"col\" class=\"number\">Difference</th></tr></thead>\n<tbody>\n",
     );
-    for part in record.parts() {
+    for part in record.parts().into_iter().filter(CodedPart::is_modeled) {
         let _ = writeln!(
             html,
             "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td><td class=\"number\">{}</td>\
