@@ -75,6 +75,30 @@ fn the_estimate_is_near_the_bytes_of_the_codec() {
     }
 }
 
+/// What neighbors and channels before tell is not in the estimate, as it is not in the file.
+#[test]
+fn the_estimate_knows_neighbors_and_channels_before() {
+    let device = Device::flex();
+    let mut gaussians = gaussians(&device);
+    let independent: f64 = model(&device, &gaussians.tensors()).bits(gaussians.tensors(), None).into_scalar();
+    let mut tensors = gaussians.tensors();
+    let [x, y, z] = [0, 1, 2].map(|axis| tensors.means.clone().narrow(1, axis, 1));
+    // Scales change slowly from place to place; the second and third color follow from the first.
+    tensors.log_scales = Tensor::cat(vec![(x * 2.0).sin(), (y * 2.0).cos(), (z * 2.0).sin()], 1) - 3.0;
+    let first = tensors.sh_dc.clone().narrow(2, 0, 1);
+    tensors.sh_dc = Tensor::cat(vec![first.clone(), first.clone() * 0.5, first * -0.8 + 0.3], 2);
+    gaussians.set_tensors(tensors);
+    let model = model(&device, &gaussians.tensors());
+    let bits: f64 = model.bits(gaussians.tensors(), None).into_scalar();
+    // Two of three colors are known but for rounding, and half of the bits of the scales.
+    let colors = 2.0 * 5.0 * COUNT as f64;
+    assert!(bits < independent - colors, "{bits} of {independent}");
+    let mut untold = model.clone();
+    untold.prediction.weights = Param::from_tensor(model.prediction.weights.val().zeros_like());
+    let blind: f64 = untold.bits(gaussians.tensors(), None).into_scalar();
+    assert!(bits < 0.9 * blind, "{bits}, without predictions {blind}");
+}
+
 #[test]
 fn rows_stand_for_all() {
     let device = Device::flex();
