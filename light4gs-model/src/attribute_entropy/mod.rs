@@ -175,6 +175,12 @@ impl AttributeEntropy {
             .clamped()
     }
 
+    /// All steps become coarser by a factor.
+    pub fn scale_steps(&mut self, factor: f32) {
+        let steps = off_tape(self.log_steps.val()) + factor.ln();
+        replace(&mut self.log_steps, steps);
+    }
+
     /// The learned step of an attribute by name, if it has one; that of the positions in units of `size`.
     pub fn step(&self, attribute: &str) -> Option<f32> {
         self.place(attribute).map(|place| self.step_values()[place])

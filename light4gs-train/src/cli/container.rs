@@ -20,6 +20,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::FitBar;
 use super::output::{say, say_json};
 use super::train::{coding_table, sections_table};
+use super::wishes::bytes;
 use crate::compression::{CodedScene, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
@@ -45,6 +46,9 @@ pub(super) struct Encode {
     /// steps that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
+    /// The file has at most so many bytes, such as 300k or 2M, and hardly fewer: steps of attributes become coarser or finer.
+    #[arg(long, value_name = "NUMBER", value_parser = bytes)]
+    target_bytes: Option<usize>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
@@ -73,7 +77,9 @@ impl Encode {
             Some(dataset) => Scene::open(dataset, &load_options(&config))?,
             None => scene_around(&checkpoint.scene.gaussians.to_arrays(), folder.root(), config.data.background)?,
         };
-        let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &self.overrides)?;
+        let size = self.target_bytes.map(|bytes| format!("compression.target_bytes={bytes}"));
+        let overrides: Vec<String> = size.into_iter().chain(self.overrides).collect();
+        let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &overrides)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
             return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
         }

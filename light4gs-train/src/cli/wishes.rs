@@ -1,4 +1,4 @@
-//! `--pixels` and `--minutes`: what a user wishes, as keys of the configuration.
+//! `--pixels`, `--minutes` and `--target-bytes`: what a user wishes, as keys of the configuration.
 
 use std::path::Path;
 
@@ -28,6 +28,10 @@ pub(super) struct Wishes {
     /// follows.
     #[arg(long, value_name = "NUMBER", value_parser = minutes)]
     minutes: Option<f64>,
+    /// The file shall have at most so many bytes, such as 300k or 2M, and hardly fewer. How many Gaussians stay, and what a
+    /// byte weighs in the loss, follow.
+    #[arg(long, value_name = "NUMBER", value_parser = bytes)]
+    target_bytes: Option<usize>,
 }
 
 impl Wishes {
@@ -51,6 +55,10 @@ impl Wishes {
             let data = Scene::open(scene, &load_options(&config))?;
             let longest = data.train.iter().map(|frame| frame.source_width.max(frame.source_height)).max().unwrap_or(0);
             wishes = presets.for_pixels(pixels, longest.max(1));
+            config = with(&wishes)?;
+        }
+        if let Some(bytes) = self.target_bytes {
+            wishes.extend(config.for_target_bytes(bytes));
             config = with(&wishes)?;
         }
         let estimated = !quiet && config.train.coarse_iterations + config.train.fine_iterations >= FEWEST_ESTIMATED;
@@ -86,6 +94,18 @@ impl Wishes {
             ));
         }
         Ok(config)
+    }
+}
+
+/// A number of bytes, with `k` for thousands or `M` for millions.
+pub(super) fn bytes(text: &str) -> Result<usize, String> {
+    let (digits, unit) = match text.strip_suffix(['k', 'K']) {
+        Some(digits) => (digits, 1e3),
+        None => text.strip_suffix('M').map_or((text, 1.0), |digits| (digits, 1e6)),
+    };
+    match digits.parse::<f64>().map(|number| (number * unit).round()) {
+        Ok(bytes) if (1e3..=1e12).contains(&bytes) => Ok(bytes as usize),
+        _ => Err("expected bytes, from 1000 to 10^12, such as 300000, 300k or 2.5M".to_owned()),
     }
 }
 

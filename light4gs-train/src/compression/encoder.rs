@@ -12,7 +12,7 @@ use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, Latent, Plan
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
-use super::{Compression, ShModel, attribute_step_search};
+use super::{Compression, ShModel, attribute_step_search, size_target};
 use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
@@ -108,11 +108,42 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         let found = attribute_step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
         input.attributes = found.unwrap_or(input.attributes);
     }
-    let encoded = encode_compressed(&data, &input)?;
+    let encoded = match config.target_bytes {
+        0 => encode_compressed(&data, &input)?,
+        target => {
+            let file = size_target::encode_to_size(&data, &input, target)?;
+            if let Some(models) = &mut compression.attributes {
+                models.scale_steps(file.factor);
+            }
+            input = file.input;
+            file.encoded
+        }
+    };
     let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;
     let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
     let coded = CodedSizes { report: encoded.report, estimate, bit_maps };
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
+}
+
+/// Bytes of a scene's file as it stands, with the steps that training has learned so far: those of its Gaussians, and all
+/// others. No step is searched for.
+///
+/// # Errors
+/// What the codec refuses.
+pub fn size_so_far<F: DeformationField, C: PlaneEntropy, S: ShModel>(
+    scene: &DynamicScene<F>,
+    compression: &Compression<C, S>,
+    config: &CompressionConfig,
+) -> Result<[u64; 2], TrainError> {
+    let (scene, compression) = (&scene.valid(), &mut compression.valid());
+    let data = scene.to_arrays(SceneMeta::default())?;
+    let input = compression_input(compression, scene, &data, config, Profile::Compact)?;
+    let report = encode_compressed(&data, &input)?.report;
+    let mut bytes = [0, report.header_bytes];
+    for (name, .., section) in &report.sections {
+        bytes[usize::from(!matches!(*name, "gaussians" | "sh"))] += section;
+    }
+    Ok(bytes)
 }
 
 /// Rounds in which [`freeze_planes`] looks for planes that no longer change.

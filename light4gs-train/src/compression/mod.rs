@@ -8,6 +8,7 @@
 //! - `code_scene`: from a trained scene to a file, with a record of expected and written bits
 //! - `attribute_step_search`: the coarsest steps of the other attributes
 //! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
+//! - `size_target`: a file of at most so many bytes
 
 mod attribute_step_search;
 mod code_scene;
@@ -16,17 +17,18 @@ mod fit;
 mod models;
 mod plane_and_sh_step_search;
 mod rate;
+mod size_target;
 
 pub use code_scene::{ASSUMED_PSNR, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
 pub use encoder::{
-    BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, freeze_planes,
+    BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, freeze_planes, size_so_far,
 };
 pub use fit::fit;
 pub use models::{ConfiguredModels, EntropyModels, ShModel, context_model};
 pub use rate::{NoisyScene, Rate};
 
-use burn::module::Module;
-use burn::tensor::Device;
+use burn::module::{Module, Param};
+use burn::tensor::{Device, Tensor};
 use light4gs_model::attributes::Coding;
 use light4gs_model::{
     AdaptiveQuantization, AdaptiveQuantizationConfig, Attribute, AttributeEntropy, CodedAttribute, ContextModel,
@@ -46,6 +48,9 @@ pub struct Compression<C: Module = ContextModel, S: Module = ShEntropyModel> {
     pub sh: Option<S>,
     /// That of the other attributes of the Gaussians, if the rate includes them.
     pub attributes: Option<AttributeEntropy>,
+    /// `[1]`, not trained: by how much the rate counts more in the loss than the configuration says, where the file shall have
+    /// a certain size.
+    pub rate_weight: Option<Param<Tensor<1>>>,
 }
 
 /// The entropy model and the steps of feature planes.
@@ -79,6 +84,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             let coded = coded_attributes(config, &scene.gaussians, compression.sh.is_some());
             compression.attributes = Some(AttributeEntropy::new(coded, device));
         }
+        if config.compression.target_bytes > 0 {
+            compression.rate_weight = Some(Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false));
+        }
         Ok(Some(compression))
     }
 
@@ -104,7 +112,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         };
         let planes = planes.map(plane_models).transpose()?;
         let sh = (config.model.sh_degree == 3).then(|| models.sh(sh, feature_size, device)).transpose()?;
-        Ok(Self { planes, sh, attributes: None })
+        Ok(Self { planes, sh, attributes: None, rate_weight: None })
     }
 
     /// Initializes the context model with the statistics of planes.

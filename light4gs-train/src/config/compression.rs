@@ -17,6 +17,9 @@ keys! {
         profile: FileProfile = FileProfile::Compact;
             Word(FileProfile::NAMES),
             "ours; paper", "or \"paper\" (other attributes and weights as float32), \"float32\"";
+        /// The file has at most so many bytes, and hardly fewer: the weight of the rate follows while training, and at last
+        /// the steps of the attributes. 0: lambda and steps alone say how large it becomes.
+        target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours", "0 = as many as lambda asks for";
         /// The rate in the loss.
         rate: RateConfig;
         /// The context model of the feature planes (MHCM).

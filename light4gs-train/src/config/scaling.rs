@@ -1,4 +1,4 @@
-//! A configuration for other images or another length of training, as changes of its keys.
+//! A configuration for other images, another length of training or a file of a certain size, as changes of its keys.
 //!
 //! The changes are overrides as [`Config::load`] takes them, so that what a user sets by hand, laid on top, wins.
 
@@ -7,6 +7,15 @@ use super::Config;
 /// How the number of Gaussians grows with the side of the images. A surface seen at twice the size shows less than four
 /// times the detail; 1.4 makes 41 000 Gaussians at 480 pixels of 12 000 at 200, about what was chosen by hand.
 const GAUSSIANS_BY_SIDE: f64 = 1.4;
+
+/// Bytes for each Gaussian that may be trained, with which a file has the next two values on the measured hull
+/// (docs/results.md, sizes). Fewer bytes come from fewer Gaussians and from a dearer byte together.
+const BYTES_A_GAUSSIAN: f64 = 6.4;
+/// Weight of a megabyte of attributes in the loss, and how it falls as there are more bytes.
+const MEGABYTE: (f64, f64) = (0.03, -3.1);
+/// Share of the Gaussians that a pass of pruning drops, and how it falls with the logarithm of the bytes; both bounded.
+const PRUNED: (f64, f64) = (0.3, -0.17);
+const PRUNED_BOUNDS: [f64; 2] = [0.1, 0.6];
 
 impl Config {
     /// For images whose longer side has `pixels` pixels in place of those of this configuration: the resolution, and more
@@ -21,6 +30,29 @@ impl Config {
             format!("train.densify.adaptive.max_gaussians={}", scaled(train.densify.strategies.adaptive.max_gaussians)),
             format!("train.guided_sampling.count={}", scaled(train.guided_sampling.count)),
         ]
+    }
+
+    /// For a file of at most `bytes`: how many Gaussians stay, and what a byte weighs at first. The trainer corrects the
+    /// weight as it goes.
+    pub fn for_target_bytes(&self, bytes: usize) -> Vec<String> {
+        let Self { train, compression, .. } = self;
+        let most = train.densify.strategies.adaptive.max_gaussians.max(1);
+        let ratio = bytes as f64 / most as f64 / BYTES_A_GAUSSIAN;
+        let mut wishes = vec![format!("compression.target_bytes={bytes}")];
+        if compression.rate.lambda <= 0.0 {
+            wishes.push("compression.rate.lambda=0.007".to_owned());
+        }
+        if compression.rate.attributes {
+            let [least, largest] = PRUNED_BOUNDS;
+            let pruned = (PRUNED.0 + PRUNED.1 * ratio.ln()).clamp(least, largest);
+            let weight = (MEGABYTE.0 * ratio.powf(MEGABYTE.1)).clamp(1e-4, 1.0);
+            wishes.push(format!("compression.rate.attribute_lambda={weight:.5}"));
+            // A configuration that does not prune may have no legal iteration for it.
+            if train.prune.fraction > 0.0 {
+                wishes.push(format!("train.prune.fraction={pruned:.3}"));
+            }
+        }
+        wishes
     }
 
     /// The same schedule `factor` times as long: every key that counts iterations of a stage. 0 stays 0, "never".
@@ -93,6 +125,23 @@ mod tests {
         assert_eq!(most(400, 480), (Some(400), (before as f64 * 2f64.powf(1.4)).round() as usize));
         // Smaller images stay as they are.
         assert_eq!(most(960, 400), (Some(960), most(400, 400).1));
+    }
+
+    /// At the hull's bytes, its values; with fewer bytes fewer Gaussians and a dearer byte, within bounds.
+    #[test]
+    fn fewer_bytes_are_fewer_gaussians_and_a_dearer_byte() {
+        let config = Config::load("dnerf-cpu+nodes", &[]).unwrap();
+        let at = |bytes| {
+            let config = Config::load("dnerf-cpu+nodes", &config.for_target_bytes(bytes)).unwrap();
+            assert_eq!(config.compression.target_bytes, bytes);
+            assert!(config.compression.rate.lambda > 0.0);
+            (config.train.prune.fraction, config.compression.rate.attribute_lambda)
+        };
+        assert_eq!(at(64_000), (0.3, 0.03));
+        let (fraction, lambda) = at(40_000);
+        assert!(fraction > 0.3 && lambda > 0.1, "{fraction}, {lambda}");
+        assert_eq!(at(1000), (0.6, 1.0));
+        assert_eq!(at(1_000_000_000), (0.1, 1e-4));
     }
 
     #[test]

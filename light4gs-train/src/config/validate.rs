@@ -6,7 +6,8 @@ use serde_json::Value;
 
 use super::model::{FieldKind, MOST_PLANE_RESOLUTION};
 use super::{
-    CompressionConfig, Config, ConfigError, EvalConfig, HexPlaneTable, KEYS, Key, ModelConfig, Problem, TrainConfig,
+    CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, HexPlaneTable, KEYS, Key, ModelConfig, Problem,
+    TrainConfig,
 };
 use crate::density::PruneConfig;
 
@@ -116,6 +117,14 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
             });
         }
     }
+    check.that(
+        "compression.target_bytes",
+        compression.target_bytes == 0 || compression.profile == FileProfile::Compact,
+        || {
+            "is set, but only the profile \"compact\" has steps that can follow it; set compression.profile=compact"
+                .to_owned()
+        },
+    );
     check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
     check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
     check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));

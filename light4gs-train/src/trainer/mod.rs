@@ -7,6 +7,7 @@
 //! - `views`: the views of an iteration, each with its own tape
 //! - `learning_rates`: the rate of each parameter group
 //! - `rate`: quantization noise, and the rate in the loss
+//! - `size_steering`: the weight of the rate, where the file shall have a certain size
 //! - `pruning`: pruning by significance
 //!
 //! The parts that a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`],
@@ -19,6 +20,7 @@ mod motion;
 pub mod profile;
 mod pruning;
 mod rate;
+mod size_steering;
 mod step;
 mod views;
 
@@ -250,6 +252,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let begin = Instant::now();
         let mut report = self.optimize(stage, iteration)?;
         self.control_density(stage, iteration);
+        if stage == Stage::Fine {
+            self.steer_size(iteration);
+        }
         if stage == Stage::Fine && self.config.train.guided_sampling.is_due(iteration) {
             self.sample_guided(iteration)?;
         }

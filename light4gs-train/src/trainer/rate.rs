@@ -61,7 +61,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 
     /// Whether the rate includes the attributes of the Gaussians, as it does after the end of densification.
-    fn gaussian_rate_is_active(&self, iteration: usize) -> bool {
+    pub(super) fn gaussian_rate_is_active(&self, iteration: usize) -> bool {
         let from = self.config.compression.rate.from.max(1);
         iteration >= from && self.density.is_over(Stage::Fine, iteration - 1)
     }
@@ -96,6 +96,10 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
                 RateWeighting::Megabytes => rate.megabytes() * (config.lambda * interval),
             };
             let term = attributes.into_iter().fold(term, |sum, part| sum + part);
+            let term = match &compression.rate_weight {
+                Some(weight) => term * weight.val(),
+                None => term,
+            };
             value = Some(term.clone().inner());
             let mut tape = term.backward();
             steps = noisy.step_gradients(&tape);

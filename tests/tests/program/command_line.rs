@@ -215,6 +215,29 @@ fn wishes_become_keys() {
 }
 
 #[test]
+fn a_file_has_the_size_that_is_wished() {
+    let w = Workspace::new(PROGRAM);
+    let size = |name: &str| fs::metadata(w.path(name)).unwrap().len();
+    let fits = |name: &str, target: u64| {
+        let bytes = size(name);
+        assert!(bytes <= target && bytes * 100 >= target * 95, "{name}: {bytes} of {target}");
+    };
+    let overrides = ["model.field=nodes", "compression.rate.attributes=true", "compression.rate.from=1"];
+    assert_success(&w.train("sized", &overrides).args(["--target-bytes", "6k"]).output().unwrap());
+    fits("sized/scene.l4gs", 6000);
+    // The same training, another size.
+    let encode = |bytes: &str| w.run(["encode", "sized", "--out", "other.l4gs", "--target-bytes", bytes]);
+    assert_success(&encode("5000"));
+    fits("other.l4gs", 5000);
+    assert_refused(&encode("1k"), &["compression.target_bytes is 1000", "coarsest steps"]);
+    assert_refused(&encode("soon"), &["--target-bytes", "300k"]);
+    assert_refused(
+        &w.train("paper", &["compression.profile=paper"]).args(["--target-bytes", "6k"]).output().unwrap(),
+        &["compression.target_bytes", "compact"],
+    );
+}
+
+#[test]
 fn a_run_is_never_overwritten_by_accident() {
     let w = trained();
     let before = fs::read(w.path("run/scene.l4gs")).unwrap();
