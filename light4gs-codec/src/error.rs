@@ -182,6 +182,35 @@ impl CodecError {
         matches!(self, Self::SelfCheck { .. })
     }
 
+    /// What is wrong, in one word that stays the same: the name of the variant in lower case, such as `over-limit`. For an error
+    /// in a file it is that of the error inside.
+    ///
+    /// ```
+    /// let error = light4gs_codec::decode(b"PK").unwrap_err();
+    /// assert_eq!(error.kind(), "not-l4gs");
+    /// ```
+    pub fn kind(&self) -> &'static str {
+        match self {
+            Self::NotL4gs { .. } => "not-l4gs",
+            Self::NewerVersion { .. } => "newer-version",
+            Self::Truncated { .. } => "truncated",
+            Self::TrailingBytes { .. } => "trailing-bytes",
+            Self::Checksum { .. } => "checksum",
+            Self::UnknownSection { .. } => "unknown-section",
+            Self::UnknownKind { .. } => "unknown-kind",
+            Self::UnknownEncoding { .. } => "unknown-encoding",
+            Self::UnknownAttribute { .. } => "unknown-attribute",
+            Self::DuplicateSection { .. } => "duplicate-section",
+            Self::MissingSection { .. } => "missing-section",
+            Self::OverLimit { .. } => "over-limit",
+            Self::NonFinite { .. } => "non-finite",
+            Self::Invalid { .. } => "invalid",
+            Self::SelfCheck { .. } => "self-check",
+            Self::InFile { error, .. } => error.kind(),
+            Self::Io { .. } => "io",
+        }
+    }
+
     /// An [`CodecError::Invalid`] from any value that can be printed.
     pub(crate) fn invalid(
         section: &'static str,

@@ -24,7 +24,7 @@ pub fn read_file(path: &Path) -> Result<SceneData, CodecError> {
 /// # Errors
 /// As [`read_file`].
 pub fn read_file_with_limits(path: &Path, limits: &Limits) -> Result<SceneData, CodecError> {
-    read_and(path, limits, |bytes| decode_with_limits(bytes, limits))
+    read_file_and(path, limits, |bytes| decode_with_limits(bytes, limits))
 }
 
 /// Reads what a file holds. See [`info`](crate::info).
@@ -40,12 +40,15 @@ pub fn read_info(path: &Path) -> Result<StreamInfo, CodecError> {
 /// # Errors
 /// As [`read_info`].
 pub fn read_info_with_limits(path: &Path, limits: &Limits) -> Result<StreamInfo, CodecError> {
-    read_and(path, limits, |bytes| info_with_limits(bytes, limits))
+    read_file_and(path, limits, |bytes| info_with_limits(bytes, limits))
 }
 
-/// Reads a file and passes it to `parse`. A file that is no stream, or that claims to be too long, is not read to its
+/// Reads a file and passes its bytes to `parse`. A file that is no stream, or that claims to be too long, is not read to its
 /// end.
-fn read_and<T>(
+///
+/// # Errors
+/// What the system refuses to read, and what `parse` refuses; the message names the file.
+pub fn read_file_and<T>(
     path: &Path,
     limits: &Limits,
     parse: impl FnOnce(&[u8]) -> Result<T, CodecError>,

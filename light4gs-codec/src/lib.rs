@@ -62,7 +62,7 @@
 //! the promises. The functions of [`checks`] say beforehand whether the encoder will refuse something.
 //!
 //! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`.
-//! There, `read_file` and `read_info` are absent and all work is done by one thread. Elsewhere planes are coded by the
+//! There, `read_file`, `read_file_and` and `read_info` are absent and all work is done by one thread. Elsewhere planes are coded by the
 //! threads of rayon's current pool; the bytes do not depend on their number.
 
 #![forbid(unsafe_code)]
@@ -98,7 +98,7 @@ pub use bytes::{
 pub use entropy::{Distributions, FrequencyTable};
 pub use error::CodecError;
 #[cfg(not(target_arch = "wasm32"))]
-pub use file::{read_file, read_file_with_limits, read_info, read_info_with_limits};
+pub use file::{read_file, read_file_and, read_file_with_limits, read_info, read_info_with_limits};
 pub use format::{MAGIC, VERSION};
 pub use limits::Limits;
 pub use motion::MotionEvaluator;

@@ -22,3 +22,22 @@ pub const MIN_TRANSMITTANCE: f32 = 1e-4;
 /// Logarithms (above all those of scales) are clamped to this before the exponential. It is far beyond any scene, and
 /// keeps the exponential finite, so that a backward pass has no 0 · infinity.
 pub const MAX_LOGARITHM: f32 = 40.0;
+
+/// A quaternion that is not longer than this has no direction; its Gaussian is not drawn.
+const SHORTEST_QUATERNION: f32 = 1e-12;
+
+/// The standard deviation from its logarithm, clamped at [`MAX_LOGARITHM`].
+pub fn scale(log_scale: f32) -> f32 {
+    log_scale.min(MAX_LOGARITHM).exp()
+}
+
+/// The opacity in [0, 1] from its logit.
+pub fn opacity(logit: f32) -> f32 {
+    1.0 / (1.0 + (-logit).exp())
+}
+
+/// The quaternion at unit length; none where it has no direction.
+pub fn unit_quaternion(quaternion: [f32; 4]) -> Option<[f32; 4]> {
+    let length = quaternion.iter().map(|q| q * q).sum::<f32>().sqrt();
+    (length.is_finite() && length > SHORTEST_QUATERNION).then(|| quaternion.map(|q| q / length))
+}

@@ -234,6 +234,20 @@ impl Camera {
         Ok(Self { rotation, translation, fx, fy, cx, cy, width, height })
     }
 
+    /// A camera from `x_cam = rotation * x_world + translation` (OpenCV axes) and intrinsics in pixels.
+    ///
+    /// # Errors
+    /// As [`Camera::from_pose`].
+    pub fn from_world_to_camera(
+        rotation: DMat3,
+        translation: DVec3,
+        intrinsics: &Intrinsics,
+    ) -> Result<Self, PoseError> {
+        let camera = Self::from_pose(rotation, -(rotation.transpose() * translation), intrinsics)?;
+        // Of a rotation that was rounded, the way over the center would give other digits.
+        Ok(Self { translation: translation.as_vec3(), ..camera })
+    }
+
     /// A camera at `eye` that looks at `target` with `up` (any length) upwards in the image.
     ///
     /// `fov_x` is the full horizontal field of view in radians; pixels are square. If `eye` equals `target`, the camera

@@ -41,13 +41,13 @@ pub mod planes;
 pub mod scene;
 pub mod sh;
 mod significance;
-pub mod spherical_harmonics;
 mod splatter;
 
 pub use attribute_entropy::{AttributeEntropy, ChannelPrediction, CodedAttribute};
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;
+pub use light4gs_render::spherical_harmonics;
 pub use planes::*;
 pub use scene::*;
 pub use sh::*;

@@ -6,9 +6,8 @@
 //! threads.
 
 use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
+use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
-
-use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 
 /// Points of a task in the forward pass.
 const CHUNK: usize = 1024;

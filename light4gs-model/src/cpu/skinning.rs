@@ -4,9 +4,9 @@
 //! then for the weights, then twice for half of the blended pose each, since sixteen sums and a weight do not fit into the
 //! sixteen vector registers of AVX2.
 
+use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use crate::kernels::skinning::{MOVED, ORIENTATION, POSE};
 
 /// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.

@@ -12,9 +12,9 @@
 //! weights worked out anew, which is faster than fetching them. What a task adds to the gradients of the nodes has its own place, and
 //! the places are added up in order: the same sums whatever the number of threads.
 
+use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use super::skinning::{
     BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, orientation, product, to_rows,
     weight,

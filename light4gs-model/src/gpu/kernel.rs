@@ -5,10 +5,10 @@ use std::fmt;
 use burn_wgpu::{KernelSource, SourceTemplate};
 use cubecl::prelude::{CubeDim, ExecutionMode, KernelId};
 use light4gs_codec::rendering::{DILATION, MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, NEAR, TILE};
+use light4gs_render::INVALID_RADIUS;
 use light4gs_shaders::Shader;
 
 use super::team::{CHUNK, Communication, Team};
-use crate::cpu::project::INVALID_RADIUS;
 
 /// Default number of invocations of a workgroup.
 const WORKGROUP: u32 = 64;

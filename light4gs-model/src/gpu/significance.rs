@@ -3,6 +3,7 @@
 use burn::tensor::Shape;
 use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
+use light4gs_render::{SCORES, View};
 use light4gs_shaders::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 
 use super::context::{Gpu, first_words};
@@ -10,9 +11,8 @@ use super::kernel::Kernel;
 use super::launch::Launch;
 use super::splat::{Begun, begin};
 use super::team::Team;
-use crate::cpu::significance::SCORES;
 use crate::gpu_error::GpuError;
-use crate::kernels::splat::{SplatInputs, View};
+use crate::kernels::splat::SplatInputs;
 
 /// Values of an intersection's sums.
 const SUMS: usize = 3;

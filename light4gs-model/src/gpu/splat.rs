@@ -6,6 +6,7 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
+use light4gs_render::{CHANNELS, View};
 use light4gs_shaders::{
     CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader,
 };
@@ -16,9 +17,8 @@ use super::launch::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
 use super::subgroups::choose_team;
 use super::team::{CHUNK, Team};
-use crate::cpu::rasterize::CHANNELS;
 use crate::gpu_error::GpuError;
-use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView, View};
+use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
 /// Values of an intersection's sums.
 const SUMS: usize = 10;

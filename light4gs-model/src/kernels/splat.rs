@@ -4,8 +4,8 @@ use std::fmt::Debug;
 
 use burn::backend::tensor::{FloatTensor, IntTensor};
 use burn::backend::{Backend, ExtensionType};
-use light4gs_codec::rendering::TILE;
 use light4gs_data::Camera;
+use light4gs_render::View;
 
 /// The differentiable inputs, in the order in which gradients are registered.
 #[derive(ExtensionType)]
@@ -71,23 +71,5 @@ impl SplatView {
     /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
     pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
         Self(View { camera, background, sh_degree })
-    }
-}
-
-/// Camera, background and active SH degree of one image.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
-    pub(crate) camera: Camera,
-    pub(crate) background: [f32; 3],
-    pub(crate) sh_degree: usize,
-}
-
-impl View {
-    pub(crate) fn tiles_across(&self) -> usize {
-        (self.camera.width as usize).div_ceil(TILE)
-    }
-
-    pub(crate) fn tiles_down(&self) -> usize {
-        (self.camera.height as usize).div_ceil(TILE)
     }
 }

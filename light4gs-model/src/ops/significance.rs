@@ -6,6 +6,7 @@ use burn::backend::{Backend, TensorMetadata, backend_extension};
 use burn_fusion::{Fusion, FusionBackend};
 #[cfg(feature = "wgpu")]
 use burn_wgpu::CubeBackend;
+use light4gs_render::{SCORES, TileLists, significance as significance_of_lists};
 
 use super::for_cpu_back_ends;
 #[cfg(feature = "wgpu")]
@@ -14,8 +15,6 @@ use super::host::HostBackend;
 #[cfg(feature = "wgpu")]
 use super::splat::resolve_inputs;
 use super::splat::{SplatInputs, SplatView, slices};
-use crate::cpu::significance::{SCORES, significance as significance_of_lists};
-use crate::cpu::tiles::TileLists;
 #[cfg(feature = "wgpu")]
 use crate::gpu::significance_on_gpu;
 

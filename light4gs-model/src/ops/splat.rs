@@ -11,16 +11,13 @@ use burn::backend::{Autodiff, Backend, TensorMetadata, backend_extension};
 use burn::tensor::TensorData;
 #[cfg(feature = "wgpu")]
 use burn_fusion::{Fusion, FusionBackend};
+use light4gs_render::{CHANNELS, GaussianSlices, TileLists, TilePixels, View, assemble, rasterize, splat_backward};
 
 #[cfg(feature = "wgpu")]
 use super::fusion::{int_leaf, leaf, resolve};
 use super::host::{HostBackend, HostTensor};
 use super::{for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::project::GaussianSlices;
-use crate::cpu::rasterize::{CHANNELS, TilePixels, assemble, rasterize};
-use crate::cpu::rasterize_backward::splat_backward;
-use crate::cpu::tiles::TileLists;
-use crate::kernels::splat::{INPUTS, View};
+use crate::kernels::splat::INPUTS;
 pub use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
 /// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
@@ -94,10 +91,11 @@ fn forward_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): Splat
     let lists = TileLists::build(&slices(&inputs), &view);
     let pixels = rasterize(&lists, &view);
     let rendering = assemble(&pixels, &view);
-    let radii: Vec<i32> = lists.splats.iter().map(|splat| splat.radius).collect();
+    let radii = lists.radii();
+    let count = radii.len();
     let outputs = SplatOutputs {
         rendering: B::from_values(rendering, [view.camera.height as usize * view.camera.width as usize * CHANNELS]),
-        radii: B::int_from_data(TensorData::new(radii, [lists.splats.len()]), &device),
+        radii: B::int_from_data(TensorData::new(radii, [count]), &device),
     };
     (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })
 }

@@ -1,6 +1,6 @@
-//! The vectors of `light4gs-model`, which contain all of its unsafe code, with their own tests.
+//! The vectors of `light4gs-render`, which contain all of its unsafe code, with their own tests.
 
 #![allow(dead_code, reason = "the kernels that use them are not here")]
 
-#[path = "../../../light4gs-model/src/cpu/lanes.rs"]
+#[path = "../../../light4gs-render/src/lanes.rs"]
 mod lanes;

@@ -4,7 +4,7 @@ use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
 
 use super::project::{GaussianSlices, Splat, project};
-use crate::kernels::splat::View;
+use crate::view::View;
 
 /// Gaussians that a parallel task projects. The number is fixed, so that results do not depend on the number of
 /// threads.
@@ -15,7 +15,7 @@ const CHUNK: usize = 512;
 /// An *intersection* is a (tile, Gaussian) pair. Intersections are numbered twice: by Gaussian (all tiles of Gaussian
 /// 0, then those of Gaussian 1, ...) and by tile (all of tile 0 front to back, then those of tile 1, ...).
 #[derive(Debug)]
-pub(crate) struct TileLists {
+pub struct TileLists {
     /// `[N]`
     pub(crate) splats: Vec<Splat>,
     /// `[N + 1]`: where the intersections of each Gaussian begin, numbered by Gaussian.
@@ -47,7 +47,7 @@ fn reaches(splat: &Splat, column: usize, row: usize) -> bool {
 
 impl TileLists {
     /// Projects all Gaussians and lists their tiles.
-    pub(crate) fn build(gaussians: &GaussianSlices, view: &View) -> Self {
+    pub fn build(gaussians: &GaussianSlices, view: &View) -> Self {
         let count = gaussians.len();
         let chunks: Vec<(Vec<Splat>, Vec<u32>, Vec<u32>)> = (0..count.div_ceil(CHUNK))
             .into_par_iter()
@@ -111,6 +111,26 @@ impl TileLists {
         Self { splats, gaussian_starts, tile_starts, gaussians: listed, tile_order }
     }
 
+    /// Memory that [`TileLists::build`] takes for each Gaussian, bytes: the splat twice, a count, two starts, a key of the
+    /// sort.
+    pub const BYTES_OF_A_GAUSSIAN: u64 = 2 * size_of::<Splat>() as u64 + 4 * 3 + 8;
+
+    /// An upper bound of the pairs of a tile and a Gaussian in it that [`TileLists::build`] lists, so that a program can refuse
+    /// them before they take memory.
+    pub fn most_pairs(gaussians: &GaussianSlices, view: &View) -> u64 {
+        let chunk = |chunk: usize| {
+            let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(gaussians.len());
+            range.map(|i| most_tiles(&project(gaussians, i, view), view)).sum::<u64>()
+        };
+        (0..gaussians.len().div_ceil(CHUNK)).into_par_iter().map(chunk).sum()
+    }
+
+    /// `[N]`, radii in pixels: three standard deviations, rounded up; 0 outside the image, and
+    /// [`INVALID_RADIUS`](crate::INVALID_RADIUS) for a Gaussian that cannot be drawn.
+    pub fn radii(&self) -> Vec<i32> {
+        self.splats.iter().map(|splat| splat.radius).collect()
+    }
+
     /// Range of a tile's intersections, numbered by tile.
     pub(crate) fn tile_range(&self, tile: usize) -> std::ops::Range<usize> {
         self.tile_starts[tile] as usize..self.tile_starts[tile + 1] as usize
@@ -150,8 +170,23 @@ impl TileLists {
     }
 }
 
+/// Whether the splat is drawn at all.
+fn is_drawn(splat: &Splat) -> bool {
+    splat.radius > 0 && splat.reach >= 0.0
+}
+
+/// Tiles of the rectangle around a splat.
+fn most_tiles(splat: &Splat, view: &View) -> u64 {
+    if !is_drawn(splat) {
+        return 0;
+    }
+    let rectangle = splat.tile_rectangle(view);
+    let [columns, rows] = [rectangle.columns, rectangle.rows].map(|[low, high]| high.saturating_sub(low) as u64);
+    columns * rows
+}
+
 fn list_tiles(splat: &Splat, view: &View, tiles: &mut Vec<u32>) {
-    if splat.radius <= 0 || splat.reach < 0.0 {
+    if !is_drawn(splat) {
         return;
     }
     let rectangle = splat.tile_rectangle(view);

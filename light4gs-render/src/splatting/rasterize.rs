@@ -4,19 +4,19 @@ use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
 
 use super::blend::{Contribution, GROUPS, Hits, TilePlane, TileVisitor, WIDTH, group_and_lanes, walk};
-use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use super::project::Splat;
 use super::tiles::TileLists;
-use crate::kernels::splat::View;
+use crate::lanes::{LANES, LaneKernel, Lanes, dispatch};
+use crate::view::View;
 
 /// Values of a pixel of the output: red, green, blue, alpha, depth.
-pub(crate) const CHANNELS: usize = 5;
+pub const CHANNELS: usize = 5;
 
 const EMPTY: TilePlane = [[0.0; LANES]; GROUPS];
 
 /// Sums over a tile's pixels after all its splats.
 #[derive(Clone, Debug)]
-pub(crate) struct TilePixels {
+pub struct TilePixels {
     pub(crate) color: [TilePlane; 3],
     pub(crate) depth: TilePlane,
     pub(crate) transmittance: TilePlane,
@@ -71,7 +71,7 @@ impl LaneKernel for RasterizeTile<'_> {
 }
 
 /// Blends every tile. Outputs are in tile order.
-pub(crate) fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
+pub fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
     (0..view.tiles_across() * view.tiles_down())
         .into_par_iter()
         .map(|tile| dispatch(RasterizeTile { lists, view, tile }))
@@ -82,7 +82,7 @@ pub(crate) fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
 ///
 /// It is one flat array with contiguous parts, since an operation on the tape has one output and contiguous slices are
 /// cheap.
-pub(crate) fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
+pub fn assemble(tiles: &[TilePixels], view: &View) -> Vec<f32> {
     let (width, height) = (view.camera.width as usize, view.camera.height as usize);
     let mut rendering = vec![0.0; width * height * CHANNELS];
     let (image, rest) = rendering.split_at_mut(3 * width * height);

@@ -5,34 +5,40 @@ use glam::{Mat3, Vec2, Vec3};
 use light4gs_codec::rendering::{DILATION, FRUSTUM_MARGIN, MIN_ALPHA, NEAR, TILE};
 use light4gs_data::Camera;
 
-use crate::kernels::splat::View;
 use crate::spherical_harmonics::{basis, basis_gradient, coefficient_count};
+use crate::view::View;
 
 /// Radius of a Gaussian that cannot be drawn because it is not finite or has no orientation.
-pub(crate) const INVALID_RADIUS: i32 = -1;
+pub const INVALID_RADIUS: i32 = -1;
 
 /// Borrowed attributes of N Gaussians, each array contiguous.
-#[derive(Clone, Copy)]
-pub(crate) struct GaussianSlices<'a> {
-    /// `[N, 3]`, world units
-    pub(crate) means: &'a [f32],
-    /// `[N, 4]` as (w, x, y, z), any length but zero
-    pub(crate) quats: &'a [f32],
-    /// `[N, 3]`, standard deviations in world units
-    pub(crate) scales: &'a [f32],
-    /// `[N]` in [0, 1]
-    pub(crate) opacities: &'a [f32],
-    /// `[N, 1, 3]`
-    pub(crate) sh_dc: &'a [f32],
-    /// `[N, K, 3]`
-    pub(crate) sh_rest: &'a [f32],
-    /// `[N, 2]`: added to the position on screen, in units of half the image
-    pub(crate) screen_offsets: &'a [f32],
+#[derive(Clone, Copy, Debug)]
+pub struct GaussianSlices<'a> {
+    /// `[N, 3]`, world units.
+    pub means: &'a [f32],
+    /// `[N, 4]` as (w, x, y, z), any length but zero.
+    pub quats: &'a [f32],
+    /// `[N, 3]`, standard deviations in world units.
+    pub scales: &'a [f32],
+    /// `[N]` in [0, 1].
+    pub opacities: &'a [f32],
+    /// `[N, 1, 3]`.
+    pub sh_dc: &'a [f32],
+    /// `[N, K, 3]`.
+    pub sh_rest: &'a [f32],
+    /// `[N, 2]`: added to the position on screen, in units of half the image.
+    pub screen_offsets: &'a [f32],
 }
 
 impl GaussianSlices<'_> {
-    pub(crate) fn len(&self) -> usize {
+    /// Number of Gaussians.
+    pub fn len(&self) -> usize {
         self.opacities.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.opacities.is_empty()
     }
 
     fn rest_count(&self) -> usize {

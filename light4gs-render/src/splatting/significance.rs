@@ -6,15 +6,15 @@
 use rayon::prelude::*;
 
 use super::blend::{Contribution, Hits, TileVisitor, walk};
-use super::lanes::{LaneKernel, Lanes, dispatch};
 use super::project::Splat;
 use super::tiles::TileLists;
-use crate::kernels::splat::View;
+use crate::lanes::{LaneKernel, Lanes, dispatch};
+use crate::view::View;
 
 /// Sums over the pixels that blend a splat: pixels, `T · alpha`, `T`.
 type Sums = [f32; 3];
 /// Values of a Gaussian in the output: pixels, sum of `T · alpha`, sum of `T · opacity`, sum of the opacity.
-pub(crate) const SCORES: usize = 4;
+pub const SCORES: usize = 4;
 
 struct SignificanceTile<'a> {
     lists: &'a TileLists,
@@ -58,7 +58,7 @@ impl<L: Lanes> TileVisitor<L> for Score<'_> {
 }
 
 /// Scores `[N, 4]` of one image; see [`SCORES`].
-pub(crate) fn significance(lists: &TileLists, view: &View) -> Vec<f32> {
+pub fn significance(lists: &TileLists, view: &View) -> Vec<f32> {
     let mut sums: Vec<Sums> = vec![[0.0; 3]; lists.gaussians.len()];
     lists.split_by_tile(&mut sums).into_par_iter().enumerate().for_each(|(tile, sums)| {
         dispatch(SignificanceTile { lists, view, tile, sums });

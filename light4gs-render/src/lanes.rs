@@ -5,25 +5,37 @@
 //! and separate multiply-add), but never between two runs on one machine.
 
 /// Lanes in a vector.
-pub(crate) const LANES: usize = 8;
+pub const LANES: usize = 8;
 
 /// Eight float32 values that are computed on together. A mask is a vector whose lanes are all ones or all zeros.
-pub(crate) trait Lanes: Copy {
+pub trait Lanes: Copy {
+    /// `value` in all lanes.
     fn splat(value: f32) -> Self;
+    /// Reads eight values.
     fn load(from: &[f32; LANES]) -> Self;
+    /// Writes the lanes.
     fn store(self, to: &mut [f32; LANES]);
+    /// `self + other`.
     fn add(self, other: Self) -> Self;
+    /// `self - other`.
     fn sub(self, other: Self) -> Self;
+    /// `self * other`.
     fn mul(self, other: Self) -> Self;
+    /// `self / other`.
     fn div(self, other: Self) -> Self;
+    /// The smaller; `other` where either is NaN.
     fn min(self, other: Self) -> Self;
+    /// The larger; `other` where either is NaN.
     fn max(self, other: Self) -> Self;
+    /// The square root.
     fn sqrt(self) -> Self;
     /// `self * b + c`
     fn mul_add(self, b: Self, c: Self) -> Self;
     /// Mask of `self >= other`.
     fn at_least(self, other: Self) -> Self;
+    /// `self & other`, bit by bit.
     fn and(self, other: Self) -> Self;
+    /// `self | other`, bit by bit.
     fn or(self, other: Self) -> Self;
     /// `!self & other`
     fn and_not(self, other: Self) -> Self;
@@ -33,6 +45,7 @@ pub(crate) trait Lanes: Copy {
     fn signs(self) -> u32;
     /// 2^n for lanes that hold whole numbers in [-126, 127], plus their sum with the rounding constant removed.
     fn exp2_of_rounded(self) -> Self;
+    /// The sum of the lanes.
     fn sum(self) -> f32;
     /// The sums of eight vectors, each `((0 + 1) + (2 + 3)) + ((4 + 5) + (6 + 7))` of its lanes: less work than one by one.
     fn sums(vectors: &[Self; LANES]) -> [f32; LANES];
@@ -58,13 +71,15 @@ pub(crate) trait Lanes: Copy {
 }
 
 /// A computation that is generic over the vector type.
-pub(crate) trait LaneKernel {
+pub trait LaneKernel {
+    /// What it gives.
     type Output;
+    /// Computes it.
     fn run<L: Lanes>(self) -> Self::Output;
 }
 
 /// Runs the kernel with the best vectors of this processor.
-pub(crate) fn dispatch<K: LaneKernel>(kernel: K) -> K::Output {
+pub fn dispatch<K: LaneKernel>(kernel: K) -> K::Output {
     #[cfg(target_arch = "x86_64")]
     if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma") {
         if std::arch::is_x86_feature_detected!("avx512f") && std::arch::is_x86_feature_detected!("avx512vl") {

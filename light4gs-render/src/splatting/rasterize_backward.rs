@@ -9,11 +9,11 @@
 use rayon::prelude::*;
 
 use super::blend::{Contribution, GROUPS, Hits, TilePlane, TileVisitor, walk};
-use super::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use super::project::{GaussianSlices, Splat, SplatGradient, project_backward};
 use super::rasterize::{CHANNELS, TilePixels, tile_of};
 use super::tiles::TileLists;
-use crate::kernels::splat::View;
+use crate::lanes::{LANES, LaneKernel, Lanes, dispatch};
+use crate::view::View;
 
 /// Sums of one splat over one tile's pixels: gradients of color and depth, then the moments of
 /// `p = alpha · dS/dalpha`: p, p dx, p dy, p dx², p dx dy, p dy².
@@ -137,18 +137,26 @@ fn total_value<L: Lanes>(pixels: &TilePixels, upstream: &[TilePlane; CHANNELS], 
 }
 
 /// Gradients of all inputs, in the layouts of [`GaussianSlices`].
-pub(crate) struct GaussianGradients {
-    pub(crate) means: Vec<f32>,
-    pub(crate) quats: Vec<f32>,
-    pub(crate) scales: Vec<f32>,
-    pub(crate) opacities: Vec<f32>,
-    pub(crate) sh_dc: Vec<f32>,
-    pub(crate) sh_rest: Vec<f32>,
-    pub(crate) screen_offsets: Vec<f32>,
+#[derive(Clone, Debug)]
+pub struct GaussianGradients {
+    /// `[N, 3]`.
+    pub means: Vec<f32>,
+    /// `[N, 4]`, before the normalization.
+    pub quats: Vec<f32>,
+    /// `[N, 3]`.
+    pub scales: Vec<f32>,
+    /// `[N]`.
+    pub opacities: Vec<f32>,
+    /// `[N, 1, 3]`.
+    pub sh_dc: Vec<f32>,
+    /// `[N, K, 3]`.
+    pub sh_rest: Vec<f32>,
+    /// `[N, 2]`.
+    pub screen_offsets: Vec<f32>,
 }
 
 /// Chain rule from the image's gradient to those of the Gaussians.
-pub(crate) fn splat_backward(
+pub fn splat_backward(
     gaussians: &GaussianSlices,
     view: &View,
     lists: &TileLists,

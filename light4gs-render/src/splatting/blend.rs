@@ -16,10 +16,10 @@
 
 use light4gs_codec::rendering::{MAX_ALPHA, MIN_ALPHA, MIN_TRANSMITTANCE, TILE};
 
-use super::lanes::{LANES, Lanes};
 use super::project::Splat;
 use super::tiles::TileLists;
-use crate::kernels::splat::View;
+use crate::lanes::{LANES, Lanes};
+use crate::view::View;
 
 /// Columns of a group of eight pixels.
 pub(crate) const WIDTH: usize = 4;
@@ -274,9 +274,9 @@ mod tests {
     use light4gs_data::Camera;
     use proptest::prelude::*;
 
-    use super::super::lanes::{LaneKernel, Portable, dispatch};
     use super::super::project::{GaussianSlices, project};
     use super::*;
+    use crate::lanes::{LaneKernel, Portable, dispatch};
 
     const SIDE: usize = 3 * TILE;
 

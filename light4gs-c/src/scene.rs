@@ -1,0 +1,34 @@
+//! The open scene.
+
+use std::ffi::CString;
+
+use light4gs_render::PlayableScene;
+
+use crate::failure::c_string;
+
+/// An open scene. It does not change until it is closed.
+#[derive(Debug)]
+pub struct L4gsScene {
+    pub(crate) playable: PlayableScene,
+    pub(crate) name: CString,
+    /// Key and value.
+    pub(crate) extras: Vec<(CString, CString)>,
+    /// Name and bytes.
+    pub(crate) sections: Vec<(CString, u64)>,
+}
+
+impl L4gsScene {
+    pub(crate) fn new(playable: PlayableScene) -> Self {
+        let info = playable.info();
+        let name = c_string(&info.meta.name);
+        let extras = info.meta.extra.iter().map(|(key, value)| (c_string(key), c_string(value))).collect();
+        let sections = info.sections.iter().map(|section| (c_string(section.name), section.bytes)).collect();
+        Self { playable, name, extras, sections }
+    }
+}
+
+// Several threads may use one scene.
+const _: () = {
+    const fn shared<T: Send + Sync>() {}
+    shared::<L4gsScene>();
+};
