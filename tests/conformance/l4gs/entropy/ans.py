@@ -59,11 +59,10 @@ class SymbolDecoder:
         end = begins[slot + 1] if slot < escape else TOTAL
         self._advance(begins[slot], end - begins[slot])
         if slot < escape:
-            symbol = distribution.first + slot
-        else:
-            symbol = self._beyond(distribution.first, escape)
+            return distribution.first + slot
+        symbol = self._beyond(distribution.first, escape)
         if abs(symbol) > LARGEST_SYMBOL:
-            self.refuse("symbols within 2^22")
+            self.refuse("integers within 2^22 after an escape")
         return symbol
 
     def _beyond(self, first: int, count: int) -> int:

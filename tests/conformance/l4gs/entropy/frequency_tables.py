@@ -26,8 +26,8 @@ def read_tables(part: str, field: str, data: bytes, count: int, budget: Budget) 
         slots = ends[1].read(decoder)
         if not 1 <= slots <= _MOST_SLOTS:
             raise Refused(part, field, f"1 to 2^14 slots, not {slots}")
-        if first < -LARGEST_SYMBOL or first + slots - 1 > LARGEST_SYMBOL:
-            raise Refused(part, field, "integers within 2^22")
+        if abs(first) > LARGEST_SYMBOL:
+            raise Refused(part, field, f"a first integer within 2^22, not {first}")
         budget.take(part, field, slots + 1, 8)
         weights = []
         code = difference = 0

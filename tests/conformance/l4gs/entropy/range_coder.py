@@ -8,7 +8,7 @@ _TOTAL_BITS = 15
 _TOTAL = 1 << _TOTAL_BITS
 _MASK = (1 << 64) - 1
 _RAW_CHUNK = 12
-# A reader may give up when it needs more words than these beyond the end.
+# No sound stream needs more words of zeros after its own.
 _WORDS_BEYOND_THE_END = 4
 
 
@@ -34,8 +34,8 @@ class RangeDecoder:
         self._next += 1
         if at < len(self._words):
             return self._words[at]
-        if at >= max(len(self._words), 4) + _WORDS_BEYOND_THE_END:
-            self.refuse("no need of words far beyond the end of the range-coded bytes")
+        if at >= len(self._words) + _WORDS_BEYOND_THE_END:
+            self.refuse(f"range-coded bytes that are enough, with {_WORDS_BEYOND_THE_END} words of zeros after them")
         return 0
 
     def _quantile(self) -> tuple[int, int]:
@@ -130,7 +130,13 @@ class AdaptiveInteger:
         # The node is a one and then the digits that were read.
         lower_bits = exponent - upper_bits
         magnitude = node << lower_bits | decoder.raw(lower_bits)
-        return -magnitude if negative else magnitude
+        return wrapped(-magnitude if negative else magnitude)
+
+
+def wrapped(integer: int, bits: int = 32) -> int:
+    """The lowest bits of an integer, as an integer with a sign."""
+    half = 1 << (bits - 1)
+    return (integer + half) % (2 * half) - half
 
 
 def contexts(count: int) -> list[AdaptiveInteger]:

@@ -122,7 +122,7 @@ def _read_node(reader: Reader, name: str, channels: list[int]) -> Node:
     name = f"{name} ({_NAMES[operation]})"
     count = 2 if operation in _PAIRS else 1
     if operation == CONCATENATE:
-        count = reader.varint(f"{name}: number of inputs", limits.NODES, 1)
+        count = reader.varint(f"{name}: number of inputs", limits.NODES, 2)
     inputs = []
     for i in range(count):
         if i == 0 and byte & _BEFORE_BIT:
@@ -131,8 +131,6 @@ def _read_node(reader: Reader, name: str, channels: list[int]) -> Node:
             continue
         value = reader.varint(f"{name}: input {i}")
         reader.require(value < len(channels), f"{name}: input {i}", f"a value before the node's own, not {value}")
-        if i == 0:
-            reader.require(value != len(channels) - 1, f"{name}: input 0", "the highest bit of the operation for the value just before")
         inputs.append(value)
     node = Node(operation, inputs)
     channels.append(_read_parameters(reader, name, node, channels))
@@ -181,14 +179,14 @@ def _read_parameters(reader: Reader, name: str, node: Node, channels: list[int])
 
 
 def _read_runs(reader: Reader, name: str, node: Node, channels: int) -> int:
-    count = reader.varint(f"{name}: number of runs", limits.LAYER_SIZE, 1)
+    count = reader.varint(f"{name}: number of runs", limits.LAYER_SIZE)
     for i in range(count):
         first = reader.varint(f"{name}: run {i}: first")
-        length = reader.varint(f"{name}: run {i}: length", least=1)
+        length = reader.varint(f"{name}: run {i}: length", limits.LAYER_SIZE)
         reader.require(first + length <= channels, f"{name}: run {i}", f"channels below {channels}")
         node.runs.append((first, length))
     total = sum(length for _, length in node.runs)
-    reader.require(total <= limits.LAYER_SIZE, f"{name}: runs", f"at most {limits.LAYER_SIZE} channels")
+    reader.require(1 <= total <= limits.LAYER_SIZE, f"{name}: runs", f"1 to {limits.LAYER_SIZE} channels")
     return total
 
 

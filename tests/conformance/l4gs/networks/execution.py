@@ -7,6 +7,7 @@ from typing import Callable
 
 import numpy as np
 
+from .. import limits
 from ..errors import Refused
 from .arithmetic import F, exponential, interpolate, logarithm, without_tiny
 from .description import (
@@ -57,6 +58,8 @@ def run(
             else:
                 result = _OPERATIONS[node.operation](node, read, target)
             values.append(without_tiny(result))
+            if max(result.shape[1:]) > limits.SIDE:
+                raise Refused(part, where, f"a height and width of at most {limits.SIDE}")
     outputs = [values[value] for value in network.outputs]
     for i, output in enumerate(outputs):
         if output.shape[1:] != target:

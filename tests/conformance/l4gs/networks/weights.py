@@ -8,12 +8,13 @@ import numpy as np
 
 from .. import limits
 from ..container import FLOAT32
-from ..entropy.range_coder import RangeDecoder, contexts, level
+from ..entropy.range_coder import RangeDecoder, contexts, level, wrapped
 from ..limits import Budget
 from ..reader import Reader
 from .description import Network
 
 _LAST_LEVEL = 24
+_LARGEST_INTEGER = 1 << 23
 
 
 def read_weights(
@@ -52,9 +53,10 @@ def _read_quantized(reader: Reader, lengths: list[int]) -> list[np.ndarray]:
         order = decoder.raw(2)
         reader.require(order <= 2, "weights: order of the prediction", "0 to 2, not 3")
         row = (decoder.raw(16) or length) if order else length
-        integers = np.array(_read_integers(decoder, shared, length, order, row), np.int32)
+        integers = np.array(_read_integers(decoder, shared, length, order, row), np.int64)
+        legal = bool((np.abs(integers) <= _LARGEST_INTEGER).all())
+        reader.require(legal, "weights", f"integers of at most {_LARGEST_INTEGER} in magnitude")
         values = integers.astype(np.float32) * step
-        reader.require(bool(np.isfinite(values).all()), "weights", "finite weights")
         tensors.append(values)
     return tensors
 
@@ -71,6 +73,6 @@ def _read_integers(decoder: RangeDecoder, shared: list, length: int, order: int,
             prediction = integers[-1]
         elif usable == 2:
             prediction = 2 * integers[-1] - integers[-2]
-        integers.append((prediction + difference + (1 << 31)) % (1 << 32) - (1 << 31))
+        integers.append(wrapped(prediction + difference))
         mean = (15 * mean + 16 * abs(difference) + 8) // 16
     return integers

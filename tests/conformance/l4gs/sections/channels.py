@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..entropy.range_coder import AdaptiveInteger, RangeDecoder, contexts, level
+from ..entropy.range_coder import AdaptiveInteger, RangeDecoder, contexts, level, wrapped
 
 NEIGHBORS = 4
 _LOOK_BACK = 64
@@ -43,7 +43,7 @@ def read_channels(decoder: RangeDecoder, count: int, width: int, neighbors: np.n
     header = AdaptiveInteger()
     near = [[int(n) for n in row] for row in neighbors]
     # For each channel read so far, of each Gaussian: the value without the channel's mean; that summed over the neighbors; the
-    # magnitude of the residual.
+    # magnitude of the residual, at most 2^16.
     values: list[list[int]] = []
     sums: list[list[int]] = []
     magnitudes: list[list[int]] = []
@@ -52,7 +52,7 @@ def read_channels(decoder: RangeDecoder, count: int, width: int, neighbors: np.n
         mean = header.read(decoder)
         means.append(mean)
         earlier = range(max(channel - _EARLIER_CHANNELS, 0), channel)
-        weights = [header.read(decoder) for _ in range(2 + 2 * len(earlier))]
+        weights = [wrapped(header.read(decoder), 16) for _ in range(2 + 2 * len(earlier))]
         residual_contexts = contexts(_LAST_LEVEL + 1)
         own: list[int] = []
         own_sums: list[int] = []
@@ -63,18 +63,18 @@ def read_channels(decoder: RangeDecoder, count: int, width: int, neighbors: np.n
             inputs = [own_sums[i], own[around[0]] if around else 0]
             for before in earlier:
                 inputs += [values[before][i], sums[before][i]]
-            predicted = (sum(w * x for w, x in zip(weights, inputs)) + (1 << 11)) >> 12
+            predicted = mean + (sum(w * x for w, x in zip(weights, inputs)) + (1 << 11) >> 12)
             context = _LAST_LEVEL
             if around:
-                activity = sum(min(own_magnitudes[n], _LARGEST_MAGNITUDE) for n in around)
+                activity = sum(own_magnitudes[n] for n in around)
                 activity += 4 * magnitudes[-1][i] if channel else activity
                 context = level(activity // 4, _LAST_LEVEL)
             residual = residual_contexts[context].read(decoder)
-            value = predicted + residual
-            if abs(value + mean) > largest:
+            value = wrapped(predicted + residual)
+            if abs(value) > largest:
                 decoder.refuse(f"integers of at most {largest} in magnitude")
-            own.append(value)
-            own_magnitudes.append(abs(residual))
+            own.append(value - mean)
+            own_magnitudes.append(min(abs(residual), _LARGEST_MAGNITUDE))
         values.append(own)
         sums.append(own_sums)
         magnitudes.append(own_magnitudes)

@@ -32,16 +32,16 @@ class SceneCoordinates:
             for j in range(3):
                 a = self.axes[j]
                 u[:, j] = ((o[:, 0] * a[0] + o[:, 1] * a[1]) + o[:, 2] * a[2]) / self.deviations[j]
+            i = np.ones(len(points), np.float32)
             if self.contracted:
                 n = (u[:, 0] * u[:, 0] + u[:, 1] * u[:, 1]) + u[:, 2] * u[:, 2]
                 i = np.where(n > F(1), F(1) / np.sqrt(n), F(1)).astype(np.float32)
-                u = u * ((F(2) - i) * i)[:, None]
-            return u * self.scale + self.offset
+            factor = (F(2) - i) * i
+            return u * (factor[:, None] * self.scale) + self.offset
 
-    def of_time(self, time: np.float32) -> np.float32:
-        """The scene's time, 0 to 1, along the planes' axis: -1 to 1."""
-        own = F(self.time_scale * time + self.time_offset)
-        return F(own * F(2) - F(1))
+    def field_time(self, time: np.float32) -> np.float32:
+        """The field's time of a time of the scene."""
+        return F(time * self.time_scale + self.time_offset)
 
 
 def read_scene_coordinates(section: Section) -> SceneCoordinates:
@@ -59,12 +59,23 @@ def read_scene_coordinates(section: Section) -> SceneCoordinates:
 
 
 def sample(plane: np.ndarray, along_width: np.ndarray, along_height: np.ndarray) -> np.ndarray:
-    """A plane `[C, H, W]` at points, whose coordinates are `[N]`: `[C, N]`."""
+    """A plane `[C, H, W]` at points, whose coordinates are `[N]`: `[C, N]`. Along both rows first, then between them."""
     column, next_column, column_share = _cell(along_width, plane.shape[2])
     row, next_row, row_share = _cell(along_height, plane.shape[1])
     first = interpolate(plane[:, row, column], plane[:, row, next_column], column_share)
     second = interpolate(plane[:, next_row, column], plane[:, next_row, next_column], column_share)
     return interpolate(first, second, row_share)
+
+
+def sample_at_time(plane: np.ndarray, along_width: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """A plane `[C, H, W]` over time at points, whose coordinates are `[N]`, at one time `[1]`: `[C, N]`.
+
+    Between both rows first, then along the row that this gives: it is the same for all points.
+    """
+    column, next_column, column_share = _cell(along_width, plane.shape[2])
+    row, next_row, row_share = _cell(time, plane.shape[1])
+    line = interpolate(plane[:, row[0]], plane[:, next_row[0]], row_share[0])
+    return interpolate(line[:, column], line[:, next_column], column_share)
 
 
 def _cell(coordinate: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -117,6 +117,8 @@ def _read_list(reader: Reader, quantized: bool) -> list[_Attribute]:
 def _read_grid(reader: Reader, name: str, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Cells `[count, 3]` as integers, and centers `[count, 3]`."""
     corner = reader.f32s((3,), f"{name}: corner")
+    legal = bool((np.abs(corner) <= np.float32(1e30)).all())
+    reader.require(legal, f"{name}: corner", "at most 1e30 in magnitude")
     step = reader.step(f"{name}: step")
     bits = reader.u8(f"{name}: bits")
     reader.require(bits <= _MOST_BITS, f"{name}: bits", f"at most {_MOST_BITS}, not {bits}")

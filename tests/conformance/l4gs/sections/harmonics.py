@@ -26,6 +26,8 @@ from .planes import Planes
 
 _EXPLICIT, _TABLES, _NETWORKS, _CHANNELS = 1, 2, 3, 4
 _MOST_DEGREE = 3
+# Gaussians whose symbols stand prior by prior.
+_GROUP = 8
 
 _SH_DC, _CHANNELS_BEFORE, _SPACE_FEATURES, _POINT, _LOG_SCALES, _QUATERNION, _OPACITY = range(7)
 _ATTRIBUTES = {_SH_DC: "sh_dc", _LOG_SCALES: "log_scales", _QUATERNION: "quats", _OPACITY: "opacity_logits"}
@@ -96,6 +98,7 @@ def read_harmonics(section: Section, around: Surroundings, budget: Budget) -> Ha
         elif section.kind == _NETWORKS:
             _Decoder(section.name, priors, around, step, values).read(streams)
         else:
+            reader.require(bool(step <= np.float32(1e30)), "step", "at most 1e30")
             neighbors = find_neighbors(around.gaussians.attributes["means"].astype(np.float64))
             for g, data in enumerate(streams, 1):
                 own = channels_of_degree(g)
@@ -159,29 +162,26 @@ class _Decoder:
         self._points = around.coordinates.of_points(around.gaussians.attributes["means"])
 
     def read(self, streams: list[bytes]) -> None:
-        for degree, data in enumerate(streams, 1):
-            decoder = SymbolDecoder(self._part, f"degree {degree}", data)
-            self._read_degree(decoder, channels_of_degree(degree))
-            decoder.end()
-
-    def _read_degree(self, decoder: SymbolDecoder, own: range) -> None:
+        decoders = [SymbolDecoder(self._part, f"degree {degree}", data) for degree, data in enumerate(streams, 1)]
+        decoder_of = [decoder for degree, decoder in enumerate(decoders, 1) for _ in channels_of_degree(degree)]
         count = len(self._values)
-        # Priors that read channels of the same degree wait for each Gaussian's own symbols.
-        waiting: dict[int, int] = {}
-        begin = 0
+        # Priors that read no channels before are evaluated for all Gaussians at once, which is faster.
+        begins = [sum(prior.channels for prior in self._priors[:i]) for i in range(len(self._priors))]
         for i, prior in enumerate(self._priors):
-            if begin in own:
-                if begin > own.start and _CHANNELS_BEFORE in prior.sources:
-                    waiting[begin] = i
-                else:
-                    self._evaluate(i, begin, slice(0, count))
-            begin += prior.channels
-        for i in range(count):
-            for channel in own:
-                if channel in waiting:
-                    self._evaluate(waiting[channel], channel, slice(i, i + 1))
-                symbol = decoder.symbol(distribution(int(self._levels[i, channel])))
-                self._values[i, channel] = (F(symbol) + self._means[i, channel]) * self._step
+            if _CHANNELS_BEFORE not in prior.sources:
+                self._evaluate(i, begins[i], slice(0, count))
+        for first in range(0, count, _GROUP):
+            group = slice(first, min(first + _GROUP, count))
+            for i, prior in enumerate(self._priors):
+                if _CHANNELS_BEFORE in prior.sources:
+                    self._evaluate(i, begins[i], group)
+                for gaussian in range(group.start, group.stop):
+                    for channel in range(begins[i], begins[i] + prior.channels):
+                        symbol = decoder_of[channel].symbol(distribution(int(self._levels[gaussian, channel])))
+                        value = (F(symbol) + self._means[gaussian, channel]) * self._step
+                        self._values[gaussian, channel] = value
+        for decoder in decoders:
+            decoder.end()
 
     def _evaluate(self, number: int, begin: int, of: slice) -> None:
         """Levels and means of the channels from `begin` on, which a prior describes, for some Gaussians."""

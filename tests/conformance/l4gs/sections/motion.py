@@ -9,13 +9,14 @@ import numpy as np
 
 from .. import limits
 from ..container import Section
+from ..errors import Refused
 from ..limits import Budget
 from ..networks.description import Network, read_network
 from ..networks.execution import run
 from ..networks.weights import read_weights
 from ..reader import Reader
 from .coordinates import SceneCoordinates
-from .gaussians import Gaussians
+from .gaussians import FIRST_ATTRIBUTES, Gaussians
 from .harmonics import Harmonics
 from .planes import Planes
 
@@ -65,21 +66,27 @@ def read_motion(section: Section, budget: Budget) -> Motion:
     names: list[str] = []
     shapes: list[tuple[int, ...]] = []
     for i in range(tensor_count):
-        raw_name = reader.block(f"tensor {i}: name")
-        reader.require(len(raw_name) <= limits.NAME_BYTES, f"tensor {i}: name", f"at most {limits.NAME_BYTES} bytes")
-        names.append(reader.text(raw_name, f"tensor {i}: name"))
+        names.append(_read_name(reader, f"tensor {i}: name"))
         axes = reader.varint(f"tensor {i}: number of axes", _MOST_AXES)
-        shapes.append(tuple(reader.varint(f"tensor {i}: length of axis {j}", limits.WEIGHTS) for j in range(axes)))
+        shapes.append(tuple(reader.varint(f"tensor {i}: length of axis {j}", (1 << 32) - 1) for j in range(axes)))
+    nothing_moves = network is None and tensor_count == 0
+    reader.require((kind == "") == nothing_moves, "kind", "empty exactly where there is no network and no tensor")
+    reader.require(len(set(names)) == len(names), "tensors", "names that are there once")
     networks = [network] if network else []
     weights, tensors = read_weights(reader, networks, shapes, section.encoding, budget)
-    reader.require(len(set(names)) == len(names), "tensors", "names that are there once")
     return Motion(kind, network, sources, outputs, weights[0] if network else [], dict(zip(names, tensors)))
+
+
+def _read_name(reader: Reader, field: str) -> str:
+    raw = reader.block(field)
+    reader.require(len(raw) <= limits.NAME_BYTES, field, f"at most {limits.NAME_BYTES} bytes")
+    return reader.text(raw, field)
 
 
 def _read_source(reader: Reader, name: str) -> Source:
     kind = reader.u8(name)
     reader.require(kind <= _ATTRIBUTE, name, f"a known input, not {kind}")
-    return Source(kind, reader.block(f"{name}: attribute").decode("latin-1") if kind == _ATTRIBUTE else "")
+    return Source(kind, _read_name(reader, f"{name}: attribute") if kind == _ATTRIBUTE else "")
 
 
 def _read_outputs(reader: Reader, network: Network) -> list[int]:
@@ -126,6 +133,18 @@ class Scene:
                 wanted = {_FEATURES: self.planes.scales * self.planes.channels, _POINT: 3, _TIME: 1}[source.kind]
             reader.require(channels == wanted, f"input {i}", f"{wanted} channels, not {channels}")
 
+    def check_shown(self) -> None:
+        """Refuses to show a scene that would look wrong, since nothing says what one of its attributes does.
+
+        Motion without a network is of a kind that only its own program knows; here such scenes stand still.
+        """
+        known = {name for name, _ in FIRST_ATTRIBUTES} | {source.attribute for source in self.motion.sources}
+        if self.motion.network is None and self.motion.kind:
+            return
+        for name in self.gaussians.attributes:
+            if name not in known and name not in self.gaussians.optional:
+                raise Refused("gaussians", name, "an attribute that may be left out, or that the motion reads")
+
     def at(self, time: np.float32) -> dict[str, np.ndarray]:
         """The attributes at a time from 0 to 1: by name, `[N, width]` each."""
         result = self.attributes()
@@ -134,14 +153,15 @@ class Scene:
             return result
         count = self.gaussians.count
         points = self.coordinates.of_points(result["means"])
+        field_time = self.coordinates.field_time(time)
         inputs = []
         for source in motion.sources:
             if source.kind == _FEATURES:
-                value = self.planes.features(points, self.coordinates.of_time(time))
+                value = self.planes.features(points, field_time)
             elif source.kind == _POINT:
                 value = points.T
             elif source.kind == _TIME:
-                value = np.full((1, count), time, np.float32)
+                value = np.full((1, count), field_time, np.float32)
             else:
                 value = result[source.attribute].T
             inputs.append(np.ascontiguousarray(value)[:, None, :])

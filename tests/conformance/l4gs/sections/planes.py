@@ -8,9 +8,9 @@ import numpy as np
 
 from .. import limits
 from ..limits import Budget
-from ..networks.arithmetic import without_tiny
+from ..networks.arithmetic import F, without_tiny
 from ..reader import Reader
-from .coordinates import sample
+from .coordinates import sample, sample_at_time
 
 # The axes x, y, z, t of a plane: its width lies along the first, its height along the second.
 AXES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
@@ -45,15 +45,15 @@ class Planes:
     def features(self, points: np.ndarray, time: np.float32) -> np.ndarray:
         """For each scale and channel, the product of the samples of its planes: `[scales * channels, N]`.
 
-        `points` are `[N, 3]` and `time` one number, in the planes' coordinates.
+        `points` are `[N, 3]` in the planes' coordinates, `time` is the field's.
         """
-        at = [points[:, 0], points[:, 1], points[:, 2], np.full(len(points), time, np.float32)]
-        result = np.ones((self.scales, self.channels, len(points)), np.float32)
+        over_time = np.ones((self.scales, self.channels, len(points)), np.float32)
+        along_time = np.array([F(2) * time - F(1)], np.float32)
         with np.errstate(all="ignore"):
             for place, values in self.values.items():
-                width, height = AXES[place.axes]
-                result[place.scale] *= sample(values, at[width], at[height])
-        return result.reshape(-1, len(points))
+                if place.has_time:
+                    over_time[place.scale] *= sample_at_time(values, points[:, AXES[place.axes][0]], along_time)
+            return self.space_features(points) * over_time.reshape(-1, len(points))
 
     def space_features(self, points: np.ndarray) -> np.ndarray:
         """For each scale and channel, the product of 1 and the samples of its planes without time: `[scales * channels, N]`.

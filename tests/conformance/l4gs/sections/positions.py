@@ -59,10 +59,7 @@ class _Tree:
         if self._ends.setdefault((digits, 1), AdaptiveBit()).read(self._decoder):
             return 0
         context = self._differences.setdefault(digits, AdaptiveInteger())
-        zeros = count // 2 + context.read(self._decoder)
-        if not 0 <= zeros <= count:
-            self._decoder.refuse(f"positions whose nodes split {count} codes, not {zeros} of them")
-        return zeros
+        return min(max(count // 2 + context.read(self._decoder), 0), count)
 
 
 def read_cells(decoder: RangeDecoder, count: int, bits: int) -> np.ndarray:
