@@ -64,5 +64,6 @@ def distribution(level: int) -> Distribution:
     spread = TOTAL - (slots + 1)
     lowest = edge(-radius - 1)
     whole = edge(radius) - lowest
-    begins = [i + math.floor((edge(i - radius - 1) - lowest) / whole * spread) for i in range(slots)]
+    # The series may round to slightly more than 1, and its rest to less than 0.
+    begins = [i + math.floor(max((edge(i - radius - 1) - lowest) / whole * spread, 0.0)) for i in range(slots)]
     return Distribution(-radius, begins + [TOTAL - 1])

@@ -116,7 +116,7 @@ class Scene:
     def attributes(self) -> dict[str, np.ndarray]:
         """All attributes of the Gaussians by name, `[N, width]` each, as motion may read them."""
         result = dict(self.gaussians.attributes)
-        result["sh_rest"] = self.harmonics.values.reshape(self.gaussians.count, -1)
+        result["sh_rest"] = self.harmonics.values.reshape(self.gaussians.count, self.harmonics.values.shape[1] * 3)
         return result
 
     def check_sources(self, part: str) -> None:

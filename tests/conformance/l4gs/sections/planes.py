@@ -53,7 +53,7 @@ class Planes:
             for place, values in self.values.items():
                 if place.has_time:
                     over_time[place.scale] *= sample_at_time(values, points[:, AXES[place.axes][0]], along_time)
-            return self.space_features(points) * over_time.reshape(-1, len(points))
+            return self.space_features(points) * over_time.reshape(self.scales * self.channels, len(points))
 
     def space_features(self, points: np.ndarray) -> np.ndarray:
         """For each scale and channel, the product of 1 and the samples of its planes without time: `[scales * channels, N]`.
@@ -68,7 +68,7 @@ class Planes:
                 width, height = AXES[place.axes]
                 samples = without_tiny(sample(without_tiny(values), points[:, width], points[:, height]))
                 result[place.scale] = without_tiny(result[place.scale] * samples)
-        return result.reshape(-1, len(points))
+        return result.reshape(self.scales * self.channels, len(points))
 
 
 def read_head(reader: Reader) -> Planes:
