@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 import unicodedata
-from typing import NoReturn, Optional
+from typing import NoReturn
 
 import numpy as np
 
@@ -18,12 +18,12 @@ _DIRECTION_MARKS = {0x061C, 0x200E, 0x200F, *range(0x202A, 0x202F), *range(0x206
 class Reader:
     """Reads fields from the bytes of one part of the stream, and names part and field where they break a rule."""
 
-    def __init__(self, part: str, data: bytes, trace: Optional[list[tuple[int, str]]] = None) -> None:
+    def __init__(self, part: str, data: bytes, begin: int = 0) -> None:
         self.part = part
         self.data = data
+        # Where the data begins in the part: the fields of an attribute or a block are read by a reader of their own.
+        self.begin = begin
         self.position = 0
-        # Where each field begins, for whom wants to know.
-        self.trace = trace
 
     def refuse(self, field: str, expectation: str) -> NoReturn:
         raise Refused(self.part, field, expectation)
@@ -40,8 +40,6 @@ class Reader:
         """The next `count` bytes."""
         if count > self.left:
             self.refuse(field, f"{count} bytes, where {self.left} are left")
-        if self.trace is not None:
-            self.trace.append((self.position, field))
         begin = self.position
         self.position += count
         return self.data[begin : self.position]
@@ -80,8 +78,6 @@ class Reader:
         begin = self.position
         while True:
             byte = self.take(1, field)[0]
-            if self.trace is not None and shift:
-                self.trace.pop()
             value |= (byte & 0x7F) << shift
             shift += 7
             if byte < 0x80:
@@ -91,6 +87,11 @@ class Reader:
         self.require(value < 1 << 64, field, "a varint below 2^64")
         self.require(least <= value <= most, field, f"from {least} to {most}, not {value}")
         return value
+
+    def part_of(self, length: int, field: str) -> Reader:
+        """A reader of the next `length` bytes."""
+        begin = self.begin + self.position
+        return Reader(self.part, self.take(length, field), begin)
 
     def block(self, field: str) -> bytes:
         return self.take(self.varint(field), field)

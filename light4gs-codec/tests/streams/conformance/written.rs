@@ -275,6 +275,18 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
     };
     streams.push(("clusters", compressed(&many, &coding)));
 
+    // So many equal Gaussians that zeros fill the section.
+    let one = clusters(1);
+    let equal = GaussianArrays {
+        means: vec![one.means[0]; 5000],
+        log_scales: vec![one.log_scales[0]; 5000],
+        quats: vec![one.quats[0]; 5000],
+        opacity_logits: vec![one.opacity_logits[0]; 5000],
+        sh_dc: vec![one.sh_dc[0]; 5000],
+        ..GaussianArrays::default()
+    };
+    streams.push(("equal", compressed(&SceneData { gaussians: equal, ..many.clone() }, &coding)));
+
     // Nothing at all.
     let nothing = SceneData { gaussians: GaussianArrays::default(), ..many };
     streams.push(("nothing", encode(&nothing).unwrap()));

@@ -64,7 +64,7 @@ def read_gaussians(section: Section, budget: Budget) -> Gaussians:
             budget.take(section.name, name, count * width, 4)
             result.attributes[name] = reader.f32s((count, width), name)
             continue
-        data = Reader(section.name, reader.take(attribute.length, name))
+        data = reader.part_of(attribute.length, name)
         if attribute.coder == _GRID:
             cells, values = _read_grid(data, name, count)
             neighbors = find_neighbors(cells)

@@ -139,7 +139,7 @@ def _read_priors(reader: Reader, encoding: int, channels: int, around: Surroundi
         priors.append(_Prior(network, [], sources, own))
         before += own
     reader.require(before == channels, "priors", f"priors of all {channels} channels, not {before}")
-    block = Reader(reader.part, reader.block("weights"))
+    block = reader.part_of(reader.varint("weights"), "weights")
     weights, _ = read_weights(block, [prior.network for prior in priors], [], encoding, budget)
     for prior, own_weights in zip(priors, weights):
         prior.weights = own_weights
