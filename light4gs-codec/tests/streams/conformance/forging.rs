@@ -3,8 +3,7 @@
 use crate::common::{ENTRY, forge_header, payload, put, table_at, u32_at};
 
 const PRELUDE: usize = 32;
-const SECTIONS: [&str; 6] =
-    ["gaussians", "sh", "scene_coordinates", "motion", "feature_planes", "context_model"];
+const SECTIONS: [&str; 6] = ["gaussians", "sh", "scene_coordinates", "motion", "feature_planes", "context_model"];
 
 /// Bytes of a part that others replace.
 pub(super) struct Edit {

@@ -15,8 +15,8 @@ use crate::{
 };
 use light4gs_codec::{
     CompressionInput, Condition, ContextModelArrays, CoordinateMapping, FeaturePlaneArrays, GaussianArrays,
-    LatentArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network, PerGroup,
-    PlanePrior, PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
+    LatentArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network, PerGroup, PlanePrior,
+    PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
     attributes::AttributeSteps,
     encode, encode_compressed,
     network::{LayerKind, Operation, Value},
@@ -41,7 +41,8 @@ fn full_motion(scene: &SceneData, random: &mut Random) -> MotionArrays {
     let features = scene.feature_planes.features() as u32;
     let rest = scene.gaussians.attribute("sh_rest").unwrap().width as u32;
     let attribute = |name: &str| MotionSource::Attribute(name.into());
-    let mut sources = vec![MotionSource::Time, MotionSource::Point, attribute("means"), attribute("sh_dc"), attribute("age")];
+    let mut sources =
+        vec![MotionSource::Time, MotionSource::Point, attribute("means"), attribute("sh_dc"), attribute("age")];
     let mut channels = vec![1, 3, 3, 3, 2];
     for (source, own) in [(MotionSource::Features, features), (attribute("sh_rest"), rest)] {
         if own > 0 {
@@ -126,7 +127,8 @@ fn rare_model(channels: u32, random: &mut Random) -> ContextModelArrays {
     // Two conditions that read anchors: one through a kernel of 3 and what follows at one place, one of kernel 7.
     let mut anchors = |kernel: u32, groups: u32| {
         let (mut network, [anchors]) = Network::new([channels]);
-        let value = network.layer(anchors, random.layer(LayerKind::Checkerboard, channels, 2 * channels, kernel, groups));
+        let value =
+            network.layer(anchors, random.layer(LayerKind::Checkerboard, channels, 2 * channels, kernel, groups));
         let value = network.leaky_relu(value, 0.01);
         let value = network.layer(value, random.linear(2 * channels, 2 * channels));
         network.output(value);
@@ -160,7 +162,8 @@ fn shared_degrees(features: u32) -> ShCoding {
         network.output(output);
         ShPrior { network, sources: sources.iter().map(|source| source.0).collect() }
     };
-    let single = [(ShSource::Position, 3), (ShSource::LogScale, 3), (ShSource::Quaternion, 4), (ShSource::OpacityLogit, 1)];
+    let single =
+        [(ShSource::Position, 3), (ShSource::LogScale, 3), (ShSource::Quaternion, 4), (ShSource::OpacityLogit, 1)];
     let priors = vec![
         prior(&mut random, &[(ShSource::Dc, 3), (ShSource::SpaceFeatures, features)], 4),
         prior(&mut random, &[(ShSource::Dc, 3), (ShSource::Decoded, 4)], 8),
@@ -239,7 +242,8 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
     own.coordinates.mapping = MAPPING;
     let parts = Parts { inter_plane: false, ..ALL_PARTS };
     let steps_of_scales = [0.1, 0.03].map(|step| PerGroup { space_only: step, space_time: 2.0 * step }).to_vec();
-    let coding = plane_coding(&own.feature_planes, model(compact_shape(4, parts), &own.feature_planes, 3), steps_of_scales);
+    let coding =
+        plane_coding(&own.feature_planes, model(compact_shape(4, parts), &own.feature_planes, 3), steps_of_scales);
     let others = input(&own, Profile::Paper, compact_shape(4, parts));
     streams.push(("own-sizes", compressed(&own, &CompressionInput { planes: Some(coding), ..others })));
     let (_, tri_plane) = planes::sets().remove(0);
