@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Iterator
 from unittest import mock
 
@@ -10,7 +11,7 @@ from l4gs.decoder import decode
 from l4gs.reader import Reader
 
 
-@dataclass
+@dataclass(frozen=True)
 class Field:
     """Bytes that were read under one name. An offset counts from the beginning of the part."""
 
@@ -20,7 +21,8 @@ class Field:
     length: int
 
 
-def fields(data: bytes) -> list[Field]:
+@lru_cache(maxsize=None)
+def fields(data: bytes) -> tuple[Field, ...]:
     """The fields of a legal stream, in the order in which they are read. A block has two: its length, and its bytes."""
     found: list[Field] = []
     take = Reader.take
@@ -32,7 +34,8 @@ def fields(data: bytes) -> list[Field]:
         offset = reader.begin + reader.position
         taken = take(reader, count, name)
         if goes_on and count == 1 and found[-1].name == name and found[-1].offset + found[-1].length == offset:
-            found[-1].length += 1
+            before = found.pop()
+            found.append(Field(before.part, before.name, before.offset, before.length + 1))
         else:
             found.append(Field(reader.part, name, offset, count))
         goes_on = count == 1 and taken[0] >= 0x80
@@ -40,7 +43,7 @@ def fields(data: bytes) -> list[Field]:
 
     with mock.patch.object(Reader, "take", taking):
         decode(data)
-    return found
+    return tuple(found)
 
 
 def lines(data: bytes) -> Iterator[str]:

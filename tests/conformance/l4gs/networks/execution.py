@@ -134,9 +134,14 @@ def _transposed_convolution(x: np.ndarray, weight: np.ndarray, bias: np.ndarray)
 # --- other operations: (node, inputs, target) -> result -----------------------------------------------------------------
 
 
+def _kept(number: float) -> np.ndarray:
+    """A number of a node, or 0 where it is tiny."""
+    return without_tiny(np.array(number, np.float32))
+
+
 def _leaky(node: Node, read: list[np.ndarray], _: Size) -> np.ndarray:
     x = read[0]
-    return np.where(x >= 0, x, without_tiny(np.array(node.first, np.float32)) * x)
+    return np.where(x >= 0, x, _kept(node.first) * x)
 
 
 def _resize(_: Node, read: list[np.ndarray], target: Size) -> np.ndarray:
@@ -179,7 +184,7 @@ def _pair(apply: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Callable[[No
 
 
 def _clamp(node: Node, read: list[np.ndarray], _: Size) -> np.ndarray:
-    x, least, most = read[0], F(node.first), F(node.second)
+    x, least, most = read[0], _kept(node.first), _kept(node.second)
     return np.where(x < least, least, np.where(x > most, most, x))
 
 
@@ -215,7 +220,7 @@ _OPERATIONS: dict[int, Callable[[Node, list[np.ndarray], Size], np.ndarray]] = {
     EXPONENTIAL: lambda node, read, target: exponential(read[0]),
     LOGARITHM: lambda node, read, target: logarithm(read[0]),
     SQUARE_ROOT: lambda node, read, target: np.sqrt(read[0]),
-    AFFINE: lambda node, read, target: read[0] * F(node.first) + F(node.second),
+    AFFINE: lambda node, read, target: read[0] * _kept(node.first) + _kept(node.second),
     CLAMP: _clamp,
     GROUP_SUM: _group_sum,
     GROUP_MAXIMUM: _group_maximum,

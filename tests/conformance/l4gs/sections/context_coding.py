@@ -148,7 +148,8 @@ class _PlaneDecoder:
             columns = np.flatnonzero(mask[row])
             for channel in range(channels):
                 symbols = [decoder.symbol(distribution(int(level_of[channel, row, x]))) for x in columns]
-                value = (np.array(symbols, np.float32) + means[channel, row, columns]) * self.step
+                with np.errstate(over="ignore"):
+                    value = (np.array(symbols, np.float32) + means[channel, row, columns]) * self.step
                 values[channel, row, columns] = value + self._center
         decoder.end()
         if not np.isfinite(values).all():
