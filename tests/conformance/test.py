@@ -17,8 +17,8 @@ sys.path.insert(0, str(FOLDER))
 import numpy as np  # noqa: E402
 
 from kit.forging import Edit, forge, split  # noqa: E402
-from kit.manifest import LISTS, TIMES, Case, read_cases  # noqa: E402
 from kit.manifest import FOLDER as MANIFEST  # noqa: E402
+from kit.manifest import LISTS, TIMES, Case, read_cases  # noqa: E402
 from kit.refusals import list_of_refusals  # noqa: E402
 from l4gs.checksum import crc32c  # noqa: E402
 from l4gs.entropy.gaussian_tables import LEVELS, distribution  # noqa: E402

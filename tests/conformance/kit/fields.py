@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache
 from typing import Iterator
 from unittest import mock
 
@@ -21,7 +21,7 @@ class Field:
     length: int
 
 
-@lru_cache(maxsize=None)
+@cache
 def fields(data: bytes) -> tuple[Field, ...]:
     """The fields of a legal stream, in the order in which they are read. A block has two: its length, and its bytes."""
     found: list[Field] = []

@@ -22,7 +22,7 @@ FLOAT32, QUANTIZED = 0, 1
 SECTION_NAMES = {1: "gaussians", 2: "sh", 3: "scene_coordinates", 4: "motion", 5: "feature_planes", 6: "context_model"}
 
 # The encodings that each kind of each section may have.
-KINDS = {
+KINDS: dict[str, dict[int, tuple[int, ...]]] = {
     "gaussians": {1: (0, 1)},
     "sh": {1: (0,), 2: (1,), 3: (0, 1), 4: (1,)},
     "scene_coordinates": {1: (0,), 2: (0,)},
@@ -79,7 +79,9 @@ def read_container(data: bytes) -> Container:
     prelude.require(meta_bytes <= limits.META_BYTES, "length of the meta", f"at most {limits.META_BYTES}")
     stream_bytes = prelude.u64("length of the stream")
     prelude.require(stream_bytes <= limits.STREAM_BYTES, "length of the stream", f"at most {limits.STREAM_BYTES}")
-    prelude.require(stream_bytes == len(data), "length of the stream", f"that of the file, {len(data)}, not {stream_bytes}")
+    prelude.require(
+        stream_bytes == len(data), "length of the stream", f"that of the file, {len(data)}, not {stream_bytes}"
+    )
     checksum = prelude.u32("checksum")
     table_begin = PRELUDE_BYTES + meta_bytes
     table_end = table_begin + ENTRY_BYTES * section_count
@@ -96,7 +98,7 @@ def _read_meta(reader: Reader) -> Meta:
     frames = reader.u32("frame count")
     reader.require(frames <= limits.FRAMES, "frame count", f"at most {limits.FRAMES}")
     frames_a_second = reader.f32("frames a second")
-    reader.require(frames_a_second >= 0, "frames a second", "not negative")
+    reader.require(bool(frames_a_second >= 0), "frames a second", "not negative")
     smallest = reader.f32s((3,), "smallest corner")
     largest = reader.f32s((3,), "largest corner")
     reader.require(bool((smallest <= largest).all()), "largest corner", "on no axis less than the smallest")
@@ -147,9 +149,13 @@ def _read_table(table: Reader, count: int, data: bytes) -> dict[str, Section]:
         if crc32c(content) != checksum:
             raise Refused(name, "checksum", "that of the section's bytes")
         sections[name] = Section(name, kind, encoding, content)
-    table.require(begin == len(data), "length", f"sections to the end of the stream; {len(data) - begin} bytes are left")
+    table.require(
+        begin == len(data), "length", f"sections to the end of the stream; {len(data) - begin} bytes are left"
+    )
     for name in list(KINDS)[:5]:
         table.require(name in sections, "section", f"a section {name}")
     context_coded = sections["feature_planes"].kind == CONTEXT_CODED
-    table.require(context_coded == ("context_model" in sections), "section", "context_model exactly with context-coded planes")
+    table.require(
+        context_coded == ("context_model" in sections), "section", "context_model exactly with context-coded planes"
+    )
     return sections

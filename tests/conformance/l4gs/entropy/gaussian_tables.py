@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -50,7 +50,7 @@ def _normal(x: float) -> float:
     return 0.5 + 0.3989422804014327 * g * a
 
 
-@lru_cache(maxsize=None)
+@cache
 def distribution(level: int) -> Distribution:
     """The distribution of a level."""
     scale = _SCALES[level]

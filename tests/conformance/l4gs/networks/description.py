@@ -152,7 +152,9 @@ def _read_parameters(reader: Reader, name: str, node: Node, channels: list[int])
             divides = read[0] % node.groups == 0 and node.outputs % node.groups == 0
             reader.require(divides, f"{name}: groups", "a divisor of inputs and outputs")
         weights = prod((read[0] // node.groups, node.kernel, node.kernel))
-        reader.require(weights <= limits.LAYER_SIZE, f"{name}: kernel", f"at most {limits.LAYER_SIZE} weights of an output")
+        reader.require(
+            weights <= limits.LAYER_SIZE, f"{name}: kernel", f"at most {limits.LAYER_SIZE} weights of an output"
+        )
         return node.outputs
     if operation == LEAKY_RELU:
         node.first = 0.01
@@ -198,11 +200,17 @@ def _check_checkerboards(reader: Reader, name: str, network: Network) -> None:
         where = f"{name}: node {i} ({node.name})"
         value = len(network.inputs) + i
         if node.operation == CHECKERBOARD:
-            reader.require(node.inputs[0] < len(network.inputs), where, "an input of the network, for a checkerboard convolution")
+            reader.require(
+                node.inputs[0] < len(network.inputs), where, "an input of the network, for a checkerboard convolution"
+            )
             partial.add(value)
             continue
         reader.require(not anchors.intersection(node.inputs), where, "no input that a checkerboard convolution reads")
         if partial.intersection(node.inputs):
-            reader.require(not node.looks_beyond, where, "an operation that stays at one place, after a checkerboard convolution")
+            reader.require(
+                not node.looks_beyond, where, "an operation that stays at one place, after a checkerboard convolution"
+            )
             partial.add(value)
-    reader.require(not anchors.intersection(network.outputs), f"{name}: outputs", "no input that a checkerboard convolution reads")
+    reader.require(
+        not anchors.intersection(network.outputs), f"{name}: outputs", "no input that a checkerboard convolution reads"
+    )

@@ -91,7 +91,9 @@ def _layer(node: Node, x: np.ndarray, weight: np.ndarray, bias: np.ndarray) -> n
     return _convolution(node, x, weight, bias, taps)
 
 
-def _convolution(node: Node, x: np.ndarray, weight: np.ndarray, bias: np.ndarray, taps: list[tuple[int, int]]) -> np.ndarray:
+def _convolution(
+    node: Node, x: np.ndarray, weight: np.ndarray, bias: np.ndarray, taps: list[tuple[int, int]]
+) -> np.ndarray:
     """`weight` is `[outputs, channels of a group, taps]`."""
     _, height, width = x.shape
     border = node.kernel // 2
@@ -127,7 +129,9 @@ def _transposed_convolution(x: np.ndarray, weight: np.ndarray, bias: np.ndarray)
                     for kx in range(column, 5, 2):
                         y = 1 + (row + 2 - ky) // 2
                         x0 = 1 + (column + 2 - kx) // 2
-                        part += weight[channel, :, ky, kx, None, None] * padded[channel, y : y + height, x0 : x0 + width]
+                        part += (
+                            weight[channel, :, ky, kx, None, None] * padded[channel, y : y + height, x0 : x0 + width]
+                        )
     return total
 
 
@@ -173,7 +177,9 @@ def _mean_over_width(node: Node, read: list[np.ndarray], target: Size) -> np.nda
     return _mean_over_height(node, [read[0].transpose(0, 2, 1)], target).transpose(0, 2, 1)
 
 
-def _pair(apply: Callable[[np.ndarray, np.ndarray], np.ndarray]) -> Callable[[Node, list[np.ndarray], Size], np.ndarray]:
+def _pair(
+    apply: Callable[[np.ndarray, np.ndarray], np.ndarray],
+) -> Callable[[Node, list[np.ndarray], Size], np.ndarray]:
     """Channel `c` of the first input with channel `c mod C2` of the second."""
 
     def operation(_: Node, read: list[np.ndarray], __: Size) -> np.ndarray:

@@ -37,7 +37,9 @@ def read_weights(
 
 def _read_quantized(reader: Reader, lengths: list[int]) -> list[np.ndarray]:
     least = -(-sum(lengths) // 256)
-    reader.require(reader.left >= least, "weights", f"at least {least} bytes for {sum(lengths)} weights, not {reader.left}")
+    reader.require(
+        reader.left >= least, "weights", f"at least {least} bytes for {sum(lengths)} weights, not {reader.left}"
+    )
     decoder = RangeDecoder(reader.part, "weights", reader.take(reader.left, "weights"))
     shared = contexts(_LAST_LEVEL + 1)
     tensors = []
@@ -49,7 +51,11 @@ def _read_quantized(reader: Reader, lengths: list[int]) -> list[np.ndarray]:
         if step == 0:
             tensors.append(np.zeros(length, np.float32))
             continue
-        reader.require(bool(np.finfo(np.float32).tiny <= step <= np.float32(1e30)), "weights: step", "a normal number, at most 1e30")
+        reader.require(
+            bool(np.finfo(np.float32).tiny <= step <= np.float32(1e30)),
+            "weights: step",
+            "a normal number, at most 1e30",
+        )
         order = decoder.raw(2)
         reader.require(order <= 2, "weights: order of the prediction", "0 to 2, not 3")
         row = (decoder.raw(16) or length) if order else length

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Optional
 
 import numpy as np
 
@@ -74,7 +73,7 @@ class _PlaneDecoder:
         prior = self.model.prior_of[self.place]
         height, width = self.planes.sizes[self.place]
         self._center = self._center_of(self.place)
-        self._latent: Optional[np.ndarray] = None
+        self._latent: np.ndarray | None = None
         if prior.reads(LATENT):
             self._latent = self._read_latent(streams[self.place, "latent"])
         values = np.zeros((self.planes.channels, height, width), np.float32)
@@ -83,10 +82,14 @@ class _PlaneDecoder:
             # At the places of anchors, conditions that read anchors are zeros: nothing here needs anchors yet.
             self._read_symbols(streams[self.place, "anchors"], "anchors", values, odd, self._parameters(None, odd))
             anchors = np.where(odd, values - self._center, F(0))
-            self._read_symbols(streams[self.place, "other places"], "other places", values, ~odd, self._parameters(anchors, odd))
+            self._read_symbols(
+                streams[self.place, "other places"], "other places", values, ~odd, self._parameters(anchors, odd)
+            )
         else:
             everywhere = np.ones_like(odd)
-            self._read_symbols(streams[self.place, "all places"], "all places", values, everywhere, self._parameters(None, odd))
+            self._read_symbols(
+                streams[self.place, "all places"], "all places", values, everywhere, self._parameters(None, odd)
+            )
         self.planes.values[self.place] = values
 
     def _center_of(self, place: Place) -> np.float32:
@@ -104,7 +107,7 @@ class _PlaneDecoder:
         decoder.end()
         return latent
 
-    def _parameters(self, anchors: Optional[np.ndarray], odd: np.ndarray) -> np.ndarray:
+    def _parameters(self, anchors: np.ndarray | None, odd: np.ndarray) -> np.ndarray:
         """Scales, then means, at every place: `[2 C, H, W]`. Without anchors, what needs them is zeros everywhere."""
         prior = self.model.prior_of[self.place]
         network = self.model.networks[prior.distribution]
@@ -120,7 +123,7 @@ class _PlaneDecoder:
         name = f"{self.place.name}: distribution"
         return run(self.part, name, network, self.model.weights[prior.distribution], inputs, size)[0]
 
-    def _condition(self, condition: Condition, anchors: Optional[np.ndarray]) -> np.ndarray:
+    def _condition(self, condition: Condition, anchors: np.ndarray | None) -> np.ndarray:
         assert condition.network is not None
         inputs = [self._source(source, anchors) for source in condition.sources]
         network = self.model.networks[condition.network]
@@ -128,7 +131,7 @@ class _PlaneDecoder:
         size = self.planes.sizes[self.place]
         return run(self.part, f"{self.place.name}: condition", network, weights, inputs, size)[0]
 
-    def _source(self, source: int, anchors: Optional[np.ndarray]) -> np.ndarray:
+    def _source(self, source: int, anchors: np.ndarray | None) -> np.ndarray:
         if source == ANCHORS:
             assert anchors is not None
             return anchors
@@ -138,7 +141,9 @@ class _PlaneDecoder:
         place = Place(self.place.scale - 1, self.place.axes) if source == BELOW else Place(self.place.scale, source)
         return self.planes.values[place] - self._center_of(place)
 
-    def _read_symbols(self, data: bytes, part: str, values: np.ndarray, mask: np.ndarray, parameters: np.ndarray) -> None:
+    def _read_symbols(
+        self, data: bytes, part: str, values: np.ndarray, mask: np.ndarray, parameters: np.ndarray
+    ) -> None:
         """Fills in the values at the places of the mask, in the order row, channel, column."""
         decoder = SymbolDecoder(self.part, f"{self.place.name}: {part}", data)
         channels, height, _ = values.shape

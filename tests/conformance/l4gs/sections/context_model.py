@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Optional
 
 import numpy as np
 
@@ -25,7 +24,7 @@ ANCHORS, LATENT, BELOW = 6, 7, 8
 class Condition:
     """A network and what each of its inputs is; `None` stands for zeros."""
 
-    network: Optional[int]
+    network: int | None
     sources: list[int] = field(default_factory=list)
 
 
@@ -72,7 +71,9 @@ def read_context_model(section: Section, planes: Planes, budget: Budget) -> Cont
     tables: list[Distribution] = []
     medians = np.zeros(0, np.float32)
     if latent_channels:
-        tables = read_tables(section.name, "tables of the latent", reader.block("tables of the latent"), latent_channels, budget)
+        tables = read_tables(
+            section.name, "tables of the latent", reader.block("tables of the latent"), latent_channels, budget
+        )
         medians = reader.f32s((latent_channels,), "medians")
     weights, _ = read_weights(reader, networks, [], section.encoding, budget)
     return ContextModel(
@@ -86,10 +87,14 @@ def _read_prior(reader: Reader, name: str, networks: list[Network], channels: in
     network = networks[distribution]
     reader.require(not network.looks_beyond, f"{name}: distribution", "a network that looks at one place only")
     fits = network.output_channels == [2 * channels]
-    reader.require(fits, f"{name}: distribution", f"one output of {2 * channels} channels, not {network.output_channels}")
+    reader.require(
+        fits, f"{name}: distribution", f"one output of {2 * channels} channels, not {network.output_channels}"
+    )
     count = reader.varint(f"{name}: number of conditions", limits.NODES)
     fits = count == len(network.inputs)
-    reader.require(fits, f"{name}: number of conditions", f"one for each of {len(network.inputs)} inputs of the distribution")
+    reader.require(
+        fits, f"{name}: number of conditions", f"one for each of {len(network.inputs)} inputs of the distribution"
+    )
     conditions = []
     for i in range(count):
         conditions.append(_read_condition(reader, f"{name}: condition {i}", networks, channels, latent_channels))
@@ -101,7 +106,9 @@ def _read_prior(reader: Reader, name: str, networks: list[Network], channels: in
     return Prior(distribution, conditions)
 
 
-def _read_condition(reader: Reader, name: str, networks: list[Network], channels: int, latent_channels: int) -> Condition:
+def _read_condition(
+    reader: Reader, name: str, networks: list[Network], channels: int, latent_channels: int
+) -> Condition:
     number = reader.varint(f"{name}: network")
     if number == 0:
         return Condition(None)
@@ -132,17 +139,19 @@ def coding_order(reader: Reader, model: ContextModel, planes: Planes) -> list[Pl
                 for source in condition.sources:
                     if source < ANCHORS:
                         there = Place(scale, source) in planes.sizes
-                        reader.require(there, f"{place.name}: prior", f"planes that exist, not {scale}.{AXIS_NAMES[source]}")
+                        reader.require(
+                            there, f"{place.name}: prior", f"planes that exist, not {scale}.{AXIS_NAMES[source]}"
+                        )
                     elif source == BELOW:
                         there = Place(scale - 1, place.axes) in planes.sizes
                         reader.require(there, f"{place.name}: prior", "a plane one scale below")
         while waiting:
             ready = [
-                place
-                for place in waiting
-                if not any(model.prior_of[place].reads(other.axes) for other in waiting)
+                place for place in waiting if not any(model.prior_of[place].reads(other.axes) for other in waiting)
             ]
-            reader.require(len(ready) > 0, f"{waiting[0].name}: prior", "planes that do not depend on each other in a circle")
+            reader.require(
+                len(ready) > 0, f"{waiting[0].name}: prior", "planes that do not depend on each other in a circle"
+            )
             order += ready
             waiting = [place for place in waiting if place not in ready]
     return order

@@ -19,7 +19,13 @@ FIRST_ATTRIBUTES = (("means", 3), ("log_scales", 3), ("quats", 4), ("opacity_log
 
 _FLOAT32, _GRID, _CHANNELS, _COLORS = range(4)
 _CODER_NAMES = ("float32", "grid", "channels", "colors")
-_QUANTIZED_CODERS = {"means": _GRID, "log_scales": _CHANNELS, "quats": _CHANNELS, "opacity_logits": _CHANNELS, "sh_dc": _COLORS}
+_QUANTIZED_CODERS = {
+    "means": _GRID,
+    "log_scales": _CHANNELS,
+    "quats": _CHANNELS,
+    "opacity_logits": _CHANNELS,
+    "sh_dc": _COLORS,
+}
 # The order of the channels of colors in a stream.
 _COLOR_ORDER = (1, 0, 2)
 _MAY_BE_LEFT_OUT = 0x80
@@ -57,7 +63,9 @@ def read_gaussians(section: Section, budget: Budget) -> Gaussians:
     if quantized:
         budget.take(section.name, "number of Gaussians", count, 136)
         least = -(-count // 8)
-        reader.require(len(section.data) >= least, "number of Gaussians", f"a section of at least {least} bytes for {count}")
+        reader.require(
+            len(section.data) >= least, "number of Gaussians", f"a section of at least {least} bytes for {count}"
+        )
     for attribute in attributes:
         name, width = attribute.name, attribute.width
         if attribute.coder == _FLOAT32:
@@ -91,7 +99,9 @@ def _read_list(reader: Reader, quantized: bool) -> list[_Attribute]:
         legal = _LEGAL_NAME.fullmatch(raw_name) is not None
         reader.require(legal, f"{field}: name", "1 to 64 of a-z, 0-9, -, _")
         field = f"{field} ({raw_name})"
-        reader.require(raw_name not in names and raw_name != "sh_rest", f"{field}: name", "a name that is there once, not sh_rest")
+        reader.require(
+            raw_name not in names and raw_name != "sh_rest", f"{field}: name", "a name that is there once, not sh_rest"
+        )
         names.add(raw_name)
         width = reader.varint(f"{field}: width", limits.ATTRIBUTE_WIDTH, 1)
         byte = reader.u8(f"{field}: coder")
@@ -106,7 +116,11 @@ def _read_list(reader: Reader, quantized: bool) -> list[_Attribute]:
             reader.require(coder == _GRID, f"{field}: coder", f"1 for means in encoding 1, not {coder}")
         else:
             reader.require(coder != _GRID, f"{field}: coder", "1 for means alone")
-        reader.require(coder < len(_CODER_NAMES) or optional, f"{field}: coder", f"a known coder, not {coder}, where the attribute may not be left out")
+        reader.require(
+            coder < len(_CODER_NAMES) or optional,
+            f"{field}: coder",
+            f"a known coder, not {coder}, where the attribute may not be left out",
+        )
         if coder == _COLORS:
             reader.require(width == 3, f"{field}: width", f"3 for the coder of colors, not {width}")
         length = reader.varint(f"{field}: length") if coder != _FLOAT32 else 0

@@ -102,8 +102,8 @@ def read_harmonics(section: Section, around: Surroundings, budget: Budget) -> Ha
             neighbors = find_neighbors(around.gaussians.attributes["means"].astype(np.float64))
             for g, data in enumerate(streams, 1):
                 own = channels_of_degree(g)
-                decoder = RangeDecoder(section.name, f"degree {g}", data)
-                integers = read_channels(decoder, count, len(own), neighbors, LARGEST_SYMBOL)
+                adaptive = RangeDecoder(section.name, f"degree {g}", data)
+                integers = read_channels(adaptive, count, len(own), neighbors, LARGEST_SYMBOL)
                 values[:, own.start : own.stop] = integers.astype(np.float32) * step
     reader.require(bool(np.isfinite(values).all()), "coefficients", "finite numbers")
     return Harmonics(degree, values.reshape(shape))
@@ -149,7 +149,9 @@ def _read_priors(reader: Reader, encoding: int, channels: int, around: Surroundi
 class _Decoder:
     """Decodes harmonics whose distributions networks give."""
 
-    def __init__(self, part: str, priors: list[_Prior], around: Surroundings, step: np.float32, values: np.ndarray) -> None:
+    def __init__(
+        self, part: str, priors: list[_Prior], around: Surroundings, step: np.float32, values: np.ndarray
+    ) -> None:
         self._part = part
         self._priors = priors
         self._around = around

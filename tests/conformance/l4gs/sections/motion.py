@@ -127,7 +127,11 @@ class Scene:
         there = self.attributes()
         for i, (source, channels) in enumerate(zip(self.motion.sources, self.motion.network.inputs)):
             if source.kind == _ATTRIBUTE:
-                reader.require(source.attribute in there, f"input {i}", f"an attribute that the Gaussians have, not {source.attribute}")
+                reader.require(
+                    source.attribute in there,
+                    f"input {i}",
+                    f"an attribute that the Gaussians have, not {source.attribute}",
+                )
                 wanted = there[source.attribute].shape[1]
             else:
                 wanted = {_FEATURES: self.planes.scales * self.planes.channels, _POINT: 3, _TIME: 1}[source.kind]

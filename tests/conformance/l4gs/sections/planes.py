@@ -96,7 +96,9 @@ def read_head(reader: Reader) -> Planes:
             reader.require(differ, f"scale {scale}: planes", "a bit 6 of 0 where no two planes differ in size")
         else:
             spanned = sorted({axis for axes in there for axis in AXES[axes]})
-            length = {axis: reader.varint(f"scale {scale}: size along {'xyzt'[axis]}", limits.SIDE, 1) for axis in spanned}
+            length = {
+                axis: reader.varint(f"scale {scale}: size along {'xyzt'[axis]}", limits.SIDE, 1) for axis in spanned
+            }
             for axes in there:
                 along_width, along_height = AXES[axes]
                 sizes[Place(scale, axes)] = (length[along_height], length[along_width])

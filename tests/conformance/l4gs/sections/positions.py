@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from ..entropy.range_coder import AdaptiveBit, AdaptiveInteger, RangeDecoder
 _MANY = 16
 
 
-@lru_cache(maxsize=None)
+@cache
 def _splits(count: int) -> list[int]:
     """0, n, 1, n - 1, 2, ...: how many of `count` codes have a 0, in the order in which the stream asks."""
     order = []
