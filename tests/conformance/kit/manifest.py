@@ -57,23 +57,20 @@ def read_cases() -> list[Case]:
 
 
 def write_lines(lines_of: dict[str, list[str]]) -> None:
-    """Writes the list of accepted files with new lines, by the names of the files. Comments stay."""
-    kept: list[str] = []
+    """Writes the list of accepted files with new lines, by the names of the files. Comments stay.
+
+    In this list, an empty line stands between two blocks.
+    """
     path = FOLDER / LISTS[0]
-    for line in path.read_text().splitlines():
-        word, _, rest = line.partition(" ")
-        if not line or line.startswith("#") or word in ("accepted", "from", "edit"):
-            if word == "accepted":
-                name = rest
-            if kept and not line and kept[-1] == "":
-                continue
-            kept.append(line)
-            if word == "from":
-                kept += ["@" + name]
-        # Edits stand before the lines.
-        if word == "edit":
-            kept[-2], kept[-1] = kept[-1], kept[-2]
     result: list[str] = []
-    for line in kept:
-        result += lines_of[line[1:]] if line.startswith("@") else [line]
-    path.write_text("\n".join(result) + "\n")
+    name = ""
+    for line in [*path.read_text().splitlines(), ""]:
+        word, _, rest = line.partition(" ")
+        if word == "accepted":
+            name = rest
+        if not line and name:
+            result += lines_of[name]
+            name = ""
+        if not line or line.startswith("#") or word in ("accepted", "from", "edit"):
+            result.append(line)
+    path.write_text("\n".join(result))

@@ -1,8 +1,9 @@
 """What every decoder must refuse: one file for each rule. `check --write` makes manifest/refused.txt of it.
 
 A rule has a name, a file, and what to change in it. A change names a field as `fields` prints it: `PART: FIELD` or, for its
-`n`-th occurrence, `PART: FIELD #n`, from 0. `=` puts other bytes in its place, `+` puts bytes before it. Where a change does not name
-a field, it is an edit as in forging.py.
+`n`-th occurrence, `PART: FIELD #n`, from 0. After `=` come the bytes in its place, in hexadecimal; `{same}` stands for those that were
+there, `{same-1}` for all of them but the last. Where a change does not name a field, it is an edit as in forging.py, in which `{table}`,
+`{meta}`, `{size}` or the name of a section stand for where the table begins, or for lengths in bytes.
 """
 
 from __future__ import annotations
@@ -27,16 +28,6 @@ RARE, OWN_SIZES, CLUSTERS, FAR = (
 
 def f32(*values: float) -> str:
     return struct.pack(f"<{len(values)}f", *values).hex()
-
-
-def u32(value: int) -> str:
-    return struct.pack("<I", value).hex()
-
-
-def text(value: str) -> str:
-    """A string of the meta: its length, and its bytes."""
-    data = value.encode()
-    return u32(len(data)) + data.hex()
 
 
 def block(value: str) -> str:
@@ -360,7 +351,7 @@ RULES: list[tuple[str, str, list[str]]] = [
         RARE,
         ["context_model: network 2: node 2: operation=81", "context_model: network 2: node 2 (linear): outputs=080301"],
     ),
-    ("another-reader-of-anchors", RARE, ["context_model: network 2: node 1: operation=05{value0}"]),
+    ("another-reader-of-anchors", RARE, ["context_model: network 2: node 1: operation=0500"]),
     ("anchors-as-an-output", COMPACT, ["context_model: network 1: output 0=00"]),
     ("too-many-priors", COMPACT, ["context_model: number of priors=21"]),
     ("distribution-that-is-no-network", COMPACT, ["context_model: prior 0: distribution=05"]),
@@ -443,7 +434,7 @@ def _edits(data: bytes, changes: list[str]) -> list[Edit]:
             raise ValueError(f"{change}: no such field")
         field = here[int(occurrence or 0)]
         old = parts[part][field.offset : field.offset + field.length].hex()
-        new = new.replace("{same-1}", old[:-2]).replace("{same}", old).replace("{value0}", "00")
+        new = new.replace("{same-1}", old[:-2]).replace("{same}", old)
         at_field.append(Edit(part, field.offset, field.length, bytes.fromhex(new)))
     at_field.sort(key=lambda edit: -edit.offset)
     return at_field + others
