@@ -355,7 +355,7 @@ fn random_stream(seed: u64) -> Vec<u8> {
         if !quantized_age {
             coding.attributes = AttributeSteps::default();
         }
-        scene.motion = if seed % 3 == 0 { motion(4) } else { full_motion(&scene, &mut random) };
+        scene.motion = if seed.is_multiple_of(3) { motion(4) } else { full_motion(&scene, &mut random) };
         if let Ok(encoded) = encode_compressed(&scene, &coding) {
             return encoded.bytes;
         }
