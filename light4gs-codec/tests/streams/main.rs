@@ -5,6 +5,7 @@ mod common;
 
 mod attributes;
 mod compressed;
+mod conformance;
 mod damage;
 mod files;
 mod golden;

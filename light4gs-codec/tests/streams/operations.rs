@@ -74,7 +74,7 @@ fn operations_that_do_not_fit_are_refused() {
 }
 
 /// A scene without planes, whose Gaussians fade and turn: one network with all operations that `hexplane` does not use.
-fn scene() -> SceneData {
+pub(crate) fn scene() -> SceneData {
     let mut scene =
         SceneData { feature_planes: Default::default(), gaussians: common::gaussians(11, 1), ..common::sample() };
     let (mut network, [time, means, quats, logits, dc]) = Network::new([1, 3, 4, 1, 3]);

@@ -21,7 +21,7 @@ fn plane(scale: u32, axes: PlaneAxes, [width, height]: [u32; 2]) -> Plane {
 }
 
 /// Sets of planes that a field may have.
-fn sets() -> Vec<(&'static str, FeaturePlaneArrays)> {
+pub(crate) fn sets() -> Vec<(&'static str, FeaturePlaneArrays)> {
     let of = |axes: &[PlaneAxes], multipliers: &[u32]| planes(axes, CHANNELS, [8, 12, 4, 16], multipliers);
     let list = |planes: Vec<Plane>| FeaturePlaneArrays { channels: CHANNELS, planes };
     vec![
@@ -56,7 +56,7 @@ fn sets() -> Vec<(&'static str, FeaturePlaneArrays)> {
     ]
 }
 
-fn scene_of(planes: FeaturePlaneArrays) -> SceneData {
+pub(crate) fn scene_of(planes: FeaturePlaneArrays) -> SceneData {
     with_planes(scene(5, 2, CHANNELS, [4; 4], &[1]), planes)
 }
 

@@ -18,7 +18,7 @@ use light4gs_codec::{
 };
 use proptest::prelude::*;
 
-const M: u32 = 2;
+pub(crate) const M: u32 = 2;
 
 /// A node of any kind that reads any values before it; often its channels fit.
 fn node(choice: u8, picks: [u8; 3], channels: &[u32], random: &mut Random) -> Node {
@@ -65,7 +65,7 @@ fn node(choice: u8, picks: [u8; 3], channels: &[u32], random: &mut Random) -> No
 }
 
 /// A graph over some inputs, with a last node that makes it fit: a linear layer at the plane's size.
-fn graph(inputs: &[u32], choices: &[(u8, [u8; 3])], random: &mut Random) -> Network {
+pub(crate) fn graph(inputs: &[u32], choices: &[(u8, [u8; 3])], random: &mut Random) -> Network {
     let mut network = Network { inputs: inputs.to_vec(), ..Network::default() };
     let mut channels = inputs.to_vec();
     for &(choice, picks) in choices {
@@ -89,7 +89,7 @@ fn graph(inputs: &[u32], choices: &[(u8, [u8; 3])], random: &mut Random) -> Netw
 }
 
 /// A model in which one graph predicts every plane from all kinds of sources.
-fn model(graph: Network, sources: Vec<PlaneSource>, random: &mut Random) -> ContextModelArrays {
+pub(crate) fn model(graph: Network, sources: Vec<PlaneSource>, random: &mut Random) -> ContextModelArrays {
     let own = Some(Condition { network: 0, sources });
     let priors = vec![
         PlanePrior { conditions: vec![None, None], distribution: 1 },

@@ -30,7 +30,7 @@ const PARTS: [&str; 10] = [
 ];
 
 /// Folders that tools create inside of them.
-const NOT_OURS: [&str; 4] = ["target", "node_modules", "corpus", "artifacts"];
+const NOT_OURS: [&str; 5] = ["target", "node_modules", "corpus", "artifacts", "__pycache__"];
 
 /// A capture as HyperNeRF's program writes it: an image and a camera for each of its 18 frames.
 const LARGE_FOLDERS: [&str; 2] =

@@ -1,0 +1,87 @@
+//! Files of the set that are made of others: `tests/conformance/kit/forging.py` says how.
+
+use crate::common::{ENTRY, forge_header, payload, put, table_at, u32_at};
+
+const PRELUDE: usize = 32;
+const SECTIONS: [&str; 6] = ["gaussians", "sh", "scene_coordinates", "motion", "feature_planes", "context_model"];
+
+/// Bytes of a part that others replace.
+pub(super) struct Edit {
+    part: String,
+    offset: usize,
+    length: usize,
+    new: Vec<u8>,
+}
+
+impl Edit {
+    /// From `PART@OFFSET-LENGTH=HEX`.
+    pub(super) fn parse(text: &str) -> Self {
+        let (part, rest) = text.split_once('@').unwrap();
+        let (offset, rest) = rest.split_once('-').unwrap();
+        let (length, hex) = rest.split_once('=').unwrap();
+        let byte = |at: usize| u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
+        Self {
+            part: part.into(),
+            offset: offset.parse().unwrap(),
+            length: length.parse().unwrap(),
+            new: (0..hex.len()).step_by(2).map(byte).collect(),
+        }
+    }
+
+    fn apply(&self, bytes: &mut Vec<u8>) {
+        bytes.splice(self.offset..self.offset + self.length, self.new.iter().copied());
+    }
+}
+
+/// A legal stream after some edits.
+pub(super) fn forge(bytes: &[u8], edits: &[Edit]) -> Vec<u8> {
+    if edits.is_empty() {
+        return bytes.to_vec();
+    }
+    let mut parts = split(bytes);
+    for edit in edits.iter().filter(|edit| !matches!(edit.part.as_str(), "header" | "file")) {
+        let part = parts.iter_mut().find(|(name, _)| *name == edit.part);
+        edit.apply(&mut part.unwrap_or_else(|| panic!("no part {}", edit.part)).1);
+    }
+    let mut forged = join(parts);
+    edits.iter().filter(|edit| edit.part == "header").for_each(|edit| edit.apply(&mut forged));
+    forge_header(&mut forged);
+    edits.iter().filter(|edit| edit.part == "file").for_each(|edit| edit.apply(&mut forged));
+    forged
+}
+
+/// The parts of a legal stream, in their order.
+fn split(bytes: &[u8]) -> Vec<(&'static str, Vec<u8>)> {
+    let table = table_at(bytes);
+    let count = u32_at(bytes, 12) as usize;
+    let mut parts = vec![
+        ("prelude", bytes[..PRELUDE].to_vec()),
+        ("meta", bytes[PRELUDE..table].to_vec()),
+        ("table", bytes[table..table + ENTRY * count].to_vec()),
+    ];
+    for index in 0..count {
+        let number = usize::from(bytes[table + ENTRY * index]);
+        parts.push((SECTIONS[number - 1], payload(bytes, index).to_vec()));
+    }
+    parts
+}
+
+/// The stream of these parts, with lengths and checksums of the sections. Entry `i` belongs to section `i`.
+fn join(parts: Vec<(&'static str, Vec<u8>)>) -> Vec<u8> {
+    let mut parts = parts.into_iter().map(|(_, bytes)| bytes);
+    let [mut forged, meta, mut table] = [(); 3].map(|()| parts.next().expect("prelude, meta and table"));
+    let sections: Vec<Vec<u8>> = parts.collect();
+    for (entry, section) in table.chunks_exact_mut(ENTRY).zip(&sections) {
+        put(entry, 4, &crc32c::crc32c(section).to_le_bytes());
+        put(entry, 8, &(section.len() as u64).to_le_bytes());
+    }
+    let (entries, meta_bytes) = ((table.len() / ENTRY) as u32, meta.len() as u32);
+    forged.extend(meta);
+    forged.extend(table);
+    sections.into_iter().for_each(|section| forged.extend(section));
+    let length = forged.len() as u64;
+    put(&mut forged, 12, &entries.to_le_bytes());
+    put(&mut forged, 16, &meta_bytes.to_le_bytes());
+    put(&mut forged, 20, &length.to_le_bytes());
+    forged
+}

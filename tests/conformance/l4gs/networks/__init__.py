@@ -1,0 +1,1 @@
+"""Small networks as lists of operations: "Networks" of docs/format.md."""
