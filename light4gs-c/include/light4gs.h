@@ -111,6 +111,8 @@ typedef struct L4gsInfo {
   uint32_t height;
   // Its horizontal field of view in radians, 0 where not known.
   float fov_x;
+  // Number of attributes beyond those that every file has; see `l4gs_attribute`.
+  uint32_t attributes;
   // Number of extra entries; see `l4gs_extra`.
   uint32_t extras;
   // Number of sections; see `l4gs_section`.
@@ -243,6 +245,17 @@ enum L4gsStatus l4gs_section(const struct L4gsScene *scene,
                              uint32_t index,
                              const char **name,
                              uint64_t *bytes);
+
+// Attribute number `index`, from 0, of those that not every file has: its name, its numbers for a Gaussian W, and its values
+// `[N, W]`, which do not change with time. Name and values belong to the scene.
+//
+// # Safety
+// `scene` is open; `name`, `width` and `values` point to a pointer, a number and a pointer.
+enum L4gsStatus l4gs_attribute(const struct L4gsScene *scene,
+                               uint32_t index,
+                               const char **name,
+                               uint32_t *width,
+                               const float **values);
 
 // Fills the arrays with the Gaussians at a time in [0, 1], as gsplat's `rasterization` takes them. A Gaussian whose quaternion
 // has no direction gets the identity and opacity 0. `count` is the number of Gaussians for which there is room; it must be

@@ -147,6 +147,7 @@ pub unsafe extern "C" fn l4gs_info(scene: *const L4gsScene, info: *mut L4gsInfo)
             width: meta.width,
             height: meta.height,
             fov_x: meta.fov_x,
+            attributes: scene.attributes.len() as u32,
             extras: scene.extras.len() as u32,
             sections: scene.sections.len() as u32,
         };
@@ -220,6 +221,38 @@ pub unsafe extern "C" fn l4gs_section(
         unsafe {
             name.write(found_name.as_ptr());
             bytes.write(*found_bytes);
+        }
+        Ok(())
+    })
+}
+
+/// Attribute number `index`, from 0, of those that not every file has: its name, its numbers for a Gaussian W, and its values
+/// `[N, W]`, which do not change with time. Name and values belong to the scene.
+///
+/// # Safety
+/// `scene` is open; `name`, `width` and `values` point to a pointer, a number and a pointer.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn l4gs_attribute(
+    scene: *const L4gsScene,
+    index: u32,
+    name: *mut *const c_char,
+    width: *mut u32,
+    values: *mut *const f32,
+) -> L4gsStatus {
+    guarded(|| {
+        // SAFETY: the caller's words.
+        let scene = unsafe { open(scene) }?;
+        refuse_null("name", name)?;
+        refuse_null("width", width)?;
+        refuse_null("values", values)?;
+        let attributes = scene.playable.further();
+        let attribute = attributes.get(index as usize);
+        let attribute = attribute.ok_or_else(|| no_such("attribute", index, attributes.len()))?;
+        // SAFETY: none is null, and the caller says what they point to.
+        unsafe {
+            name.write(scene.attributes[index as usize].as_ptr());
+            width.write(attribute.width);
+            values.write(attribute.values.as_ptr());
         }
         Ok(())
     })

@@ -13,6 +13,8 @@ pub struct L4gsScene {
     pub(crate) name: CString,
     /// Key and value.
     pub(crate) extras: Vec<(CString, CString)>,
+    /// Names of the further attributes.
+    pub(crate) attributes: Vec<CString>,
     /// Name and bytes.
     pub(crate) sections: Vec<(CString, u64)>,
 }
@@ -23,7 +25,8 @@ impl L4gsScene {
         let name = c_string(&info.meta.name);
         let extras = info.meta.extra.iter().map(|(key, value)| (c_string(key), c_string(value))).collect();
         let sections = info.sections.iter().map(|section| (c_string(section.name), section.bytes)).collect();
-        Self { playable, name, extras, sections }
+        let attributes = playable.further().iter().map(|attribute| c_string(&attribute.name)).collect();
+        Self { name, extras, attributes, sections, playable }
     }
 }
 

@@ -160,6 +160,8 @@ pub struct L4gsInfo {
     pub height: u32,
     /// Its horizontal field of view in radians, 0 where not known.
     pub fov_x: f32,
+    /// Number of attributes beyond those that every file has; see `l4gs_attribute`.
+    pub attributes: u32,
     /// Number of extra entries; see `l4gs_extra`.
     pub extras: u32,
     /// Number of sections; see `l4gs_section`.

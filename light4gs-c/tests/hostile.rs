@@ -87,6 +87,11 @@ fn use_scene(scene: *mut L4gsScene, random: &mut Random, drawn: &mut u64) {
             let status = l4gs_extra(scene, index, &mut key, &mut value);
             assert_eq!(status == L4gsStatus::Ok, index < info.extras);
         }
+        for index in 0..info.attributes + 1 {
+            let (mut name, mut width, mut values) = (null(), 0, null());
+            let status = l4gs_attribute(scene, index, &mut name, &mut width, &mut values);
+            assert_eq!(status == L4gsStatus::Ok, index < info.attributes);
+        }
         for index in 0..info.sections + 1 {
             let (mut name, mut bytes) = (null(), 0);
             let status = l4gs_section(scene, index, &mut name, &mut bytes);
@@ -197,6 +202,7 @@ fn null_pointers_are_refused() {
             l4gs_info(null(), &mut L4gsInfo::default()),
             l4gs_extra(null(), 0, &mut null(), &mut null()),
             l4gs_section(null(), 0, &mut null(), &mut 0),
+            l4gs_attribute(null(), 0, &mut null(), &mut 0, &mut null()),
             l4gs_gaussians_gsplat(null(), 0.0, 0, null()),
             l4gs_gaussians_inria(null(), 0.0, 0, null()),
             l4gs_render(null(), &camera(), 0.0, null(), [0.0; 3].as_mut_ptr(), 3),
@@ -212,6 +218,9 @@ fn null_pointers_are_refused() {
             l4gs_extra(scene, 0, null_mut(), &mut null()),
             l4gs_extra(scene, 0, &mut null(), null_mut()),
             l4gs_section(scene, 0, null_mut(), &mut 0),
+            l4gs_attribute(scene, 0, null_mut(), &mut 0, &mut null()),
+            l4gs_attribute(scene, 0, &mut null(), null_mut(), &mut null()),
+            l4gs_attribute(scene, 0, &mut null(), &mut 0, null_mut()),
             l4gs_section(scene, 0, &mut null(), null_mut()),
             l4gs_gaussians_gsplat(scene, 0.0, 0, null()),
             l4gs_gaussians_inria(scene, 0.0, 0, null()),

@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use glam::{DMat3, DVec3};
-use light4gs_codec::{AttributeValues, CodecError, Limits};
+use light4gs_codec::{CodecError, Limits};
 use light4gs_data::{Camera, Intrinsics};
 use light4gs_render::PlayableScene;
 use light4gs_render::conventions::{Gsplat, Inria};
@@ -136,18 +136,11 @@ impl Scene {
 
     /// Means, harmonics of degree 0, the others, opacities, scales, quaternions; and the further attributes by name.
     fn inria<'py>(&self, py: Python<'py>, time: f32) -> PyResult<([Bound<'py, PyByteArray>; 6], Bound<'py, PyDict>)> {
-        let found = py.detach(|| {
-            let gaussians = self.0.at(time)?;
-            let arrays = Inria::of(&gaussians);
-            Ok((arrays, gaussians))
-        });
-        let (arrays, gaussians) = found.map_err(|error| call_exception(py, error))?;
-        let Inria { means, f_dc, f_rest, opacity, scale, rot } = arrays;
+        let found = py.detach(|| self.0.at(time).map(|gaussians| Inria::of(&gaussians)));
+        let Inria { means, f_dc, f_rest, opacity, scale, rot } = found.map_err(|error| call_exception(py, error))?;
         let further = PyDict::new(py);
-        for attribute in &gaussians.further {
-            let values = gaussians.attribute(&attribute.name);
-            let AttributeValues { name, width, values, .. } = values.expect("an attribute that is listed");
-            further.set_item(name, (width, bytes_of(py, values)?))?;
+        for attribute in self.0.further() {
+            further.set_item(&attribute.name, (attribute.width, bytes_of(py, &attribute.values)?))?;
         }
         let arrays = [
             bytes_of(py, &means)?,

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use light4gs_codec::rendering::{TILE, opacity, scale};
 use light4gs_codec::{
-    CodecError, GaussianArrays, Limits, MotionEvaluator, MotionSource, SceneData, StreamInfo, decode_with_limits,
-    info_with_limits, read_file_and,
+    CodecError, FurtherAttribute, GaussianArrays, Limits, MotionEvaluator, MotionSource, SceneData, StreamInfo,
+    decode_with_limits, info_with_limits, read_file_and,
 };
 use light4gs_data::Camera;
 
@@ -71,6 +71,11 @@ impl PlayableScene {
     /// What the file holds: metadata, counts, sections.
     pub fn info(&self) -> &StreamInfo {
         &self.info
+    }
+
+    /// The attributes of the Gaussians beyond those that every file has. They do not change with time.
+    pub fn further(&self) -> &[FurtherAttribute] {
+        &self.canonical.further
     }
 
     /// Number of Gaussians.

@@ -10,19 +10,30 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates that have rooms.
-const CRATES: [&str; 5] = ["light4gs-codec", "light4gs-data", "light4gs-model", "light4gs-train", "light4gs-web"];
+const CRATES: [&str; 7] = [
+    "light4gs-codec",
+    "light4gs-data",
+    "light4gs-render",
+    "light4gs-model",
+    "light4gs-train",
+    "light4gs-web",
+    "light4gs-c",
+];
 
 /// How many files a folder may hold.
 const MOST_FILES: usize = 16;
 
 /// The repository's folders.
-const PARTS: [&str; 10] = [
+const PARTS: [&str; 13] = [
     ".ci",
     "docs",
     "examples",
+    "light4gs-c",
     "light4gs-codec",
     "light4gs-data",
     "light4gs-model",
+    "light4gs-python",
+    "light4gs-render",
     "light4gs-train",
     "light4gs-web",
     "shaders",
