@@ -64,7 +64,7 @@ def test_the_conventions_agree(stream):
     n, k = scene.gaussian_count, (scene.sh_degree + 1) ** 2
     shapes = {"means": (n, 3), "quats": (n, 4), "scales": (n, 3), "opacities": (n,), "sh": (n, k, 3)}
     assert {name: getattr(g, name).shape for name in shapes} == shapes
-    assert all(getattr(g, name).dtype == np.float32 and getattr(g, name).flags.writeable for name in shapes)
+    assert all(getattr(g, name).dtype == np.float32 and getattr(g, name).flags["W"] for name in shapes)
     assert np.array_equal(g.means, raw.means)
     np.testing.assert_allclose(g.scales, np.exp(np.minimum(raw.scale, 40)), rtol=1e-6)
     np.testing.assert_allclose(g.opacities, 1 / (1 + np.exp(-raw.opacity)), rtol=1e-6)
