@@ -27,8 +27,8 @@ pub use fit::fit;
 pub use models::{ConfiguredModels, EntropyModels, ShModel, context_model};
 pub use rate::{NoisyScene, Rate};
 
-use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor};
+use burn::module::Module;
+use burn::tensor::Device;
 use light4gs_model::attributes::Coding;
 use light4gs_model::{
     AdaptiveQuantization, AdaptiveQuantizationConfig, Attribute, AttributeEntropy, CodedAttribute, ContextModel,
@@ -48,9 +48,6 @@ pub struct Compression<C: Module = ContextModel, S: Module = ShEntropyModel> {
     pub sh: Option<S>,
     /// That of the other attributes of the Gaussians, if the rate includes them.
     pub attributes: Option<AttributeEntropy>,
-    /// `[1]`, not trained: by how much the rate counts more in the loss than the configuration says, where the file shall have
-    /// a certain size.
-    pub rate_weight: Option<Param<Tensor<1>>>,
 }
 
 /// The entropy model and the steps of feature planes.
@@ -84,9 +81,6 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             let coded = coded_attributes(config, &scene.gaussians, compression.sh.is_some());
             compression.attributes = Some(AttributeEntropy::new(coded, device));
         }
-        if config.compression.target_bytes > 0 {
-            compression.rate_weight = Some(Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false));
-        }
         Ok(Some(compression))
     }
 
@@ -112,7 +106,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         };
         let planes = planes.map(plane_models).transpose()?;
         let sh = (config.model.sh_degree == 3).then(|| models.sh(sh, feature_size, device)).transpose()?;
-        Ok(Self { planes, sh, attributes: None, rate_weight: None })
+        Ok(Self { planes, sh, attributes: None })
     }
 
     /// Initializes the context model with the statistics of planes.

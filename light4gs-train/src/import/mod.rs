@@ -87,6 +87,7 @@ impl ImportedScene {
             stage: Stage::Fine,
             iteration,
             seconds: 0.0,
+            rate_weight: 1.0,
         };
         let name = checkpoint_name(Stage::Fine, iteration);
         let path = folder.checkpoints().join(name);

@@ -40,6 +40,8 @@ pub struct Checkpoint<F: DeformationField = BuiltInField, E: EntropyModels = Con
     pub iteration: usize,
     /// Seconds of training so far.
     pub seconds: f64,
+    /// By how much the rate counts more in the loss than the configuration says, where the file shall have a certain size; 1 else.
+    pub rate_weight: f64,
 }
 
 fn entry<const D: usize>(tensor: Tensor<D>) -> Entry {
@@ -69,6 +71,8 @@ const TIME: &str = "time.";
 /// Prefix of the names of the density strategy's statistics.
 const DENSITY: &str = "density.";
 
+/// Key of the weight of the rate, which is stored if it is not 1.
+const RATE_WEIGHT: &str = "rate_weight";
 /// Key of the coordinate mapping, which is stored if it is not the paper's.
 const MAPPING: &str = "coordinate_mapping";
 
@@ -129,6 +133,9 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             ("iteration".to_owned(), self.iteration.to_string()),
             ("seconds".to_owned(), self.seconds.to_string()),
         ]);
+        if self.rate_weight != 1.0 {
+            metadata.insert(RATE_WEIGHT.to_owned(), self.rate_weight.to_string());
+        }
         let mapping = self.scene.coordinates.mapping();
         if mapping != CoordinateMapping::default() {
             metadata.insert(MAPPING.to_owned(), mapping_text(&mapping));
@@ -164,6 +171,14 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         let seconds = file.number::<f64>("seconds").map_err(failed)?;
         if !(seconds.is_finite() && seconds >= 0.0) {
             return Err(failed(format!("metadata `seconds` is {seconds}, expected a duration")));
+        }
+
+        let rate_weight = match file.text(RATE_WEIGHT) {
+            Ok(_) => file.number::<f64>(RATE_WEIGHT).map_err(failed)?,
+            Err(_) => 1.0,
+        };
+        if !(rate_weight.is_finite() && rate_weight > 0.0) {
+            return Err(failed(format!("metadata `{RATE_WEIGHT}` is {rate_weight}, expected a weight")));
         }
 
         // A model of the right structure, whose tensors are replaced afterwards.
@@ -205,7 +220,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             density.insert(name, vector(values, &inner));
         }
         file.finish().map_err(failed)?;
-        Ok(Self { scene, compression, adam, density, stage, iteration, seconds })
+        Ok(Self { scene, compression, adam, density, stage, iteration, seconds, rate_weight })
     }
 }
 
@@ -409,6 +424,7 @@ mod tests {
             stage: Stage::Coarse,
             iteration: 1,
             seconds: 0.0,
+            rate_weight: 1.0,
         };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join(checkpoint_name(Stage::Coarse, 1));

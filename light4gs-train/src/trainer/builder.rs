@@ -287,6 +287,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             stage: Stage::Coarse,
             iteration: 0,
             seconds: 0.0,
+            rate_weight: 1.0,
         };
         self.check_encodable(&state)?;
         Ok(state)

@@ -96,10 +96,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
                 RateWeighting::Megabytes => rate.megabytes() * (config.lambda * interval),
             };
             let term = attributes.into_iter().fold(term, |sum, part| sum + part);
-            let term = match &compression.rate_weight {
-                Some(weight) => term * weight.val(),
-                None => term,
-            };
+            let term = term * self.state.rate_weight;
             value = Some(term.clone().inner());
             let mut tape = term.backward();
             steps = noisy.step_gradients(&tape);

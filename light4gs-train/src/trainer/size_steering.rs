@@ -1,6 +1,5 @@
 //! The weight of the rate follows the size of the file, where the file shall have a certain size.
 
-use burn::module::Param;
 use light4gs_model::DeformationField;
 
 use super::Trainer;
@@ -22,7 +21,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if target == 0 || !iteration.is_multiple_of(interval) || !self.gaussian_rate_is_active(iteration) {
             return;
         }
-        let Some(compression) = &mut self.state.compression else { return };
+        let Some(compression) = &self.state.compression else { return };
         // A scene that cannot be coded has diverged, and the trainer says so.
         let Ok([gaussians, others]) = size_so_far(&self.state.scene, compression, &self.config.compression) else {
             return;
@@ -31,11 +30,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let passes = prune.iterations.iter().filter(|pass| **pass > iteration).count();
         let kept = (1.0 - prune.fraction).powi(passes as i32);
         let expected = gaussians as f64 * kept + others as f64;
-        if let Some(weight) = &mut compression.rate_weight {
-            let before: f64 = weight.val().into_scalar();
-            let after = (before * (expected / target as f64).powf(POWER)).clamp(1.0 / MOST, MOST);
-            *weight = Param::initialized(weight.id, weight.val() * (after / before)).set_require_grad(false);
-        }
+        let weight = &mut self.state.rate_weight;
+        *weight = (*weight * (expected / target as f64).powf(POWER)).clamp(1.0 / MOST, MOST);
         self.profile.lap("size of the file");
     }
 }

@@ -107,6 +107,7 @@ pub fn mutate(parts: &Parts, random: &mut impl Rng) -> (Parts, String) {
                 ("iteration", "-1"),
                 ("iteration", "18446744073709551616"),
                 ("seconds", "NaN"),
+                ("rate_weight", "-1"),
                 ("seconds", "-5"),
                 ("stage", "final"),
                 ("stage", ""),

@@ -225,6 +225,11 @@ fn a_file_has_the_size_that_is_wished() {
     let overrides = ["model.field=nodes", "compression.rate.attributes=true", "compression.rate.from=1"];
     assert_success(&w.train("sized", &overrides).args(["--target-bytes", "6k"]).output().unwrap());
     fits("sized/scene.l4gs", 6000);
+    // A run that did not know of a size goes on with one.
+    assert_success(&w.train("free", &overrides).output().unwrap());
+    let longer = ["--set", "compression.target_bytes=5500", "--set", "train.fine_iterations=60"];
+    assert_success(&w.command(["resume", "free", "--quiet"]).args(longer).output().unwrap());
+    fits("free/scene.l4gs", 5500);
     // The same training, another size.
     let encode = |bytes: &str| w.run(["encode", "sized", "--out", "other.l4gs", "--target-bytes", bytes]);
     assert_success(&encode("5000"));
