@@ -68,12 +68,13 @@ pub(super) fn search(
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use light4gs_codec::{FurtherAttribute, GaussianArrays};
 
     use super::*;
 
-    fn scene() -> SceneData {
+    /// 500 Gaussians with numbers of all kinds.
+    pub(in crate::compression) fn scene() -> SceneData {
         let random = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
         let triple = |i: usize| [random(3 * i), random(3 * i + 1), random(3 * i + 2)];
         let gaussians = GaussianArrays {

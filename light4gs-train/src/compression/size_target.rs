@@ -88,23 +88,10 @@ fn with_steps_scaled(given: &CompressionInput, factor: f32) -> CompressionInput 
 #[cfg(test)]
 mod tests {
     use light4gs_codec::attributes::AttributeSteps;
-    use light4gs_codec::{GaussianArrays, Profile, WeightPrecisions};
+    use light4gs_codec::{Profile, WeightPrecisions};
 
     use super::*;
-
-    fn scene() -> SceneData {
-        let random = |i: usize| ((i as f32 * 12.9898).sin() * 43_758.547).fract();
-        let triple = |i: usize| [random(3 * i), random(3 * i + 1), random(3 * i + 2)];
-        let gaussians = GaussianArrays {
-            means: (0..400).map(triple).collect(),
-            log_scales: (0..400).map(|i| triple(i).map(|v| v - 4.0)).collect(),
-            quats: (0..400).map(|i| [1.0, random(i), random(i + 1), random(i + 2)]).collect(),
-            opacity_logits: (0..400).map(random).collect(),
-            sh_dc: (0..400).map(triple).collect(),
-            ..GaussianArrays::default()
-        };
-        SceneData { gaussians, ..SceneData::default() }
-    }
+    use crate::compression::attribute_step_search::tests::scene;
 
     fn input() -> CompressionInput {
         CompressionInput {
