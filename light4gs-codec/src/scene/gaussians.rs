@@ -150,6 +150,53 @@ impl GaussianArrays {
     pub fn attribute(&self, name: &str) -> Option<AttributeValues<'_>> {
         self.attributes().find(|attribute| attribute.name == name)
     }
+
+    /// The Gaussians with these indices, in their order.
+    ///
+    /// # Panics
+    /// If there is no such Gaussian.
+    pub fn select(&self, indices: &[u32]) -> Self {
+        fn rows<T: Copy>(values: &[T], width: usize, indices: &[u32]) -> Vec<T> {
+            let row = |&index: &u32| &values[index as usize * width..][..width];
+            indices.iter().flat_map(row).copied().collect()
+        }
+        let Self { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further } = self;
+        let further = further.iter().map(|attribute| FurtherAttribute {
+            name: attribute.name.clone(),
+            values: rows(&attribute.values, attribute.width as usize, indices),
+            ..*attribute
+        });
+        Self {
+            means: rows(means, 1, indices),
+            log_scales: rows(log_scales, 1, indices),
+            quats: rows(quats, 1, indices),
+            opacity_logits: rows(opacity_logits, 1, indices),
+            sh_dc: rows(sh_dc, 1, indices),
+            sh_degree: *sh_degree,
+            // Empty also where only the other attributes were decoded.
+            sh_rest: rows(sh_rest, sh_rest.len() / self.len().max(1), indices),
+            further: further.collect(),
+        }
+    }
+
+    /// Appends Gaussians that have the same attributes and the same degree.
+    pub(crate) fn append(&mut self, more: Self) {
+        let Self { means, log_scales, quats, opacity_logits, sh_dc, sh_degree: _, sh_rest, further } = more;
+        self.means.extend(means);
+        self.log_scales.extend(log_scales);
+        self.quats.extend(quats);
+        self.opacity_logits.extend(opacity_logits);
+        self.sh_dc.extend(sh_dc);
+        self.sh_rest.extend(sh_rest);
+        for (own, attribute) in self.further.iter_mut().zip(further) {
+            own.values.extend(attribute.values);
+        }
+    }
+
+    /// Bytes of all arrays.
+    pub(crate) fn bytes(&self) -> u64 {
+        self.attributes().map(|attribute| 4 * attribute.values.len() as u64).sum()
+    }
 }
 
 impl FurtherAttribute {

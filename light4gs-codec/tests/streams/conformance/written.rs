@@ -226,6 +226,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
         sh: sh_tables(2),
         attributes: steps.clone(),
         weights: Default::default(),
+        layers: Default::default(),
     };
     streams.push(("motion-all-quantized", compressed(&all, &coding)));
     streams.push(("motion-operations", encode(&operations::scene()).unwrap()));
@@ -276,6 +277,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
         sh: ShCoding::Channels { step: 0.01 },
         attributes: AttributeSteps::default().with("wide", 0.02).with("outliers", 0.01),
         weights: Default::default(),
+        layers: Default::default(),
     };
     streams.push(("clusters", compressed(&many, &coding)));
 
