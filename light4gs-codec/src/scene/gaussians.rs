@@ -146,37 +146,47 @@ impl GaussianArrays {
         BUILT_IN.iter().zip(fields).map(row).chain([rest]).chain(further.iter().map(FurtherAttribute::view))
     }
 
+    /// The Gaussians at these indices, in their order.
+    ///
+    /// ```
+    /// use light4gs_codec::GaussianArrays;
+    ///
+    /// let gaussians = GaussianArrays { opacity_logits: vec![1.0, 2.0, 3.0], ..GaussianArrays::default() };
+    /// # let gaussians = GaussianArrays { means: vec![[0.0; 3]; 3], log_scales: vec![[0.0; 3]; 3], quats: vec![[0.0; 4]; 3], sh_dc: vec![[0.0; 3]; 3], ..gaussians };
+    /// assert_eq!(gaussians.gathered(&[2, 0, 2]).opacity_logits, [3.0, 1.0, 3.0]);
+    /// ```
+    ///
+    /// # Panics
+    /// If an index is beyond the last Gaussian.
+    pub fn gathered(&self, indices: &[u32]) -> Self {
+        fn rows<T: Copy>(values: &[T], indices: &[u32]) -> Vec<T> {
+            indices.iter().map(|&index| values[index as usize]).collect()
+        }
+        let wide = |values: &[f32], width: usize| -> Vec<f32> {
+            indices.iter().flat_map(|&index| &values[width * index as usize..][..width]).copied().collect()
+        };
+        let Self { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further } = self;
+        let further = further.iter().map(|FurtherAttribute { name, width, values, optional }| FurtherAttribute {
+            name: name.clone(),
+            width: *width,
+            values: wide(values, *width as usize),
+            optional: *optional,
+        });
+        Self {
+            means: rows(means, indices),
+            log_scales: rows(log_scales, indices),
+            quats: rows(quats, indices),
+            opacity_logits: rows(opacity_logits, indices),
+            sh_dc: rows(sh_dc, indices),
+            sh_degree: *sh_degree,
+            sh_rest: wide(sh_rest, 3 * sh_rest_coefficients(*sh_degree)),
+            further: further.collect(),
+        }
+    }
+
     /// The attribute with a name.
     pub fn attribute(&self, name: &str) -> Option<AttributeValues<'_>> {
         self.attributes().find(|attribute| attribute.name == name)
-    }
-
-    /// The Gaussians with these indices, in their order.
-    ///
-    /// # Panics
-    /// If there is no such Gaussian.
-    pub fn select(&self, indices: &[u32]) -> Self {
-        fn rows<T: Copy>(values: &[T], width: usize, indices: &[u32]) -> Vec<T> {
-            let row = |&index: &u32| &values[index as usize * width..][..width];
-            indices.iter().flat_map(row).copied().collect()
-        }
-        let Self { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further } = self;
-        let further = further.iter().map(|attribute| FurtherAttribute {
-            name: attribute.name.clone(),
-            values: rows(&attribute.values, attribute.width as usize, indices),
-            ..*attribute
-        });
-        Self {
-            means: rows(means, 1, indices),
-            log_scales: rows(log_scales, 1, indices),
-            quats: rows(quats, 1, indices),
-            opacity_logits: rows(opacity_logits, 1, indices),
-            sh_dc: rows(sh_dc, 1, indices),
-            sh_degree: *sh_degree,
-            // Empty also where only the other attributes were decoded.
-            sh_rest: rows(sh_rest, sh_rest.len() / self.len().max(1), indices),
-            further: further.collect(),
-        }
     }
 
     /// Appends Gaussians that have the same attributes and the same degree.

@@ -89,7 +89,7 @@ pub fn encode_compressed_with_limits(
         layer_sections.push(section);
         let conditions =
             Conditions { gaussians: &attributes, coordinates: &scene.coordinates, feature_planes: &feature_planes };
-        let rest = scene.gaussians.select(&order).sh_rest;
+        let rest = scene.gaussians.gathered(&order).sh_rest;
         let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
         let mut writer = Writer::default();
         let continued = first_coding.as_ref().filter(|coding| !matches!(coding, ShCoding::Channels { .. }));
@@ -176,7 +176,7 @@ fn write_gaussians(gaussians: &GaussianArrays, input: &CompressionInput) -> Resu
         return Ok(coded.into_iter().map(layer).collect());
     }
     let layer = |order: Vec<u32>| {
-        let attributes = GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.select(&order) };
+        let attributes = GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.gathered(&order) };
         let mut writer = Writer::default();
         attributes::write_float32(&attributes, &mut writer);
         Layer { section: section(Encoding::Float32, writer.bytes), attributes, order }

@@ -197,7 +197,10 @@ impl<'a> OpenStream<'a> {
     ) -> Result<GaussianArrays, CodecError> {
         let layers = match self.layers() {
             0 | 1 => vec![gaussians],
-            _ => split(&gaussians, &self.heads()?.counts),
+            _ => {
+                let gaussians = GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians };
+                split(&gaussians, &self.heads()?.counts)
+            }
         };
         concatenated(self.sh_of_layers_within(layers, coordinates, feature_planes, budget)?, budget)
     }
@@ -330,7 +333,7 @@ fn split(gaussians: &GaussianArrays, counts: &[u32]) -> Vec<GaussianArrays> {
     let mut start = 0;
     let take = |&count: &u32| {
         let end = (start + count).min(gaussians.len() as u32);
-        let layer = gaussians.select(&(start..end).collect::<Vec<_>>());
+        let layer = gaussians.gathered(&(start..end).collect::<Vec<_>>());
         start = end;
         layer
     };

@@ -54,7 +54,7 @@ fn as_a_set(gaussians: &GaussianArrays) -> Vec<Vec<u32>> {
 
 /// The Gaussians `0..count`.
 fn first(gaussians: &GaussianArrays, count: usize) -> GaussianArrays {
-    gaussians.select(&(0..count as u32).collect::<Vec<_>>())
+    gaussians.gathered(&(0..count as u32).collect::<Vec<_>>())
 }
 
 #[test]

@@ -235,7 +235,7 @@ fn layered() -> Vec<(&'static str, Vec<u8>)> {
     let channels = compressed(&scene, &input(Profile::Compact, ShCoding::Channels { step: 0.02 }, 4));
     let without_loss = |indices: &[u32]| {
         let scene = sample();
-        encode(&SceneData { gaussians: scene.gaussians.select(indices), ..scene }).unwrap()
+        encode(&SceneData { gaussians: scene.gaussians.gathered(indices), ..scene }).unwrap()
     };
     vec![
         ("layers-reordered", reordered(&networks)),
