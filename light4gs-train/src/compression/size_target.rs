@@ -88,7 +88,7 @@ fn with_steps_scaled(given: &CompressionInput, factor: f32) -> CompressionInput 
 #[cfg(test)]
 mod tests {
     use light4gs_codec::attributes::AttributeSteps;
-    use light4gs_codec::{Profile, WeightPrecisions};
+    use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
 
     use super::*;
     use crate::compression::attribute_step_search::tests::scene;
@@ -100,6 +100,7 @@ mod tests {
             sh: ShCoding::Channels { step: 0.02 },
             attributes: AttributeSteps::default(),
             weights: WeightPrecisions::default(),
+            layers: GaussianLayers::default(),
         }
     }
 

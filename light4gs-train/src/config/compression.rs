@@ -2,7 +2,7 @@
 
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
-use light4gs_codec::{Profile, WeightPrecisions};
+use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
 use light4gs_model::{AdaptiveQuantizationConfig, ContextPart, ShKind};
 
 use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
@@ -20,6 +20,11 @@ keys! {
         /// The file has at most so many bytes, and hardly fewer: the weight of the rate follows while training, and at last
         /// the steps of the attributes. 0: lambda and steps alone say how large it becomes.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours", "0 = as many as lambda asks for";
+        /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
+        /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
+        /// bytes; the profile `float32` has only one.
+        layers: usize = GaussianLayers::default().count as usize;
+            Whole { least: 1, most: GaussianLayers::MOST as u64 }, "ours", "more = a coarse scene comes first, for slow connections";
         /// The rate in the loss.
         rate: RateConfig;
         /// The context model of the feature planes (MHCM).
