@@ -2,8 +2,8 @@
 
 use light4gs_codec::{CodecError, SceneData, SectionInfo, StreamDecoder};
 
-use crate::OpenScene;
 use crate::description::Facts;
+use crate::scene::OpenScene;
 
 /// A file whose bytes are coming.
 #[derive(Debug, Default)]
@@ -24,7 +24,7 @@ impl Arrival {
     }
 
     /// As [`Arrival::push`], with all layers that have come.
-    pub(crate) fn push_all(&mut self, bytes: &[u8]) -> Result<Option<OpenScene>, CodecError> {
+    fn push_all(&mut self, bytes: &[u8]) -> Result<Option<OpenScene>, CodecError> {
         self.advance(bytes, usize::MAX)
     }
 
@@ -46,6 +46,20 @@ impl Arrival {
     /// As [`StreamDecoder::finish`]: a file of which bytes are missing.
     pub fn finish(self) -> Result<SceneData, CodecError> {
         self.decoder.finish()
+    }
+}
+
+impl OpenScene {
+    /// Decodes a whole file.
+    ///
+    /// # Errors
+    /// As [`light4gs_codec::decode`].
+    pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
+        let mut arrival = Arrival::default();
+        let scene = arrival.push_all(bytes)?;
+        // Here a file that is cut short is refused.
+        arrival.finish()?;
+        scene.ok_or(CodecError::MissingSection { section: "gaussians" })
     }
 }
 

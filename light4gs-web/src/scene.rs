@@ -2,7 +2,6 @@
 
 use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, SceneData};
 
-use crate::Arrival;
 use crate::description::{Facts, describe};
 use crate::draw_list::{DrawList, Viewpoint};
 use crate::gaussians::{FLOATS, Unchanged, opacity, pack, rotation, scales};
@@ -21,18 +20,6 @@ pub struct OpenScene {
 }
 
 impl OpenScene {
-    /// Decodes a stream.
-    ///
-    /// # Errors
-    /// As [`light4gs_codec::decode`].
-    pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
-        let mut arrival = Arrival::default();
-        let scene = arrival.push_all(bytes)?;
-        // Here a file that is cut short is refused.
-        arrival.finish()?;
-        scene.ok_or(CodecError::MissingSection { section: "gaussians" })
-    }
-
     /// Of a decoded scene, whose scales are multiplied by `growth`.
     pub(crate) fn new(scene: &SceneData, facts: &Facts<'_>, growth: f32) -> Result<Self, CodecError> {
         let evaluator = MotionEvaluator::new(scene)?;

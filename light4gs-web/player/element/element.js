@@ -127,14 +127,17 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       else this.layers.progress("Loading", share);
     };
     try {
-      const list = cameras ? download(cameras, signal).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : [];
+      const list = cameras ? download(cameras, signal).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : Promise.resolve([]);
       if (keep) {
         const [bytes, known] = await Promise.all([download(address, signal), list]);
         if (loading === this.#loading) await this.open(bytes, { cameras: known, keep });
         return true;
       }
       report(0);
-      const [loaded, known] = await Promise.all([load(pieces(address, signal, report)), list]);
+      const coming = load(pieces(address, signal, report));
+      // Where the cameras do not come, the scene is not shown.
+      list.catch(() => coming.then((unwanted) => unwanted.close(), () => {}));
+      const [loaded, known] = await Promise.all([coming, list]);
       if (loading !== this.#loading) {
         loaded.close();
         return true;
@@ -156,7 +159,11 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
         this.#fail(error);
         return false;
       }
-      if (loading === this.#loading) this.#fail(error);
+      // What comes still is not reported any more.
+      if (loading === this.#loading) {
+        this.#loading++;
+        this.#fail(error);
+      }
       return false;
     }
   }

@@ -25,7 +25,7 @@ RARE, OWN_SIZES, CLUSTERS, FAR = (
     f"{STREAMS}{name}.l4gs" for name in ("rare-operations", "own-sizes", "clusters", "far-values")
 )
 LAYERS, LAYERS_TABLES, LAYERS_CHANNELS, LAYERS_FLOAT32 = (
-    f"{STREAMS}layers-{name}.l4gs" for name in ("networks", "tables", "channels", "float32")
+    f"{STREAMS}layers/{name}.l4gs" for name in ("networks", "tables", "channels", "float32")
 )
 
 

@@ -238,11 +238,11 @@ fn layered() -> Vec<(&'static str, Vec<u8>)> {
         encode(&SceneData { gaussians: scene.gaussians.gathered(indices), ..scene }).unwrap()
     };
     vec![
-        ("layers-reordered", reordered(&networks)),
-        ("layers-networks", networks),
-        ("layers-tables", tables),
-        ("layers-channels", channels),
-        ("layers-float32", with_layer(&without_loss(&[1]), &without_loss(&[0]))),
+        ("layers/reordered", reordered(&networks)),
+        ("layers/networks", networks),
+        ("layers/tables", tables),
+        ("layers/channels", channels),
+        ("layers/float32", with_layer(&without_loss(&[1]), &without_loss(&[0]))),
     ]
 }
 
