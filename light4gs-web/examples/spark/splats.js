@@ -1,0 +1,40 @@
+// The Gaussians of a .l4gs scene in Spark: they are packed into its 16 bytes a splat, Spark sorts and draws them.
+
+import { PackedSplats, SplatMesh, setPackedSplat } from "@sparkjsdev/spark";
+import { Follower, baseColors } from "light4gs-player";
+
+/** @param {import("light4gs-player").Scene} scene */
+export async function createSplats(scene) {
+  const packed = new PackedSplats({ maxSplats: scene.count });
+  await packed.initialized;
+  packed.ensureSplats(scene.count);
+  packed.numSplats = scene.count;
+  const colors = new Float32Array(4 * scene.count);
+  const follower = new Follower((time) => scene.gaussiansAt(time), (gaussians) => {
+    const { count, means: m, scales: s, quaternions: q } = gaussians;
+    baseColors(gaussians, colors);
+    for (let i = 0; i < count; i++) {
+      const [a, b] = [3 * i, 4 * i];
+      setPackedSplat(
+        packed.packedArray, i, m[a], m[a + 1], m[a + 2], s[a], s[a + 1], s[a + 2],
+        q[b + 1], q[b + 2], q[b + 3], q[b], colors[b + 3], colors[b], colors[b + 1], colors[b + 2],
+      );
+    }
+    packed.needsUpdate = true;
+  });
+  await follower.update(0);
+  const object = new SplatMesh({ packedSplats: packed });
+  await object.initialized;
+  return {
+    object,
+    /** Says what is wanted: a time in [0, 1]. */
+    update: (time) => follower.update(time),
+    get time() {
+      return follower.shown;
+    },
+    dispose() {
+      follower.stop();
+      object.dispose();
+    },
+  };
+}
