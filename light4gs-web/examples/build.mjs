@@ -6,7 +6,7 @@ import { copyFileSync, mkdirSync } from "node:fs";
 import { resolve } from "node:path";
 import { fileURLToPath } from "node:url";
 
-export const ENGINES = ["three", "spark"];
+export const ENGINES = ["three", "spark", "babylon", "playcanvas"];
 const here = fileURLToPath(new URL(".", import.meta.url));
 
 /**

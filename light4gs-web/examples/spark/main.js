@@ -9,7 +9,8 @@ const scene = await openScene();
 const renderer = new THREE.WebGLRenderer({ canvas: document.querySelector("canvas") });
 const world = new THREE.Scene();
 world.background = new THREE.Color().setRGB(...scene.info.background, THREE.SRGBColorSpace);
-world.add(new SparkRenderer({ renderer }));
+// The constants of the renderer that the scene was trained with; Spark's own are those of scenes with anti-aliasing.
+world.add(new SparkRenderer({ renderer, preBlurAmount: 0.3, blurAmount: 0, minAlpha: 1 / 255, maxStdDev: 3.33, sortRadial: false }));
 const camera = new THREE.PerspectiveCamera(view.fovY, 1, view.near, view.far);
 camera.up.set(...view.up);
 camera.position.set(...view.position);

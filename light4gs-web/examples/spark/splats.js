@@ -5,6 +5,7 @@ import { Follower, baseColors } from "light4gs-player";
 
 /** @param {import("light4gs-player").Scene} scene */
 export async function createSplats(scene) {
+  let object = null;
   const packed = new PackedSplats({ maxSplats: scene.count });
   await packed.initialized;
   packed.ensureSplats(scene.count);
@@ -20,10 +21,11 @@ export async function createSplats(scene) {
         q[b + 1], q[b + 2], q[b + 3], q[b], colors[b + 3], colors[b], colors[b + 1], colors[b + 2],
       );
     }
-    packed.needsUpdate = true;
+    packed.needsUpdate = true; // its texture
+    if (object) object.needsUpdate = true; // and what Spark has made of it
   });
   await follower.update(0);
-  const object = new SplatMesh({ packedSplats: packed });
+  object = new SplatMesh({ packedSplats: packed });
   await object.initialized;
   return {
     object,
