@@ -1,6 +1,6 @@
 // The Gaussians of a .l4gs scene as a gsplat component of PlayCanvas: textures of a container, in a format made for them.
 
-import { BoundingBox, Entity, GSplatContainer, GSplatFormat, PIXELFORMAT_RGBA32F, Vec3 } from "playcanvas";
+import { BoundingBox, Entity, GSplatContainer, GSplatFormat, PIXELFORMAT_RGBA32F, Vec3, WORKBUFFER_UPDATE_ONCE } from "playcanvas";
 import { Follower, baseColors } from "light4gs-player";
 
 const STREAMS = ["center", "scale", "rotation", "color"];
@@ -37,10 +37,12 @@ export async function createSplats(scene, app) {
     // For the order, which a worker of PlayCanvas makes.
     container.centers.set(means);
     container.update();
+    // PlayCanvas draws from a copy of all splats, and has to be told that this part of it is old.
+    object.gsplat.workBufferUpdate = WORKBUFFER_UPDATE_ONCE;
   });
-  await follower.update(0);
   const object = new Entity("light4gs");
   object.addComponent("gsplat", { resource: container });
+  await follower.update(0);
   return {
     object,
     /** Says what is wanted: a time in [0, 1]. */

@@ -36,6 +36,7 @@ export async function createSplats(scene) {
     },
     dispose() {
       follower.stop();
+      object.removeFromParent();
       object.dispose();
     },
   };

@@ -121,6 +121,7 @@ export async function createSplats(scene, camera) {
     },
     dispose() {
       follower.stop();
+      object.removeFromParent();
       for (const part of [list, geometry, material]) part.dispose();
     },
   };
