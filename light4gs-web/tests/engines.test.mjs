@@ -101,6 +101,19 @@ describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examp
     });
   }
 
+  test("the page about the library has a running scene", async () => {
+    const page = await open(browser, `${server.url}/`);
+    await page.waitForFunction(() => document.querySelector("l4gs-player").player?.time > 0);
+    const first = await page.evaluate(() => document.querySelector("l4gs-player").player.time);
+    await page.waitForFunction((first) => document.querySelector("l4gs-player").player.time !== first, first);
+    await page.getByText("Babylon.js", { exact: true }).click();
+    await page.frameLocator('iframe[src="babylon/"]').locator("canvas").waitFor();
+    await page.frames().find((frame) => frame.url().endsWith("/babylon/")).waitForFunction(() => globalThis.example?.splats.time > 0);
+    if (pictures) writeFileSync(`${pictures}/page.png`, await page.screenshot());
+    assert.deepEqual(page.problems, []);
+    await page.context().close();
+  });
+
   test("three: the mesh goes where its matrix says", async () => {
     const page = await examplePage("three");
     await page.evaluate(() => {

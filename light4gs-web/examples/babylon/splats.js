@@ -6,11 +6,6 @@ import { Follower, baseColors } from "light4gs-player";
 /** Bytes a splat: center and scales as floats, color with opacity and quaternion as bytes. */
 const SPLAT = 32;
 
-/**
- * @param {import("light4gs-player").Scene} scene
- * @param {import("@babylonjs/core/scene.js").Scene} world  with `useRightHandedSystem`, or the scene is a mirror image
- * @param {number} [shDegree]  of the colors that Babylon.js evaluates; 0 saves the time of writing the coefficients
- */
 export async function createSplats(scene, world, shDegree = scene.info.shDegree) {
   const object = new GaussianSplattingMesh("light4gs", null, world);
   const data = new ArrayBuffer(SPLAT * scene.count);
@@ -41,7 +36,6 @@ export async function createSplats(scene, world, shDegree = scene.info.shDegree)
   await follower.update(0);
   return {
     object,
-    /** Says what is wanted: a time in [0, 1]. */
     update: (time) => follower.update(time),
     get time() {
       return follower.shown;

@@ -12,10 +12,6 @@ const readGLSL = `
   vec4 getColor() { return loadL4gsColor(); }`;
 const readWGSL = readGLSL.replace(/(vec\d) (\w+)\(\)/g, "fn $2() -> $1f");
 
-/**
- * @param {import("light4gs-player").Scene} scene
- * @param {import("playcanvas").AppBase} app  with the system of gsplat components
- */
 export async function createSplats(scene, app) {
   const streams = STREAMS.map((name) => ({ name: `l4gs${name[0].toUpperCase()}${name.slice(1)}`, format: PIXELFORMAT_RGBA32F }));
   const container = new GSplatContainer(app.graphicsDevice, scene.count, new GSplatFormat(app.graphicsDevice, streams, { readGLSL, readWGSL }));
@@ -45,7 +41,6 @@ export async function createSplats(scene, app) {
   await follower.update(0);
   return {
     object,
-    /** Says what is wanted: a time in [0, 1]. */
     update: (time) => follower.update(time),
     get time() {
       return follower.shown;

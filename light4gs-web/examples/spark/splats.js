@@ -3,7 +3,6 @@
 import { PackedSplats, SplatMesh, setPackedSplat } from "@sparkjsdev/spark";
 import { Follower, baseColors } from "light4gs-player";
 
-/** @param {import("light4gs-player").Scene} scene */
 export async function createSplats(scene) {
   let object = null;
   const packed = new PackedSplats({ maxSplats: scene.count });
@@ -29,7 +28,6 @@ export async function createSplats(scene) {
   await object.initialized;
   return {
     object,
-    /** Says what is wanted: a time in [0, 1]. */
     update: (time) => follower.update(time),
     get time() {
       return follower.shown;

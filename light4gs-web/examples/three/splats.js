@@ -65,7 +65,6 @@ void main() {
   contribution = alpha < 1.0 / 255.0 ? vec4(0.0) : vec4(color.rgb * alpha, alpha);
 }`;
 
-/** @param {import("light4gs-player").Scene} scene @param {THREE.Camera} camera  for the first order */
 export async function createSplats(scene, camera) {
   const rows = Math.ceil(scene.count / ROW);
   const list = new THREE.DataTexture(new Float32Array(16 * ROW * rows), 4 * ROW, rows, THREE.RGBAFormat, THREE.FloatType);
@@ -114,7 +113,6 @@ export async function createSplats(scene, camera) {
   await update(0);
   return {
     object,
-    /** Says what is wanted: a time in [0, 1], and the camera where it is another one. */
     update,
     get time() {
       return follower.shown.time;
