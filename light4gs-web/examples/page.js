@@ -16,7 +16,7 @@ export async function openScene() {
 /** The time to show at a moment (milliseconds): the scene over and over, or `example.hold`, where a test has set it. */
 export const timeAt = (scene, now) => globalThis.example?.hold ?? ((now / 1000) % scene.duration) / scene.duration;
 
-/** For the console, and for the tests: `globalThis.example`. */
-export function expose(scene, splats, more = {}) {
-  globalThis.example = { scene, splats, hold: null, ...more };
+/** For the console, and for the tests: `globalThis.example`. `create` makes splats of another scene. */
+export function expose(scene, splats, create, more = {}) {
+  globalThis.example = { scene, splats, create, hold: null, ...more };
 }

@@ -22,7 +22,7 @@ camera.setTarget(new Vector3(...view.target));
 addEventListener("resize", () => engine.resize());
 
 const splats = await createSplats(scene, world);
-expose(scene, splats);
+expose(scene, splats, (other, shDegree) => createSplats(other, world, shDegree));
 engine.runRenderLoop(() => {
   splats.update(timeAt(scene, performance.now()));
   world.render();

@@ -26,6 +26,6 @@ app.root.addChild(camera);
 
 const splats = await createSplats(scene, app);
 app.root.addChild(splats.object);
-expose(scene, splats);
+expose(scene, splats, (other) => createSplats(other, app));
 app.on("update", () => splats.update(timeAt(scene, performance.now())));
 app.start();

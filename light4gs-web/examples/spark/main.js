@@ -25,7 +25,7 @@ resize();
 
 const splats = await createSplats(scene);
 world.add(splats.object);
-expose(scene, splats);
+expose(scene, splats, createSplats);
 renderer.setAnimationLoop((now) => {
   splats.update(timeAt(scene, now));
   renderer.render(world, camera);
