@@ -106,10 +106,12 @@ describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examp
     await page.waitForFunction(() => document.querySelector("l4gs-player").player?.time > 0);
     const first = await page.evaluate(() => document.querySelector("l4gs-player").player.time);
     await page.waitForFunction((first) => document.querySelector("l4gs-player").player.time !== first, first);
+    const [player, picture] = [await page.locator("l4gs-player").boundingBox(), await page.locator("l4gs-player canvas").boundingBox()];
+    assert.ok(picture.width > 0.9 * player.width && picture.height > 0.6 * player.height, JSON.stringify(picture));
+    if (pictures) writeFileSync(`${pictures}/page.png`, await page.screenshot());
     await page.getByText("Babylon.js", { exact: true }).click();
     await page.frameLocator('iframe[src="babylon/"]').locator("canvas").waitFor();
     await page.frames().find((frame) => frame.url().endsWith("/babylon/")).waitForFunction(() => globalThis.example?.splats.time > 0);
-    if (pictures) writeFileSync(`${pictures}/page.png`, await page.screenshot());
     assert.deepEqual(page.problems, []);
     await page.context().close();
   });
@@ -151,6 +153,13 @@ describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examp
     for (const behind of [[155, 115], [285, 215]]) assert.deepEqual(at(behind), [255, 0, 0]);
     const ball = [155, 272];
     assert.ok(Math.hypot(...at(ball).map((value, i) => value - expected(ball)[i])) < 25, `${at(ball)}, expected ${expected(ball)}`);
+
+    // Where the target wants linear colors, as for effects behind it, it gets them.
+    await page.evaluate(() => (globalThis.example.renderer.outputColorSpace = globalThis.example.THREE.LinearSRGBColorSpace));
+    const linear = Array.from((await still(page)).pixels.subarray(4 * (SIZE * ball[1] + ball[0]))).slice(0, 3);
+    const converted = expected(ball).map((value) => 255 * (value <= 10.3 ? value / 255 / 12.92 : ((value / 255 + 0.055) / 1.055) ** 2.4));
+    assert.ok(Math.hypot(...linear.map((value, i) => value - converted[i])) < 25, `${linear}, expected ${converted}`);
+    assert.deepEqual(page.problems, []);
     await page.context().close();
   });
 });

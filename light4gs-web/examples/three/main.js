@@ -22,7 +22,7 @@ resize();
 
 const splats = await createSplats(scene, camera);
 world.add(splats.object);
-expose(scene, splats, (other) => createSplats(other, camera), { THREE, world, camera });
+expose(scene, splats, (other) => createSplats(other, camera), { THREE, renderer, world, camera });
 renderer.setAnimationLoop((now) => {
   splats.update(timeAt(scene, now));
   renderer.render(world, camera);
