@@ -1,6 +1,6 @@
 // The Gaussians of a .l4gs scene as a gsplat component of PlayCanvas: textures of a container, in a format made for them.
 
-import { BoundingBox, Entity, GSplatContainer, GSplatFormat, PIXELFORMAT_RGBA32F, Vec3, WORKBUFFER_UPDATE_ONCE } from "playcanvas";
+import { BoundingBox, Entity, GSplatContainer, GSplatFormat, PIXELFORMAT_RGBA32F, Vec3, WORKBUFFER_UPDATE_ALWAYS, WORKBUFFER_UPDATE_AUTO } from "playcanvas";
 import { Follower, baseColors } from "light4gs-player";
 
 const STREAMS = ["center", "scale", "rotation", "color"];
@@ -33,9 +33,11 @@ export async function createSplats(scene, app) {
     // For the order, which a worker of PlayCanvas makes.
     container.centers.set(means);
     container.update();
-    // PlayCanvas draws from a copy of all splats, and has to be told that this part of it is old.
-    object.gsplat.workBufferUpdate = WORKBUFFER_UPDATE_ONCE;
+    // PlayCanvas draws from a copy of all splats. WORKBUFFER_UPDATE_ONCE would be lost where a new order comes in the same frame.
+    object.gsplat.workBufferUpdate = WORKBUFFER_UPDATE_ALWAYS;
   });
+  const copied = () => (object.gsplat.workBufferUpdate = WORKBUFFER_UPDATE_AUTO);
+  app.scene.on("postrender", copied);
   const object = new Entity("light4gs");
   object.addComponent("gsplat", { resource: container });
   await follower.update(0);
@@ -47,6 +49,7 @@ export async function createSplats(scene, app) {
     },
     dispose() {
       follower.stop();
+      app.scene.off("postrender", copied);
       object.destroy();
       container.destroy();
     },
