@@ -49,7 +49,7 @@ fn a_scene_goes_all_the_way() {
     for unknown in ["scene.splat", "scene.gltf", "frames.v3"] {
         assert_refused(
             &w.run(["export", "again.l4gs", "--out", unknown]),
-            &[unknown, ".ply", ".glb", ".4dgs", "slash"],
+            &[unknown, ".ply", ".zip", ".glb", ".4dgs", "slash"],
         );
         assert!(!w.path(unknown).exists());
     }
