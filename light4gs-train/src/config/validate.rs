@@ -117,14 +117,19 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
             });
         }
     }
-    check.that(
-        "compression.target_bytes",
-        compression.target_bytes == 0 || compression.profile == FileProfile::Compact,
-        || {
+    let wishes = [
+        ("compression.target_bytes", compression.target_bytes > 0),
+        ("compression.target_db", compression.target_db > 0.0),
+    ];
+    for (key, wished) in wishes {
+        check.that(key, !wished || compression.profile == FileProfile::Compact, || {
             "is set, but only the profile \"compact\" has steps that can follow it; set compression.profile=compact"
                 .to_owned()
-        },
-    );
+        });
+    }
+    check.that("compression.target_db", !wishes.iter().all(|(_, wished)| *wished), || {
+        "is set beside compression.target_bytes; a file follows one of both, set the other to 0".to_owned()
+    });
     check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
     check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
     check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));
