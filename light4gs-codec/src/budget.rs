@@ -1,6 +1,6 @@
 //! Memory and time that decoding takes: both are added up before they are taken.
 
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::{CodecError, Limits, limits::at_most};
 
@@ -16,24 +16,46 @@ pub(crate) struct Budget {
     pub(crate) limits: Limits,
     memory: AtomicU64,
     nanoseconds: AtomicU64,
+    exhausted: AtomicBool,
 }
 
 impl Budget {
     /// A budget from which only the fixed amount is taken.
     pub(crate) fn new(limits: &Limits) -> Self {
-        Self { limits: *limits, memory: AtomicU64::new(SMALL_THINGS), nanoseconds: AtomicU64::new(0) }
+        Self::resumed(limits, Demand { memory_bytes: SMALL_THINGS, nanoseconds: 0 })
+    }
+
+    /// A budget of which others have taken a part: what [`Budget::demand`] has told, or nothing.
+    pub(crate) fn resumed(limits: &Limits, spent: Demand) -> Self {
+        let Demand { memory_bytes, nanoseconds } = spent;
+        Self {
+            limits: *limits,
+            memory: AtomicU64::new(memory_bytes.max(SMALL_THINGS)),
+            nanoseconds: AtomicU64::new(nanoseconds),
+            exhausted: AtomicBool::new(false),
+        }
     }
 
     /// Asks for memory.
     pub(crate) fn memory(&self, section: &'static str, bytes: u64) -> Result<(), CodecError> {
         let field = "memory that decoding takes in bytes";
-        at_most(section, field, spend(&self.memory, bytes), self.limits.memory_bytes)
+        self.within(at_most(section, field, spend(&self.memory, bytes), self.limits.memory_bytes))
     }
 
     /// Asks for time.
     pub(crate) fn time(&self, section: &'static str, nanoseconds: u64) -> Result<(), CodecError> {
         let field = "time that decoding takes in nanoseconds";
-        at_most(section, field, spend(&self.nanoseconds, nanoseconds), self.limits.nanoseconds)
+        self.within(at_most(section, field, spend(&self.nanoseconds, nanoseconds), self.limits.nanoseconds))
+    }
+
+    fn within(&self, answer: Result<(), CodecError>) -> Result<(), CodecError> {
+        self.exhausted.fetch_or(answer.is_err(), Ordering::Relaxed);
+        answer
+    }
+
+    /// Whether more was asked for than there is. A longer stream may ask for more.
+    pub(crate) fn is_exhausted(&self) -> bool {
+        self.exhausted.load(Ordering::Relaxed)
     }
 
     /// Asks for the memory of `count` things of a number of bytes each, and for the time to make them.

@@ -2,7 +2,7 @@
 
 use std::slice::from_ref;
 
-use crate::{CodecError, SceneData, bytes::Section, scene::SH_REST};
+use crate::{AttributeValues, CodecError, GaussianArrays, SceneData, bytes::Section, scene::SH_REST};
 
 /// One array of numbers of a scene.
 struct Field<'a> {
@@ -22,10 +22,7 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     add("meta", "background".into(), &meta.background);
     add("meta", "fov_x".into(), from_ref(&meta.fov_x));
 
-    for attribute in gaussians.attributes() {
-        let section = if attribute.name == SH_REST { Section::Sh } else { Section::Gaussians };
-        add(section.name(), attribute.name.to_owned(), attribute.values);
-    }
+    of_gaussians(gaussians).for_each(|Field { section, name, values }| add(section, name, values));
 
     let section = Section::SceneCoordinates.name();
     add(section, "mean".into(), &coordinates.mean);
@@ -53,9 +50,25 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     fields
 }
 
+fn of_gaussians(gaussians: &GaussianArrays) -> impl Iterator<Item = Field<'_>> {
+    gaussians.attributes().map(|AttributeValues { name, values, .. }| {
+        let section = if name == SH_REST { Section::Sh } else { Section::Gaussians };
+        Field { section: section.name(), name: name.to_owned(), values }
+    })
+}
+
 /// Refuses NaN and infinities.
 pub(crate) fn check_finite(scene: &SceneData) -> Result<(), CodecError> {
-    for Field { section, name, values } in fields(scene) {
+    check_all_finite(fields(scene))
+}
+
+/// As [`check_finite`], for Gaussians alone.
+pub(crate) fn check_finite_gaussians(gaussians: &GaussianArrays) -> Result<(), CodecError> {
+    check_all_finite(of_gaussians(gaussians))
+}
+
+fn check_all_finite<'a>(fields: impl IntoIterator<Item = Field<'a>>) -> Result<(), CodecError> {
+    for Field { section, name, values } in fields {
         if let Some(index) = values.iter().position(|value| !value.is_finite()) {
             return Err(CodecError::NonFinite { section, field: name, index, value: values[index] });
         }

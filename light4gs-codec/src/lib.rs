@@ -114,7 +114,8 @@ pub use scene::{
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use steps::PerGroup;
 pub use stream::{
-    CompressionInput, CompressionReport, Encoded, OpenStream, Profile, SectionInfo, StreamInfo, WeightPrecisions,
-    decode, decode_with_limits, encode, encode_compressed, encode_compressed_with_limits, encode_planes, encode_sh,
-    info, info_with_limits, plane_distributions, sh_distributions,
+    CompressionInput, CompressionReport, Encoded, GaussianLayers, LayerInfo, OpenStream, Profile, SectionInfo,
+    StreamDecoder, StreamInfo, WeightPrecisions, decode, decode_with_limits, encode, encode_compressed,
+    encode_compressed_with_limits, encode_planes, encode_sh, info, info_with_limits, plane_distributions,
+    sh_distributions,
 };

@@ -113,7 +113,9 @@ fn a_table_that_lies() {
 
     let error = forged_entry(3, 0, &99u16.to_le_bytes());
     assert!(matches!(error, CodecError::UnknownSection { index: 3, id: 99 }));
-    assert!(matches!(forged_entry(3, 0, &1u16.to_le_bytes()), CodecError::DuplicateSection { section: "gaussians" }));
+    assert!(matches!(forged_entry(4, 0, &4u16.to_le_bytes()), CodecError::DuplicateSection { section: "motion" }));
+    let error = forged_entry(3, 0, &1u16.to_le_bytes());
+    assert_eq!(error.to_string(), "table: number of sh sections is 1, expected 2, one for each gaussians section");
     let error = forged_entry(4, 2, &[7]);
     assert_eq!(error.to_string(), "feature_planes: unknown kind 7; use a newer program");
     let error = forged_entry(4, 3, &[7]);

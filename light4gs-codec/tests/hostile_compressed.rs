@@ -186,10 +186,12 @@ fn sections_and_encodings_that_do_not_belong() {
         forge_header(&mut bytes);
         decode(&bytes).unwrap_err()
     };
-    for (section, kind) in [(0, 0), (0, 2), (1, 5), (2, 3), (3, 0), (4, 3), (5, 2)] {
+    for (section, kind) in [(0, 0), (0, 2), (1, 6), (2, 3), (3, 0), (4, 3), (5, 2)] {
         let error = entry(section, 2, kind);
         assert!(matches!(error, CodecError::UnknownKind { .. }), "{section} {kind}: {error}");
     }
+    let error = entry(1, 2, 5).to_string();
+    assert_eq!(error, "table: kind of the first sh is continued, expected one with a coding of its own");
     for (section, encoding) in [(0, 2), (2, 1), (3, 2), (4, 0), (4, 2), (5, 5)] {
         let error = entry(section, 3, encoding);
         assert!(matches!(error, CodecError::UnknownEncoding { .. }), "{section} {encoding}: {error}");

@@ -102,7 +102,13 @@ export class Player extends EventTarget {
     this.controls = options.controls === false ? null : new Controls(this);
     canvas.addEventListener("webglcontextlost", this.#lost);
     canvas.addEventListener("webglcontextrestored", this.#restored);
+    scene.addEventListener("change", this.#more);
   }
+
+  /** More Gaussians of the scene have come. */
+  #more = () => {
+    this.#shownTime = -1;
+  };
 
   #lost = (/** @type {Event} */ event) => event.preventDefault();
 
@@ -410,6 +416,7 @@ export class Player extends EventTarget {
     cancelAnimationFrame(this.#request);
     for (const observer of this.#observers) observer.disconnect();
     this.controls?.dispose();
+    this.scene.removeEventListener("change", this.#more);
     this.canvas.removeEventListener("webglcontextlost", this.#lost);
     this.canvas.removeEventListener("webglcontextrestored", this.#restored);
     this.renderer.dispose();

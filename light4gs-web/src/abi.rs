@@ -5,6 +5,9 @@
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
+use light4gs_codec::CodecError;
+
+use crate::Arrival;
 use crate::description::describe_error;
 use crate::draw_list::Viewpoint;
 use crate::scene::OpenScene;
@@ -12,14 +15,21 @@ use crate::scene::OpenScene;
 #[derive(Default)]
 struct State {
     scene: Option<OpenScene>,
+    arrival: Option<Arrival>,
     input: Vec<u8>,
     text: String,
     numbers: Vec<f32>,
     list_length: usize,
 }
 
-static STATE: Mutex<State> =
-    Mutex::new(State { scene: None, input: Vec::new(), text: String::new(), numbers: Vec::new(), list_length: 0 });
+static STATE: Mutex<State> = Mutex::new(State {
+    scene: None,
+    arrival: None,
+    input: Vec::new(),
+    text: String::new(),
+    numbers: Vec::new(),
+    list_length: 0,
+});
 
 fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
@@ -39,20 +49,53 @@ pub extern "C" fn open() -> u32 {
     let state = &mut *state();
     state.scene = None;
     let input = std::mem::take(&mut state.input);
-    match OpenScene::decode(&input) {
-        Ok(scene) => {
-            state.text = scene.description().to_owned();
-            state.scene = Some(scene);
-            1
-        }
-        Err(error) => {
-            state.text = describe_error(&error);
-            0
+    let opened = OpenScene::decode(&input);
+    state.take(opened.map(Some))
+}
+
+/// Begins with a file that comes in pieces. The scene that is open stays until something of the file can be seen.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn begin() {
+    state().arrival = Some(Arrival::default());
+}
+
+/// Takes the input as the next piece of the file, and frees it. Returns 1 if the scene is another one now, since there is
+/// more to be seen; 2 if it is not; 0 if the file is damaged. [`text`] has the description or the error.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn push() -> u32 {
+    let state = &mut *state();
+    let input = std::mem::take(&mut state.input);
+    let pushed = state.arrival.get_or_insert_default().push(&input);
+    state.take(pushed)
+}
+
+/// Ends the file. Returns 2 if it is complete, else 0; [`text`] has the error.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn finish() -> u32 {
+    let state = &mut *state();
+    let finished = state.arrival.take().unwrap_or_default().finish();
+    state.take(finished.map(|_| None))
+}
+
+impl State {
+    /// Keeps a scene, where there is a new one, or the error.
+    fn take(&mut self, answer: Result<Option<OpenScene>, CodecError>) -> u32 {
+        match answer {
+            Ok(None) => 2,
+            Ok(Some(scene)) => {
+                self.text = scene.description().to_owned();
+                self.scene = Some(scene);
+                1
+            }
+            Err(error) => {
+                self.text = describe_error(&error);
+                0
+            }
         }
     }
 }
 
-/// The description or the error from [`open`], as JSON.
+/// The description or the error from [`open`], [`push`] and [`finish`], as JSON.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn text() -> *const u8 {
     state().text.as_ptr()

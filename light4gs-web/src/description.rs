@@ -2,26 +2,53 @@
 
 use std::fmt::{Display, Write as _};
 
-use light4gs_codec::{CodecError, SceneData, SceneMeta, StreamInfo};
+use light4gs_codec::{CodecError, SceneData, SceneMeta, SectionInfo, VERSION};
+
+/// What is said of a file besides its scene.
+#[derive(Debug)]
+pub(crate) struct Facts<'a> {
+    /// Of the whole file.
+    pub(crate) bytes: u64,
+    /// Layers of Gaussians, and how many of them have come.
+    pub(crate) layers: usize,
+    pub(crate) shown: usize,
+    pub(crate) sections: &'a [SectionInfo],
+}
+
+impl Facts<'_> {
+    /// Names and bytes of the sections; those of further layers are added to the first.
+    fn sizes(&self) -> Vec<(&str, u64)> {
+        let mut sizes: Vec<(&str, u64)> = Vec::new();
+        for section in self.sections {
+            match sizes.iter_mut().find(|(name, _)| *name == section.name) {
+                Some((_, sum)) => *sum += section.bytes,
+                None => sizes.push((section.name, section.bytes)),
+            }
+        }
+        sizes
+    }
+}
 
 /// The description of a scene: `{"name": ..., "sections": [...]}`.
-pub(crate) fn describe(scene: &SceneData, info: &StreamInfo) -> String {
+pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>) -> String {
     let SceneMeta { name, frame_count, fps, bounds, background, width, height, fov_x, extra, .. } = &scene.meta;
-    let sections = info.sections.iter().map(|section| format!("[{},{}]", text(section.name), section.bytes));
+    let sizes = facts.sizes();
+    let sections = sizes.iter().map(|(name, bytes)| format!("[{},{bytes}]", text(name)));
     let extra = extra.iter().map(|(key, value)| format!("{}:{}", text(key), text(value)));
     format!(
         "{{\"name\":{},\"frameCount\":{frame_count},\"fps\":{fps},\"bounds\":[{},{}],\"background\":{},\"width\":{width},\
-         \"height\":{height},\"fovX\":{fov_x},\"version\":{},\"bytes\":{},\"count\":{},\"shDegree\":{},\"moves\":{},\
-         \"sections\":{},\"extra\":{{{}}}}}",
+         \"height\":{height},\"fovX\":{fov_x},\"version\":{VERSION},\"bytes\":{},\"count\":{},\"shDegree\":{},\"moves\":{},\
+         \"layers\":{},\"layersShown\":{},\"sections\":{},\"extra\":{{{}}}}}",
         text(name),
         list(bounds[0]),
         list(bounds[1]),
         list(*background),
-        info.version,
-        info.bytes,
+        facts.bytes,
         scene.gaussians.len(),
         scene.gaussians.sh_degree,
         scene.motion.network.is_some(),
+        facts.layers,
+        facts.shown,
         list(sections),
         extra.collect::<Vec<_>>().join(","),
     )

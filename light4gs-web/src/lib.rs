@@ -6,6 +6,7 @@
 //!
 //! | file | what |
 //! |---|---|
+//! | `arrival.rs` | a file that is shown while it comes |
 //! | `scene.rs` | a decoded scene, of which one time after the other is computed |
 //! | `gaussians.rs` | activations, and the values for the vertex shader |
 //! | `draw_list.rs` | the list for drawing, back to front, with colors |
@@ -15,6 +16,7 @@
 //! | `page.rs` | pages around the player, for the program; not in WebAssembly |
 
 pub mod abi;
+mod arrival;
 mod description;
 mod digest;
 mod draw_list;
@@ -23,6 +25,7 @@ mod gaussians;
 pub mod page;
 mod scene;
 
+pub use arrival::Arrival;
 pub use digest::digest;
 pub use draw_list::{ENTRY, ROW, Viewpoint};
 pub use scene::OpenScene;

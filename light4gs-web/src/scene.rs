@@ -1,8 +1,9 @@
 //! A decoded scene, of which one time after the other is computed.
 
-use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, info};
+use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, SceneData};
 
-use crate::description::describe;
+use crate::Arrival;
+use crate::description::{Facts, describe};
 use crate::draw_list::{DrawList, Viewpoint};
 use crate::gaussians::{FLOATS, Unchanged, opacity, pack, rotation, scales};
 
@@ -25,18 +26,27 @@ impl OpenScene {
     /// # Errors
     /// As [`light4gs_codec::decode`].
     pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
-        let info = info(bytes)?;
-        let scene = OpenStream::new(bytes)?.scene()?;
-        let evaluator = MotionEvaluator::new(&scene)?;
-        let description = describe(&scene, &info);
-        let canonical = scene.gaussians;
+        let mut arrival = Arrival::default();
+        let scene = arrival.push(bytes)?;
+        // Here a file that is cut short is refused.
+        arrival.finish()?;
+        scene.ok_or(CodecError::MissingSection { section: "gaussians" })
+    }
+
+    /// Of a decoded scene, whose scales are multiplied by `growth`.
+    pub(crate) fn new(scene: &SceneData, facts: &Facts<'_>, growth: f32) -> Result<Self, CodecError> {
+        let evaluator = MotionEvaluator::new(scene)?;
+        let mut canonical = scene.gaussians.clone();
+        if growth != 1.0 {
+            canonical.log_scales.as_flattened_mut().iter_mut().for_each(|scale| *scale += growth.ln());
+        }
         let floats = FLOATS * canonical.len();
         Ok(Self {
             moved: canonical.clone(),
             unchanged: Unchanged::of(&canonical, |output| evaluator.changes(output)),
             canonical,
             evaluator,
-            description,
+            description: describe(scene, facts),
             packed: vec![0.0; floats],
             list: DrawList::default(),
         })

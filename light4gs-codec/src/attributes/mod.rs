@@ -103,7 +103,25 @@ pub struct AttributeSizes {
 /// Arrays of different lengths, NaN and infinities, names that no attribute can have, steps that are not positive, positions
 /// beyond ±1e30, and other numbers beyond 2^23 steps.
 pub fn encode(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<EncodedAttributes, CodecError> {
-    let quantized = Quantized::of(gaussians, steps)?;
+    Ok(encode_quantized(Quantized::of(gaussians, steps)?))
+}
+
+/// Codes layers of Gaussians, given by their indices: each can be decoded by itself, and all of them have one grid and one
+/// set of steps, so that a Gaussian has the same bits in whatever layer it is. Returns the decoded Gaussians of each layer too.
+pub(crate) fn encode_layers(
+    gaussians: &GaussianArrays,
+    steps: &AttributeSteps,
+    layers: &[Vec<u32>],
+) -> Result<Vec<(EncodedAttributes, GaussianArrays)>, CodecError> {
+    let all = Quantized::of(gaussians, steps)?;
+    let code = |layer: Quantized| {
+        let decoded = layer.reconstructed();
+        (encode_quantized(layer), decoded)
+    };
+    Ok(all.into_layers(layers).into_iter().map(code).collect())
+}
+
+fn encode_quantized(quantized: Quantized) -> EncodedAttributes {
     let neighbors = quantized.neighbors();
     let mut streams: Vec<Vec<u8>> = Vec::new();
     let mut infos: Vec<AttributeInfo> = Vec::new();
@@ -116,13 +134,13 @@ pub fn encode(gaussians: &GaussianArrays, steps: &AttributeSteps) -> Result<Enco
 
     let sizes: Vec<_> = infos.iter().map(|info| (info.name.clone(), info.bytes as usize)).collect();
     let mut writer = Writer::default();
-    Head { count: gaussians.len() as u32, attributes: infos }.write(&mut writer);
+    Head { count: quantized.order.len() as u32, attributes: infos }.write(&mut writer);
     streams.iter().for_each(|stream| writer.bytes.extend(stream));
-    let least = gaussians.len().div_ceil(GAUSSIANS_A_BYTE);
+    let least = quantized.order.len().div_ceil(GAUSSIANS_A_BYTE);
     writer.bytes.resize(writer.bytes.len().max(least), 0);
     let overhead = writer.bytes.len() - sizes.iter().map(|(_, bytes)| bytes).sum::<usize>();
     let sizes = AttributeSizes { overhead, attributes: sizes };
-    Ok(EncodedAttributes { bytes: writer.bytes, order: quantized.order, sizes })
+    EncodedAttributes { bytes: writer.bytes, order: quantized.order, sizes }
 }
 
 /// Writes Gaussians whose arrays fit together as float32, without `sh_degree` and `sh_rest`.

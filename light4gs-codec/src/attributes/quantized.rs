@@ -59,6 +59,31 @@ impl Quantized {
         Ok(Self { grid, order, codes, attributes })
     }
 
+    /// The Gaussians of each layer, by their indices in the given arrays; each layer in Morton order.
+    pub(super) fn into_layers(self, layers: &[Vec<u32>]) -> Vec<Self> {
+        if layers.len() == 1 {
+            return vec![self];
+        }
+        let mut layer_of = vec![0; self.order.len()];
+        for (number, layer) in layers.iter().enumerate() {
+            layer.iter().for_each(|&row| layer_of[row as usize] = number);
+        }
+        let mut places = vec![Vec::new(); layers.len()];
+        for (place, &row) in self.order.iter().enumerate() {
+            places[layer_of[row as usize]].push(place);
+        }
+        places.iter().map(|places| self.select(places)).collect()
+    }
+
+    fn select(&self, places: &[usize]) -> Self {
+        Self {
+            grid: self.grid,
+            order: places.iter().map(|&place| self.order[place]).collect(),
+            codes: places.iter().map(|&place| self.codes[place]).collect(),
+            attributes: self.attributes.iter().map(|attribute| attribute.select(places)).collect(),
+        }
+    }
+
     fn cells(&self) -> Vec<[i32; 3]> {
         self.codes.iter().map(|&code| morton_cell(code)).collect()
     }
@@ -103,6 +128,20 @@ impl QuantizedAttribute {
             ),
         };
         Ok(Self { name: name.to_owned(), width, optional, coder, numbers })
+    }
+
+    fn select(&self, places: &[usize]) -> Self {
+        let of_channel = |indices: &Vec<i32>| places.iter().map(|&place| indices[place]).collect();
+        let numbers = match &self.numbers {
+            Integers::Cells => Integers::Cells,
+            Integers::Channels { step, channels } => {
+                Integers::Channels { step: *step, channels: channels.iter().map(of_channel).collect() }
+            }
+            Integers::Float32(values) => Integers::Float32(
+                places.iter().flat_map(|&place| &values[place * self.width..][..self.width]).copied().collect(),
+            ),
+        };
+        Self { name: self.name.clone(), numbers, ..*self }
     }
 
     /// Its row in the list of a section.

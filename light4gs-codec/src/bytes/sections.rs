@@ -35,6 +35,11 @@ impl Section {
         Self::ALL.into_iter().find(|section| section.id() == id)
     }
 
+    /// Whether there is one for each layer of Gaussians.
+    pub(crate) const fn is_layered(self) -> bool {
+        matches!(self, Self::Gaussians | Self::Sh)
+    }
+
     /// The name in messages.
     pub(crate) const fn name(self) -> &'static str {
         match self {
@@ -62,6 +67,8 @@ pub enum Kind {
     ShNetworks,
     /// Spherical harmonics, coded adaptively as other attributes.
     ShChannels,
+    /// Spherical harmonics of a layer after the first, under the tables or networks of the first one.
+    ShContinued,
     /// Mean, principal axes and deviations of a cloud.
     SceneCoordinatesPrincipalAxes,
     /// The same, with a mapping of their coordinates other than the paper's.
@@ -77,12 +84,13 @@ pub enum Kind {
 }
 
 impl Kind {
-    const ALL: [Self; 11] = [
+    const ALL: [Self; 12] = [
         Self::GaussiansExplicit,
         Self::ShExplicit,
         Self::ShTables,
         Self::ShNetworks,
         Self::ShChannels,
+        Self::ShContinued,
         Self::SceneCoordinatesPrincipalAxes,
         Self::SceneCoordinatesMapped,
         Self::MotionDescription,
@@ -99,6 +107,7 @@ impl Kind {
             Self::ShTables => (Section::Sh, 2),
             Self::ShNetworks => (Section::Sh, 3),
             Self::ShChannels => (Section::Sh, 4),
+            Self::ShContinued => (Section::Sh, 5),
             Self::SceneCoordinatesPrincipalAxes => (Section::SceneCoordinates, 1),
             Self::SceneCoordinatesMapped => (Section::SceneCoordinates, 2),
             Self::MotionDescription => (Section::Motion, 1),
@@ -121,7 +130,9 @@ impl Kind {
             | Self::SceneCoordinatesPrincipalAxes
             | Self::SceneCoordinatesMapped
             | Self::FeaturePlanesExplicit => &[Encoding::Float32],
-            Self::ShTables | Self::ShChannels | Self::FeaturePlanesContextCoded => &[Encoding::Quantized],
+            Self::ShTables | Self::ShChannels | Self::ShContinued | Self::FeaturePlanesContextCoded => {
+                &[Encoding::Quantized]
+            }
             _ => &[Encoding::Float32, Encoding::Quantized],
         }
     }
@@ -132,6 +143,7 @@ impl Kind {
             Self::GaussiansExplicit | Self::ShExplicit | Self::FeaturePlanesExplicit => "explicit",
             Self::ShTables => "tables",
             Self::ShChannels => "channels",
+            Self::ShContinued => "continued",
             Self::ShNetworks | Self::ContextModelNetworks => "networks",
             Self::SceneCoordinatesPrincipalAxes => "principal axes",
             Self::SceneCoordinatesMapped => "mapped principal axes",

@@ -167,7 +167,16 @@ pub(crate) fn reads_feature_planes(bytes: &[u8], kind: Kind, limits: &Limits) ->
     Ok(priors.iter().any(|prior| prior.sources.contains(&ShSource::SpaceFeatures)))
 }
 
-/// Writes `sh_rest` of Gaussians in their final order; returns it as a decoder gets it.
+/// What [`write`] and [`write_continued`] have written.
+#[derive(Debug)]
+pub(crate) struct Written {
+    /// `sh_rest` as a decoder gets it.
+    pub(crate) values: Vec<f32>,
+    pub(crate) bytes: ShBytes,
+}
+
+/// Writes `sh_rest` of Gaussians in their final order. Returns the coding as a decoder gets it, too: that of the layers that
+/// follow.
 pub(crate) fn write(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
@@ -175,16 +184,37 @@ pub(crate) fn write(
     conditions: Conditions<'_>,
     limits: &Limits,
     writer: &mut Writer,
-) -> Result<(Vec<f32>, ShBytes), CodecError> {
-    let degree = gaussians.sh_degree;
-    coding.check(degree, conditions.features(), limits)?;
+) -> Result<(Written, ShCoding), CodecError> {
+    coding.check(gaussians.sh_degree, conditions.features(), limits)?;
     let start = writer.bytes.len();
     Head::of(gaussians).write(writer);
     let coding = coding.write(precision, writer)?;
+    Ok((write_streams(gaussians, &coding, conditions, start, writer)?, coding))
+}
 
+/// Writes `sh_rest` of a layer after the first under the tables or networks of that one, as [`write`] has returned them.
+pub(crate) fn write_continued(
+    gaussians: &GaussianArrays,
+    coding: &ShCoding,
+    conditions: Conditions<'_>,
+    writer: &mut Writer,
+) -> Result<Written, CodecError> {
+    let start = writer.bytes.len();
+    Head::of(gaussians).write(writer);
+    write_streams(gaussians, coding, conditions, start, writer)
+}
+
+/// Writes the sub-streams and their lengths into a section that begins at `start`.
+fn write_streams(
+    gaussians: &GaussianArrays,
+    coding: &ShCoding,
+    conditions: Conditions<'_>,
+    start: usize,
+    writer: &mut Writer,
+) -> Result<Written, CodecError> {
+    let (degree, step) = (gaussians.sh_degree, coding.step());
     let mut values = gaussians.sh_rest.clone();
-    let step = coding.step();
-    let streams = match HarmonicsModel::new(&coding, conditions) {
+    let streams = match HarmonicsModel::new(coding, conditions) {
         None => channels::write(conditions.gaussians, step, degree, &mut values),
         Some(mut model) => {
             let mut writers: Vec<SymbolWriter> = (0..degree).map(|_| SymbolWriter::default()).collect();
@@ -199,56 +229,115 @@ pub(crate) fn write(
     streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
     let model = (writer.bytes.len() - start) as u64;
     streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
-    Ok((values, ShBytes { model, degrees: streams.iter().map(|stream| stream.len() as u64).collect() }))
+    let bytes = ShBytes { model, degrees: streams.iter().map(|stream| stream.len() as u64).collect() };
+    Ok(Written { values, bytes })
 }
 
-/// The head and the coefficients.
-pub(crate) fn read(
-    bytes: &[u8],
-    (kind, encoding): (Kind, Encoding),
-    conditions: Conditions<'_>,
-    budget: &Budget,
-) -> Result<(Head, Vec<f32>), CodecError> {
-    let limits = &budget.limits;
-    let mut reader = Reader::new(SECTION, bytes);
-    let head = Head::read(&mut reader, limits)?;
-    if head.count as usize != conditions.gaussians.len() {
-        let expected = format!("{}, the number of Gaussians", conditions.gaussians.len());
-        return Err(CodecError::invalid(SECTION, "count", head.count, expected));
+impl ShBytes {
+    /// Adds those of another layer.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.model += other.model;
+        self.degrees.resize(self.degrees.len().max(other.degrees.len()), 0);
+        self.degrees.iter_mut().zip(&other.degrees).for_each(|(sum, bytes)| *sum += bytes);
     }
-    if kind == Kind::ShExplicit {
-        budget.things(SECTION, bytes.len() as u64, 1, 1)?;
-        let values = reader.f32s("sh_rest", head.values())?;
-        reader.finish()?;
-        return Ok((head, values));
-    }
-    budget.stream(SECTION, bytes.len())?;
-    if kind == Kind::ShChannels {
-        attributes::ask_for_channels(SECTION, head.count.into(), head.values(), budget)?;
-    } else {
-        budget.things(SECTION, head.values(), 4, READ_NANOSECONDS)?;
-    }
-    let coding = ShCoding::read(&mut reader, (kind, encoding), head.degree, conditions.features(), budget)?;
-    coding.check(head.degree, conditions.features(), limits)?;
-    if let ShCoding::Networks { priors, .. } = &coding {
-        let programs = priors.iter().fold(0u64, |sum, prior| sum.saturating_add(prior.network.program_bytes()));
-        budget.things(SECTION, programs, 1, 2)?;
+}
+
+/// The tables or networks of a layer, for those that continue it.
+#[derive(Debug)]
+pub(crate) struct FirstCoding {
+    degree: u8,
+    pub(crate) coding: ShCoding,
+}
+
+/// The head of a section, its coding, and the bytes of its numbers.
+#[derive(Debug)]
+pub(crate) struct Parts<'a> {
+    pub(crate) head: Head,
+    kind: Kind,
+    /// None where numbers are float32, and where the coding is that of the first layer.
+    coding: Option<ShCoding>,
+    rest: Reader<'a>,
+}
+
+impl<'a> Parts<'a> {
+    /// Reads head and coding, for planes with so many features.
+    pub(crate) fn read(
+        bytes: &'a [u8],
+        (kind, encoding): (Kind, Encoding),
+        features: u64,
+        budget: &Budget,
+    ) -> Result<Self, CodecError> {
+        let limits = &budget.limits;
+        let mut rest = Reader::new(SECTION, bytes);
+        let head = Head::read(&mut rest, limits)?;
+        match kind {
+            Kind::ShExplicit => budget.things(SECTION, bytes.len() as u64, 1, 1)?,
+            _ => budget.stream(SECTION, bytes.len())?,
+        }
+        let coding = match kind {
+            Kind::ShExplicit | Kind::ShContinued => None,
+            _ => {
+                let coding = ShCoding::read(&mut rest, (kind, encoding), head.degree, features, budget)?;
+                coding.check(head.degree, features, limits)?;
+                Some(coding)
+            }
+        };
+        Ok(Self { head, kind, coding, rest })
     }
 
-    let lengths = (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
-    let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "symbols as an encoder writes them");
-    let streams: Vec<&[u8]> =
-        lengths.into_iter().map(|length| reader.take("sub-stream", length)).collect::<Result<_, _>>()?;
-    reader.finish()?;
-    let Some(mut model) = HarmonicsModel::new(&coding, conditions) else {
-        return Ok((head, channels::read(conditions.gaussians, coding.step(), &streams).map_err(damaged)?));
-    };
-    let mut readers = streams.into_iter().map(SymbolReader::new).collect::<Result<Vec<_>, _>>().map_err(damaged)?;
-    budget.time(SECTION, model.nanoseconds().saturating_mul(u64::from(head.count).div_ceil(LANES as u64)))?;
-    let mut values = vec![0.0; head.values() as usize];
-    walk(&mut model, coding.step(), head.degree, &mut values, &mut readers).map_err(damaged)?;
-    readers.into_iter().try_for_each(SymbolReader::finish).map_err(damaged)?;
-    Ok((head, values))
+    /// The coding, for the layers that continue this one.
+    pub(crate) fn into_coding(self) -> Option<FirstCoding> {
+        self.coding.map(|coding| FirstCoding { degree: self.head.degree, coding })
+    }
+
+    /// The coefficients of the decoded Gaussians of the section. One that continues another needs the `first` coding.
+    pub(crate) fn values(
+        &self,
+        first: Option<&FirstCoding>,
+        conditions: Conditions<'_>,
+        budget: &Budget,
+    ) -> Result<Vec<f32>, CodecError> {
+        let (head, mut reader) = (self.head, self.rest.clone());
+        if head.count as usize != conditions.gaussians.len() {
+            let expected = format!("{}, the number of Gaussians", conditions.gaussians.len());
+            return Err(CodecError::invalid(SECTION, "count", head.count, expected));
+        }
+        if self.kind == Kind::ShExplicit {
+            let values = reader.f32s("sh_rest", head.values())?;
+            reader.finish()?;
+            return Ok(values);
+        }
+        let of_the_first = || first.filter(|first| first.degree == head.degree).map(|first| &first.coding);
+        let Some(coding) = self.coding.as_ref().or_else(of_the_first) else {
+            let expected = "that of a first layer of the same degree, with tables or networks";
+            return Err(CodecError::invalid(SECTION, "coding", self.kind.name(), expected));
+        };
+        if let ShCoding::Channels { .. } = coding {
+            attributes::ask_for_channels(SECTION, head.count.into(), head.values(), budget)?;
+        } else {
+            budget.things(SECTION, head.values(), 4, READ_NANOSECONDS)?;
+        }
+        if let ShCoding::Networks { priors, .. } = coding {
+            let programs = priors.iter().fold(0u64, |sum, prior| sum.saturating_add(prior.network.program_bytes()));
+            budget.things(SECTION, programs, 1, 2)?;
+        }
+
+        let lengths =
+            (0..head.degree).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
+        let damaged = |Damaged| CodecError::invalid(SECTION, "symbols", "damaged", "symbols as an encoder writes them");
+        let streams: Vec<&[u8]> =
+            lengths.into_iter().map(|length| reader.take("sub-stream", length)).collect::<Result<_, _>>()?;
+        reader.finish()?;
+        let Some(mut model) = HarmonicsModel::new(coding, conditions) else {
+            return channels::read(conditions.gaussians, coding.step(), &streams).map_err(damaged);
+        };
+        let mut readers = streams.into_iter().map(SymbolReader::new).collect::<Result<Vec<_>, _>>().map_err(damaged)?;
+        budget.time(SECTION, model.nanoseconds().saturating_mul(u64::from(head.count).div_ceil(LANES as u64)))?;
+        let mut values = vec![0.0; head.values() as usize];
+        walk(&mut model, coding.step(), head.degree, &mut values, &mut readers).map_err(damaged)?;
+        readers.into_iter().try_for_each(SymbolReader::finish).map_err(damaged)?;
+        Ok(values)
+    }
 }
 
 /// Scales and means of decoded harmonics.

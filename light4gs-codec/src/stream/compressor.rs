@@ -8,6 +8,7 @@ use super::{
 };
 use crate::{
     CodecError, Demand, FeaturePlaneArrays, GaussianArrays, Limits, PlaneBytes, PlaneCoding, SceneData, ShBytes,
+    ShCoding,
     attributes::{self, EncodedAttributes},
     bytes::{
         Writer,
@@ -70,7 +71,7 @@ pub fn encode_compressed_with_limits(
     let compact = |precision| (input.profile == Profile::Compact).then_some(precision);
 
     let mut sections = Vec::new();
-    let (attributes, order) = write_gaussians(&scene.gaussians, input, &mut sections)?;
+    let layers = write_gaussians(&scene.gaussians, input)?;
     let mut writer = Writer::default();
     let motion = motion::section::write(&scene.motion, compact(input.weights.motion), &mut writer)?;
     push(&mut sections, Kind::MotionDescription, encoding_of(compact(input.weights.motion)), writer);
@@ -81,26 +82,57 @@ pub fn encode_compressed_with_limits(
     let (feature_planes, planes) =
         write_planes(&scene.feature_planes, input.planes.as_ref(), precision, limits, &mut sections)?;
 
-    let conditions =
-        Conditions { gaussians: &attributes, coordinates: &scene.coordinates, feature_planes: &feature_planes };
-    let rest = reordered(&scene.gaussians, &order);
-    let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
-    let mut writer = Writer::default();
-    let precision = compact(input.weights.sh);
-    let (sh_rest, sh) = sh::section::write(&with_rest, &input.sh, precision, conditions, limits, &mut writer)?;
-    let kind = input.sh.kind();
-    // Harmonics are entropy coded in either profile; in that of the paper, the weights of networks are not.
-    let encoding = if kind == Kind::ShNetworks { encoding_of(precision) } else { Encoding::Quantized };
-    push(&mut sections, kind, encoding, writer);
+    let mut gaussians = GaussianArrays { sh_degree: scene.gaussians.sh_degree, ..GaussianArrays::default() };
+    let (mut sh, mut first_coding) = (ShBytes::default(), None);
+    let mut layer_sections = Vec::new();
+    for Layer { section, attributes, order } in layers {
+        layer_sections.push(section);
+        let conditions =
+            Conditions { gaussians: &attributes, coordinates: &scene.coordinates, feature_planes: &feature_planes };
+        let rest = scene.gaussians.gathered(&order).sh_rest;
+        let with_rest = GaussianArrays { sh_degree: scene.gaussians.sh_degree, sh_rest: rest, ..attributes.clone() };
+        let mut writer = Writer::default();
+        let continued = first_coding.as_ref().filter(|coding| !matches!(coding, ShCoding::Channels { .. }));
+        let (written, kind, encoding) = match continued {
+            Some(coding) => {
+                let written = sh::section::write_continued(&with_rest, coding, conditions, &mut writer)?;
+                (written, Kind::ShContinued, Encoding::Quantized)
+            }
+            None => {
+                let precision = compact(input.weights.sh);
+                let (written, coding) =
+                    sh::section::write(&with_rest, &input.sh, precision, conditions, limits, &mut writer)?;
+                first_coding = Some(coding);
+                let kind = input.sh.kind();
+                // Harmonics are entropy coded in either profile; in that of the paper, the weights of networks are not.
+                let networks = kind == Kind::ShNetworks;
+                (written, kind, if networks { encoding_of(precision) } else { Encoding::Quantized })
+            }
+        };
+        push(&mut layer_sections, kind, encoding, writer);
+        sh.add(&written.bytes);
+        let layer = GaussianArrays { sh_rest: written.values, ..with_rest };
+        match gaussians.is_empty() {
+            true => gaussians = layer,
+            false => gaussians.append(layer),
+        }
+    }
 
     let expected = SceneData {
         meta: scene.meta.clone(),
-        gaussians: GaussianArrays { sh_rest, ..with_rest },
+        gaussians,
         coordinates: scene.coordinates.clone(),
         feature_planes,
         motion,
     };
-    sections.sort_by_key(|section| section.kind.place().0.id());
+    if input.layers.count > 1 {
+        // What all layers share, and what the planes need before the planes; then layer after layer.
+        sections.sort_by_key(|section| (section.kind == Kind::FeaturePlanesContextCoded, section.kind.place().0.id()));
+        sections.extend(layer_sections);
+    } else {
+        sections.extend(layer_sections);
+        sections.sort_by_key(|section| section.kind.place().0.id());
+    }
     let bytes = container::write(&scene.meta, &sections, limits)?;
 
     let (decoded, demand) = OpenStream::with_limits(&bytes, limits)?.scene_and_demand()?;
@@ -122,22 +154,34 @@ fn encoding_of(precision: Option<WeightPrecision>) -> Encoding {
     if precision.is_some() { Encoding::Quantized } else { Encoding::Float32 }
 }
 
-/// The attributes without `sh_rest`, as decoded, and the index of each Gaussian in the given arrays.
-fn write_gaussians(
-    gaussians: &GaussianArrays,
-    input: &CompressionInput,
-    sections: &mut Vec<NewSection>,
-) -> Result<(GaussianArrays, Vec<u32>), CodecError> {
+/// A layer of Gaussians without `sh_rest`.
+struct Layer {
+    section: NewSection,
+    /// As decoded.
+    attributes: GaussianArrays,
+    /// The index of each Gaussian in the given arrays.
+    order: Vec<u32>,
+}
+
+fn write_gaussians(gaussians: &GaussianArrays, input: &CompressionInput) -> Result<Vec<Layer>, CodecError> {
+    let layers = input.layers.split(gaussians);
+    let section = |encoding, payload| NewSection { kind: Kind::GaussiansExplicit, encoding, payload };
     if input.profile == Profile::Compact {
-        let EncodedAttributes { bytes, order, .. } = attributes::encode(gaussians, &input.attributes)?;
-        push(sections, Kind::GaussiansExplicit, Encoding::Quantized, Writer { bytes });
-        return Ok((attributes::quantized(gaussians, &input.attributes)?, order));
+        let coded = attributes::encode_layers(gaussians, &input.attributes, &layers)?;
+        let layer = |(EncodedAttributes { bytes, order, .. }, attributes)| Layer {
+            section: section(Encoding::Quantized, bytes),
+            attributes,
+            order,
+        };
+        return Ok(coded.into_iter().map(layer).collect());
     }
-    let mut writer = Writer::default();
-    attributes::write_float32(gaussians, &mut writer);
-    push(sections, Kind::GaussiansExplicit, Encoding::Float32, writer);
-    let order = (0..gaussians.len() as u32).collect();
-    Ok((GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.clone() }, order))
+    let layer = |order: Vec<u32>| {
+        let attributes = GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians.gathered(&order) };
+        let mut writer = Writer::default();
+        attributes::write_float32(&attributes, &mut writer);
+        Layer { section: section(Encoding::Float32, writer.bytes), attributes, order }
+    };
+    Ok(layers.into_iter().map(layer).collect())
 }
 
 /// The planes as decoded, and the bytes of each.
@@ -164,8 +208,91 @@ fn write_planes(
     Ok((decoded, planes))
 }
 
-/// `sh_rest` in the order of the stream.
-fn reordered(gaussians: &GaussianArrays, order: &[u32]) -> Vec<f32> {
-    let channels = gaussians.sh_rest.len() / gaussians.len().max(1);
-    order.iter().flat_map(|&index| &gaussians.sh_rest[index as usize * channels..][..channels]).copied().collect()
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Coder, GaussianLayers, WeightPrecisions,
+        attributes::{AttributeSteps, Head, typical_size},
+        bytes::{Reader, Section},
+        decode_with_limits, info_with_limits,
+    };
+
+    /// The steps of a compact stream.
+    fn steps(bytes: &[u8], scene: &SceneData) -> AttributeSteps {
+        let info = info_with_limits(bytes, &Limits::large()).expect("a stream");
+        let section = info.sections.iter().find(|section| section.name == "gaussians").expect("Gaussians");
+        let mut reader = Reader::new("gaussians", &bytes[section.offset as usize..][..section.bytes as usize]);
+        let head = Head::read(&mut reader, section.encoding, &Limits::large()).expect("a head");
+        let mut steps = AttributeSteps::default();
+        for attribute in head.attributes {
+            let mut stream = Reader::new("gaussians", reader.take("attribute", attribute.bytes).expect("its bytes"));
+            if attribute.coder == Coder::Float32 {
+                continue;
+            }
+            let mut step = 1.0;
+            if attribute.coder == Coder::Grid {
+                stream.take("corner", 12).expect("a corner");
+                step /= typical_size(&scene.gaussians.log_scales);
+            }
+            steps = steps.with(&attribute.name, step * stream.f32("step").expect("a step"));
+        }
+        steps
+    }
+
+    /// What layers cost: `LIGHT4GS_STREAMS=folder cargo test --release -p light4gs-codec --lib cost_of_layers -- --ignored
+    /// --nocapture`. Planes and motion are the same bytes with layers or without, so that only the rest is coded again.
+    #[test]
+    #[ignore = "needs a folder of streams"]
+    fn cost_of_layers() {
+        let folder = std::env::var("LIGHT4GS_STREAMS").expect("a folder in LIGHT4GS_STREAMS");
+        for entry in std::fs::read_dir(folder).expect("a folder") {
+            let path = entry.expect("an entry").path();
+            let bytes = std::fs::read(&path).expect("a file");
+            let stream = OpenStream::with_limits(&bytes, &Limits::large()).expect("a stream");
+            let (kind, encoding, payload) = stream.container.section(Section::Sh).expect("harmonics");
+            let scene = decode_with_limits(&bytes, &Limits::large()).expect("a scene");
+            let budget = crate::budget::Budget::new(&Limits::large());
+            let features = scene.feature_planes.features();
+            let parts = sh::section::Parts::read(payload, (kind, encoding), features, &budget).expect("harmonics");
+            let Some(sh) = parts.into_coding() else { continue };
+            let input = CompressionInput {
+                profile: Profile::Compact,
+                planes: None,
+                sh: sh.coding,
+                attributes: steps(&bytes, &scene),
+                weights: WeightPrecisions::default(),
+                layers: GaussianLayers::default(),
+            };
+            let sizes = |count| {
+                let layers = GaussianLayers::new(count);
+                let coded = encode_compressed_with_limits(
+                    &scene,
+                    &CompressionInput { layers, ..input.clone() },
+                    &Limits::large(),
+                );
+                let coded = coded.expect("a file");
+                let of_kind =
+                    |of: Section| coded.report.sections.iter().filter(|s| s.0 == of.name()).map(|s| s.3).sum::<u64>();
+                (of_kind(Section::Gaussians), of_kind(Section::Sh), coded.report.header_bytes)
+            };
+            let (gaussians, sh, header) = sizes(1);
+            println!(
+                "{}: {} bytes, {} Gaussians; coded again {gaussians} + {sh}",
+                path.display(),
+                bytes.len(),
+                scene.gaussians.len()
+            );
+            for count in 2..=8 {
+                let (layered, layered_sh, layered_header) = sizes(count);
+                let more = (layered + layered_sh + layered_header) as f64 - (gaussians + sh + header) as f64;
+                println!(
+                    "  {count} layers: Gaussians {layered} ({:+.2} %), harmonics {layered_sh} ({:+.2} %), file {:+.2} %",
+                    100.0 * (layered as f64 / gaussians as f64 - 1.0),
+                    100.0 * (layered_sh as f64 / sh as f64 - 1.0),
+                    100.0 * more / bytes.len() as f64
+                );
+            }
+        }
+    }
 }

@@ -3,6 +3,8 @@
 //! `docs/format.md` has the layout. Sections follow each other without gaps in the order of the table, so that every
 //! byte of a stream belongs to something that a checksum covers.
 
+use std::borrow::Cow;
+
 use super::meta;
 use crate::{
     CodecError, Limits, SceneMeta,
@@ -76,16 +78,94 @@ impl Prelude {
     }
 }
 
-/// A stream whose header, meta and table have been checked. The sections' checksums are checked when they are read.
+impl Prelude {
+    /// Bytes before the first section.
+    pub(crate) fn header_bytes(&self) -> u64 {
+        PRELUDE as u64 + u64::from(self.meta_bytes) + u64::from(self.section_count) * ENTRY as u64
+    }
+}
+
+/// Everything before the sections, checked.
 #[derive(Clone, Debug)]
-pub(crate) struct Container<'a> {
-    bytes: &'a [u8],
+pub(crate) struct Header {
     pub(crate) prelude: Prelude,
     pub(crate) meta: SceneMeta,
     pub(crate) entries: Vec<Entry>,
 }
 
+impl Header {
+    /// Reads it from a stream, or from the beginning of one.
+    pub(crate) fn read(bytes: &[u8], prelude: Prelude, limits: &Limits) -> Result<Self, CodecError> {
+        let mut reader = Reader::new("header", &bytes[PRELUDE..]);
+        let meta_bytes = reader.take("meta", prelude.meta_bytes.into())?;
+        let table = reader.take("table", u64::from(prelude.section_count) * ENTRY as u64)?;
+        let header_bytes = PRELUDE + meta_bytes.len() + table.len();
+        let computed = header_checksum(&bytes[..header_bytes]);
+        if computed != prelude.crc {
+            return Err(CodecError::Checksum { section: "header", stored: prelude.crc, computed });
+        }
+        if prelude.flags != 0 {
+            let found = format!("{:#06x}", prelude.flags);
+            return Err(CodecError::invalid("header", "flags", found, "0, there are none yet; use a newer program"));
+        }
+
+        let entries = read_table(table, header_bytes as u64, prelude.file_bytes)?;
+        let meta = meta::read(meta_bytes, limits)?;
+        meta::check(&meta, limits)?;
+        Ok(Self { prelude, meta, entries })
+    }
+
+    pub(crate) fn has(&self, section: Section) -> bool {
+        self.entries.iter().any(|entry| entry.section == section)
+    }
+
+    /// Layers of Gaussians.
+    pub(crate) fn layers(&self) -> usize {
+        self.entries.iter().filter(|entry| entry.section == Section::Gaussians).count()
+    }
+
+    /// Which entry has the number `layer` among those of a section.
+    pub(crate) fn entry(&self, section: Section, layer: usize) -> Result<&Entry, CodecError> {
+        let mut entries = self.entries.iter().filter(|entry| entry.section == section);
+        entries.nth(layer).ok_or(CodecError::MissingSection { section: section.name() })
+    }
+
+    /// Bytes from the beginning of the stream after which nothing is missing of what all layers share.
+    pub(crate) fn shared_bytes(&self) -> u64 {
+        let shared = self.entries.iter().filter(|entry| !entry.section.is_layered());
+        shared.map(Entry::end).fold(self.prelude.header_bytes(), u64::max)
+    }
+
+    /// Bytes from the beginning of the stream after which nothing is missing of a layer, and of what all layers share.
+    pub(crate) fn layer_bytes(&self, layer: usize) -> u64 {
+        let of_layer = |section| self.entry(section, layer).map_or(0, Entry::end);
+        self.shared_bytes().max(of_layer(Section::Gaussians)).max(of_layer(Section::Sh))
+    }
+}
+
+impl Entry {
+    /// Where the section ends in the stream.
+    pub(crate) fn end(&self) -> u64 {
+        self.offset + self.bytes
+    }
+}
+
+/// A stream, or its beginning, whose header, meta and table have been checked. The sections' checksums are checked when they
+/// are read.
+#[derive(Clone, Debug)]
+pub(crate) struct Container<'a> {
+    bytes: &'a [u8],
+    pub(crate) header: Cow<'a, Header>,
+    /// Whether the sections' checksums have been checked already.
+    verified: bool,
+}
+
 impl<'a> Container<'a> {
+    /// The beginning of a stream. The sections that are there have been checked against their checksums.
+    pub(crate) fn beginning(bytes: &'a [u8], header: &'a Header) -> Self {
+        Self { bytes, header: Cow::Borrowed(header), verified: true }
+    }
+
     /// Reads everything before the sections.
     pub(crate) fn read(bytes: &'a [u8], limits: &Limits) -> Result<Self, CodecError> {
         let prelude = Prelude::read(bytes, limits)?;
@@ -101,42 +181,38 @@ impl<'a> Container<'a> {
         if stated < there {
             return Err(CodecError::TrailingBytes { section: "stream", bytes: there - stated });
         }
-
-        let mut reader = Reader::new("header", &bytes[PRELUDE..]);
-        let meta_bytes = reader.take("meta", prelude.meta_bytes.into())?;
-        let table = reader.take("table", u64::from(prelude.section_count) * ENTRY as u64)?;
-        let header_bytes = PRELUDE + meta_bytes.len() + table.len();
-        let computed = header_checksum(&bytes[..header_bytes]);
-        if computed != prelude.crc {
-            return Err(CodecError::Checksum { section: "header", stored: prelude.crc, computed });
-        }
-        if prelude.flags != 0 {
-            let found = format!("{:#06x}", prelude.flags);
-            return Err(CodecError::invalid("header", "flags", found, "0, there are none yet; use a newer program"));
-        }
-
-        let entries = read_table(table, header_bytes as u64, stated)?;
-        let meta = meta::read(meta_bytes, limits)?;
-        meta::check(&meta, limits)?;
-        Ok(Self { bytes, prelude, meta, entries })
-    }
-
-    pub(crate) fn has(&self, section: Section) -> bool {
-        self.entries.iter().any(|entry| entry.section == section)
+        Ok(Self { bytes, header: Cow::Owned(Header::read(bytes, prelude, limits)?), verified: false })
     }
 
     /// The kind, encoding and bytes of a section; the bytes are checked against their checksum.
     pub(crate) fn section(&self, section: Section) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
-        let name = section.name();
-        let entry = self.entries.iter().find(|entry| entry.section == section);
-        let entry = entry.ok_or(CodecError::MissingSection { section: name })?;
-        // `read_table` has checked that the range is inside the stream, whose length is a `usize`.
-        let payload = &self.bytes[entry.offset as usize..(entry.offset + entry.bytes) as usize];
-        let computed = crc32c::crc32c(payload);
-        if computed != entry.crc {
-            return Err(CodecError::Checksum { section: name, stored: entry.crc, computed });
+        self.layer(section, 0)
+    }
+
+    /// As [`Container::section`], for one of the layers.
+    pub(crate) fn layer(&self, section: Section, layer: usize) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
+        let entry = self.header.entry(section, layer)?;
+        let needed = entry.end();
+        let available = self.bytes.len() as u64;
+        if needed > available {
+            let field = "the section".into();
+            return Err(CodecError::Truncated { section: section.name(), field, needed, available });
+        }
+        let payload = &self.bytes[entry.offset as usize..needed as usize];
+        if !self.verified {
+            entry.check(crc32c::crc32c(payload))?;
         }
         Ok((entry.kind, entry.encoding, payload))
+    }
+}
+
+impl Entry {
+    /// Refuses another checksum than that of the table.
+    pub(crate) fn check(&self, computed: u32) -> Result<(), CodecError> {
+        if computed == self.crc {
+            return Ok(());
+        }
+        Err(CodecError::Checksum { section: self.section.name(), stored: self.crc, computed })
     }
 }
 
@@ -153,8 +229,19 @@ fn read_table(table: &[u8], start: u64, end: u64) -> Result<Vec<Entry>, CodecErr
         let encoding = Encoding::from_number(kind, reader.u8("encoding")?)?;
         let crc = reader.u32("checksum")?;
         let bytes = reader.u64("length")?;
-        if entries.iter().any(|entry| entry.section == section) {
+        let before = entries.iter().find(|entry| entry.section == section);
+        if before.is_some() && !section.is_layered() {
             return Err(CodecError::DuplicateSection { section: name });
+        }
+        if let Some(first) = before {
+            check_further_layer(first, kind, encoding)?;
+        } else if kind == Kind::ShContinued {
+            return Err(CodecError::invalid(
+                "table",
+                "kind of the first sh",
+                kind.name(),
+                "one with a coding of its own",
+            ));
         }
         if bytes > end - offset {
             let (needed, available) = (bytes, end - offset);
@@ -163,10 +250,31 @@ fn read_table(table: &[u8], start: u64, end: u64) -> Result<Vec<Entry>, CodecErr
         entries.push(Entry { section, kind, encoding, crc, offset, bytes });
         offset += bytes;
     }
-    match end - offset {
-        0 => Ok(entries),
-        bytes => Err(CodecError::TrailingBytes { section: "stream", bytes }),
+    if end > offset {
+        return Err(CodecError::TrailingBytes { section: "stream", bytes: end - offset });
     }
+    let count = |section: Section| entries.iter().filter(|entry| entry.section == section).count();
+    let (gaussians, sh) = (count(Section::Gaussians), count(Section::Sh));
+    // Where one is missing altogether, it is named when it is read.
+    if gaussians > 0 && sh > 0 && gaussians != sh {
+        let expected = format!("{gaussians}, one for each gaussians section");
+        return Err(CodecError::invalid("table", "number of sh sections", sh, expected));
+    }
+    Ok(entries)
+}
+
+/// Refuses kinds and encodings of a layer after the first that do not follow from the first.
+fn check_further_layer(first: &Entry, kind: Kind, encoding: Encoding) -> Result<(), CodecError> {
+    let expected = match first.kind {
+        Kind::ShTables | Kind::ShNetworks => (Kind::ShContinued, Encoding::Quantized),
+        _ => (first.kind, first.encoding),
+    };
+    if (kind, encoding) == expected {
+        return Ok(());
+    }
+    let name = |(kind, encoding): (Kind, Encoding)| format!("{} ({})", kind.name(), encoding.name());
+    let field = format!("kind of a further {} section", first.section.name());
+    Err(CodecError::invalid("table", field, name((kind, encoding)), format!("{}, after the first one", name(expected))))
 }
 
 /// The checksum of a header: over all of it except the checksum itself.

@@ -1,16 +1,20 @@
 //! The contents of a stream, without decoding its numbers.
 
-use super::{container::Container, input::Profile};
+use super::{
+    OpenStream,
+    container::{Entry, Header},
+    input::Profile,
+};
 use crate::{
     CodecError, ContextModelArrays, Limits, MotionArrays, PerGroup, PlaneBytes, SceneMeta,
-    attributes::{self, AttributeInfo},
+    attributes::AttributeInfo,
     bytes::{
         Reader, Section,
         sections::{Encoding, Kind},
     },
     motion::section,
     plane_layout::PlaneLayout,
-    planes, sh,
+    planes,
 };
 
 /// The contents of a stream.
@@ -30,7 +34,9 @@ pub struct StreamInfo {
     pub meta: SceneMeta,
     /// The sections, in the order of the stream.
     pub sections: Vec<SectionInfo>,
-    /// Number of Gaussians.
+    /// The layers of Gaussians, at least one.
+    pub layers: Vec<LayerInfo>,
+    /// Number of Gaussians of all layers.
     pub gaussian_count: u32,
     /// The attributes of every Gaussian, without the spherical harmonics beyond degree 0.
     pub attributes: Vec<AttributeInfo>,
@@ -67,6 +73,38 @@ pub struct SectionInfo {
     pub crc: u32,
 }
 
+/// One layer of Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct LayerInfo {
+    /// Its Gaussians.
+    pub gaussians: u32,
+    /// Bytes from the beginning of the stream with which this layer and those before it can be shown: those of the first
+    /// layer are the bytes to the first image.
+    pub bytes_to_show: u64,
+}
+
+impl StreamInfo {
+    /// Bytes from the beginning of the stream that a player needs for the first image.
+    pub fn bytes_to_first_image(&self) -> u64 {
+        self.layers.first().map_or(self.bytes, |layer| layer.bytes_to_show)
+    }
+}
+
+impl Header {
+    /// The sections, in the order of the stream.
+    pub(crate) fn sections(&self) -> Vec<SectionInfo> {
+        let section = |entry: &Entry| SectionInfo {
+            name: entry.section.name(),
+            kind: entry.kind,
+            encoding: entry.encoding,
+            offset: entry.offset,
+            bytes: entry.bytes,
+            crc: entry.crc,
+        };
+        self.entries.iter().map(section).collect()
+    }
+}
+
 /// Summarizes a stream: header, meta, counts, and the size of every section.
 ///
 /// All checksums are checked, so this is also a quick test of a file for damage.
@@ -82,21 +120,16 @@ pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
 /// # Errors
 /// As [`info`].
 pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, CodecError> {
-    let container = Container::read(bytes, limits)?;
-    for section in Section::ALL {
-        if container.has(section) {
-            container.section(section)?;
-        }
-    }
+    let stream = OpenStream::with_limits(bytes, limits)?;
+    stream.check_sums()?;
+    let heads = stream.heads()?;
+    let container = &stream.container;
     let limits = limits.for_stream(bytes.len());
     let open = |section: Section| {
         let (kind, encoding, payload) = container.section(section)?;
         Ok::<_, CodecError>((kind, encoding, Reader::new(section.name(), payload)))
     };
-    let (_, gaussian_encoding, mut reader) = open(Section::Gaussians)?;
-    let gaussians = attributes::Head::read(&mut reader, gaussian_encoding, &limits)?;
-    let (sh_kind, _, mut reader) = open(Section::Sh)?;
-    let sh = sh::section::Head::read(&mut reader, &limits)?;
+    let (gaussian_encoding, sh_kind) = (open(Section::Gaussians)?.1, open(Section::Sh)?.0);
     let motion = section::read_description(&mut open(Section::Motion)?.2, &limits)?;
     let (plane_kind, _, mut reader) = open(Section::FeaturePlanes)?;
     let (mut plane_bytes, mut plane_steps, mut context_model) = (Vec::new(), Vec::new(), None);
@@ -112,29 +145,25 @@ pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, Cod
     let coded = compact || plane_kind != Kind::FeaturePlanesExplicit || sh_kind != Kind::ShExplicit;
     let profile = if compact { Profile::Compact } else { Profile::Paper };
 
-    let sections: Vec<_> = container
-        .entries
-        .iter()
-        .map(|entry| SectionInfo {
-            name: entry.section.name(),
-            kind: entry.kind,
-            encoding: entry.encoding,
-            offset: entry.offset,
-            bytes: entry.bytes,
-            crc: entry.crc,
-        })
-        .collect();
+    let Header { prelude, meta, .. } = &*container.header;
+    let mut bytes_to_show = 0;
+    let layers = heads.counts.iter().enumerate().map(|(layer, &gaussians)| {
+        bytes_to_show = container.header.layer_bytes(layer).max(bytes_to_show);
+        LayerInfo { gaussians, bytes_to_show }
+    });
     Ok(StreamInfo {
-        version: container.prelude.version,
-        flags: container.prelude.flags,
+        version: prelude.version,
+        flags: prelude.flags,
         profile: coded.then_some(profile),
-        bytes: container.prelude.file_bytes,
-        header_bytes: container.prelude.file_bytes - sections.iter().map(|section| section.bytes).sum::<u64>(),
-        meta: container.meta,
-        sections,
-        gaussian_count: gaussians.count,
-        attributes: gaussians.attributes,
-        sh_degree: sh.degree,
+        bytes: prelude.file_bytes,
+        header_bytes: prelude.header_bytes(),
+        meta: meta.clone(),
+        sections: container.header.sections(),
+        layers: layers.collect(),
+        // `LayerHeads` has compared the sum with a limit.
+        gaussian_count: heads.counts.iter().sum(),
+        attributes: heads.attributes,
+        sh_degree: heads.degree,
         plane_channels: head.channels,
         planes: head.layout,
         plane_bytes,

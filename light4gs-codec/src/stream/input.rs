@@ -1,5 +1,6 @@
 //! How a scene is to be compressed.
 
+use super::GaussianLayers;
 use crate::{
     CodecError, Limits, PlaneCoding, SceneData, ShCoding,
     attributes::{AttributeSteps, check_positions},
@@ -41,13 +42,16 @@ pub struct CompressionInput {
     pub attributes: AttributeSteps,
     /// How finely weights are quantized, in the compact profile.
     pub weights: WeightPrecisions,
+    /// Into how many layers the Gaussians are divided, for files that are shown while they come.
+    pub layers: GaussianLayers,
 }
 
 impl CompressionInput {
     /// Refuses what [`crate::encode_compressed`] refuses before it codes the first number.
     pub(crate) fn check(&self, scene: &SceneData, limits: &Limits) -> Result<(), CodecError> {
         super::check(scene, limits)?;
-        let Self { profile, planes, sh, attributes, weights } = self;
+        let Self { profile, planes, sh, attributes, weights, layers } = self;
+        layers.check(scene.gaussians.len())?;
         if *profile == Profile::Compact {
             check_positions(&scene.gaussians.means)?;
             attributes.check()?;

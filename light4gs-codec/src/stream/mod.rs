@@ -5,27 +5,33 @@
 //! | `container.rs` | header and table |
 //! | `meta.rs`, `scene_coordinates.rs` | the simple sections; the others have modules of their own |
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and the compressor |
-//! | `open.rs`, `info.rs` | decoding section by section; a summary without decoding |
+//! | `layers.rs` | layers of Gaussians |
+//! | `open.rs`, `incremental.rs` | decoding section by section; decoding while the bytes come |
+//! | `info.rs` | a summary without decoding |
 
 mod compressor;
 pub(crate) mod container;
+mod incremental;
 mod info;
 mod input;
+mod layers;
 mod meta;
 mod open;
 mod parts;
 mod scene_coordinates;
 
 pub use compressor::{CompressionReport, Encoded, encode_compressed, encode_compressed_with_limits};
-pub use info::{SectionInfo, StreamInfo, info, info_with_limits};
+pub use incremental::StreamDecoder;
+pub use info::{LayerInfo, SectionInfo, StreamInfo, info, info_with_limits};
 pub use input::{CompressionInput, Profile, WeightPrecisions};
+pub use layers::GaussianLayers;
 pub use open::OpenStream;
 pub use parts::{encode_planes, encode_sh, plane_distributions, sh_distributions};
 
 use container::NewSection;
 
 use crate::{
-    CodecError, Limits, SceneData, attributes,
+    CodecError, GaussianArrays, Limits, SceneData, attributes,
     bytes::{
         Writer,
         sections::{Encoding, Kind},
@@ -82,11 +88,21 @@ pub fn decode_with_limits(bytes: &[u8], limits: &Limits) -> Result<SceneData, Co
     OpenStream::with_limits(bytes, limits)?.scene()
 }
 
+/// Refuses a further layer of Gaussians that contradicts itself. [`check`] has accepted the scene with the first one.
+pub(crate) fn check_layer(gaussians: &GaussianArrays, limits: &Limits) -> Result<(), CodecError> {
+    check_shapes(gaussians, limits)?;
+    fields::check_finite_gaussians(gaussians)
+}
+
+fn check_shapes(gaussians: &GaussianArrays, limits: &Limits) -> Result<(), CodecError> {
+    attributes::check(gaussians, limits)?;
+    sh::section::check(gaussians)
+}
+
 /// Refuses a scene that contradicts itself, both in the encoder and in the decoder.
 pub(crate) fn check(scene: &SceneData, limits: &Limits) -> Result<(), CodecError> {
     meta::check(&scene.meta, limits)?;
-    attributes::check(&scene.gaussians, limits)?;
-    sh::section::check(&scene.gaussians)?;
+    check_shapes(&scene.gaussians, limits)?;
     fields::check_finite(scene)?;
     scene.motion.check(limits)?;
     planes::head::check(&scene.feature_planes, limits)?;

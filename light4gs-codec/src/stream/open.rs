@@ -1,13 +1,18 @@
 //! A stream whose sections are decoded one at a time.
 
-use super::{check, container::Container, scene_coordinates};
+use super::{
+    check,
+    container::{Container, Header},
+    layers::LayerHeads,
+    scene_coordinates,
+};
 use crate::{
     CodecError, FeaturePlaneArrays, GaussianArrays, Limits, MotionArrays, SceneCoordinateArrays, SceneData, SceneMeta,
     attributes,
     budget::{Budget, Demand},
-    bytes::{Section, sections::Kind},
+    bytes::{Reader, Section, sections::Kind},
     motion, parallel, planes,
-    sh::{self, coding::Conditions},
+    sh::{self, coding::Conditions, section::FirstCoding},
 };
 
 /// A stream whose header has been checked and whose sections are decoded one by one, on request.
@@ -24,7 +29,7 @@ use crate::{
 /// ```
 #[derive(Clone, Debug)]
 pub struct OpenStream<'a> {
-    container: Container<'a>,
+    pub(super) container: Container<'a>,
     limits: Limits,
 }
 
@@ -45,6 +50,11 @@ impl<'a> OpenStream<'a> {
         Ok(Self { container: Container::read(bytes, limits)?, limits: limits.for_stream(bytes.len()) })
     }
 
+    /// The beginning of a stream whose sections, as far as they are there, have been checked against their checksums.
+    pub(crate) fn beginning(bytes: &'a [u8], header: &'a Header, limits: Limits) -> Self {
+        Self { container: Container::beginning(bytes, header), limits }
+    }
+
     /// A budget for one call.
     fn budget(&self) -> Budget {
         Budget::new(&self.limits)
@@ -52,7 +62,7 @@ impl<'a> OpenStream<'a> {
 
     /// The scene meta.
     pub fn meta(&self) -> &SceneMeta {
-        &self.container.meta
+        &self.container.header.meta
     }
 
     /// The Gaussians without `sh_degree` and `sh_rest`.
@@ -64,8 +74,55 @@ impl<'a> OpenStream<'a> {
     }
 
     fn gaussians_within(&self, budget: &Budget) -> Result<GaussianArrays, CodecError> {
-        let (_, encoding, payload) = self.container.section(Section::Gaussians)?;
+        concatenated(self.gaussian_layers_within(budget)?, budget)
+    }
+
+    /// The Gaussians of every layer, without their harmonics.
+    fn gaussian_layers_within(&self, budget: &Budget) -> Result<Vec<GaussianArrays>, CodecError> {
+        self.heads()?;
+        parallel::map(self.layers().max(1), |layer| self.layer_of_gaussians_within(layer, budget)).into_iter().collect()
+    }
+
+    pub(crate) fn layer_of_gaussians_within(
+        &self,
+        layer: usize,
+        budget: &Budget,
+    ) -> Result<GaussianArrays, CodecError> {
+        let (_, encoding, payload) = self.container.layer(Section::Gaussians, layer)?;
         attributes::decode_within(payload, encoding, budget)
+    }
+
+    /// Number of layers of Gaussians: 1, unless the encoder was asked for more.
+    pub fn layers(&self) -> usize {
+        self.container.header.layers()
+    }
+
+    /// Refuses a section that has not the checksum of the table.
+    pub(super) fn check_sums(&self) -> Result<(), CodecError> {
+        for section in Section::ALL {
+            let count = self.container.header.entries.iter().filter(|entry| entry.section == section).count();
+            (0..count).try_for_each(|layer| self.container.layer(section, layer).map(drop))?;
+        }
+        Ok(())
+    }
+
+    /// The heads of all layers.
+    pub(super) fn heads(&self) -> Result<LayerHeads, CodecError> {
+        let mut heads = LayerHeads::default();
+        for layer in 0..self.layers().max(1) {
+            self.add_heads(layer, &mut heads)?;
+        }
+        Ok(heads)
+    }
+
+    /// Adds the heads of a layer to those of the layers before.
+    pub(crate) fn add_heads(&self, layer: usize, heads: &mut LayerHeads) -> Result<(), CodecError> {
+        let (_, encoding, payload) = self.container.layer(Section::Gaussians, layer)?;
+        let gaussians =
+            attributes::Head::read(&mut Reader::new(Section::Gaussians.name(), payload), encoding, &self.limits)?;
+        let (_, _, payload) = self.container.layer(Section::Sh, layer)?;
+        let sh = sh::section::Head::read(&mut Reader::new(Section::Sh.name(), payload), &self.limits)?;
+        heads.add(gaussians, sh, self.limits.gaussians)
     }
 
     /// The scene coordinates.
@@ -138,10 +195,50 @@ impl<'a> OpenStream<'a> {
         feature_planes: &FeaturePlaneArrays,
         budget: &Budget,
     ) -> Result<GaussianArrays, CodecError> {
-        let (kind, encoding, payload) = self.container.section(Section::Sh)?;
-        let conditions = Conditions { gaussians: &gaussians, coordinates, feature_planes };
-        let (head, sh_rest) = sh::section::read(payload, (kind, encoding), conditions, budget)?;
-        Ok(GaussianArrays { sh_degree: head.degree, sh_rest, ..gaussians })
+        let layers = match self.layers() {
+            0 | 1 => vec![gaussians],
+            _ => {
+                let gaussians = GaussianArrays { sh_degree: 0, sh_rest: Vec::new(), ..gaussians };
+                split(&gaussians, &self.heads()?.counts)
+            }
+        };
+        concatenated(self.sh_of_layers_within(layers, coordinates, feature_planes, budget)?, budget)
+    }
+
+    /// Layers of Gaussians, at least one, completed by their harmonics.
+    fn sh_of_layers_within(
+        &self,
+        layers: Vec<GaussianArrays>,
+        coordinates: &SceneCoordinateArrays,
+        feature_planes: &FeaturePlaneArrays,
+        budget: &Budget,
+    ) -> Result<Vec<GaussianArrays>, CodecError> {
+        let of_layer = |layer: usize, first: Option<&FirstCoding>| {
+            self.sh_of_layer_within(layer, &layers[layer], first, (coordinates, feature_planes), budget)
+        };
+        let Harmonics { degree, rest, coding } = of_layer(0, None)?;
+        let further = parallel::map(layers.len() - 1, |at| of_layer(at + 1, coding.as_ref()).map(|layer| layer.rest));
+        let rests = std::iter::once(Ok(rest)).chain(further);
+        let complete = |(gaussians, rest): (GaussianArrays, Result<Vec<f32>, CodecError>)| {
+            Ok(GaussianArrays { sh_degree: degree, sh_rest: rest?, ..gaussians })
+        };
+        layers.into_iter().zip(rests).map(complete).collect()
+    }
+
+    /// The harmonics of a layer. Where they continue those of the first layer, its coding is needed.
+    pub(crate) fn sh_of_layer_within(
+        &self,
+        layer: usize,
+        gaussians: &GaussianArrays,
+        first: Option<&FirstCoding>,
+        (coordinates, feature_planes): (&SceneCoordinateArrays, &FeaturePlaneArrays),
+        budget: &Budget,
+    ) -> Result<Harmonics, CodecError> {
+        let (kind, encoding, payload) = self.container.layer(Section::Sh, layer)?;
+        let conditions = Conditions { gaussians, coordinates, feature_planes };
+        let parts = sh::section::Parts::read(payload, (kind, encoding), feature_planes.features(), budget)?;
+        let rest = parts.values(first, conditions, budget)?;
+        Ok(Harmonics { degree: parts.head.degree, rest, coding: parts.into_coding() })
     }
 
     /// The whole scene. Sections that do not depend on each other are decoded at the same time where there are threads.
@@ -158,35 +255,89 @@ impl<'a> OpenStream<'a> {
         self.check_sections()?;
         let coordinates = self.coordinates()?;
         let coupled = self.sh_needs_feature_planes()?;
-        let (gaussians, feature_planes) = parallel::join(
+        let (layers, feature_planes) = parallel::join(
             || {
-                let gaussians = self.gaussians_within(&budget)?;
+                let layers = self.gaussian_layers_within(&budget)?;
                 if coupled {
-                    return Ok(gaussians);
+                    return Ok(layers);
                 }
-                self.sh_within(gaussians, &coordinates, &FeaturePlaneArrays::default(), &budget)
+                self.sh_of_layers_within(layers, &coordinates, &FeaturePlaneArrays::default(), &budget)
             },
             || self.feature_planes_within(&budget),
         );
-        let (mut gaussians, feature_planes) = (gaussians?, feature_planes?);
+        let (mut layers, feature_planes) = (layers?, feature_planes?);
         if coupled {
-            gaussians = self.sh_within(gaussians, &coordinates, &feature_planes, &budget)?;
+            layers = self.sh_of_layers_within(layers, &coordinates, &feature_planes, &budget)?;
         }
+        let gaussians = concatenated(layers, &budget)?;
         let motion = self.motion_within(&budget)?;
-        let scene = SceneData { meta: self.container.meta.clone(), gaussians, coordinates, feature_planes, motion };
+        let meta = self.meta().clone();
+        let scene = SceneData { meta, gaussians, coordinates, feature_planes, motion };
         check(&scene, &self.limits)?;
         Ok((scene, budget.demand()))
+    }
+
+    /// The scene without its Gaussians: what all layers share.
+    pub(crate) fn shared_within(&self, budget: &Budget) -> Result<SceneData, CodecError> {
+        self.check_sections()?;
+        Ok(SceneData {
+            meta: self.meta().clone(),
+            gaussians: GaussianArrays::default(),
+            coordinates: self.coordinates()?,
+            feature_planes: self.feature_planes_within(budget)?,
+            motion: self.motion_within(budget)?,
+        })
     }
 
     /// Refuses a context model without coded planes, and coded planes without a context model.
     fn check_sections(&self) -> Result<(), CodecError> {
         let coded = self.container.section(Section::FeaturePlanes)?.0 == Kind::FeaturePlanesContextCoded;
-        if self.container.has(Section::ContextModel) && !coded {
+        if self.container.header.has(Section::ContextModel) && !coded {
             let section = Section::ContextModel.name();
             return Err(CodecError::invalid(section, "section", "there", "none, since no plane is coded with it"));
         }
         Ok(())
     }
+}
+
+/// The decoded harmonics of a layer.
+#[derive(Debug)]
+pub(crate) struct Harmonics {
+    pub(crate) degree: u8,
+    pub(crate) rest: Vec<f32>,
+    /// For layers that continue this one.
+    pub(crate) coding: Option<FirstCoding>,
+}
+
+/// All layers, one after the other.
+fn concatenated(layers: Vec<GaussianArrays>, budget: &Budget) -> Result<GaussianArrays, CodecError> {
+    let mut layers = layers.into_iter();
+    let mut all = layers.next().unwrap_or_default();
+    layers.try_for_each(|layer| append_within(&mut all, layer, budget))?;
+    Ok(all)
+}
+
+/// Appends a layer; for a moment its numbers are there twice.
+pub(crate) fn append_within(
+    gaussians: &mut GaussianArrays,
+    layer: GaussianArrays,
+    budget: &Budget,
+) -> Result<(), CodecError> {
+    budget.memory(Section::Gaussians.name(), layer.bytes())?;
+    gaussians.append(layer);
+    Ok(())
+}
+
+/// Gaussians in layers of these sizes; where they are too few, the last layers are too small, which is refused later.
+fn split(gaussians: &GaussianArrays, counts: &[u32]) -> Vec<GaussianArrays> {
+    let mut start = 0;
+    let take = |&count: &u32| {
+        let end = (start + count).min(gaussians.len() as u32);
+        let layer = gaussians.gathered(&(start..end).collect::<Vec<_>>());
+        start = end;
+        layer
+    };
+    counts.iter().map(take).collect()
 }
 
 #[cfg(test)]

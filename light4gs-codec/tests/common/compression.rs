@@ -361,6 +361,7 @@ pub fn input(scene: &SceneData, profile: Profile, shape: Shape) -> CompressionIn
         // The attribute `label` has no step.
         attributes: AttributeSteps::default().with("age", 0.01),
         weights: Default::default(),
+        layers: Default::default(),
     }
 }
 

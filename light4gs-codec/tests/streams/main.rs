@@ -9,6 +9,7 @@ mod conformance;
 mod damage;
 mod files;
 mod golden;
+mod layers;
 mod motion;
 mod motion_over_time;
 mod network_weights;

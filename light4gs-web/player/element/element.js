@@ -7,8 +7,8 @@ import { Layers } from "./layers.js";
 import { icon, LAYOUT } from "./layout.js";
 import { fillPanel } from "./panel.js";
 import { Player } from "../player.js";
-import { dismiss, load, prepare } from "../scene/scene.js";
-import { bytesOf, download } from "./sources.js";
+import { Scene, dismiss, load, prepare } from "../scene/scene.js";
+import { bytesOf, download, pieces } from "./sources.js";
 import { watch } from "./watch.js";
 
 /** @typedef {import("../views/camera.js").DatasetCamera} DatasetCamera */
@@ -36,7 +36,8 @@ let connected = 0;
  * `watch` (address of a small JSON text; whenever it changes, the scene is loaded again). In place of `src` a child
  * `<script type="application/l4gs">` may hold the scene as base64, and `<script type="application/json">` the cameras.
  *
- * Events: `load`, `error` (detail: the error), `timechange`, `statechange`.
+ * Events: `load` (the first image), `complete` (all of a file that was loaded from an address), `error` (detail: the error),
+ * `timechange`, `statechange`.
  */
 export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   static observedAttributes = ["src", "background", "loop"];
@@ -116,35 +117,58 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   async load(address, cameras, { keep = false } = {}) {
     const loading = ++this.#loading;
     const { signal } = this.#abort;
+    /** The scene, once there is something to see of it. @type {Scene | null} */
+    let scene = null;
     const report = (/** @type {number} */ share) => {
-      if (!keep && loading === this.#loading) this.layers.progress("Loading", share);
+      if (scene ? scene !== this.player?.scene : loading !== this.#loading) return;
+      if (scene) this.#say(Number.isNaN(share) ? "Loading …" : `Loading ${Math.round(100 * share)} %`);
+      else this.layers.progress("Loading", share);
     };
-    report(0);
     try {
-      const [bytes, list] = await Promise.all([
-        download(address, signal, report),
-        cameras ? download(cameras, signal).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : [],
-      ]);
-      if (loading === this.#loading) await this.open(bytes, { cameras: list, keep });
+      const list = cameras ? download(cameras, signal).then((bytes) => readCameras(new TextDecoder().decode(bytes), cameras)) : [];
+      if (keep) {
+        const [bytes, known] = await Promise.all([download(address, signal), list]);
+        if (loading === this.#loading) await this.open(bytes, { cameras: known, keep });
+        return true;
+      }
+      report(0);
+      const [loaded, known] = await Promise.all([load(pieces(address, signal, report)), list]);
+      if (loading !== this.#loading) {
+        loaded.close();
+        return true;
+      }
+      await this.open(loaded, { cameras: known });
+      scene = loaded;
+      await loaded.whole;
+      if (loaded !== this.player?.scene) return true;
+      this.#say("");
+      this.#nameCanvas();
+      this.dispatchEvent(new Event("complete"));
       return true;
     } catch (error) {
+      if (scene && scene === this.player?.scene) {
+        this.#say("");
+        this.#end();
+        this.#fail(error);
+        return false;
+      }
       if (loading === this.#loading) this.#fail(error);
       return false;
     }
   }
 
   /**
-   * Shows a scene.
-   * @param {ArrayBuffer | Uint8Array} bytes
+   * Shows a scene: a file, or one that was loaded.
+   * @param {import("../scene/scene.js").Source | Scene} source
    * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
    */
-  async open(bytes, { cameras = [], keep = false } = {}) {
+  async open(source, { cameras = [], keep = false } = {}) {
     const loading = ++this.#loading;
     const before = keep ? this.player : null;
     if (!before) this.layers.progress("Decoding");
     let scene;
     try {
-      scene = await load(bytes);
+      scene = source instanceof Scene ? source : await load(source);
       if (loading !== this.#loading) return scene.close();
       const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
       const playing = before ? before.playing : this.hasAttribute("autoplay") && !still && scene.info.moves;
@@ -198,7 +222,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     for (const id of ["play", "time", "clock", "speed", "loop"]) this.find(id).hidden = !info.moves;
     this.find("background").value = toHex(player.background);
     this.find("speed").value = String(player.speed);
-    this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
+    this.#nameCanvas();
     this.find("cameras").hidden = this.#cameras.length === 0;
     fillCameras(this.find("camera"), this.#cameras, player.path.length > 1);
     player.addEventListener("timechange", this.#showTime);
@@ -209,6 +233,12 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.#showState();
     this.#togglePanel(!this.find("panel").hidden);
     this.dispatchEvent(new Event("load"));
+  }
+
+  /** What screen readers say of the scene. */
+  #nameCanvas() {
+    const { info } = /** @type {Player} */ (this.player).scene;
+    this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
   }
 
   #showTime = () => {
@@ -246,6 +276,12 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.find("background").value = color;
     this.player.redraw();
   }
+
+  /** A line in a corner of the image; none where it is empty. */
+  #say = (/** @type {string} */ status) => {
+    this.find("status").textContent = status;
+    this.find("status").hidden = !status;
+  };
 
   /** @param {any} error */
   #fail(error) {
@@ -386,15 +422,11 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   }
 
   #watch() {
-    const say = (/** @type {string} */ status) => {
-      this.find("status").textContent = status;
-      this.find("status").hidden = !status;
-    };
     const show = async () => {
       const address = this.getAttribute("src");
       return address !== null && this.load(address, this.getAttribute("cameras"), { keep: this.player !== null });
     };
-    watch(this.getAttribute("watch") ?? "", this.#abort.signal, say, show);
+    watch(this.getAttribute("watch") ?? "", this.#abort.signal, this.#say, show);
   }
 }
 

@@ -10,6 +10,9 @@ const SLICE = 8192;
  * @property {WebAssembly.Memory} memory
  * @property {(bytes: number) => number} reserve_input
  * @property {() => number} open
+ * @property {() => void} begin
+ * @property {() => number} push
+ * @property {() => number} finish
  * @property {() => number} text
  * @property {() => number} text_length
  * @property {() => bigint} digest
@@ -38,20 +41,59 @@ export class Decoder {
    * @returns {import("./scene.js").SceneInfo}
    */
   open(bytes) {
+    const info = this.#answer(() => {
+      this.#give(bytes);
+      return this.wasm.open();
+    });
+    return /** @type {import("./scene.js").SceneInfo} */ (info);
+  }
+
+  /** Begins with a file that comes in pieces. The scene before stays until something of it can be seen. */
+  begin() {
+    this.wasm.begin();
+  }
+
+  /**
+   * Takes the next piece of the file. Returns the description of the scene, if that is another one now.
+   * @param {Uint8Array} bytes
+   */
+  push(bytes) {
+    return this.#answer(() => {
+      this.#give(bytes);
+      return this.wasm.push();
+    });
+  }
+
+  /** Ends the file: throws where bytes are missing. */
+  finish() {
+    this.#answer(() => this.wasm.finish());
+  }
+
+  /** @param {Uint8Array} bytes */
+  #give(bytes) {
+    const at = this.wasm.reserve_input(bytes.length);
+    new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
+  }
+
+  /**
+   * The description of a new scene, where there is one.
+   * @param {() => number} ask  0 for an error, 1 for a new scene
+   * @returns {import("./scene.js").SceneInfo | null}
+   */
+  #answer(ask) {
     const { wasm } = this;
-    let opened;
+    let answer;
     try {
-      const at = wasm.reserve_input(bytes.length);
-      new Uint8Array(wasm.memory.buffer, at, bytes.length).set(bytes);
-      opened = wasm.open();
+      answer = ask();
     } catch (error) {
       // The module stops itself where memory runs out: there is nothing to unwind to.
       throw new SceneError("memory", `the decoder stopped (${error instanceof Error ? error.message : error})`);
     }
+    if (answer > 1) return null;
     const text = new Uint8Array(wasm.memory.buffer, wasm.text(), wasm.text_length());
     // Notes in a file may be any text.
     const description = JSON.parse(new TextDecoder().decode(text));
-    if (!opened) throw new SceneError(description.error, description.message);
+    if (!answer) throw new SceneError(description.error, description.message);
     this.info = description;
     this.time = NaN;
     return description;
@@ -105,8 +147,7 @@ export class Decoder {
    * @param {Uint8Array} bytes
    */
   digest(bytes) {
-    const at = this.wasm.reserve_input(bytes.length);
-    new Uint8Array(this.wasm.memory.buffer, at, bytes.length).set(bytes);
+    this.#give(bytes);
     return BigInt.asUintN(64, this.wasm.digest()).toString(16).padStart(16, "0");
   }
 }

@@ -19,6 +19,8 @@ import { SceneError } from "../errors.js";
  * @property {number} count  Gaussians
  * @property {number} shDegree  of the spherical harmonics, 0 to 3
  * @property {boolean} moves  whether anything changes with time
+ * @property {number} layers  layers of Gaussians that the file has
+ * @property {number} layersShown  those that have come
  * @property {[string, number][]} sections  name and bytes of each part of the file
  * @property {Record<string, string>} extra  free notes
  */
@@ -66,8 +68,38 @@ function decoderModule() {
   return module;
 }
 
-/** A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. */
-export class Scene {
+/** @typedef {ArrayBuffer | Uint8Array | ReadableStream<Uint8Array> | AsyncIterable<Uint8Array>} Source  a file, whole or as it comes */
+
+/** The pieces of a stream; browsers differ in whether it can be walked over. @param {ReadableStream<Uint8Array>} stream */
+async function* piecesOf(stream) {
+  const reader = stream.getReader();
+  try {
+    for (;;) {
+      const { done, value } = await reader.read();
+      if (done) return;
+      yield value;
+    }
+  } finally {
+    reader.cancel().catch(() => {});
+  }
+}
+
+/** @param {Uint8Array[]} pieces */
+function joined(pieces) {
+  const bytes = new Uint8Array(pieces.reduce((sum, piece) => sum + piece.length, 0));
+  let at = 0;
+  for (const piece of pieces) {
+    bytes.set(piece, at);
+    at += piece.length;
+  }
+  return bytes;
+}
+
+/**
+ * A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. Where its file is still coming, the event
+ * `change` tells of more Gaussians.
+ */
+export class Scene extends EventTarget {
   /** @type {Map<number, { resolve: (answer: any) => void, reject: (error: Error) => void }>} */
   #waiting = new Map();
   #worker;
@@ -82,6 +114,7 @@ export class Scene {
 
   /** Use {@link load}. */
   constructor() {
+    super();
     this.#url = URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" }));
     this.#worker = new Worker(this.#url);
     this.#worker.onmessage = ({ data: answer }) => {
@@ -104,6 +137,8 @@ export class Scene {
     this.info = /** @type {any} */ (null);
     /** What decoding took, in milliseconds. */
     this.decodeMs = 0;
+    /** Resolves when the whole file is there; fails with a {@link SceneError} where it does not come. @type {Promise<void>} */
+    this.whole = Promise.resolve();
   }
 
   /** @param {Error} error */
@@ -133,6 +168,59 @@ export class Scene {
     const { info, milliseconds } = await this.#ask({ type: "open", bytes });
     this.info = info;
     this.decodeMs = milliseconds;
+  }
+
+  /**
+   * Resolves as soon as there is something to see.
+   * @param {AsyncIterable<Uint8Array>} pieces
+   */
+  async receive(pieces) {
+    /** @type {Promise<void>} */
+    const visible = new Promise((resolve) => {
+      this.whole = this.#receive(pieces, resolve);
+    });
+    // Nobody has to ask for the whole.
+    this.whole.catch(() => {});
+    await Promise.race([visible, this.whole]);
+  }
+
+  /** @param {AsyncIterable<Uint8Array>} pieces @param {() => void} show  called once there is something to see */
+  async #receive(pieces, show) {
+    /** What has come while the decoder was at work: it gets all of it at once. @type {Uint8Array[]} */
+    let waiting = [];
+    /** @type {Promise<void> | null} */
+    let working = null;
+    /** @type {unknown} */
+    let failure = null;
+    const work = async () => {
+      try {
+        while (waiting.length > 0) {
+          const bytes = joined(waiting);
+          waiting = [];
+          const { info, milliseconds } = await this.#ask({ type: "push", bytes: bytes.buffer }, [bytes.buffer]);
+          this.decodeMs += milliseconds;
+          if (!info) continue;
+          const first = !this.info;
+          this.info = info;
+          if (first) show();
+          else this.dispatchEvent(new Event("change"));
+        }
+      } catch (error) {
+        failure = error;
+      } finally {
+        working = null;
+      }
+    };
+    await this.#prepared;
+    await this.#ask({ type: "begin" });
+    for await (const piece of pieces) {
+      if (failure) throw failure;
+      waiting.push(piece);
+      working ??= work();
+    }
+    while (working) await working;
+    if (failure) throw failure;
+    await this.#ask({ type: "finish" });
   }
 
   /** Number of Gaussians. */
@@ -208,16 +296,19 @@ export function dismiss() {
 }
 
 /**
- * Decodes a `.l4gs` file.
- * @param {ArrayBuffer | Uint8Array} bytes
+ * Decodes a `.l4gs` file. One that comes as a stream is there as soon as something can be seen: {@link Scene.whole} says when
+ * all of it is.
+ * @param {Source} source
  * @returns {Promise<Scene>}
  * @throws {SceneError} whose `kind` says what is wrong with the file
  */
-export async function load(bytes) {
+export async function load(source) {
   const scene = standby ?? new Scene();
   standby = null;
   try {
-    await scene.open(bytes instanceof Uint8Array ? bytes.slice().buffer : bytes);
+    if ("getReader" in source) await scene.receive(piecesOf(source));
+    else if (Symbol.asyncIterator in source) await scene.receive(source);
+    else await scene.open(source instanceof Uint8Array ? source.slice().buffer : source);
     return scene;
   } catch (error) {
     scene.close();

@@ -24,8 +24,15 @@ const pause = () =>
  */
 const send = (answer, transfer = []) => /** @type {any} */ (self).postMessage(answer, transfer);
 
-/** What was asked for last, done or not. @type {Promise<void>} */
-let lastFrame = Promise.resolve();
+/** What was asked for last of that which needs the Gaussians at one time, done or not. @type {Promise<void>} */
+let last = Promise.resolve();
+
+/** One after the other: the decoder moves the Gaussians of one scene to one time only, and pauses meanwhile. */
+const inTurn = (/** @type {() => void | Promise<void>} */ work) => {
+  const turn = last.then(work);
+  last = turn.catch(() => {});
+  return turn;
+};
 
 /** @param {any} request */
 async function frame({ id, time, viewpoint, memory }) {
@@ -54,12 +61,27 @@ const answers = {
     send({ id, info, milliseconds: performance.now() - start });
   },
 
-  // One after the other: the decoder moves the Gaussians to one time only, and pauses meanwhile.
-  frame(request) {
-    const turn = lastFrame.then(() => frame(request));
-    lastFrame = turn.catch(() => {});
-    return turn;
+  begin({ id }) {
+    if (!decoder) throw new Error("there is no decoder");
+    decoder.begin();
+    send({ id });
   },
+
+  push: ({ id, bytes }) =>
+    inTurn(() => {
+      if (!decoder) throw new Error("there is no decoder");
+      const start = performance.now();
+      const info = decoder.push(new Uint8Array(bytes));
+      send({ id, info, milliseconds: performance.now() - start });
+    }),
+
+  finish({ id }) {
+    if (!decoder) throw new Error("there is no decoder");
+    decoder.finish();
+    send({ id });
+  },
+
+  frame: (request) => inTurn(() => frame(request)),
 
   attributes({ id, time }) {
     if (!decoder) throw new Error("no scene is open");

@@ -1,6 +1,7 @@
 """Files of the set that are made of others: bytes replaced, and then lengths and checksums that fit.
 
-An edit replaces `length` bytes at `offset` of a part. Parts are `prelude`, `meta`, `table` and the sections by name. After these
+An edit replaces `length` bytes at `offset` of a part. Parts are `prelude`, `meta`, `table` and the sections by name, those of
+further layers with a number, as in `gaussians_2`. After these
 edits, the lengths and checksums of all sections, the numbers in the prelude and the checksum of the header are computed again.
 Edits of the part `header` have offsets in the whole file; they come after that, and then only the checksum of the header is
 computed again. Edits of the part `file` come last of all, and nothing is computed after them.
@@ -16,7 +17,7 @@ from l4gs.checksum import crc32c
 
 _NAMES = {1: "gaussians", 2: "sh", 3: "scene_coordinates", 4: "motion", 5: "feature_planes", 6: "context_model"}
 _PRELUDE, _ENTRY, _CHECKSUM_AT = 32, 16, 28
-_EDIT = re.compile(r"([a-z_]+)@(\d+)-(\d+)=((?:[0-9a-f]{2})*)")
+_EDIT = re.compile(r"([a-z_]+[0-9]*)@(\d+)-(\d+)=((?:[0-9a-f]{2})*)")
 
 
 @dataclass
@@ -68,7 +69,9 @@ def split(data: bytes) -> dict[str, bytes]:
     parts = {"prelude": data[:_PRELUDE], "meta": data[_PRELUDE:table], "table": data[table:at]}
     for i in range(count):
         number, _, _, _, length = struct.unpack_from("<HBBIQ", data, table + _ENTRY * i)
-        parts[_NAMES[number]] = data[at : at + length]
+        name = _NAMES[number]
+        before = sum(part.split("_")[0] == name for part in parts)
+        parts[f"{name}_{before + 1}" if before else name] = data[at : at + length]
         at += length
     return parts
 

@@ -24,6 +24,9 @@ ALL, EQUAL = STREAMS + "motion-all.l4gs", STREAMS + "equal.l4gs"
 RARE, OWN_SIZES, CLUSTERS, FAR = (
     f"{STREAMS}{name}.l4gs" for name in ("rare-operations", "own-sizes", "clusters", "far-values")
 )
+LAYERS, LAYERS_TABLES, LAYERS_CHANNELS, LAYERS_FLOAT32 = (
+    f"{STREAMS}layers-{name}.l4gs" for name in ("networks", "tables", "channels", "float32")
+)
 
 
 def f32(*values: float) -> str:
@@ -97,18 +100,43 @@ RULES: list[tuple[str, str, list[str]]] = [
     # The table.
     ("unknown-section", FLOAT32, ["table@0-2=0700"]),
     ("section-0", FLOAT32, ["table@0-2=0000"]),
-    ("section-twice", FLOAT32, ["table@16-2=0100"]),
+    ("section-twice", FLOAT32, ["table@48-2=0300"]),
     ("section-missing", FLOAT32, ["table@64-16=", "feature_planes@0-{feature_planes}="]),
     ("context-model-without-need", FLOAT32, ["table@80-0=06000100" + "00" * 12]),
     ("context-model-missing", COMPACT, ["table@80-16=", "context_model@0-{context_model}="]),
     ("unknown-kind-of-gaussians", FLOAT32, ["table@2-1=02"]),
-    ("unknown-kind-of-sh", FLOAT32, ["table@18-1=05"]),
+    ("unknown-kind-of-sh", FLOAT32, ["table@18-1=06"]),
     ("kind-0", FLOAT32, ["table@34-1=00"]),
     ("unknown-encoding", FLOAT32, ["table@3-1=02"]),
     ("encoding-of-another-kind", FLOAT32, ["table@19-1=01"]),
     ("scene-coordinates-quantized", FLOAT32, ["table@35-1=01"]),
     ("section-beyond-the-end", FLOAT32, ["header@{table+72}-8=ffffffffffffffff"]),
     ("section-shorter-than-its-bytes", FLOAT32, ["header@{table+72}-2=ff00"]),
+    # Layers.
+    ("layer-without-harmonics", LAYERS, ["table@112-16=", "sh_2@0-{sh_2}="]),
+    ("harmonics-without-a-layer", LAYERS, ["table@96-4=02000501"]),
+    ("first-harmonics-that-continue", LAYERS, ["table@82-2=0501"]),
+    ("further-networks", LAYERS, ["table@114-1=03"]),
+    ("further-tables", LAYERS_TABLES, ["table@114-1=02"]),
+    ("channels-that-continue", LAYERS_CHANNELS, ["table@114-1=05"]),
+    ("explicit-harmonics-that-continue", LAYERS_FLOAT32, ["table@98-2=0501"]),
+    ("further-layer-in-another-encoding", LAYERS, ["table@99-1=00"]),
+    ("further-layer-of-another-degree", LAYERS, ["sh_2: degree=01"]),
+    ("further-channels-of-another-degree", LAYERS_CHANNELS, ["sh_2: degree=01", "sh_2: length of degree 2=", "sh_2: degree 2="]),
+    ("further-float32-of-another-degree", LAYERS_FLOAT32, ["sh_2: degree=00", "sh_2: coefficients="]),
+    ("further-layer-of-another-number", LAYERS, ["sh_2: number of Gaussians=12"]),
+    ("further-layer-with-another-attribute", LAYERS, ["gaussians_2: attribute 5: name #1=" + b"agf".hex()]),
+    ("further-layer-with-another-mark", LAYERS, ["gaussians_2: attribute 5 (age): coder=02"]),
+    (
+        "further-layer-with-another-coder",
+        LAYERS_CHANNELS,
+        [
+            "gaussians_2: attribute 6 (label): coder=8901",
+            "gaussians_2: label=00",
+        ],
+    ),
+    ("further-layer-cut-off", LAYERS, ["sh_2@{sh_2-1}-1="]),
+    ("further-layer-too-long", LAYERS, ["gaussians_2@{gaussians_2}-0=01"]),
     # Fields of every section.
     ("varint-with-a-last-group-of-0", FLOAT32, ["feature_planes: channels=8100"]),
     ("varint-beyond-64-bits", FLOAT32, ["motion: number of tensors=ffffffffffffffffff02"]),

@@ -24,13 +24,16 @@ SECTION_NAMES = {1: "gaussians", 2: "sh", 3: "scene_coordinates", 4: "motion", 5
 # The encodings that each kind of each section may have.
 KINDS: dict[str, dict[int, tuple[int, ...]]] = {
     "gaussians": {1: (0, 1)},
-    "sh": {1: (0,), 2: (1,), 3: (0, 1), 4: (1,)},
+    "sh": {1: (0,), 2: (1,), 3: (0, 1), 4: (1,), 5: (1,)},
     "scene_coordinates": {1: (0,), 2: (0,)},
     "motion": {1: (0, 1)},
     "feature_planes": {1: (0,), 2: (1,)},
     "context_model": {1: (0, 1)},
 }
 CONTEXT_CODED = 2
+# Sections that there are once for each layer of Gaussians.
+LAYERED = ("gaussians", "sh")
+SH_TABLES, SH_NETWORKS, SH_CONTINUED = 2, 3, 5
 
 
 @dataclass
@@ -63,7 +66,18 @@ class Section:
 @dataclass
 class Container:
     meta: Meta
+    # Those of further layers have a number after their names: `gaussians_2`.
     sections: dict[str, Section]
+
+    def layers(self) -> list[tuple[Section, Section]]:
+        """`gaussians` and `sh` of each layer."""
+        count = sum(name.startswith(LAYERED[0]) for name in self.sections)
+        return [(self.sections[of_layer("gaussians", n)], self.sections[of_layer("sh", n)]) for n in range(1, count + 1)]
+
+
+def of_layer(name: str, layer: int) -> str:
+    """The name of a section of a layer, counted from 1."""
+    return name if layer == 1 else f"{name}_{layer}"
 
 
 def read_container(data: bytes) -> Container:
@@ -140,9 +154,18 @@ def _read_table(table: Reader, count: int, data: bytes) -> dict[str, Section]:
         length = table.u64("length")
         table.require(number in SECTION_NAMES, "section", f"a known section, not {number}")
         name = SECTION_NAMES[number]
-        table.require(name not in sections, "section", f"each section once; {name} is there twice")
+        first = sections.get(name)
+        once = first is None or name in LAYERED
+        table.require(once, "section", f"each section once; {name} is there twice")
         table.require(kind in KINDS[name], "kind", f"a known kind of {name}, not {kind}")
         table.require(encoding in KINDS[name][kind], "encoding", f"one that kind {kind} of {name} has, not {encoding}")
+        if first is None:
+            begins = name != "sh" or kind != SH_CONTINUED
+            table.require(begins, "kind", f"a kind of the first sh that continues no other, not {kind}")
+        else:
+            wanted = _of_further_layers(first)
+            table.require((kind, encoding) == wanted, "kind", f"kind and encoding {wanted} of a further {name}")
+            name = of_layer(name, 1 + sum(other.split("_")[0] == name for other in sections))
         table.require(length <= len(data) - begin, "length", f"{name} within the stream")
         content = data[begin : begin + length]
         begin += length
@@ -154,8 +177,17 @@ def _read_table(table: Reader, count: int, data: bytes) -> dict[str, Section]:
     )
     for name in list(KINDS)[:5]:
         table.require(name in sections, "section", f"a section {name}")
+    layers = [sum(name.split("_")[0] == layered for name in sections) for layered in LAYERED]
+    table.require(layers[0] == layers[1], "section", f"a section sh for each of {layers[0]} gaussians, not {layers[1]}")
     context_coded = sections["feature_planes"].kind == CONTEXT_CODED
     table.require(
         context_coded == ("context_model" in sections), "section", "context_model exactly with context-coded planes"
     )
     return sections
+
+
+def _of_further_layers(first: Section) -> tuple[int, int]:
+    """Kind and encoding of the sections of further layers."""
+    if first.name == "sh" and first.kind in (SH_TABLES, SH_NETWORKS):
+        return SH_CONTINUED, QUANTIZED
+    return first.kind, first.encoding

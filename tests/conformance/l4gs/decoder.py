@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from .container import CONTEXT_CODED, Meta, read_container
+from .errors import Refused
 from .limits import Budget
 from .reader import Reader
 from .sections.context_coding import read_context_coded_planes
 from .sections.context_model import read_context_model
 from .sections.coordinates import read_scene_coordinates
-from .sections.gaussians import read_gaussians
-from .sections.harmonics import Surroundings, read_harmonics
+from .sections.gaussians import Gaussians, all_gaussians, check_further_layer, read_gaussians
+from .sections.harmonics import Harmonics, Surroundings, all_harmonics, read_harmonics
 from .sections.motion import Scene, read_motion
 from .sections.planes import Planes, read_explicit_planes, read_head
 
@@ -19,12 +20,22 @@ def decode(data: bytes) -> tuple[Meta, Scene]:
     container = read_container(data)
     sections = container.sections
     budget = Budget(len(data))
-    gaussians = read_gaussians(sections["gaussians"], budget)
     coordinates = read_scene_coordinates(sections["scene_coordinates"])
     motion = read_motion(sections["motion"], budget)
     planes = _read_planes(container.sections, budget)
-    harmonics = read_harmonics(sections["sh"], Surroundings(gaussians, planes, coordinates), budget)
-    scene = Scene(gaussians, harmonics, planes, coordinates, motion)
+    gaussians: list[Gaussians] = []
+    harmonics: list[Harmonics] = []
+    coding = None
+    for of_gaussians, of_harmonics in container.layers():
+        gaussians.append(read_gaussians(of_gaussians, budget))
+        around = Surroundings(gaussians[-1], planes, coordinates)
+        values, coding = read_harmonics(of_harmonics, around, coding, budget)
+        harmonics.append(values)
+        check_further_layer(of_gaussians.name, gaussians)
+        same = values.degree == harmonics[0].degree
+        if not same:
+            raise Refused(of_harmonics.name, "degree", f"that of the first layer, {harmonics[0].degree}")
+    scene = Scene(all_gaussians(gaussians), all_harmonics(harmonics), planes, coordinates, motion)
     scene.check_sources("motion")
     return container.meta, scene
 

@@ -51,23 +51,26 @@ pub(super) fn forge(bytes: &[u8], edits: &[Edit]) -> Vec<u8> {
 }
 
 /// The parts of a legal stream, in their order.
-fn split(bytes: &[u8]) -> Vec<(&'static str, Vec<u8>)> {
+fn split(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
     let table = table_at(bytes);
     let count = u32_at(bytes, 12) as usize;
     let mut parts = vec![
-        ("prelude", bytes[..PRELUDE].to_vec()),
-        ("meta", bytes[PRELUDE..table].to_vec()),
-        ("table", bytes[table..table + ENTRY * count].to_vec()),
+        ("prelude".to_owned(), bytes[..PRELUDE].to_vec()),
+        ("meta".to_owned(), bytes[PRELUDE..table].to_vec()),
+        ("table".to_owned(), bytes[table..table + ENTRY * count].to_vec()),
     ];
     for index in 0..count {
-        let number = usize::from(bytes[table + ENTRY * index]);
-        parts.push((SECTIONS[number - 1], payload(bytes, index).to_vec()));
+        let number = bytes[table + ENTRY * index];
+        let name = SECTIONS[usize::from(number) - 1];
+        let before = (0..index).filter(|other| bytes[table + ENTRY * other] == number).count();
+        let name = if before > 0 { format!("{name}_{}", before + 1) } else { name.to_owned() };
+        parts.push((name, payload(bytes, index).to_vec()));
     }
     parts
 }
 
 /// The stream of these parts, with lengths and checksums of the sections. Entry `i` belongs to section `i`.
-fn join(parts: Vec<(&'static str, Vec<u8>)>) -> Vec<u8> {
+fn join(parts: Vec<(String, Vec<u8>)>) -> Vec<u8> {
     let mut parts = parts.into_iter().map(|(_, bytes)| bytes);
     let [mut forged, meta, mut table] = [(); 3].map(|()| parts.next().expect("prelude, meta and table"));
     let sections: Vec<Vec<u8>> = parts.collect();

@@ -15,8 +15,8 @@ use crate::{
 };
 use light4gs_codec::{
     CompressionInput, Condition, ContextModelArrays, CoordinateMapping, FeaturePlaneArrays, GaussianArrays,
-    LatentArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network, PerGroup, PlanePrior,
-    PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
+    GaussianLayers, LatentArrays, MotionArrays, MotionNetwork, MotionOutput, MotionSource, NamedTensor, Network,
+    PerGroup, PlanePrior, PlaneSource, Profile, SceneData, ShCoding, ShPrior, ShSource,
     attributes::AttributeSteps,
     encode, encode_compressed,
     network::{LayerKind, Operation, Value},
@@ -208,6 +208,44 @@ fn reordered(bytes: &[u8]) -> Vec<u8> {
     forged
 }
 
+/// A stream with the Gaussians of another one as a further layer.
+fn with_layer(bytes: &[u8], more: &[u8]) -> Vec<u8> {
+    let (table, count) = (common::table_at(bytes), common::u32_at(bytes, 12) as usize);
+    let end = table + common::ENTRY * count;
+    // `gaussians` and `sh` are the first two sections.
+    let further = &more[common::table_at(more)..][..2 * common::ENTRY];
+    let payloads = [common::payload(more, 0), common::payload(more, 1)].concat();
+    let mut forged = [&bytes[..end], further, &bytes[end..], &payloads].concat();
+    let length = forged.len() as u64;
+    common::put(&mut forged, 12, &(count as u32 + 2).to_le_bytes());
+    common::put(&mut forged, 20, &length.to_le_bytes());
+    common::forge_header(&mut forged);
+    forged
+}
+
+/// Layers of Gaussians: under networks, under tables and under neither, in another order, and without loss.
+fn layered() -> Vec<(&'static str, Vec<u8>)> {
+    let scene = scene(29, 2, 4, [8, 4, 4, 4], &[1, 2]);
+    let input = |profile, sh, layers| {
+        let layers = GaussianLayers::new(layers);
+        CompressionInput { sh, layers, ..input(&scene, profile, compact_shape(4, ALL_PARTS)) }
+    };
+    let networks = compressed(&scene, &input(Profile::Compact, sh_networks(ShKind::Everything, 2, 8), 2));
+    let tables = compressed(&scene, &input(Profile::Paper, sh_tables(2), 3));
+    let channels = compressed(&scene, &input(Profile::Compact, ShCoding::Channels { step: 0.02 }, 4));
+    let without_loss = |indices: &[u32]| {
+        let scene = sample();
+        encode(&SceneData { gaussians: scene.gaussians.gathered(indices), ..scene }).unwrap()
+    };
+    vec![
+        ("layers-reordered", reordered(&networks)),
+        ("layers-networks", networks),
+        ("layers-tables", tables),
+        ("layers-channels", channels),
+        ("layers-float32", with_layer(&without_loss(&[1]), &without_loss(&[0]))),
+    ]
+}
+
 /// The streams of the set that are not golden ones, by name.
 fn streams() -> Vec<(&'static str, Vec<u8>)> {
     let mut streams = Vec::new();
@@ -226,6 +264,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
         sh: sh_tables(2),
         attributes: steps.clone(),
         weights: Default::default(),
+        layers: Default::default(),
     };
     streams.push(("motion-all-quantized", compressed(&all, &coding)));
     streams.push(("motion-operations", encode(&operations::scene()).unwrap()));
@@ -276,6 +315,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
         sh: ShCoding::Channels { step: 0.01 },
         attributes: AttributeSteps::default().with("wide", 0.02).with("outliers", 0.01),
         weights: Default::default(),
+        layers: Default::default(),
     };
     streams.push(("clusters", compressed(&many, &coding)));
 
@@ -298,6 +338,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
 
     let golden = common::compression::tiny(Profile::Compact);
     streams.push(("reordered", reordered(&compressed(&golden.0, &golden.1))));
+    streams.extend(layered());
     streams
 }
 

@@ -1,5 +1,6 @@
 import { Layers } from "./layers.js";
 import { Player } from "../player.js";
+import { Scene } from "../scene/scene.js";
 export type DatasetCamera = import("../views/camera.js").DatasetCamera;
 declare const L4gsPlayer_base: {
     new (): HTMLElement;
@@ -11,7 +12,8 @@ declare const L4gsPlayer_base: {
  * `watch` (address of a small JSON text; whenever it changes, the scene is loaded again). In place of `src` a child
  * `<script type="application/l4gs">` may hold the scene as base64, and `<script type="application/json">` the cameras.
  *
- * Events: `load`, `error` (detail: the error), `timechange`, `statechange`.
+ * Events: `load` (the first image), `complete` (all of a file that was loaded from an address), `error` (detail: the error),
+ * `timechange`, `statechange`.
  */
 export declare class L4gsPlayer extends L4gsPlayer_base {
     #private;
@@ -37,11 +39,11 @@ export declare class L4gsPlayer extends L4gsPlayer_base {
         keep?: boolean;
     }): Promise<boolean>;
     /**
-     * Shows a scene.
-     * @param {ArrayBuffer | Uint8Array} bytes
+     * Shows a scene: a file, or one that was loaded.
+     * @param {import("../scene/scene.js").Source | Scene} source
      * @param {{ cameras?: DatasetCamera[], keep?: boolean }} [options]
      */
-    open(bytes: ArrayBuffer | Uint8Array, { cameras, keep }?: {
+    open(source: import("../scene/scene.js").Source | Scene, { cameras, keep }?: {
         cameras?: DatasetCamera[];
         keep?: boolean;
     }): Promise<void>;

@@ -52,6 +52,14 @@ export type SceneInfo = {
      */
     moves: boolean;
     /**
+     * layers of Gaussians that the file has
+     */
+    layers: number;
+    /**
+     * those that have come
+     */
+    layersShown: number;
+    /**
      * name and bytes of each part of the file
      */
     sections: [string, number][];
@@ -115,17 +123,28 @@ export type Frame = {
      */
     sortMs: number;
 };
-/** A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. */
-export declare class Scene {
+export type Source = ArrayBuffer | Uint8Array | ReadableStream<Uint8Array> | AsyncIterable<Uint8Array>;
+/**
+ * A decoded scene. Made by {@link load}; {@link Scene.close} frees what it holds. Where its file is still coming, the event
+ * `change` tells of more Gaussians.
+ */
+export declare class Scene extends EventTarget {
     #private;
     /** @type {SceneInfo} */
     info: SceneInfo;
     /** What decoding took, in milliseconds. */
     decodeMs: number;
+    /** Resolves when the whole file is there; fails with a {@link SceneError} where it does not come. @type {Promise<void>} */
+    whole: Promise<void>;
     /** Use {@link load}. */
     constructor();
     /** @param {ArrayBuffer} bytes */
     open(bytes: ArrayBuffer): Promise<void>;
+    /**
+     * Resolves as soon as there is something to see.
+     * @param {AsyncIterable<Uint8Array>} pieces
+     */
+    receive(pieces: AsyncIterable<Uint8Array>): Promise<void>;
     /** Number of Gaussians. */
     get count(): number;
     /** Length in seconds: the source's where it is known, else at 30 frames a second. */
@@ -158,9 +177,10 @@ export declare function prepare(): void;
 /** Ends the decoder that {@link prepare} started, where no file has come for it. */
 export declare function dismiss(): void;
 /**
- * Decodes a `.l4gs` file.
- * @param {ArrayBuffer | Uint8Array} bytes
+ * Decodes a `.l4gs` file. One that comes as a stream is there as soon as something can be seen: {@link Scene.whole} says when
+ * all of it is.
+ * @param {Source} source
  * @returns {Promise<Scene>}
  * @throws {SceneError} whose `kind` says what is wrong with the file
  */
-export declare function load(bytes: ArrayBuffer | Uint8Array): Promise<Scene>;
+export declare function load(source: Source): Promise<Scene>;

@@ -10,6 +10,7 @@ import numpy as np
 from .. import limits
 from ..container import QUANTIZED, Section
 from ..entropy.range_coder import RangeDecoder
+from ..errors import Refused
 from ..limits import Budget
 from ..reader import Reader
 from .channels import find_neighbors, read_channels
@@ -41,6 +42,7 @@ class Gaussians:
     count: int
     attributes: dict[str, np.ndarray]  # by name: [count, width] float32
     optional: set[str]  # those that a reader may leave out
+    rows: list[tuple[str, int, int, bool]]  # name, width, coder, mark of each attribute in the list
 
 
 @dataclass
@@ -58,7 +60,8 @@ def read_gaussians(section: Section, budget: Budget) -> Gaussians:
     reader.require(count <= limits.GAUSSIANS, "number of Gaussians", f"at most {limits.GAUSSIANS}")
     quantized = section.encoding == QUANTIZED
     attributes = _read_list(reader, quantized)
-    result = Gaussians(count, {}, {attribute.name for attribute in attributes if attribute.optional})
+    rows = [(row.name, row.width, row.coder, row.optional) for row in attributes]
+    result = Gaussians(count, {}, {row.name for row in attributes if row.optional}, rows)
     neighbors = np.zeros((0, 4), np.int64)
     if quantized:
         budget.take(section.name, "number of Gaussians", count, 136)
@@ -86,6 +89,22 @@ def read_gaussians(section: Section, budget: Budget) -> Gaussians:
         reader.require(not any(reader.take(fill, "fill")), "fill", "zeros")
     reader.end()
     return result
+
+
+def check_further_layer(part: str, layers: list[Gaussians]) -> None:
+    """Refuses a last layer that does not fit those before it."""
+    if layers[-1].rows != layers[0].rows:
+        raise Refused(part, "attributes", f"those of the first layer, {layers[0].rows}")
+    count = sum(layer.count for layer in layers)
+    if count > limits.GAUSSIANS:
+        raise Refused(part, "number of Gaussians", f"at most {limits.GAUSSIANS} in all layers, not {count}")
+
+
+def all_gaussians(layers: list[Gaussians]) -> Gaussians:
+    """The Gaussians of all layers, one layer after the other."""
+    first = layers[0]
+    attributes = {name: np.concatenate([layer.attributes[name] for layer in layers]) for name in first.attributes}
+    return Gaussians(sum(layer.count for layer in layers), attributes, first.optional, first.rows)
 
 
 def _read_list(reader: Reader, quantized: bool) -> list[_Attribute]:

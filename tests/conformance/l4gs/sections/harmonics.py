@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import limits
-from ..container import Section
+from ..container import SH_CONTINUED, SH_NETWORKS, SH_TABLES, Section
 from ..entropy.ans import LARGEST_SYMBOL, SymbolDecoder
 from ..entropy.frequency_tables import read_tables
 from ..entropy.gaussian_tables import distribution, levels
@@ -24,7 +24,7 @@ from .coordinates import SceneCoordinates
 from .gaussians import Gaussians
 from .planes import Planes
 
-_EXPLICIT, _TABLES, _NETWORKS, _CHANNELS = 1, 2, 3, 4
+_EXPLICIT = 1
 _MOST_DEGREE = 3
 # Gaussians whose symbols stand prior by prior.
 _GROUP = 8
@@ -62,7 +62,26 @@ def channels_of_degree(degree: int) -> range:
     return range(begin, begin + 3 * (2 * degree + 1))
 
 
-def read_harmonics(section: Section, around: Surroundings, budget: Budget) -> Harmonics:
+@dataclass
+class Coding:
+    """How symbols become coefficients."""
+
+    kind: int
+    degree: int
+    step: np.float32
+    tables: list
+    priors: list[_Prior]
+
+
+def all_harmonics(layers: list[Harmonics]) -> Harmonics:
+    """The harmonics of all layers, one layer after the other."""
+    return Harmonics(layers[0].degree, np.concatenate([layer.values for layer in layers]))
+
+
+def read_harmonics(
+    section: Section, around: Surroundings, first: Coding | None, budget: Budget
+) -> tuple[Harmonics, Coding | None]:
+    """The harmonics, and the coding for layers that continue these; `first` is the one that is continued here."""
     reader = Reader(section.name, section.data)
     count = reader.varint("number of Gaussians", limits.GAUSSIANS)
     expected = around.gaussians.count
@@ -75,27 +94,32 @@ def read_harmonics(section: Section, around: Surroundings, budget: Budget) -> Ha
     if section.kind == _EXPLICIT:
         values = reader.f32s(shape, "coefficients")
         reader.end()
-        return Harmonics(degree, values)
-    step = read_step(reader, "step")
+        return Harmonics(degree, values), None
     channels = 3 * coefficients
-    if section.kind == _TABLES:
-        tables = read_tables(section.name, "tables", reader.block("tables"), channels, budget)
-    elif section.kind == _NETWORKS:
-        priors = _read_priors(reader, section.encoding, channels, around, budget)
+    if section.kind == SH_CONTINUED and first is not None:
+        coding = first
+        reader.require(degree == first.degree, "degree", f"that of the first layer, {first.degree}, not {degree}")
+    else:
+        coding = Coding(section.kind, degree, read_step(reader, "step"), [], [])
+    if section.kind == SH_TABLES:
+        coding.tables = read_tables(section.name, "tables", reader.block("tables"), channels, budget)
+    elif section.kind == SH_NETWORKS:
+        coding.priors = _read_priors(reader, section.encoding, channels, around, budget)
+    step, tables, priors = coding.step, coding.tables, coding.priors
     lengths = [reader.varint(f"length of degree {g}") for g in range(1, degree + 1)]
     streams = [reader.take(length, f"degree {g}") for g, length in enumerate(lengths, 1)]
     reader.end()
 
     values = np.zeros((count, channels), np.float32)
     with np.errstate(over="ignore"):
-        if section.kind == _TABLES:
+        if coding.kind == SH_TABLES:
             for g, data in enumerate(streams, 1):
                 decoder = SymbolDecoder(section.name, f"degree {g}", data)
                 own = channels_of_degree(g)
                 symbols = [[decoder.symbol(tables[channel]) for channel in own] for _ in range(count)]
                 decoder.end()
                 values[:, own.start : own.stop] = np.array(symbols, np.float32).reshape(count, len(own)) * step
-        elif section.kind == _NETWORKS:
+        elif coding.kind == SH_NETWORKS:
             _Decoder(section.name, priors, around, step, values).read(streams)
         else:
             reader.require(bool(step <= np.float32(1e30)), "step", "at most 1e30")
@@ -106,7 +130,7 @@ def read_harmonics(section: Section, around: Surroundings, budget: Budget) -> Ha
                 integers = read_channels(adaptive, count, len(own), neighbors, LARGEST_SYMBOL)
                 values[:, own.start : own.stop] = integers.astype(np.float32) * step
     reader.require(bool(np.isfinite(values).all()), "coefficients", "finite numbers")
-    return Harmonics(degree, values.reshape(shape))
+    return Harmonics(degree, values.reshape(shape)), coding
 
 
 def _read_priors(reader: Reader, encoding: int, channels: int, around: Surroundings, budget: Budget) -> list[_Prior]:

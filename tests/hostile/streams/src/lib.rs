@@ -12,6 +12,7 @@
 //! | `sound.rs` | sound streams to begin with |
 //! | `mutations.rs` | what is done to them |
 //! | `bombs.rs` | streams that promise much with few bytes |
+//! | `transfers.rs` | streams that come in pieces, cut anywhere and resumed anywhere |
 //! | `watch.rs` | memory, time and panics of one decoding |
 
 mod bombs;
@@ -19,6 +20,7 @@ mod mutations;
 pub mod parts;
 mod random;
 mod sound;
+pub mod transfers;
 pub mod watch;
 
 use random::Random;

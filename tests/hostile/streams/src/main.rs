@@ -1,4 +1,5 @@
-//! Many hostile streams: `cargo run --release -p light4gs-hostile -- --inputs 1000000 --threads 2 --seed 1`.
+//! Many hostile streams: `cargo run --release -p light4gs-hostile -- --inputs 1000000 --threads 2 --seed 1`. With `--what
+//! transfers`, streams that come in pieces.
 //!
 //! Prints the findings, and saves the bytes of each.
 
@@ -17,13 +18,14 @@ use std::{
 
 use light4gs_hostile::{
     Inputs,
+    transfers::Transfers,
     watch::{CountingAllocator, Decoder, Outcome},
 };
 
 #[global_allocator]
 static ALLOCATOR: CountingAllocator = CountingAllocator;
 
-const USAGE: &str = "usage: hostile-streams [--inputs N] [--threads N] [--seed N] [--first N] [--out FOLDER]";
+const USAGE: &str = "usage: hostile-streams [--what streams|transfers] [--inputs N] [--threads N] [--seed N] [--first N] [--out FOLDER]";
 /// Number of inputs between two lines of progress.
 const REPORT: u64 = 50_000;
 
@@ -69,6 +71,7 @@ impl Summary {
 }
 
 struct Arguments {
+    transfers: bool,
     inputs: u64,
     threads: u64,
     seed: u64,
@@ -77,12 +80,14 @@ struct Arguments {
 }
 
 fn arguments() -> Result<Arguments, String> {
-    let mut all = Arguments { inputs: 10_000, threads: 1, seed: 1, first: 0, out: "target/hostile-findings".into() };
+    let out = "target/hostile-findings".into();
+    let mut all = Arguments { transfers: false, inputs: 10_000, threads: 1, seed: 1, first: 0, out };
     let mut given = std::env::args().skip(1);
     while let Some(name) = given.next() {
         let value = given.next().ok_or_else(|| format!("{name} needs a value; {USAGE}"))?;
         let number = || value.parse::<u64>().map_err(|_| format!("{name} {value} is no number; {USAGE}"));
         match name.as_str() {
+            "--what" if value == "streams" || value == "transfers" => all.transfers = value == "transfers",
             "--inputs" => all.inputs = number()?,
             "--threads" => all.threads = number()?.clamp(1, 64),
             "--seed" => all.seed = number()?,
@@ -95,7 +100,7 @@ fn arguments() -> Result<Arguments, String> {
 }
 
 fn main() -> ExitCode {
-    let Arguments { inputs, threads, seed, first, out } = match arguments() {
+    let Arguments { transfers, inputs, threads, seed, first, out } = match arguments() {
         Ok(arguments) => arguments,
         Err(problem) => {
             eprintln!("{problem}");
@@ -104,6 +109,7 @@ fn main() -> ExitCode {
     };
     std::panic::set_hook(Box::new(|_| ()));
     let (made, next) = (Inputs::new(seed), AtomicU64::new(first));
+    let transfers = transfers.then(|| Transfers::new(seed));
     let (summary, begin) = (Mutex::new(Summary::default()), Instant::now());
     let work = || {
         let decoder = Decoder::on_this_thread();
@@ -112,8 +118,17 @@ fn main() -> ExitCode {
             if number >= first + inputs {
                 return;
             }
-            let (kind, bytes) = made.input(number);
-            let outcome = decoder.run(&bytes);
+            let (kind, bytes, outcome) = match &transfers {
+                Some(transfers) => {
+                    let transfer = transfers.transfer(number);
+                    (transfer.kind, transfer.bytes(), transfers.run(&transfer, &decoder))
+                }
+                None => {
+                    let (kind, bytes) = made.input(number);
+                    let outcome = decoder.run(&bytes);
+                    (kind, bytes, outcome)
+                }
+            };
             let mut summary = summary.lock().unwrap_or_else(PoisonError::into_inner);
             summary.add(number, kind, &outcome);
             if let Some(fault) = outcome.fault() {

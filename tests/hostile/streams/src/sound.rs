@@ -1,6 +1,6 @@
 //! Valid streams, from which the hostile ones are made.
 
-use light4gs_codec::{CompressionInput, FrequencyTable, Profile, ShCoding, encode, encode_compressed};
+use light4gs_codec::{CompressionInput, FrequencyTable, GaussianLayers, Profile, ShCoding, encode, encode_compressed};
 
 use crate::parts::Parts;
 
@@ -35,5 +35,29 @@ pub(crate) fn streams() -> Vec<Parts> {
     let flat = vec![1.0 / 16_384.0; 16_384];
     let table = FrequencyTable::from_pmf(-8192, &flat).expect("a legal table");
     add(&many, &CompressionInput { sh: ShCoding::Tables { step: 0.02, tables: vec![table; 45] }, ..coding });
+    streams.extend(layered());
     streams.iter().map(|bytes| Parts::of(bytes)).collect()
+}
+
+/// Streams of several layers of Gaussians: in both profiles, with every model of the spherical harmonics.
+fn layered() -> Vec<Vec<u8>> {
+    let mut streams = Vec::new();
+    for profile in [Profile::Compact, Profile::Paper] {
+        let scene = scene(40, 2, 4, [8, 4, 4, 4], &[1, 2]);
+        let input = input(&scene, profile, compact_shape(4, ALL_PARTS));
+        let codings = [
+            sh_networks(ShKind::Everything, 2, 8),
+            input.sh.clone(),
+            ShCoding::Channels { step: 0.02 },
+            ShCoding::Channels { step: 0.02 },
+        ];
+        for (sh, count) in codings.into_iter().zip([2, 3, 4, 8]) {
+            let layers = GaussianLayers::new(count);
+            // Without planes there is little but layers.
+            let planes = input.planes.clone().filter(|_| count < 8);
+            let input = CompressionInput { sh, layers, planes, ..input.clone() };
+            streams.push(encode_compressed(&scene, &input).expect("sound").bytes);
+        }
+    }
+    streams
 }

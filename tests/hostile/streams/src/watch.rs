@@ -75,6 +75,8 @@ pub struct Outcome {
     pub bytes: usize,
     /// Processor time of the thread.
     pub time: Duration,
+    /// What else is wrong.
+    pub wrong: Option<&'static str>,
 }
 
 impl Outcome {
@@ -83,6 +85,7 @@ impl Outcome {
         match &self.answer {
             None => Some("panic"),
             Some(Err(error)) if error.is_internal() => Some("internal error"),
+            _ if self.wrong.is_some() => self.wrong,
             _ if self.bytes > MOST_BYTES => Some("memory"),
             _ if self.time > MOST_TIME => Some("time"),
             _ => None,
@@ -111,17 +114,20 @@ impl Decoder {
 
     /// Decodes `bytes` at the default limits, and reads what they hold.
     pub fn run(&self, bytes: &[u8]) -> Outcome {
+        self.watch(|| {
+            let answer = decode(bytes).map(drop);
+            let _ = info(bytes);
+            answer
+        })
+    }
+
+    /// Watches some decoding.
+    pub fn watch(&self, work: impl FnOnce() -> Result<(), CodecError> + Send) -> Outcome {
         let before = USED.get();
         MOST.set(before);
         let begin = processor_time();
-        let answer = catch_unwind(AssertUnwindSafe(|| {
-            self.pool.install(|| {
-                let answer = decode(bytes).map(drop);
-                let _ = info(bytes);
-                answer
-            })
-        }));
-        Outcome { answer: answer.ok(), time: processor_time() - begin, bytes: MOST.get() - before }
+        let answer = catch_unwind(AssertUnwindSafe(|| self.pool.install(work)));
+        Outcome { answer: answer.ok(), time: processor_time() - begin, bytes: MOST.get() - before, wrong: None }
     }
 }
 
