@@ -71,6 +71,19 @@ pub extern "C" fn digest() -> u64 {
     light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
 }
 
+/// Chooses the level of detail that [`evaluate`] and [`draw_list`] are about: 0 is the scene itself. Returns 1 if nothing of it
+/// is evaluated yet, else 0.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn show_level(level: u32) -> u32 {
+    state().scene.as_mut().map_or(0, |scene| u32::from(scene.show_level(level)))
+}
+
+/// How many Gaussians the level of [`show_level`] has.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn count() -> usize {
+    state().scene.as_ref().map_or(0, OpenScene::count)
+}
+
 /// Computes the Gaussians `first` to `last` at a time in [0, 1].
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {

@@ -4,15 +4,15 @@ use std::fmt::{Display, Write as _};
 
 use light4gs_codec::{CodecError, SceneData, SceneMeta, StreamInfo};
 
-/// The description of a scene: `{"name": ..., "sections": [...]}`.
-pub(crate) fn describe(scene: &SceneData, info: &StreamInfo) -> String {
+/// The description of a scene with so many levels of detail: `{"name": ..., "sections": [...]}`.
+pub(crate) fn describe(scene: &SceneData, info: &StreamInfo, levels: u32) -> String {
     let SceneMeta { name, frame_count, fps, bounds, background, width, height, fov_x, extra, .. } = &scene.meta;
     let sections = info.sections.iter().map(|section| format!("[{},{}]", text(section.name), section.bytes));
     let extra = extra.iter().map(|(key, value)| format!("{}:{}", text(key), text(value)));
     format!(
         "{{\"name\":{},\"frameCount\":{frame_count},\"fps\":{fps},\"bounds\":[{},{}],\"background\":{},\"width\":{width},\
          \"height\":{height},\"fovX\":{fov_x},\"version\":{},\"bytes\":{},\"count\":{},\"shDegree\":{},\"moves\":{},\
-         \"sections\":{},\"extra\":{{{}}}}}",
+         \"levels\":{levels},\"sections\":{},\"extra\":{{{}}}}}",
         text(name),
         list(bounds[0]),
         list(bounds[1]),

@@ -1,22 +1,54 @@
 //! A decoded scene, of which one time after the other is computed.
 
-use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, info};
+use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, SceneData, info};
 
 use crate::description::describe;
 use crate::draw_list::{DrawList, Viewpoint};
 use crate::gaussians::{FLOATS, Unchanged, opacity, pack, rotation, scales};
+use crate::levels::{Selection, levels, select};
 
 /// A decoded scene.
 #[derive(Debug)]
 pub struct OpenScene {
+    /// Without its Gaussians.
+    scene: SceneData,
+    full: Level,
+    /// The level that was asked for last besides the scene itself, with its number. One at a time: it has at most half of
+    /// the Gaussians, and so takes at most half of the memory of the scene.
+    reduced: Option<(u32, Level)>,
+    /// The level that is shown is the reduced one.
+    shows_reduced: bool,
+    description: String,
+    list: DrawList,
+}
+
+/// Gaussians that are moved and drawn together: those of the scene, or fewer in place of them.
+#[derive(Debug)]
+struct Level {
     canonical: GaussianArrays,
     moved: GaussianArrays,
     unchanged: Unchanged,
     evaluator: MotionEvaluator,
-    description: String,
+    /// Factors of the areas; empty where they are all 1.
+    growth: Vec<f32>,
     /// The values for drawing: [`FLOATS`] numbers per Gaussian.
     packed: Vec<f32>,
-    list: DrawList,
+}
+
+impl Level {
+    /// The Gaussians of a scene, which are taken out of it.
+    fn take(scene: &mut SceneData, growth: Vec<f32>) -> Result<Self, CodecError> {
+        let evaluator = MotionEvaluator::new(scene)?;
+        let canonical = std::mem::take(&mut scene.gaussians);
+        Ok(Self {
+            moved: canonical.clone(),
+            unchanged: Unchanged::of(&canonical, |output| evaluator.changes(output)),
+            packed: vec![0.0; FLOATS * canonical.len()],
+            canonical,
+            evaluator,
+            growth,
+        })
+    }
 }
 
 impl OpenScene {
@@ -26,25 +58,15 @@ impl OpenScene {
     /// As [`light4gs_codec::decode`].
     pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
         let info = info(bytes)?;
-        let scene = OpenStream::new(bytes)?.scene()?;
-        let evaluator = MotionEvaluator::new(&scene)?;
-        let description = describe(&scene, &info);
-        let canonical = scene.gaussians;
-        let floats = FLOATS * canonical.len();
-        Ok(Self {
-            moved: canonical.clone(),
-            unchanged: Unchanged::of(&canonical, |output| evaluator.changes(output)),
-            canonical,
-            evaluator,
-            description,
-            packed: vec![0.0; floats],
-            list: DrawList::default(),
-        })
+        let mut scene = OpenStream::new(bytes)?.scene()?;
+        let description = describe(&scene, &info, levels(scene.gaussians.len()));
+        let full = Level::take(&mut scene, Vec::new())?;
+        Ok(Self { scene, full, reduced: None, shows_reduced: false, description, list: DrawList::default() })
     }
 
-    /// Number of Gaussians.
+    /// Number of Gaussians of the level that is shown.
     pub fn count(&self) -> usize {
-        self.canonical.len()
+        self.reduced.as_ref().filter(|_| self.shows_reduced).map_or(&self.full, |(_, level)| level).canonical.len()
     }
 
     /// The scene as JSON: name, sizes, sections.
@@ -52,24 +74,56 @@ impl OpenScene {
         &self.description
     }
 
-    /// Computes the Gaussians `first` to `last` at a time.
+    /// Chooses what [`OpenScene::evaluate`] and [`OpenScene::draw_list`] are about: 0 is the scene itself, and each further
+    /// level has half of the Gaussians of the one before. The description says how many there are; beyond the last one it
+    /// is taken. Returns whether the level was made anew: nothing of it is evaluated then.
+    pub fn show_level(&mut self, level: u32) -> bool {
+        let canonical = &self.full.canonical;
+        let level = level.min(levels(canonical.len()));
+        self.shows_reduced = level > 0;
+        if level == 0 || self.reduced.as_ref().is_some_and(|(made, _)| *made == level) {
+            return false;
+        }
+        // The memory of the one before comes back first.
+        self.reduced = None;
+        let Selection { indices, growth } = select(canonical, canonical.len() >> level);
+        self.scene.gaussians = canonical.gathered(&indices);
+        // What was possible with all Gaussians is possible with some of them.
+        self.reduced = Level::take(&mut self.scene, growth).ok().map(|reduced| (level, reduced));
+        self.shows_reduced = self.reduced.is_some();
+        true
+    }
+
+    /// The level that is shown, and memory for its list.
+    fn shown(&mut self) -> (&mut Level, &mut DrawList) {
+        let level = match &mut self.reduced {
+            Some((_, reduced)) if self.shows_reduced => reduced,
+            _ => &mut self.full,
+        };
+        (level, &mut self.list)
+    }
+
+    /// Computes the Gaussians `first` to `last` of the level that is shown at a time.
     pub fn evaluate(&mut self, time: f32, first: usize, last: usize) {
-        let last = last.min(self.count());
+        let (Level { canonical, moved, unchanged, evaluator, growth, packed }, _) = self.shown();
+        let last = last.min(canonical.len());
         let range = first.min(last)..last;
-        self.evaluator.apply(&self.canonical, time, range.clone(), &mut self.moved);
-        pack(&self.moved, &self.unchanged, range, &mut self.packed);
+        evaluator.apply(canonical, time, range.clone(), moved);
+        pack(moved, unchanged, growth, range, packed);
     }
 
     /// The Gaussians as computed last, back to front, [`ENTRY`](crate::ENTRY) numbers each.
     pub fn draw_list(&mut self, viewpoint: &Viewpoint) -> &[f32] {
-        self.list.make(&self.packed, &self.moved, viewpoint)
+        let (level, list) = self.shown();
+        list.make(&level.packed, &level.moved, viewpoint)
     }
 
     /// All attributes at a time, activated: centers `[N, 3]`, standard deviations `[N, 3]`, unit quaternions `(w, x, y, z)
     /// [N, 4]` (zeros where there is no direction), opacities `[N]`, harmonics `[N, (degree + 1)², 3]`, one behind the other.
     pub fn attributes_at(&self, time: f32) -> Vec<f32> {
-        let mut moved = self.canonical.clone();
-        self.evaluator.apply(&self.canonical, time, 0..self.count(), &mut moved);
+        let Level { canonical, evaluator, .. } = &self.full;
+        let mut moved = canonical.clone();
+        evaluator.apply(canonical, time, 0..canonical.len(), &mut moved);
         let rest = moved.sh_rest.len() / moved.len().max(1);
         let mut attributes = Vec::with_capacity(moved.len() * (14 + rest));
         attributes.extend(moved.means.iter().flatten());

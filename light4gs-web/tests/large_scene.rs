@@ -1,6 +1,6 @@
 //! A large scene for measuring the player, made of the synthetic one: each Gaussian is replaced by smaller ones.
 
-use light4gs_codec::{FurtherAttribute, GaussianArrays, encode, read_file, sh_rest_coefficients};
+use light4gs_codec::{GaussianArrays, encode, read_file};
 
 /// Gaussians of the large scene.
 const COUNT: usize = 100_000;
@@ -24,28 +24,16 @@ fn write() {
 fn divided(gaussians: &GaussianArrays, count: usize) -> GaussianArrays {
     let sources = gaussians.len();
     assert!((1..=count).contains(&sources), "{sources} Gaussians");
-    let rest = 3 * sh_rest_coefficients(gaussians.sh_degree);
-    let further = gaussians.further.iter().map(|attribute| FurtherAttribute { values: Vec::new(), ..attribute.clone() });
-    let mut parts = GaussianArrays { sh_degree: gaussians.sh_degree, further: further.collect(), ..Default::default() };
+    let indices: Vec<u32> = (0..count).map(|index| (index % sources) as u32).collect();
+    let mut parts = gaussians.gathered(&indices);
     let mut random = Random(1);
     for index in 0..count {
-        let source = index % sources;
-        let share = 1.0 / (source..count).step_by(sources).len() as f32;
-        let quaternion = gaussians.quats[source];
-        let offset: [f32; 3] = std::array::from_fn(|axis| {
-            gaussians.log_scales[source][axis].exp() * (1.0 - share).sqrt() * random.normal()
-        });
-        let offset = rotated(quaternion, offset);
-        parts.means.push(std::array::from_fn(|axis| gaussians.means[source][axis] + offset[axis]));
-        parts.log_scales.push(gaussians.log_scales[source].map(|scale| scale + 0.5 * share.ln()));
-        parts.quats.push(quaternion);
-        parts.opacity_logits.push(gaussians.opacity_logits[source]);
-        parts.sh_dc.push(gaussians.sh_dc[source]);
-        parts.sh_rest.extend_from_slice(&gaussians.sh_rest[rest * source..][..rest]);
-        for (part, whole) in parts.further.iter_mut().zip(&gaussians.further) {
-            let width = whole.width as usize;
-            part.values.extend_from_slice(&whole.values[width * source..][..width]);
-        }
+        let share = 1.0 / (index % sources..count).step_by(sources).len() as f32;
+        let scales = parts.log_scales[index].map(f32::exp);
+        let offset = scales.map(|scale| scale * (1.0 - share).sqrt() * random.normal());
+        let offset = rotated(parts.quats[index], offset);
+        parts.means[index].iter_mut().zip(offset).for_each(|(mean, offset)| *mean += offset);
+        parts.log_scales[index].iter_mut().for_each(|scale| *scale += 0.5 * share.ln());
     }
     parts
 }

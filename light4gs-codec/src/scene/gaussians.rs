@@ -146,6 +146,44 @@ impl GaussianArrays {
         BUILT_IN.iter().zip(fields).map(row).chain([rest]).chain(further.iter().map(FurtherAttribute::view))
     }
 
+    /// The Gaussians at these indices, in their order.
+    ///
+    /// ```
+    /// use light4gs_codec::GaussianArrays;
+    ///
+    /// let gaussians = GaussianArrays { opacity_logits: vec![1.0, 2.0, 3.0], ..GaussianArrays::default() };
+    /// # let gaussians = GaussianArrays { means: vec![[0.0; 3]; 3], log_scales: vec![[0.0; 3]; 3], quats: vec![[0.0; 4]; 3], sh_dc: vec![[0.0; 3]; 3], ..gaussians };
+    /// assert_eq!(gaussians.gathered(&[2, 0, 2]).opacity_logits, [3.0, 1.0, 3.0]);
+    /// ```
+    ///
+    /// # Panics
+    /// If an index is beyond the last Gaussian.
+    pub fn gathered(&self, indices: &[u32]) -> Self {
+        fn rows<T: Copy>(values: &[T], indices: &[u32]) -> Vec<T> {
+            indices.iter().map(|&index| values[index as usize]).collect()
+        }
+        let wide = |values: &[f32], width: usize| -> Vec<f32> {
+            indices.iter().flat_map(|&index| &values[width * index as usize..][..width]).copied().collect()
+        };
+        let Self { means, log_scales, quats, opacity_logits, sh_dc, sh_degree, sh_rest, further } = self;
+        let further = further.iter().map(|FurtherAttribute { name, width, values, optional }| FurtherAttribute {
+            name: name.clone(),
+            width: *width,
+            values: wide(values, *width as usize),
+            optional: *optional,
+        });
+        Self {
+            means: rows(means, indices),
+            log_scales: rows(log_scales, indices),
+            quats: rows(quats, indices),
+            opacity_logits: rows(opacity_logits, indices),
+            sh_dc: rows(sh_dc, indices),
+            sh_degree: *sh_degree,
+            sh_rest: wide(sh_rest, 3 * sh_rest_coefficients(*sh_degree)),
+            further: further.collect(),
+        }
+    }
+
     /// The attribute with a name.
     pub fn attribute(&self, name: &str) -> Option<AttributeValues<'_>> {
         self.attributes().find(|attribute| attribute.name == name)

@@ -19,6 +19,7 @@ import { SceneError } from "../errors.js";
  * @property {number} count  Gaussians
  * @property {number} shDegree  of the spherical harmonics, 0 to 3
  * @property {boolean} moves  whether anything changes with time
+ * @property {number} levels  levels of detail besides the scene itself; each has half of the Gaussians of the one before
  * @property {[string, number][]} sections  name and bytes of each part of the file
  * @property {Record<string, string>} extra  free notes
  */
@@ -168,10 +169,11 @@ export class Scene {
    * @param {number} time  in [0, 1]
    * @param {Viewpoint} viewpoint
    * @param {ArrayBuffer | null} [memory]  to be used again
+   * @param {number} [level]  of detail: 0 is the scene itself, at most {@link SceneInfo.levels}
    * @returns {Promise<Frame>}
    */
-  frame(time, viewpoint, memory = null) {
-    return this.#ask({ type: "frame", time, viewpoint, memory }, memory ? [memory] : []);
+  frame(time, viewpoint, memory = null, level = 0) {
+    return this.#ask({ type: "frame", time, viewpoint, memory, level }, memory ? [memory] : []);
   }
 
   /**

@@ -28,9 +28,10 @@ const send = (answer, transfer = []) => /** @type {any} */ (self).postMessage(an
 let lastFrame = Promise.resolve();
 
 /** @param {any} request */
-async function frame({ id, time, viewpoint, memory }) {
+async function frame({ id, time, viewpoint, memory, level }) {
   if (!decoder) throw new Error("no scene is open");
   const start = performance.now();
+  decoder.showLevel(level);
   const moved = time !== decoder.time;
   if (moved) await decoder.evaluate(time, pause);
   const evaluated = performance.now();
