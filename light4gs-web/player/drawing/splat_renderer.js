@@ -1,7 +1,7 @@
 // Draws sorted Gaussians with WebGL2: one quad each, back to front, premultiplied, into half floats where the browser can.
 
 import { GraphicsError } from "../errors.js";
-import { ENTRY, ROW } from "./constants.js";
+import { ENTRY, MIN_ALPHA, ROW } from "./constants.js";
 import { fragmentShader, screenFragmentShader, screenVertexShader, vertexShader } from "./shaders.js";
 
 /**
@@ -48,7 +48,7 @@ export class SplatRenderer {
     const parts = {
       splats, screen: this.#link(screenVertexShader, screenFragmentShader),
       rotation: uniform("rotation"), translation: uniform("translation"),
-      focal: uniform("focal"), principal: uniform("principal"), size: uniform("size"), triangles: uniform("triangles"),
+      focal: uniform("focal"), principal: uniform("principal"), size: uniform("size"), least: uniform("least"), triangles: uniform("triangles"),
       target: gl.createTexture(), framebuffer: gl.createFramebuffer(), list: gl.createTexture(),
       quads: gl.createVertexArray(), nothing: gl.createVertexArray(), indices: gl.createBuffer(),
     };
@@ -169,6 +169,7 @@ export class SplatRenderer {
       gl.uniform2f(parts.focal, view.fx * x, view.fy * y);
       gl.uniform2f(parts.principal, view.cx * x, view.cy * y);
       gl.uniform2f(parts.size, columns, rows);
+      gl.uniform1f(parts.least, draft ? this.draftAlpha ?? MIN_ALPHA : MIN_ALPHA);
       gl.bindTexture(gl.TEXTURE_2D, parts.list);
       gl.bindVertexArray(parts.quads);
       gl.enable(gl.BLEND);
