@@ -37,10 +37,13 @@ pub(crate) fn select(gaussians: &GaussianArrays, count: usize) -> Selection {
     let mut sum = 0.5;
     for index in along_curve(&gaussians.means) {
         let significance = f64::from(significance[index as usize]);
+        if significance == 0.0 {
+            continue;
+        }
         let probability = if significance < threshold { significance / threshold } else { 1.0 };
         let before = f64::floor(sum);
         sum += probability;
-        if f64::floor(sum) > before && probability > 0.0 {
+        if f64::floor(sum) > before {
             chosen.push((index, (1.0 / probability) as f32));
         }
     }
@@ -105,4 +108,99 @@ fn spread(mut bits: u64) -> u64 {
         bits = (bits | bits << shift) & mask;
     }
     bits
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Round Gaussians at the corners of small squares, some large among many small ones.
+    fn gaussians(count: usize) -> GaussianArrays {
+        let scale = |index: usize| if index.is_multiple_of(50) { 0.5_f32 } else { 0.01 + 1e-4 * (index % 37) as f32 };
+        GaussianArrays {
+            means: (0..count).map(|index| [(index % 97) as f32, (index / 97) as f32, (index % 5) as f32]).collect(),
+            log_scales: (0..count).map(|index| [scale(index).ln(); 3]).collect(),
+            quats: vec![[1.0, 0.0, 0.0, 0.0]; count],
+            opacity_logits: (0..count).map(|index| (index % 7) as f32 - 3.0).collect(),
+            sh_dc: vec![[0.0; 3]; count],
+            ..GaussianArrays::default()
+        }
+    }
+
+    fn total(gaussians: &GaussianArrays) -> f64 {
+        (0..gaussians.len()).map(|index| f64::from(significance(gaussians, index))).sum()
+    }
+
+    #[test]
+    fn a_scene_has_levels_as_long_as_some_thousands_remain() {
+        assert_eq!([0, 5999, 6000, 6415, 100_000, 10_000_000].map(levels), [0, 0, 1, 1, 5, 5]);
+    }
+
+    #[test]
+    fn the_whole_covers_as_much_as_before() {
+        let all = gaussians(20_000);
+        for level in 1..=3 {
+            let Selection { indices, growth } = select(&all, all.len() >> level);
+            let covered: f64 = indices
+                .iter()
+                .zip(&growth)
+                .map(|(&index, &growth)| f64::from(significance(&all, index as usize) * growth))
+                .sum();
+            assert!((covered / total(&all) - 1.0).abs() < 1e-3, "{covered} of {}", total(&all));
+            assert!(indices.len().abs_diff(all.len() >> level) <= 1, "{} Gaussians", indices.len());
+            assert!(indices.is_sorted_by(|a, b| a < b) && growth.iter().all(|&growth| growth >= 1.0));
+        }
+    }
+
+    /// So that no part of the scene becomes thinner than another.
+    #[test]
+    fn each_part_covers_as_much_as_before() {
+        let all = gaussians(20_000);
+        let Selection { indices, growth } = select(&all, 5000);
+        let halves = [0, 1].map(|half| {
+            let here = |index: usize| usize::from(all.means[index][1] >= 100.0) == half;
+            let before: f64 =
+                (0..all.len()).filter(|&index| here(index)).map(|index| f64::from(significance(&all, index))).sum();
+            let kept = indices.iter().zip(&growth).filter(|(index, _)| here(**index as usize));
+            let after: f64 = kept.map(|(&index, &growth)| f64::from(significance(&all, index as usize) * growth)).sum();
+            after / before
+        });
+        assert!(halves.iter().all(|share| (share - 1.0).abs() < 0.02), "{halves:?}");
+    }
+
+    #[test]
+    fn what_covers_most_stays_as_it_is() {
+        let all = gaussians(20_000);
+        let Selection { indices, growth } = select(&all, 2500);
+        let mut order: Vec<u32> = (0..all.len() as u32).collect();
+        order.sort_by(|&a, &b| significance(&all, b as usize).total_cmp(&significance(&all, a as usize)));
+        // The large ones are 400; those of the lowest opacity among them cover least.
+        for index in &order[..300] {
+            let place = indices.binary_search(index).expect("a large one was dropped");
+            assert_eq!(growth[place], 1.0);
+        }
+    }
+
+    #[test]
+    fn what_no_view_shows_is_dropped() {
+        let mut all = gaussians(8000);
+        all.opacity_logits[3] = -9.0;
+        all.log_scales[7] = [f32::NEG_INFINITY; 3];
+        all.means[11] = [f32::NAN, f32::INFINITY, 0.0];
+        let Selection { indices, .. } = select(&all, 7900);
+        assert!(!indices.contains(&3) && !indices.contains(&7));
+        assert_eq!(select(&GaussianArrays::default(), 0), Selection::default());
+        // Fewer than are asked for can be seen.
+        all.opacity_logits[10..].fill(-9.0);
+        let Selection { indices, growth } = select(&all, 4000);
+        assert!(indices == [0, 1, 2, 4, 5, 6, 8, 9] && growth == [1.0; 8], "{} of 8", indices.len());
+    }
+
+    #[test]
+    fn neighbors_on_the_curve_are_neighbors_in_space() {
+        let points: Vec<[f32; 3]> = [0.0, 1.0, 2.0, 3.0].map(|x| [x, 0.0, -x]).to_vec();
+        assert_eq!(along_curve(&points), [3, 2, 1, 0]);
+        assert_eq!(spread(0b101), 0b100_0001);
+        assert_eq!(spread((1 << 21) - 1).count_ones(), 21);
+    }
 }

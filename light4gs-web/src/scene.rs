@@ -137,3 +137,58 @@ impl OpenScene {
         attributes
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene() -> OpenScene {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/quickstart.l4gs");
+        OpenScene::decode(&std::fs::read(path).expect("a scene")).expect("a scene")
+    }
+
+    fn list(scene: &mut OpenScene, level: u32, time: f32) -> Vec<f32> {
+        scene.show_level(level);
+        scene.evaluate(time, 0, scene.count());
+        scene.draw_list(&Viewpoint { row: [0.0, 0.0, 1.0, 5.0], eye: [0.0, 0.0, -5.0] }).to_vec()
+    }
+
+    /// A level that was drawn in between changes nothing of the scene itself, to the last bit.
+    #[test]
+    fn the_scene_itself_stays_as_it_is() {
+        let expected = list(&mut scene(), 0, 0.5);
+        let mut scene = scene();
+        let count = scene.count();
+        let attributes = scene.attributes_at(0.25);
+        assert_eq!(list(&mut scene, 0, 0.5), expected);
+        let fewer = list(&mut scene, 1, 0.5);
+        assert!(scene.count().abs_diff(count / 2) <= 1 && fewer.len() < expected.len());
+        assert_eq!(list(&mut scene, 0, 0.5), expected);
+        assert_eq!((scene.count(), scene.attributes_at(0.25)), (count, attributes));
+    }
+
+    /// What a level keeps is where it is in the scene, at every time, with the same opacity.
+    #[test]
+    fn a_level_moves_as_the_scene_does() {
+        let mut scene = scene();
+        let centers = |list: &[f32]| {
+            let drawn = list.chunks_exact(crate::ENTRY).filter(|entry| entry[3] > 0.0);
+            drawn.map(|entry| [0, 1, 2, 3].map(|i| entry[i].to_bits())).collect::<std::collections::HashSet<_>>()
+        };
+        for time in [0.0, 0.7] {
+            let all = centers(&list(&mut scene, 0, time));
+            let fewer = centers(&list(&mut scene, 1, time));
+            assert!(fewer.len() > 1000 && fewer.is_subset(&all), "{} of {}", fewer.len(), all.len());
+        }
+    }
+
+    #[test]
+    fn a_level_is_made_once_and_there_is_no_further_one() {
+        let mut scene = scene();
+        assert!(!scene.show_level(0));
+        assert!(scene.show_level(9));
+        let count = scene.count();
+        assert!(!scene.show_level(0) && !scene.show_level(1));
+        assert_eq!(scene.count(), count);
+    }
+}
