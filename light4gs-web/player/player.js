@@ -28,6 +28,8 @@ import { SplatRenderer } from "./drawing/splat_renderer.js";
 const STILL = 150;
 /** Milliseconds between two looks at the graphics card. */
 const WATCH = 3;
+/** How much more than the image a draft's list covers. */
+const SPARE_SPREAD = 1.25;
 /** A viewpoint that has everything before it. */
 const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
 
@@ -353,6 +355,12 @@ export class Player extends EventTarget {
     return { row: [...forward, -(forward[0] * position[0] + forward[1] * position[1] + forward[2] * position[2])], eye: position };
   }
 
+  /** The tangent of the angle between the view axis and a corner of the image, and some more for turning until the next list. */
+  #spread() {
+    const { fx, fy, cx, cy, width, height } = this.view;
+    return SPARE_SPREAD * Math.hypot(Math.max(cx, width - cx) / fx, Math.max(cy, height - cy) / fy);
+  }
+
   #viewpointKey() {
     return this.#viewpoint().row.join() + this.camera.position.join();
   }
@@ -367,8 +375,10 @@ export class Player extends EventTarget {
       const time = this.#moment;
       const key = this.#viewpointKey();
       const memory = this.#spare;
+      // A draft may leave out what is not seen: the image at rest has a list of its own.
+      const viewpoint = level > 0 ? { ...this.#viewpoint(), spread: this.#spread() } : this.#viewpoint();
       this.#spare = null;
-      const { list, evaluateMs, sortMs } = await this.scene.frame(time, this.#viewpoint(), memory, level);
+      const { list, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level);
       if (this.#disposed) return;
       const start = performance.now();
       this.renderer.setList(list);

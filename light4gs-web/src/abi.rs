@@ -94,7 +94,7 @@ pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
 
 /// What is drawn, back to front: 16 numbers each, center, opacity, covariance xx, xy, xz, yy, yz, zz, color, and three zeros;
 /// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera
-/// stands at the eye. [`list_length`] says how many numbers.
+/// stands at the eye and sees the cone with this tangent, or all in front of it. [`list_length`] says how many numbers.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn draw_list(
     row_x: f32,
@@ -104,8 +104,9 @@ pub extern "C" fn draw_list(
     eye_x: f32,
     eye_y: f32,
     eye_z: f32,
+    spread: f32,
 ) -> *const f32 {
-    let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z] };
+    let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z], spread };
     let state = &mut *state();
     let list = state.scene.as_mut().map_or(&[][..], |scene| scene.draw_list(&viewpoint));
     state.list_length = list.len();

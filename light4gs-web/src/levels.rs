@@ -5,8 +5,8 @@
 //! times opacity stays as it is, and what covers much is not changed at all. The choice is systematic along a Morton
 //! curve: of neighbors that are dropped together, about one in `1 / p` stays and covers the others.
 
-use light4gs_codec::GaussianArrays;
 use light4gs_codec::rendering::MIN_ALPHA;
+use light4gs_codec::{GaussianArrays, MotionEvaluator, MotionOutput};
 
 use crate::gaussians::{opacity, scales};
 
@@ -14,6 +14,8 @@ use crate::gaussians::{opacity, scales};
 const FEWEST: usize = 3000;
 /// Each level has half of the Gaussians of the one before.
 const MOST_LEVELS: u32 = 5;
+/// When the significance is looked at: each time takes as long as an image of all Gaussians.
+const TIMES: [f32; 3] = [0.0, 0.5, 1.0];
 
 /// What a level is made of.
 #[derive(Debug, Default, PartialEq)]
@@ -29,26 +31,35 @@ pub(crate) fn levels(count: usize) -> u32 {
     (1..=MOST_LEVELS).take_while(|&level| count >> level >= FEWEST).count() as u32
 }
 
-/// Chooses about `count` Gaussians.
-pub(crate) fn select(gaussians: &GaussianArrays, count: usize) -> Selection {
-    let significance: Vec<f32> = (0..gaussians.len()).map(|index| significance(gaussians, index)).collect();
-    let threshold = threshold(&significance, count);
-    let mut chosen = Vec::with_capacity(count + 1);
-    let mut sum = 0.5;
-    for index in along_curve(&gaussians.means) {
-        let significance = f64::from(significance[index as usize]);
-        if significance == 0.0 {
-            continue;
+/// What each Gaussian covers where it covers most: of the canonical Gaussians and those at some times. An opacity may
+/// change so that it is seen at some times only.
+pub(crate) fn most_significance(canonical: &GaussianArrays, evaluator: &MotionEvaluator) -> Vec<f32> {
+    let mut most: Vec<f32> = (0..canonical.len()).map(|index| significance(canonical, index)).collect();
+    if evaluator.changes(MotionOutput::OpacityLogit) || evaluator.changes(MotionOutput::LogScale) {
+        let mut moved = canonical.clone();
+        for time in TIMES {
+            evaluator.apply(canonical, time, 0..canonical.len(), &mut moved);
+            most.iter_mut().enumerate().for_each(|(index, most)| *most = most.max(significance(&moved, index)));
         }
+    }
+    most
+}
+
+/// Chooses about `count` Gaussians, given their centers and their significance.
+pub(crate) fn select(centers: &[[f32; 3]], significance: &[f32], count: usize) -> Selection {
+    let threshold = threshold(significance, count);
+    let mut growth_of = vec![0.0; centers.len()];
+    let mut sum = 0.5;
+    for index in along_curve(centers) {
+        let significance = f64::from(significance[index as usize]);
         let probability = if significance < threshold { significance / threshold } else { 1.0 };
         let before = f64::floor(sum);
         sum += probability;
-        if f64::floor(sum) > before {
-            chosen.push((index, (1.0 / probability) as f32));
+        if significance > 0.0 && f64::floor(sum) > before {
+            growth_of[index as usize] = (1.0 / probability) as f32;
         }
     }
-    chosen.sort_unstable_by_key(|&(index, _)| index);
-    let (indices, growth) = chosen.into_iter().unzip();
+    let (indices, growth) = (0..).zip(growth_of).filter(|&(_, growth)| growth > 0.0).unzip();
     Selection { indices, growth }
 }
 
@@ -61,19 +72,24 @@ fn significance(gaussians: &GaussianArrays, index: usize) -> f32 {
     if opacity >= MIN_ALPHA && significance.is_finite() { significance } else { 0.0 }
 }
 
-/// The significance from which on a Gaussian is kept for certain, so that the probabilities of all have the sum `count`.
+/// The significance from which on a Gaussian is kept for certain, so that the probabilities of all have the sum `count`; 0
+/// where there are no more than that.
 fn threshold(significance: &[f32], count: usize) -> f64 {
-    let mut falling = significance.to_vec();
-    falling.sort_unstable_by(|a, b| b.total_cmp(a));
-    let mut rest: f64 = falling.iter().map(|&value| f64::from(value)).sum();
-    for (certain, &next) in falling.iter().enumerate().take(count) {
-        let threshold = rest / (count - certain) as f64;
-        if f64::from(next) <= threshold {
+    let (mut threshold, mut certain) = (f64::INFINITY, 0);
+    loop {
+        let below = significance.iter().map(|&value| f64::from(value)).filter(|&value| value < threshold);
+        let rest: f64 = below.sum();
+        if certain >= count || rest == 0.0 {
+            return 0.0;
+        }
+        // Falls from step to step: what is above it is above the next one too.
+        threshold = rest / (count - certain) as f64;
+        let found = significance.iter().filter(|&&value| f64::from(value) >= threshold).count();
+        if found <= certain {
             return threshold;
         }
-        rest -= f64::from(next);
+        certain = found;
     }
-    0.0
 }
 
 /// The indices of points in the order of a Morton curve.
@@ -113,6 +129,7 @@ fn spread(mut bits: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use light4gs_codec::SceneData;
 
     /// Round Gaussians at the corners of small squares, some large among many small ones.
     fn gaussians(count: usize) -> GaussianArrays {
@@ -125,6 +142,11 @@ mod tests {
             sh_dc: vec![[0.0; 3]; count],
             ..GaussianArrays::default()
         }
+    }
+
+    fn chosen(all: &GaussianArrays, count: usize) -> Selection {
+        let still = MotionEvaluator::new(&SceneData::default()).expect("a scene without motion");
+        select(&all.means, &most_significance(all, &still), count)
     }
 
     fn total(gaussians: &GaussianArrays) -> f64 {
@@ -140,7 +162,7 @@ mod tests {
     fn the_whole_covers_as_much_as_before() {
         let all = gaussians(20_000);
         for level in 1..=3 {
-            let Selection { indices, growth } = select(&all, all.len() >> level);
+            let Selection { indices, growth } = chosen(&all, all.len() >> level);
             let covered: f64 = indices
                 .iter()
                 .zip(&growth)
@@ -156,7 +178,7 @@ mod tests {
     #[test]
     fn each_part_covers_as_much_as_before() {
         let all = gaussians(20_000);
-        let Selection { indices, growth } = select(&all, 5000);
+        let Selection { indices, growth } = chosen(&all, 5000);
         let halves = [0, 1].map(|half| {
             let here = |index: usize| usize::from(all.means[index][1] >= 100.0) == half;
             let before: f64 =
@@ -171,7 +193,7 @@ mod tests {
     #[test]
     fn what_covers_most_stays_as_it_is() {
         let all = gaussians(20_000);
-        let Selection { indices, growth } = select(&all, 2500);
+        let Selection { indices, growth } = chosen(&all, 2500);
         let mut order: Vec<u32> = (0..all.len() as u32).collect();
         order.sort_by(|&a, &b| significance(&all, b as usize).total_cmp(&significance(&all, a as usize)));
         // The large ones are 400; those of the lowest opacity among them cover least.
@@ -187,12 +209,12 @@ mod tests {
         all.opacity_logits[3] = -9.0;
         all.log_scales[7] = [f32::NEG_INFINITY; 3];
         all.means[11] = [f32::NAN, f32::INFINITY, 0.0];
-        let Selection { indices, .. } = select(&all, 7900);
+        let Selection { indices, .. } = chosen(&all, 7900);
         assert!(!indices.contains(&3) && !indices.contains(&7));
-        assert_eq!(select(&GaussianArrays::default(), 0), Selection::default());
+        assert_eq!(chosen(&GaussianArrays::default(), 0), Selection::default());
         // Fewer than are asked for can be seen.
         all.opacity_logits[10..].fill(-9.0);
-        let Selection { indices, growth } = select(&all, 4000);
+        let Selection { indices, growth } = chosen(&all, 4000);
         assert!(indices == [0, 1, 2, 4, 5, 6, 8, 9] && growth == [1.0; 8], "{} of 8", indices.len());
     }
 

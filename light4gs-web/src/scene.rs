@@ -5,7 +5,7 @@ use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, OpenStream, Sc
 use crate::description::describe;
 use crate::draw_list::{DrawList, Viewpoint};
 use crate::gaussians::{FLOATS, Unchanged, opacity, pack, rotation, scales};
-use crate::levels::{Selection, levels, select};
+use crate::levels::{Selection, levels, most_significance, select};
 
 /// A decoded scene.
 #[derive(Debug)]
@@ -16,6 +16,8 @@ pub struct OpenScene {
     /// The level that was asked for last besides the scene itself, with its number. One at a time: it has at most half of
     /// the Gaussians, and so takes at most half of the memory of the scene.
     reduced: Option<(u32, Level)>,
+    /// What each Gaussian covers, from the first reduced level on.
+    significance: Option<Vec<f32>>,
     /// The level that is shown is the reduced one.
     shows_reduced: bool,
     description: String,
@@ -61,7 +63,15 @@ impl OpenScene {
         let mut scene = OpenStream::new(bytes)?.scene()?;
         let description = describe(&scene, &info, levels(scene.gaussians.len()));
         let full = Level::take(&mut scene, Vec::new())?;
-        Ok(Self { scene, full, reduced: None, shows_reduced: false, description, list: DrawList::default() })
+        Ok(Self {
+            scene,
+            full,
+            reduced: None,
+            significance: None,
+            shows_reduced: false,
+            description,
+            list: DrawList::default(),
+        })
     }
 
     /// Number of Gaussians of the level that is shown.
@@ -86,7 +96,8 @@ impl OpenScene {
         }
         // The memory of the one before comes back first.
         self.reduced = None;
-        let Selection { indices, growth } = select(canonical, canonical.len() >> level);
+        let significance = self.significance.get_or_insert_with(|| most_significance(canonical, &self.full.evaluator));
+        let Selection { indices, growth } = select(&canonical.means, significance, canonical.len() >> level);
         self.scene.gaussians = canonical.gathered(&indices);
         // What was possible with all Gaussians is possible with some of them.
         self.reduced = Level::take(&mut self.scene, growth).ok().map(|reduced| (level, reduced));
@@ -150,7 +161,17 @@ mod tests {
     fn list(scene: &mut OpenScene, level: u32, time: f32) -> Vec<f32> {
         scene.show_level(level);
         scene.evaluate(time, 0, scene.count());
-        scene.draw_list(&Viewpoint { row: [0.0, 0.0, 1.0, 5.0], eye: [0.0, 0.0, -5.0] }).to_vec()
+        scene.draw_list(&Viewpoint { row: [0.0, 0.0, 1.0, 5.0], eye: [0.0, 0.0, -5.0], spread: f32::INFINITY }).to_vec()
+    }
+
+    /// The canonical opacity of some is too low to be seen, but not that of another time.
+    #[test]
+    fn what_is_seen_at_any_time_may_be_kept() {
+        let OpenScene { full: Level { canonical, evaluator, .. }, .. } = scene();
+        let still = MotionEvaluator::new(&SceneData::default()).expect("a scene without motion");
+        let seen = |significance: &[f32]| significance.iter().filter(|&&value| value > 0.0).count();
+        let [once, most] = [&still, &evaluator].map(|evaluator| seen(&most_significance(&canonical, evaluator)));
+        assert!(most > once && once > 1000, "{once} of {most}");
     }
 
     /// A level that was drawn in between changes nothing of the scene itself, to the last bit.

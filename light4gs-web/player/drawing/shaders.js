@@ -15,8 +15,8 @@ uniform vec3 translation;
 uniform vec2 focal;
 uniform vec2 principal;
 uniform vec2 size;
-// Alpha at which a Gaussian ends.
-uniform float least;
+// The share of a Gaussian's weight that may be left out.
+uniform float tail;
 
 uniform highp sampler2D list;
 // Three corners a Gaussian, or four.
@@ -28,6 +28,7 @@ out vec2 place;
 const float NEAR = ${float(NEAR)};
 const float DILATION = ${float(DILATION)};
 const float FRUSTUM_MARGIN = ${float(FRUSTUM_MARGIN)};
+const float MIN_ALPHA = ${float(MIN_ALPHA)};
 
 void main() {
   // Outside of the clip volume, until it is known to be seen.
@@ -41,7 +42,7 @@ void main() {
   float last = texelFetch(list, at + ivec2(3, 0), 0).x;
   float opacity = first.w;
   vec3 position = rotation * first.xyz + translation;
-  if (!(position.z > NEAR) || !(opacity >= least)) return;
+  if (!(position.z > NEAR) || !(opacity >= MIN_ALPHA)) return;
 
   // Rows of the projection's Jacobian times the view rotation, at a place not far outside of the image.
   vec2 limit = FRUSTUM_MARGIN * 0.5 * size / focal;
@@ -59,7 +60,7 @@ void main() {
   if (!(determinant > 0.0)) return;
 
   // With the covariance as L Lᵀ, the circle of radius reach becomes the ellipse where alpha falls below the threshold.
-  float reach = sqrt(2.0 * log(opacity / least));
+  float reach = sqrt(2.0 * log(opacity / max(MIN_ALPHA, tail * opacity)));
   float width = sqrt(xx);
   // A square around the circle of radius 1, or a triangle.
   int number = gl_VertexID - 3 * gaussian;

@@ -16,7 +16,7 @@ const SLICE = 8192;
  * @property {(level: number) => number} show_level
  * @property {() => number} count
  * @property {(time: number, first: number, last: number) => void} evaluate
- * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number) => number} draw_list
+ * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number, spread: number) => number} draw_list
  * @property {() => number} list_length
  * @property {(time: number) => number} attributes_at
  * @property {() => number} numbers_length
@@ -99,8 +99,8 @@ export class Decoder {
    * @param {import("./scene.js").Viewpoint} viewpoint
    * @param {ArrayBuffer | null} memory  to be used again
    */
-  drawList({ row, eye }, memory) {
-    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2]);
+  drawList({ row, eye, spread = Infinity }, memory) {
+    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2], spread);
     const list = new Float32Array(this.wasm.memory.buffer, at, this.wasm.list_length());
     if (!memory || memory.byteLength < list.byteLength) return list.slice();
     const copy = new Float32Array(memory, 0, list.length);

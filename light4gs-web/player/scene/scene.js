@@ -39,6 +39,8 @@ import { SceneError } from "../errors.js";
  * @typedef {object} Viewpoint  where a scene is seen from
  * @property {ArrayLike<number>} row  the depth of a point is `row · (x, y, z, 1)`
  * @property {ArrayLike<number>} eye  the camera's center, world units
+ * @property {number} [spread]  what does not reach into the cone around the view axis is left out: the tangent of its angle to
+ *   the axis; all in front of the camera where not given
  */
 
 /**

@@ -4,9 +4,13 @@
  * Shares of the pixels along each side, and levels of detail, each faster than the one before. Of what takes the same time,
  * this is what looks best (docs/player.md).
  */
-const LADDER = [[1, 0], [0.7, 0], [0.5, 0], [0.5, 1], [0.5, 2], [0.35, 2], [0.35, 3], [0.35, 4], [0.35, 5]];
+const LADDER = [[1, 0], [0.7, 0], [0.7, 1], [0.5, 1], [0.5, 2], [0.35, 2], [0.35, 3], [0.35, 4], [0.35, 5]];
 /** Milliseconds of an image: above, the next faster step; below, a slower one is tried after a while. */
 const [SLOW, FAST] = [28, 14];
+/** In place of the first, where the next step would look worse than fewer images a second. */
+const VERY_SLOW = 45;
+/** The last step of the ladder that looks well. */
+const LAST_GOOD = LADDER.findIndex(([, level]) => level > 2) - 1;
 /** Images that are measured before a step is judged. */
 const SAMPLES = 4;
 /** Milliseconds until a slower step is tried. */
@@ -19,9 +23,13 @@ class Steps {
   #intervals = [];
   #tried = 0;
 
-  /** @param {number} last  the fastest step */
-  constructor(last) {
+  /**
+   * @param {number} last  the fastest step
+   * @param {number} [lastGood]  the fastest one that is worth it where not much time is missing
+   */
+  constructor(last, lastGood = last) {
     this.last = last;
+    this.lastGood = lastGood;
   }
 
   /**
@@ -40,7 +48,7 @@ class Steps {
     const median = sorted[Math.floor(sorted.length / 2)];
     const before = this.step;
     this.#intervals = [];
-    if (median > SLOW && this.step < this.last) {
+    if (median > (this.step < this.lastGood ? SLOW : VERY_SLOW) && this.step < this.last) {
       // Far too slow: more than one step at once.
       this.step = Math.min(this.step + (median > 3 * SLOW ? 2 : 1), this.last);
       this.#tried = now;
@@ -54,14 +62,14 @@ class Steps {
 
 /** Chooses scale and level from the time that images take. What stands still is always drawn in full. */
 export class Draft {
-  #drawing = new Steps(LADDER.length - 1);
+  #drawing = new Steps(LADDER.length - 1, LAST_GOOD);
   #worker;
 
   /** @param {number} levels  of detail that the scene has besides itself */
   constructor(levels) {
     this.levels = levels;
     // Each level takes half of the time of the one before.
-    this.#worker = new Steps(levels);
+    this.#worker = new Steps(levels, 2);
   }
 
   /** The scale to draw moving images at: the share of the pixels along each side. */
