@@ -4,7 +4,7 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use zip::ZipWriter;
-use zip::write::SimpleFileOptions;
+use zip::write::FileOptions;
 
 use crate::atomic::write_atomically;
 use crate::error::DataError;
@@ -19,7 +19,7 @@ pub fn write_ply_zip(path: &Path, times: impl Iterator<Item = GaussianPly>) -> R
     let mut refused = None;
     let written = write_atomically(path, |file| {
         let mut archive = ZipWriter::new(file);
-        let options = SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+        let options = FileOptions::default().compression_method(zip::CompressionMethod::Stored);
         for (k, gaussians) in times.enumerate() {
             let bytes = gaussians.bytes(path).map_err(|problem| {
                 refused = Some(problem);
