@@ -36,9 +36,9 @@ fn make(file: &str, gaussians: &str, layers: &str) -> Result<Vec<u8>, String> {
     let input = CompressionInput {
         profile: Profile::Compact,
         planes: None,
-        sh: ShCoding::Channels { step: 0.001 },
+        sh: ShCoding::Channels { step: 0.0001 },
         // Finer than by default: a reader allows a time that depends on the bytes, so each Gaussian has to have some.
-        attributes: AttributeSteps::default().with("log_scales", 0.005).with("quats", 0.001).with("sh_dc", 0.0025),
+        attributes: AttributeSteps::default().with("log_scales", 0.0005).with("quats", 0.0001).with("sh_dc", 0.00025),
         weights: WeightPrecisions::default(),
         layers: GaussianLayers::new(number(layers)?),
     };

@@ -14,14 +14,23 @@ pub struct Arrival {
 }
 
 impl Arrival {
-    /// Takes the next bytes. Where they complete something that can be seen, it is decoded and returned: the scene with the
-    /// Gaussians that have come, enlarged to stand for those that have not.
+    /// Takes the next bytes, or none. Decodes one more layer, if there is one, and returns the scene with the Gaussians so far,
+    /// enlarged to stand for those that have not come: what can be seen is shown before the next layer is decoded.
     ///
     /// # Errors
     /// As [`StreamDecoder::push`] and [`StreamDecoder::decode`].
     pub fn push(&mut self, bytes: &[u8]) -> Result<Option<OpenScene>, CodecError> {
+        self.advance(bytes, self.shown + 1)
+    }
+
+    /// As [`Arrival::push`], with all layers that have come.
+    pub(crate) fn push_all(&mut self, bytes: &[u8]) -> Result<Option<OpenScene>, CodecError> {
+        self.advance(bytes, usize::MAX)
+    }
+
+    fn advance(&mut self, bytes: &[u8], layers: usize) -> Result<Option<OpenScene>, CodecError> {
         self.decoder.push(bytes)?;
-        let shown = self.decoder.decode()?;
+        let shown = self.decoder.decode_until(layers)?;
         let Some(scene) = self.decoder.scene().filter(|_| shown > self.shown) else { return Ok(None) };
         self.shown = shown;
         let sections = self.decoder.sections().unwrap_or_default();
@@ -89,7 +98,9 @@ mod tests {
     #[test]
     fn the_last_scene_is_that_of_the_whole() {
         let (bytes, mut arrival) = (layered(), Arrival::default());
-        let last = bytes.chunks(7000).filter_map(|piece| arrival.push(piece).expect("sound")).last().expect("a scene");
+        // More layers come at once than are shown at once.
+        let pieces = bytes.chunks(70_000).chain([&[][..]; 4]);
+        let last = pieces.filter_map(|piece| arrival.push(piece).expect("sound")).last().expect("a scene");
         let whole = OpenScene::decode(&bytes).expect("a scene");
         assert_eq!(last.description(), whole.description());
         assert_eq!(last.attributes_at(0.4), whole.attributes_at(0.4));

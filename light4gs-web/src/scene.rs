@@ -61,7 +61,7 @@ impl OpenScene {
     /// As [`light4gs_codec::decode`].
     pub fn decode(bytes: &[u8]) -> Result<Self, CodecError> {
         let mut arrival = Arrival::default();
-        let scene = arrival.push(bytes)?;
+        let scene = arrival.push_all(bytes)?;
         // Here a file that is cut short is refused.
         arrival.finish()?;
         scene.ok_or(CodecError::MissingSection { section: "gaussians" })

@@ -18,7 +18,7 @@ export async function serve(files) {
     const name = decodeURIComponent(new URL(request.url, "http://localhost").pathname.slice(1));
     const content = files[name];
     if (content === undefined) return response.writeHead(404).end("not found");
-    if (typeof content === "function") return content(response);
+    if (typeof content === "function") return content(response, request);
     response.writeHead(200, { "content-type": TYPES[name.split(".").pop()] ?? "text/html", "content-length": Buffer.byteLength(content) });
     response.end(content);
   });

@@ -102,7 +102,16 @@ impl StreamDecoder {
     /// # Errors
     /// As [`crate::decode`]; a decoder that has failed.
     pub fn decode(&mut self) -> Result<usize, CodecError> {
-        self.unless_failed(Self::decode_complete)?;
+        self.decode_until(usize::MAX)
+    }
+
+    /// As [`StreamDecoder::decode`], but stops when `layers` are decoded, for a program that wants to show them before it goes
+    /// on.
+    ///
+    /// # Errors
+    /// As [`StreamDecoder::decode`].
+    pub fn decode_until(&mut self, layers: usize) -> Result<usize, CodecError> {
+        self.unless_failed(|decoder| decoder.decode_complete(layers))?;
         Ok(self.decoded)
     }
 
@@ -214,8 +223,8 @@ impl StreamDecoder {
         Ok(())
     }
 
-    fn decode_complete(&mut self) -> Result<(), CodecError> {
-        while let Some(header) = &self.header {
+    fn decode_complete(&mut self, layers: usize) -> Result<(), CodecError> {
+        while let Some(header) = self.header.as_ref().filter(|_| self.decoded < layers) {
             let there = self.received() == header.prelude.file_bytes;
             let shared = self.scene.is_some();
             let needed = if shared { header.layer_bytes(self.decoded) } else { header.shared_bytes() };

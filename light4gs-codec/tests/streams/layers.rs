@@ -123,6 +123,19 @@ fn each_layer_is_that_of_the_whole() {
 }
 
 #[test]
+fn layers_may_be_decoded_one_at_a_time() {
+    for bytes in streams() {
+        let mut decoder = StreamDecoder::new();
+        decoder.push(&bytes).unwrap();
+        for layer in 0..=decoder.layers().unwrap() {
+            assert_eq!(decoder.decode_until(layer).unwrap(), layer);
+            assert_eq!(decoder.scene().is_some(), layer > 0);
+        }
+        assert_eq!(decoder.finish().unwrap(), decode(&bytes).unwrap());
+    }
+}
+
+#[test]
 fn a_given_significance_says_what_comes_first() {
     let (scene, input) = tiny(Profile::Compact);
     let significance = (0..6).map(|index| if index == 4 { 1.0 } else { 0.0 }).collect();

@@ -7,7 +7,9 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use light4gs_codec::attributes::AttributeInfo;
 use light4gs_codec::plane_layout::PlaneShape;
-use light4gs_codec::{Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
+use light4gs_codec::{
+    LayerInfo, Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits,
+};
 use light4gs_data::{Scene, write_atomically};
 use light4gs_model::DeformationField;
 use light4gs_model::attributes::BUILT_IN;
@@ -52,6 +54,10 @@ pub(super) struct Encode {
     /// The decoded file has at least this PSNR on the test views, dB, and is hardly larger than that takes.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
+    /// Layers of Gaussians, the most significant ones first: with more than 1, such as 4, a player shows a coarse scene after the
+    /// first few bytes.
+    #[arg(long, value_name = "NUMBER")]
+    layers: Option<usize>,
     /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
     #[arg(long)]
     device: Option<DeviceName>,
@@ -87,6 +93,7 @@ impl Encode {
             overrides.push(format!("compression.target_bytes={bytes}"));
             overrides.push(format!("compression.target_db={quality:?}"));
         }
+        overrides.extend(self.layers.map(|count| format!("compression.layers={count}")));
         overrides.extend(self.overrides);
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &overrides)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
@@ -187,6 +194,9 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
             "name": name, "frames": frame_count, "fps": fps, "bounds": bounds, "background": background,
             "config_digest": digest, "width": width, "height": height, "fov_x": fov_x,
             "gaussians": info.gaussian_count, "sh_degree": info.sh_degree,
+            "layers": info.layers.iter().map(|layer| json!({"gaussians": layer.gaussians, "bytes_to_show": layer.bytes_to_show}))
+                .collect::<Vec<_>>(),
+            "bytes_to_first_image": info.bytes_to_first_image(),
             "attributes": info.attributes.iter().map(|a| json!({"name": a.name, "width": a.width, "coder": a.coder.name(),
                 "optional": a.optional, "bytes": a.bytes})).collect::<Vec<_>>(),
             "feature_planes": {"channels": info.plane_channels, "planes": info.planes.planes().iter().map(|plane| {
@@ -203,6 +213,10 @@ fn print_info(info: &StreamInfo, json: bool) -> Result<(), TrainError> {
     let rate = if *fps > 0.0 { format!(" at {fps} frames a second") } else { String::new() };
     say(format_args!("{name}: version {}, {width}×{height}, {frame_count} times{rate}", info.version))?;
     say(format_args!("{} Gaussians, spherical harmonics of degree {}", info.gaussian_count, info.sh_degree))?;
+    for (number, LayerInfo { gaussians, bytes_to_show }) in (1..).zip(&info.layers).filter(|_| info.layers.len() > 1) {
+        let image = if number == 1 { ", the first image" } else { "" };
+        say(format_args!("layer {number}: {gaussians} Gaussians, shown after {bytes_to_show} bytes{image}"))?;
+    }
     let built_in = |name: &str| BUILT_IN.iter().any(|attribute| attribute.name == name);
     for AttributeInfo { name, width, coder, optional, bytes } in info.attributes.iter().filter(|a| !built_in(&a.name)) {
         let optional = if *optional { ", optional" } else { "" };

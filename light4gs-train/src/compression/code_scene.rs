@@ -12,8 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{
     BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, MissedQuality,
-    SearchImages,
-    ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search,
+    SearchImages, ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
@@ -161,9 +160,7 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
             let error = mean_squared_error(&render(&data), &views, images)?;
             Some(SearchImages { render: &render, error, psnr: &psnr })
         }
-        (true, None) => {
-            Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0), psnr: &psnr })
-        }
+        (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0), psnr: &psnr }),
     };
     let (compression, fit_seconds, settings) = match (trained.compression, &images) {
         (Some(compression), _) => (compression.clone(), None, settings.clone()),

@@ -4,8 +4,8 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{
-    CodecError, CompressionInput, CompressionReport, Encoded, GaussianArrays, PlaneCoding, Profile, SceneData, SceneMeta,
-    ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
+    CodecError, CompressionInput, CompressionReport, Encoded, GaussianArrays, GaussianLayers, PlaneCoding, Profile,
+    SceneData, SceneMeta, ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
 };
 use light4gs_model::attributes::SH_REST;
 use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, counted_sh_coding};
@@ -225,6 +225,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
             context_model: WeightPrecision::Bits(config.weights.context_bits),
             sh: WeightPrecision::Bits(config.weights.context_bits),
         },
+        layers: GaussianLayers::new(config.layers as u32),
     })
 }
 

@@ -164,7 +164,7 @@ fn scaled(data: &SceneData, given: &CompressionInput, factor: f32) -> Result<Sca
 #[cfg(test)]
 mod tests {
     use light4gs_codec::attributes::AttributeSteps;
-    use light4gs_codec::{Profile, WeightPrecisions};
+    use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
 
     use super::*;
     use crate::compression::attribute_step_search::tests::scene;
@@ -176,6 +176,7 @@ mod tests {
             sh: ShCoding::Channels { step: 0.02 },
             attributes: AttributeSteps::default(),
             weights: WeightPrecisions::default(),
+            layers: GaussianLayers::default(),
         }
     }
 

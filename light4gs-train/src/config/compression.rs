@@ -2,7 +2,7 @@
 
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
-use light4gs_codec::{Profile, WeightPrecisions};
+use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
 use light4gs_model::{AdaptiveQuantizationConfig, ContextPart, ShKind};
 
 use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
@@ -23,6 +23,11 @@ keys! {
         /// The decoded file has at least this PSNR on the test views (on those of training where there are none), and is hardly
         /// better: as with `target_bytes`, weight and steps follow. 0: no such wish.
         target_db: f64 = 0.0; DECIBELS, "ours", "0 = what lambda gives";
+        /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
+        /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
+        /// bytes; the profile `float32` has only one.
+        layers: usize = GaussianLayers::default().count as usize;
+            Whole { least: 1, most: GaussianLayers::MOST as u64 }, "ours", "more = a coarse scene comes first, for slow connections";
         /// The rate in the loss.
         rate: RateConfig;
         /// The context model of the feature planes (MHCM).

@@ -149,8 +149,8 @@ impl Config {
     /// Whether training is the same with both, so that they differ at most in how the result is written.
     pub fn trains_like(&self, other: &Self) -> bool {
         let mut like = self.clone();
-        let CompressionConfig { profile, attributes, .. } = other.compression.clone();
-        like.compression = CompressionConfig { profile, attributes, ..like.compression };
+        let CompressionConfig { profile, attributes, layers, .. } = other.compression.clone();
+        like.compression = CompressionConfig { profile, attributes, layers, ..like.compression };
         like == *other
     }
 

@@ -130,6 +130,10 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.that("compression.target_db", !wishes.iter().all(|(_, wished)| *wished), || {
         "is set beside compression.target_bytes; a file follows one of both, set the other to 0".to_owned()
     });
+    let float32 = compression.profile == FileProfile::Float32;
+    check.that("compression.layers", compression.layers == 1 || !float32, || {
+        format!("is {}, but the profile \"float32\" has one layer; set compression.profile=compact", compression.layers)
+    });
     check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
     check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
     check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));

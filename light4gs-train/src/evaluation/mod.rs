@@ -210,9 +210,15 @@ impl<F: DeformationField> DecodedScene<F> {
 
 /// Sections of a file with the header in front; their sizes add up to that of the file.
 pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
-    let header = SectionSize { name: "header".into(), bytes: info.header_bytes };
-    let sections = info.sections.iter().map(|s| SectionSize { name: s.name.to_owned(), bytes: s.bytes });
-    std::iter::once(header).chain(sections).collect()
+    let mut sizes = vec![SectionSize { name: "header".into(), bytes: info.header_bytes }];
+    for section in &info.sections {
+        // Layers of Gaussians have a section each.
+        match sizes.iter_mut().find(|size| size.name == section.name) {
+            Some(size) => size.bytes += section.bytes,
+            None => sizes.push(SectionSize { name: section.name.to_owned(), bytes: section.bytes }),
+        }
+    }
+    sizes
 }
 
 impl Evaluation {

@@ -119,7 +119,9 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     const { signal } = this.#abort;
     /** The scene, once there is something to see of it. @type {Scene | null} */
     let scene = null;
-    const report = (/** @type {number} */ share) => {
+    let share = 0;
+    const report = (/** @type {number} */ now) => {
+      share = now;
       if (scene ? scene !== this.player?.scene : loading !== this.#loading) return;
       if (scene) this.#say(Number.isNaN(share) ? "Loading …" : `Loading ${Math.round(100 * share)} %`);
       else this.layers.progress("Loading", share);
@@ -139,6 +141,8 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       }
       await this.open(loaded, { cameras: known });
       scene = loaded;
+      // All may be there already, and not be decoded yet.
+      report(share);
       await loaded.whole;
       if (loaded !== this.player?.scene) return true;
       this.#say("");

@@ -71,6 +71,9 @@ function decoderModule() {
   return module;
 }
 
+/** Milliseconds that the decoder leaves for the first image before it goes on. */
+const FIRST_IMAGE = 200;
+
 /** @typedef {ArrayBuffer | Uint8Array | ReadableStream<Uint8Array> | AsyncIterable<Uint8Array>} Source  a file, whole or as it comes */
 
 /** The pieces of a stream; browsers differ in whether it can be walked over. @param {ReadableStream<Uint8Array>} stream */
@@ -205,8 +208,12 @@ export class Scene extends EventTarget {
           if (!info) continue;
           const first = !this.info;
           this.info = info;
-          if (first) show();
-          else this.dispatchEvent(new Event("change"));
+          if (first) {
+            show();
+            await new Promise((resolve) => setTimeout(resolve, FIRST_IMAGE));
+          } else this.dispatchEvent(new Event("change"));
+          // One layer is decoded at a time: the next one may be there already.
+          if (waiting.length === 0 && info.layersShown < info.layers) waiting.push(new Uint8Array());
         }
       } catch (error) {
         failure = error;
