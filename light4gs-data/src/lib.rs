@@ -35,7 +35,9 @@ pub use atomic::{is_temporary_name, sweep_leftovers, write_atomically};
 pub use camera::{Camera, Intrinsics, PoseError};
 pub use digest::DatasetDigest;
 pub use error::DataError;
-pub use exchange::{GlbOptions, Influence, Joint, JointPose, MotionSample, Skin, glb_bytes, write_four_dgs, write_glb};
+pub use exchange::{
+    GlbOptions, Influence, Joint, JointPose, MotionSample, Skin, glb_bytes, write_four_dgs, write_glb, write_ply_zip,
+};
 pub use frame::{Frame, Mask, MaskMeaning};
 pub use images::{
     ImageStore, PixelMask, Region, RgbImage8, RgbImage32, composite, composite_resized, image_size, regions,

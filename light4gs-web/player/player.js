@@ -28,6 +28,8 @@ import { SplatRenderer } from "./drawing/splat_renderer.js";
 const STILL = 150;
 /** Milliseconds between two looks at the graphics card. */
 const WATCH = 3;
+/** How much more than the image a draft's list covers. */
+const SPARE_SPREAD = 1.25;
 /** A viewpoint that has everything before it. */
 const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
 
@@ -60,11 +62,15 @@ export class Player extends EventTarget {
   #playing = false;
   #shownTime = -1;
   #shownFrom = "";
-  #draft = new Draft();
+  /** The level of detail of the list that the renderer has. */
+  #shownLevel = 0;
+  /** @type {Draft} */
+  #draft;
   #wasDraft = false;
   /** Pixels of the image in full. */
   #size = { width: 1, height: 1 };
-  #lastDraw = 0;
+  /** When something was last to be seen otherwise. */
+  #lastChange = -Infinity;
   /** The image that the graphics card is at. @type {{ fence: WebGLSync | null, since: number, moving: boolean } | null} */
   #drawing = null;
   /** @type {number[]} */
@@ -91,6 +97,7 @@ export class Player extends EventTarget {
     /** Red, green, blue in [0, 1]. @type {number[]} */
     this.background = [...scene.info.background];
     this.renderer = new SplatRenderer(canvas);
+    this.#draft = new Draft(scene.info.levels);
     this.camera = new Camera();
     this.home = this.camera.clone();
     this.camera.lens = sourceLens(scene.info);
@@ -136,7 +143,7 @@ export class Player extends EventTarget {
     if (this.#disposed) return;
     this.#draw(1);
     this.#observers = [
-      new ResizeObserver(() => (this.#dirty = true)),
+      new ResizeObserver(() => this.#change()),
       // A player that was scrolled away costs nothing.
       new IntersectionObserver((entries) => (this.#visible = entries[entries.length - 1].isIntersecting)),
     ];
@@ -167,6 +174,7 @@ export class Player extends EventTarget {
 
   set time(value) {
     this.#time = Math.min(1, Math.max(0, Number(value) || 0));
+    if (this.scene.info.moves) this.#lastChange = performance.now();
     this.dispatchEvent(new Event("timechange"));
   }
 
@@ -220,8 +228,14 @@ export class Player extends EventTarget {
 
   /** To be called after the camera was changed from outside. */
   cameraMoved() {
-    this.#dirty = true;
+    this.#change();
     this.dispatchEvent(new Event("camerachange"));
+  }
+
+  /** What is on the canvas is not what is to be seen. */
+  #change() {
+    this.#dirty = true;
+    this.#lastChange = performance.now();
   }
 
   /** The training cameras in the order of their times: the path that {@link following} takes. */
@@ -254,18 +268,30 @@ export class Player extends EventTarget {
    */
   #render(now) {
     if (this.#disposed || this.#isDrawing(now)) return;
-    const moving = this.#dirty;
-    if (moving) {
-      this.#lastDraw = now;
-      this.#measure();
-      this.#draw(this.#draft.scale);
-      // The worker makes the next list while this one is drawn.
-      if (this.#playing) this.#update();
-    } else if (this.#wasDraft && now - this.#lastDraw > STILL) {
-      this.#draw(1);
-    } else return;
-    this.#drawing = { fence: this.renderer.fence(), since: now, moving };
+    const full = this.#isStill(now) && this.#shownLevel === 0 && this.#isShown();
+    if (!this.#dirty && !(this.#wasDraft && full)) return;
+    this.#measure();
+    this.#draw(full ? 1 : this.#draft.scale);
+    // The worker makes the next list while this one is drawn.
+    if (this.#playing) this.#update();
+    // Right after a rest the list has more Gaussians than those that follow.
+    this.#drawing = { fence: this.renderer.fence(), since: now, moving: !full && this.#shownLevel === this.#draft.level };
     this.#watch();
+  }
+
+  /** Whether nothing has moved for a while. @param {number} now */
+  #isStill(now) {
+    return !(this.#playing && this.scene.info.moves) && now - this.#lastChange > STILL;
+  }
+
+  /** Whether the list is that of the time and the viewpoint that are to be seen. */
+  #isShown() {
+    return this.#moment === this.#shownTime && this.#viewpointKey() === this.#shownFrom;
+  }
+
+  /** The time, where it makes a difference. */
+  get #moment() {
+    return this.scene.info.moves ? this.#time : 0;
   }
 
   /** Looks after the graphics card between animation frames: an image need not wait for the next one. */
@@ -287,14 +313,16 @@ export class Player extends EventTarget {
   /** Has the worker make what is to be seen now, if that is not what it made last. */
   #update() {
     if (this.#busy || this.#undrawn) return;
-    if (this.#time !== this.#shownTime || this.#viewpointKey() !== this.#shownFrom) this.#show().catch(this.#fail);
+    const still = this.#isStill(performance.now());
+    if (this.#isShown() && !(still && this.#shownLevel > 0)) return;
+    this.#show(still ? 0 : this.#draft.level).catch(this.#fail);
   }
 
   /** Whether the graphics card is still at the last image. @param {number} now */
   #isDrawing(now) {
     if (!this.#drawing) return false;
     if (!this.renderer.isDone(this.#drawing.fence)) return true;
-    if (this.#drawing.moving) this.#draft.measure(now - this.#drawing.since, now);
+    if (this.#drawing.moving) this.#draft.measureDrawing(now - this.#drawing.since, now);
     this.#drawing = null;
     return false;
   }
@@ -320,7 +348,7 @@ export class Player extends EventTarget {
     if (nearest === this.#followed) return;
     this.#followed = nearest;
     this.#take(nearest);
-    this.#dirty = true;
+    this.#change();
   }
 
   /** @type {DatasetCamera | null} */
@@ -333,19 +361,30 @@ export class Player extends EventTarget {
     return { row: [...forward, -(forward[0] * position[0] + forward[1] * position[1] + forward[2] * position[2])], eye: position };
   }
 
+  /** The tangent of the angle between the view axis and a corner of the image, and some more for turning until the next list. */
+  #spread() {
+    const { fx, fy, cx, cy, width, height } = this.view;
+    return SPARE_SPREAD * Math.hypot(Math.max(cx, width - cx) / fx, Math.max(cy, height - cy) / fy);
+  }
+
   #viewpointKey() {
     return this.#viewpoint().row.join() + this.camera.position.join();
   }
 
-  /** Has the worker make the list for what is to be seen now, and gives it to the renderer. */
-  async #show() {
+  /**
+   * Has the worker make the list for what is to be seen now, and gives it to the renderer.
+   * @param {number} [level]  of detail
+   */
+  async #show(level = 0) {
     this.#busy = true;
     try {
-      const time = this.#time;
+      const time = this.#moment;
       const key = this.#viewpointKey();
       const memory = this.#spare;
+      // A draft may leave out what is not seen: the image at rest has a list of its own.
+      const viewpoint = level > 0 ? { ...this.#viewpoint(), spread: this.#spread() } : this.#viewpoint();
       this.#spare = null;
-      const { list, evaluateMs, sortMs } = await this.scene.frame(time, this.#viewpoint(), memory);
+      const { list, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level);
       if (this.#disposed) return;
       const start = performance.now();
       this.renderer.setList(list);
@@ -353,8 +392,10 @@ export class Player extends EventTarget {
       this.timings.upload = performance.now() - start;
       this.timings.sort = sortMs;
       if (evaluateMs > 0) this.timings.evaluate = evaluateMs;
+      if (level === this.#draft.level && !this.#isStill(start)) this.#draft.measureWorker(evaluateMs + sortMs, start);
       this.#shownTime = time;
       this.#shownFrom = key;
+      this.#shownLevel = level;
       this.#dirty = this.#undrawn = true;
     } finally {
       this.#busy = false;
@@ -379,6 +420,14 @@ export class Player extends EventTarget {
     return this.#draft.scale;
   }
 
+  /**
+   * The level of detail that is drawn while something moves, of {@link Scene.info}'s `levels`: 0 where there is time for all
+   * Gaussians, and half as many with each further one.
+   */
+  get draftLevel() {
+    return this.#draft.level;
+  }
+
   /** Images a second over the last second; 0 where nothing changes. */
   get fps() {
     const times = this.#frameTimes;
@@ -388,7 +437,7 @@ export class Player extends EventTarget {
 
   /** Draws again, as after {@link background} was changed. */
   redraw() {
-    this.#dirty = true;
+    this.#change();
   }
 
   /**

@@ -114,6 +114,19 @@ pub extern "C" fn digest() -> u64 {
     light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
 }
 
+/// Chooses the level of detail that [`evaluate`] and [`draw_list`] are about: 0 is the scene itself. Returns 1 if nothing of it
+/// is evaluated yet, else 0.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn show_level(level: u32) -> u32 {
+    state().scene.as_mut().map_or(0, |scene| u32::from(scene.show_level(level)))
+}
+
+/// How many Gaussians the level of [`show_level`] has.
+#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+pub extern "C" fn count() -> usize {
+    state().scene.as_ref().map_or(0, OpenScene::count)
+}
+
 /// Computes the Gaussians `first` to `last` at a time in [0, 1].
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
@@ -124,7 +137,7 @@ pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
 
 /// What is drawn, back to front: 16 numbers each, center, opacity, covariance xx, xy, xz, yy, yz, zz, color, and three zeros;
 /// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera
-/// stands at the eye. [`list_length`] says how many numbers.
+/// stands at the eye and sees the cone with this tangent, or all in front of it. [`list_length`] says how many numbers.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn draw_list(
     row_x: f32,
@@ -134,8 +147,9 @@ pub extern "C" fn draw_list(
     eye_x: f32,
     eye_y: f32,
     eye_z: f32,
+    spread: f32,
 ) -> *const f32 {
-    let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z] };
+    let viewpoint = Viewpoint { row: [row_x, row_y, row_z, row_w], eye: [eye_x, eye_y, eye_z], spread };
     let state = &mut *state();
     let list = state.scene.as_mut().map_or(&[][..], |scene| scene.draw_list(&viewpoint));
     state.list_length = list.len();

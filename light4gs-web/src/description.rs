@@ -29,8 +29,8 @@ impl Facts<'_> {
     }
 }
 
-/// The description of a scene: `{"name": ..., "sections": [...]}`.
-pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>) -> String {
+/// The description of a scene with so many levels of detail: `{"name": ..., "sections": [...]}`.
+pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>, levels: u32) -> String {
     let SceneMeta { name, frame_count, fps, bounds, background, width, height, fov_x, extra, .. } = &scene.meta;
     let sizes = facts.sizes();
     let sections = sizes.iter().map(|(name, bytes)| format!("[{},{bytes}]", text(name)));
@@ -38,7 +38,7 @@ pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>) -> String {
     format!(
         "{{\"name\":{},\"frameCount\":{frame_count},\"fps\":{fps},\"bounds\":[{},{}],\"background\":{},\"width\":{width},\
          \"height\":{height},\"fovX\":{fov_x},\"version\":{VERSION},\"bytes\":{},\"count\":{},\"shDegree\":{},\"moves\":{},\
-         \"layers\":{},\"layersShown\":{},\"sections\":{},\"extra\":{{{}}}}}",
+         \"layers\":{},\"layersShown\":{},\"levels\":{levels},\"sections\":{},\"extra\":{{{}}}}}",
         text(name),
         list(bounds[0]),
         list(bounds[1]),

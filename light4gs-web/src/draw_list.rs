@@ -20,6 +20,28 @@ pub struct Viewpoint {
     pub row: [f32; 4],
     /// The camera's center, world units.
     pub eye: [f32; 3],
+    /// Gaussians that do not reach into the cone around the view axis are left out: the tangent of its angle to the axis, or
+    /// infinity for all in front of the camera.
+    pub spread: f32,
+}
+
+/// Standard deviations at which the alpha of an opaque Gaussian falls below [`MIN_ALPHA`]: `√(2 ln 255)`, rounded up.
+const REACH: f32 = 3.33;
+
+impl Viewpoint {
+    fn depth(&self, [x, y, z]: [f32; 3]) -> f32 {
+        x * self.row[0] + y * self.row[1] + z * self.row[2] + self.row[3]
+    }
+
+    /// Whether a Gaussian at a depth may reach into the cone.
+    fn sees(&self, gaussian: &[f32], depth: f32) -> bool {
+        let offset: [f32; 3] = std::array::from_fn(|axis| gaussian[axis] - self.eye[axis]);
+        let from_axis = (offset.iter().map(|x| x * x).sum::<f32>() - depth * depth).max(0.0).sqrt();
+        // The trace of the covariance is no less than the largest variance.
+        let radius = REACH * (gaussian[4] + gaussian[7] + gaussian[9]).sqrt();
+        // At the border of the cone a sphere touches it where it is a little farther from the axis.
+        from_axis <= self.spread * depth + radius * (1.0 + self.spread * self.spread).sqrt()
+    }
 }
 
 /// A list, and memory that is used again for the next one.
@@ -31,14 +53,15 @@ pub(crate) struct DrawList {
 }
 
 impl DrawList {
-    /// The Gaussians in front of the camera, farthest first, of equal ones the later first. `packed` has [`FLOATS`] numbers
+    /// The Gaussians that a viewpoint sees, farthest first, of equal ones the later first. `packed` has [`FLOATS`] numbers
     /// for each Gaussian.
     pub(crate) fn make(&mut self, packed: &[f32], gaussians: &GaussianArrays, viewpoint: &Viewpoint) -> &[f32] {
-        let Viewpoint { row, eye } = viewpoint;
+        let eye = viewpoint.eye;
+        let all = viewpoint.spread == f32::INFINITY;
         self.keys.clear();
         for (index, gaussian) in packed.chunks_exact(FLOATS).enumerate() {
-            let depth = gaussian[0] * row[0] + gaussian[1] * row[1] + gaussian[2] * row[2] + row[3];
-            if depth > NEAR && gaussian[3] >= MIN_ALPHA {
+            let depth = viewpoint.depth([gaussian[0], gaussian[1], gaussian[2]]);
+            if depth > NEAR && gaussian[3] >= MIN_ALPHA && (all || viewpoint.sees(gaussian, depth)) {
                 // Depths are positive, so their bits sort as they do.
                 self.keys.push((depth.to_bits(), index as u32));
             }
@@ -133,7 +156,7 @@ mod tests {
     }
 
     fn order(list: &mut DrawList, scene: &(Vec<f32>, GaussianArrays), z: f32) -> Vec<usize> {
-        let viewpoint = Viewpoint { row: [0.0, 0.0, z, 0.0], eye: [0.0; 3] };
+        let viewpoint = Viewpoint { row: [0.0, 0.0, z, 0.0], eye: [0.0; 3], spread: f32::INFINITY };
         let entries = list.make(&scene.0, &scene.1, &viewpoint);
         assert!(entries.len().is_multiple_of(ENTRY * ROW));
         let drawn = entries.chunks_exact(ENTRY).filter(|entry| entry[3] > 0.0);
@@ -162,6 +185,19 @@ mod tests {
         let mut expected: Vec<usize> = (0..5000).collect();
         expected.sort_by(|&a, &b| depths[b].total_cmp(&depths[a]).then(b.cmp(&a)));
         assert_eq!(order(&mut DrawList::default(), &along_z(&depths), 1.0), expected);
+    }
+
+    #[test]
+    fn what_does_not_reach_into_the_cone_is_left_out() {
+        let viewpoint = Viewpoint { row: [0.0, 0.0, 1.0, -1.0], eye: [0.0, 0.0, 1.0], spread: 0.5 };
+        // At a depth of 4 the cone ends 2 from the axis.
+        let sees = |x: f32, variance: f32| {
+            let gaussian = [x, 0.0, 5.0, 1.0, variance, 0.0, 0.0, 0.0, 0.0, 0.0];
+            viewpoint.sees(&gaussian, viewpoint.depth([x, 0.0, 5.0]))
+        };
+        assert!(sees(0.0, 0.0) && sees(1.99, 0.0) && !sees(-2.01, 0.0));
+        // Three standard deviations across, where the way to the border is 0.5 · cos of the cone's angle.
+        assert!(sees(2.5, 0.04) && !sees(2.8, 0.04) && sees(-2.8, 1.0));
     }
 
     #[test]

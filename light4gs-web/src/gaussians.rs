@@ -59,8 +59,15 @@ impl Unchanged {
     }
 }
 
-/// Packs a range of Gaussians, [`FLOATS`] numbers each. Gaussians that cannot be drawn get opacity 0.
-pub(crate) fn pack(gaussians: &GaussianArrays, unchanged: &Unchanged, range: Range<usize>, packed: &mut [f32]) {
+/// Packs a range of Gaussians, [`FLOATS`] numbers each. Their areas are multiplied by `growth`, where it is not empty.
+/// Gaussians that cannot be drawn get opacity 0.
+pub(crate) fn pack(
+    gaussians: &GaussianArrays,
+    unchanged: &Unchanged,
+    growth: &[f32],
+    range: Range<usize>,
+    packed: &mut [f32],
+) {
     for (gaussian, packed) in range.clone().zip(packed[FLOATS * range.start..].chunks_exact_mut(FLOATS)) {
         let known = unchanged.scales.get(gaussian).copied();
         let scales = known.unwrap_or_else(|| scales(gaussians.log_scales[gaussian]));
@@ -70,6 +77,9 @@ pub(crate) fn pack(gaussians: &GaussianArrays, unchanged: &Unchanged, range: Ran
         packed[4..].fill(0.0);
         if let Some(rotation) = rotation(gaussians.quats[gaussian]) {
             packed[4..].copy_from_slice(&covariance(rotation, scales));
+        }
+        if let Some(&growth) = growth.get(gaussian) {
+            packed[4..].iter_mut().for_each(|value| *value *= growth);
         }
         if !packed[4..].iter().any(|value| *value != 0.0) || packed.iter().any(|value| !value.is_finite()) {
             packed.fill(0.0);
@@ -93,9 +103,9 @@ mod tests {
             further: Vec::new(),
         };
         let mut packed = vec![-1.0; FLOATS];
-        pack(&gaussians, &Unchanged::default(), 0..1, &mut packed);
+        pack(&gaussians, &Unchanged::default(), &[], 0..1, &mut packed);
         let mut again = vec![-1.0; FLOATS];
-        pack(&gaussians, &Unchanged::of(&gaussians, |_| false), 0..1, &mut again);
+        pack(&gaussians, &Unchanged::of(&gaussians, |_| false), &[], 0..1, &mut again);
         assert_eq!(packed, again);
         packed
     }

@@ -8,6 +8,7 @@
 //! |---|---|
 //! | `arrival.rs` | a file that is shown while it comes |
 //! | `scene.rs` | a decoded scene, of which one time after the other is computed |
+//! | `levels.rs` | levels of detail: fewer, larger Gaussians in place of those of a scene |
 //! | `gaussians.rs` | activations, and the values for the vertex shader |
 //! | `draw_list.rs` | the list for drawing, back to front, with colors |
 //! | `description.rs` | the contents of a file for the player's panel, as JSON |
@@ -21,6 +22,7 @@ mod description;
 mod digest;
 mod draw_list;
 mod gaussians;
+mod levels;
 #[cfg(not(target_arch = "wasm32"))]
 pub mod page;
 mod scene;

@@ -10,6 +10,7 @@ use std::path::Path;
 
 /// Coefficients above degree 0 for each channel, for SH degree 3.
 const REST: usize = 15;
+const ENCODING: Encoding = Encoding::BinaryLittleEndian;
 
 /// Static Gaussians as plain arrays; every list has the same length `N`.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -84,6 +85,21 @@ impl GaussianPly {
     /// [`DataError::Io`] when it cannot be written; [`DataError::Ply`] when the lists differ in length, or the name of
     /// a further property is one of the layout, occurs twice, or has spaces or control characters.
     pub fn write(&self, path: &Path) -> Result<(), DataError> {
+        let properties = self.properties(path)?;
+        table::write(path, ENCODING, &properties, self.len(), |i, row| self.fill(i, row))
+    }
+
+    /// The bytes that [`GaussianPly::write`] writes; `path` is that of the file they go into, for errors.
+    pub(crate) fn bytes(&self, path: &Path) -> Result<Vec<u8>, DataError> {
+        let properties = self.properties(path)?;
+        let mut bytes = Vec::new();
+        let written = table::write_to(&mut bytes, ENCODING, &properties, self.len(), |i, row| self.fill(i, row));
+        written.map_err(DataError::io("write", path))?;
+        Ok(bytes)
+    }
+
+    /// The properties of the layout and the further ones.
+    fn properties(&self, path: &Path) -> Result<Vec<Property>, DataError> {
         let lengths =
             [self.sh_dc.len(), self.sh_rest.len(), self.opacity_logits.len(), self.log_scales.len(), self.quats.len()];
         let mut names = names();
@@ -102,19 +118,21 @@ impl GaussianPly {
                 "pass lists of one length",
             ));
         }
-        let properties: Vec<Property> = names.into_iter().map(|name| Property::new(name, Scalar::F32)).collect();
-        table::write(path, Encoding::BinaryLittleEndian, &properties, self.len(), |i, row| {
-            row.extend(self.means[i]);
-            row.extend([0.0; 3]);
-            row.extend(self.sh_dc[i]);
-            for channel in 0..3 {
-                row.extend(self.sh_rest[i].iter().map(|coefficient| coefficient[channel]));
-            }
-            row.push(self.opacity_logits[i]);
-            row.extend(self.log_scales[i]);
-            row.extend(self.quats[i]);
-            row.extend(self.further.iter().map(|(_, values)| values[i]));
-        })
+        Ok(names.into_iter().map(|name| Property::new(name, Scalar::F32)).collect())
+    }
+
+    /// The values of one Gaussian, in the order of the properties.
+    fn fill(&self, i: usize, row: &mut Vec<f32>) {
+        row.extend(self.means[i]);
+        row.extend([0.0; 3]);
+        row.extend(self.sh_dc[i]);
+        for channel in 0..3 {
+            row.extend(self.sh_rest[i].iter().map(|coefficient| coefficient[channel]));
+        }
+        row.push(self.opacity_logits[i]);
+        row.extend(self.log_scales[i]);
+        row.extend(self.quats[i]);
+        row.extend(self.further.iter().map(|(_, values)| values[i]));
     }
 
     fn first_non_finite(&self) -> Option<usize> {

@@ -159,46 +159,55 @@ pub fn write(
     encoding: Encoding,
     properties: &[Property],
     rows: usize,
-    mut fill: impl FnMut(usize, &mut Vec<f32>),
+    fill: impl FnMut(usize, &mut Vec<f32>),
 ) -> Result<(), DataError> {
-    write_atomically(path, |out| {
-        let format = match encoding {
-            Encoding::Ascii => "ascii",
-            Encoding::BinaryLittleEndian => "binary_little_endian",
-        };
-        write!(out, "ply\nformat {format} 1.0\nelement vertex {rows}\n")?;
-        for property in properties {
-            writeln!(out, "property {} {}", property.scalar.name(), property.name)?;
+    write_atomically(path, |out| write_to(out, encoding, properties, rows, fill))
+}
+
+/// As [`write`](fn@write), to a writer.
+pub(crate) fn write_to(
+    out: &mut impl Write,
+    encoding: Encoding,
+    properties: &[Property],
+    rows: usize,
+    mut fill: impl FnMut(usize, &mut Vec<f32>),
+) -> io::Result<()> {
+    let format = match encoding {
+        Encoding::Ascii => "ascii",
+        Encoding::BinaryLittleEndian => "binary_little_endian",
+    };
+    write!(out, "ply\nformat {format} 1.0\nelement vertex {rows}\n")?;
+    for property in properties {
+        writeln!(out, "property {} {}", property.scalar.name(), property.name)?;
+    }
+    writeln!(out, "end_header")?;
+    let mut row = Vec::with_capacity(properties.len());
+    let mut bytes = Vec::new();
+    for i in 0..rows {
+        row.clear();
+        fill(i, &mut row);
+        if row.len() != properties.len() {
+            return Err(io::Error::other(format!(
+                "row {i} has {} values for {} properties",
+                row.len(),
+                properties.len()
+            )));
         }
-        writeln!(out, "end_header")?;
-        let mut row = Vec::with_capacity(properties.len());
-        let mut bytes = Vec::new();
-        for i in 0..rows {
-            row.clear();
-            fill(i, &mut row);
-            if row.len() != properties.len() {
-                return Err(io::Error::other(format!(
-                    "row {i} has {} values for {} properties",
-                    row.len(),
-                    properties.len()
-                )));
+        match encoding {
+            Encoding::Ascii => {
+                let words: Vec<String> = row.iter().map(f32::to_string).collect();
+                writeln!(out, "{}", words.join(" "))?;
             }
-            match encoding {
-                Encoding::Ascii => {
-                    let words: Vec<String> = row.iter().map(f32::to_string).collect();
-                    writeln!(out, "{}", words.join(" "))?;
+            Encoding::BinaryLittleEndian => {
+                bytes.clear();
+                for (property, &value) in properties.iter().zip(&row) {
+                    property.scalar.encode(value, &mut bytes);
                 }
-                Encoding::BinaryLittleEndian => {
-                    bytes.clear();
-                    for (property, &value) in properties.iter().zip(&row) {
-                        property.scalar.encode(value, &mut bytes);
-                    }
-                    out.write_all(&bytes)?;
-                }
+                out.write_all(&bytes)?;
             }
         }
-        Ok(())
-    })
+    }
+    Ok(())
 }
 
 #[cfg(test)]

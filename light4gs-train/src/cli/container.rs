@@ -20,9 +20,9 @@ use serde_json::json;
 use super::check_output;
 use super::limits::LimitsArgument;
 use super::output::progress::FitBar;
-use super::output::{say, say_json};
+use super::output::{say, say_json, tell};
 use super::train::{coding_table, sections_table};
-use super::wishes::bytes;
+use super::wishes::{bytes, decibels};
 use crate::compression::{CodedScene, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
 use crate::config::{Config, DeviceName};
 use crate::dataset::{image_store, load_options};
@@ -51,6 +51,9 @@ pub(super) struct Encode {
     /// The file has at most so many bytes, such as 300k or 2M, and hardly fewer: steps of attributes become coarser or finer.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
+    /// The decoded file has at least this PSNR on the test views, dB, and is hardly larger than that takes.
+    #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
+    target_db: Option<f64>,
     /// Layers of Gaussians, the most significant ones first: with more than 1, such as 4, a player shows a coarse scene after the
     /// first few bytes.
     #[arg(long, value_name = "NUMBER")]
@@ -83,9 +86,15 @@ impl Encode {
             Some(dataset) => Scene::open(dataset, &load_options(&config))?,
             None => scene_around(&checkpoint.scene.gaussians.to_arrays(), folder.root(), config.data.background)?,
         };
-        let size = self.target_bytes.map(|bytes| format!("compression.target_bytes={bytes}"));
-        let layers = self.layers.map(|count| format!("compression.layers={count}"));
-        let overrides: Vec<String> = size.into_iter().chain(layers).chain(self.overrides).collect();
+        // A file follows one wish: that of the command in place of the run's.
+        let (bytes, quality) = (self.target_bytes.unwrap_or(0), self.target_db.unwrap_or(0.0));
+        let mut overrides = Vec::new();
+        if bytes > 0 || quality > 0.0 {
+            overrides.push(format!("compression.target_bytes={bytes}"));
+            overrides.push(format!("compression.target_db={quality:?}"));
+        }
+        overrides.extend(self.layers.map(|count| format!("compression.layers={count}")));
+        overrides.extend(self.overrides);
         let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &overrides)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
             return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
@@ -114,6 +123,9 @@ impl Encode {
             other => other,
         })?;
         if let Some((record, _)) = coded.coding.filter(|_| !self.json) {
+            if let Some(missed) = record.missed_quality {
+                tell(missed);
+            }
             let table = coding_table(&record);
             if let Some(seconds) = record.fit_seconds.filter(|_| table.is_some()) {
                 say(format_args!("the entropy models were fitted to the finished scene in {seconds:.1} s"))?;

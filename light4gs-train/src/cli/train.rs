@@ -301,6 +301,9 @@ fn print_evaluation(evaluation: &Evaluation, json: bool) -> Result<(), TrainErro
     if let Some(table) = evaluation.coding.as_ref().and_then(coding_table) {
         say(table)?;
     }
+    if let Some(missed) = evaluation.coding.as_ref().and_then(|coding| coding.missed_quality) {
+        tell(missed);
+    }
     let [width, height] = evaluation.resolution;
     say(format_args!(
         "{} Gaussians, {:.1} FPS at {width}×{height} on {}",

@@ -1,4 +1,4 @@
-//! `--pixels`, `--minutes` and `--target-bytes`: what a user wishes, as keys of the configuration.
+//! `--pixels`, `--minutes`, `--target-bytes` and `--target-db`: what a user wishes, as keys of the configuration.
 
 use std::path::Path;
 
@@ -32,6 +32,10 @@ pub(super) struct Wishes {
     /// byte weighs in the loss, follow.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
+    /// The decoded file shall have at least this PSNR on the test views, dB, and hardly more. What a byte weighs in the loss
+    /// follows, in the last part of training.
+    #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
+    target_db: Option<f64>,
 }
 
 impl Wishes {
@@ -59,6 +63,10 @@ impl Wishes {
         }
         if let Some(bytes) = self.target_bytes {
             wishes.extend(config.for_target_bytes(bytes));
+            config = with(&wishes)?;
+        }
+        if let Some(quality) = self.target_db {
+            wishes.extend(config.for_target_db(quality));
             config = with(&wishes)?;
         }
         let estimated = !quiet && config.train.coarse_iterations + config.train.fine_iterations >= FEWEST_ESTIMATED;
@@ -106,6 +114,14 @@ pub(super) fn bytes(text: &str) -> Result<usize, String> {
     match digits.parse::<f64>().map(|number| (number * unit).round()) {
         Ok(bytes) if (1e3..=1e12).contains(&bytes) => Ok(bytes as usize),
         _ => Err("expected bytes, from 1000 to 10^12, such as 300000, 300k or 2.5M".to_owned()),
+    }
+}
+
+/// A PSNR in dB.
+pub(super) fn decibels(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(quality) if (1.0..=100.0).contains(&quality) => Ok(quality),
+        _ => Err("expected a PSNR in dB, from 1 to 100, such as 28.5".to_owned()),
     }
 }
 

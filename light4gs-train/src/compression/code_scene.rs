@@ -11,8 +11,8 @@ use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy,
 use serde::{Deserialize, Serialize};
 
 use super::{
-    BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, SearchImages,
-    ShModel, encode, fit, plane_and_sh_step_search,
+    BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, MissedQuality,
+    SearchImages, ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
 use crate::dataset::{ImageSource, scene_meta};
@@ -41,6 +41,9 @@ pub struct CodingRecord {
     pub coded_bits: BitEstimate,
     /// Of every plane.
     pub planes: Vec<PlaneRecord>,
+    /// The wished quality, if the file does not have it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub missed_quality: Option<MissedQuality>,
 }
 
 /// A part of a file with trained models: the expected and the written bits.
@@ -145,13 +148,19 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     // A field that cannot be decoded is refused here, before anything is fitted.
     DynamicScene::<F>::from_arrays(&data, &inner)?;
     let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
+    let psnr = |data: &SceneData| match trained.images {
+        Some(images) => mean_psnr::<F>(data, measured_views(dataset), images, &inner),
+        None => Err(TrainError::Input(
+            "compression.target_db needs the images of a dataset, and this scene has none; give --target-bytes".into(),
+        )),
+    };
     let images = match (searches(settings, trained.compression) && profile == Profile::Compact, trained.images) {
         (false, _) => None,
         (true, Some(images)) => {
             let error = mean_squared_error(&render(&data), &views, images)?;
-            Some(SearchImages { render: &render, error })
+            Some(SearchImages { render: &render, error, psnr: &psnr })
         }
-        (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0) }),
+        (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0), psnr: &psnr }),
     };
     let (compression, fit_seconds, settings) = match (trained.compression, &images) {
         (Some(compression), _) => (compression.clone(), None, settings.clone()),
@@ -198,16 +207,18 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
             attributes: 8.0 * attribute_bytes as f64,
         },
         planes: plane_records(&encoded, &compression),
+        missed_quality: encoded.coded.missed,
     };
     Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
 }
 
 /// Whether the search for steps needs renderings. Steps of planes and harmonics can change only before models are
-/// fitted; those of other attributes unless they were learned.
+/// fitted; those of other attributes unless they were learned, or for a wished quality.
 fn searches<C: PlaneEntropy, S: ShModel>(settings: &CompressionConfig, trained: Option<&Compression<C, S>>) -> bool {
     let fitted = settings.steps.search_tolerance > 0.0 || settings.sh.search_tolerance > 0.0;
     let learned = trained.is_some_and(|models| models.learned_attributes().is_some());
-    (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
+    let wished = settings.target_db > 0.0;
+    wished || (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
 }
 
 fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Compression<C, S>) -> Vec<PlaneRecord> {

@@ -4,15 +4,16 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{
-    CodecError, CompressionInput, CompressionReport, GaussianArrays, GaussianLayers, PlaneCoding, Profile, SceneData,
-    SceneMeta, ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
+    CodecError, CompressionInput, CompressionReport, Encoded, GaussianArrays, GaussianLayers, PlaneCoding, Profile,
+    SceneData, SceneMeta, ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
 };
 use light4gs_model::attributes::SH_REST;
 use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
-use super::{Compression, ShModel, attribute_step_search, size_target};
+use super::step_factor::{encode_to_quality, encode_to_size};
+use super::{Compression, MissedQuality, ShModel, attribute_step_search};
 use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
@@ -36,6 +37,8 @@ pub struct CodedSizes {
     pub estimate: BitEstimate,
     /// The same for every place of every plane.
     pub bit_maps: Vec<BitMap>,
+    /// The wished quality, if the file does not have it.
+    pub missed: Option<MissedQuality>,
 }
 
 /// Bits at each place of a plane, all channels together.
@@ -76,13 +79,14 @@ pub struct BitEstimate {
     pub attributes: f64,
 }
 
-/// Images for the search of attribute steps: `render` renders some training views as pixel values, `error` is the mean
-/// squared error of the unquantized scene's.
+/// Images for the search of steps.
 pub struct SearchImages<'a> {
-    /// Renders plain arrays; other parts of the scene are as decoded.
+    /// Renders some training views of a scene, as pixel values.
     pub render: &'a dyn Fn(&SceneData) -> Vec<f32>,
-    /// Of the unquantized scene, against the training images.
+    /// Mean squared error of these, for the unquantized scene.
     pub error: f64,
+    /// The PSNR by which `compression.target_db` is reached, dB.
+    pub psnr: &'a dyn Fn(&SceneData) -> Result<f64, TrainError>,
 }
 
 /// Encodes a scene in a profile. Before this returns, everything that was coded is decoded again and compared.
@@ -99,7 +103,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let compression = &mut compression.valid();
     let data = scene.to_arrays(meta)?;
     let mut input = compression_input(compression, scene, &data, config, profile)?;
-    if let (Some(images), Profile::Compact, None) = (images, input.profile, compression.learned_attributes())
+    if let (Some(images), Profile::Compact, None) = (&images, input.profile, compression.learned_attributes())
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
@@ -108,10 +112,19 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         let found = attribute_step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
         input.attributes = found.unwrap_or(input.attributes);
     }
-    let encoded = match config.target_bytes {
-        0 => encode_compressed(&data, &input)?,
-        target => {
-            let file = size_target::encode_to_size(&data, &input, target)?;
+    let mut missed = None;
+    let file = match (config.target_bytes, config.target_db, images) {
+        (1.., ..) => Some(encode_to_size(&data, &input, config.target_bytes)?),
+        (0, target, Some(images)) if target > 0.0 => {
+            let file;
+            (file, missed) = encode_to_quality(&data, &input, target, images.psnr)?;
+            Some(file)
+        }
+        _ => None,
+    };
+    let encoded = match file {
+        None => encode_compressed(&data, &input)?,
+        Some(file) => {
             if let Some(models) = &mut compression.attributes {
                 models.scale_steps(file.factor);
             }
@@ -121,29 +134,24 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     };
     let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;
     let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
-    let coded = CodedSizes { report: encoded.report, estimate, bit_maps };
+    let coded = CodedSizes { report: encoded.report, estimate, bit_maps, missed };
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
-/// Bytes of a scene's file as it stands, with the steps that training has learned so far: those of its Gaussians, and all
-/// others. No step is searched for.
+/// A scene's file as it stands, with the steps that training has learned so far. No step is searched for.
 ///
 /// # Errors
 /// What the codec refuses.
-pub fn size_so_far<F: DeformationField, C: PlaneEntropy, S: ShModel>(
+pub fn encoded_so_far<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
     compression: &Compression<C, S>,
+    meta: SceneMeta,
     config: &CompressionConfig,
-) -> Result<[u64; 2], TrainError> {
+) -> Result<Encoded, TrainError> {
     let (scene, compression) = (&scene.valid(), &mut compression.valid());
-    let data = scene.to_arrays(SceneMeta::default())?;
+    let data = scene.to_arrays(meta)?;
     let input = compression_input(compression, scene, &data, config, Profile::Compact)?;
-    let report = encode_compressed(&data, &input)?.report;
-    let mut bytes = [0, report.header_bytes];
-    for (name, .., section) in &report.sections {
-        bytes[usize::from(!matches!(*name, "gaussians" | "sh"))] += section;
-    }
-    Ok(bytes)
+    Ok(encode_compressed(&data, &input)?)
 }
 
 /// Rounds in which [`freeze_planes`] looks for planes that no longer change.

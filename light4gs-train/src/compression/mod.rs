@@ -8,7 +8,7 @@
 //! - `code_scene`: from a trained scene to a file, with a record of expected and written bits
 //! - `attribute_step_search`: the coarsest steps of the other attributes
 //! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
-//! - `size_target`: a file of at most so many bytes
+//! - `step_factor`, `quality`: a file of a wished size or quality; what the quality is
 
 mod attribute_step_search;
 mod code_scene;
@@ -16,16 +16,20 @@ mod encoder;
 mod fit;
 mod models;
 mod plane_and_sh_step_search;
+mod quality;
 mod rate;
-mod size_target;
+mod step_factor;
 
 pub use code_scene::{ASSUMED_PSNR, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
 pub use encoder::{
-    BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, freeze_planes, size_so_far,
+    BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, encoded_so_far,
+    freeze_planes,
 };
 pub use fit::fit;
 pub use models::{ConfiguredModels, EntropyModels, ShModel, context_model};
+pub use quality::{mean_psnr, measured_views};
 pub use rate::{NoisyScene, Rate};
+pub use step_factor::MissedQuality;
 
 use burn::module::Module;
 use burn::tensor::Device;

@@ -97,7 +97,7 @@ mod tests {
     fn found(tolerance: f64, error: f64) -> CompressionConfig {
         let mut settings = CompressionConfig::default();
         (settings.steps.search_tolerance, settings.sh.search_tolerance) = (tolerance, tolerance);
-        search(&scene(), &mut settings, &SearchImages { render: &render, error });
+        search(&scene(), &mut settings, &SearchImages { render: &render, error, psnr: &|_| Ok(0.0) });
         settings
     }
 

@@ -6,7 +6,7 @@ use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
 use light4gs_model::{AdaptiveQuantizationConfig, ContextPart, ShKind};
 
 use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
-use crate::keys::{ITERATION, RATE, STEP, TOLERANCE, WEIGHT, choice, keys, named};
+use crate::keys::{DECIBELS, ITERATION, RATE, STEP, WEIGHT, choice, keys, named};
 
 keys! {
     /// The form of the file, and what is trained to make it small (paper III-C to III-E,
@@ -20,6 +20,9 @@ keys! {
         /// The file has at most so many bytes, and hardly fewer: the weight of the rate follows while training, and at last
         /// the steps of the attributes. 0: lambda and steps alone say how large it becomes.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours", "0 = as many as lambda asks for";
+        /// The decoded file has at least this PSNR on the test views (on those of training where there are none), and is hardly
+        /// better: as with `target_bytes`, weight and steps follow. 0: no such wish.
+        target_db: f64 = 0.0; DECIBELS, "ours", "0 = what lambda gives";
         /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
         /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
         /// bytes; the profile `float32` has only one.
@@ -168,7 +171,7 @@ keys! {
         learning_rate: f64 = 2e-3; RATE, "ours";
         /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
         /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
-        search_tolerance: f64 = 0.0; TOLERANCE, "ours", "dB; 0 = no search, also for a scene trained without a rate";
+        search_tolerance: f64 = 0.0; DECIBELS, "ours", "dB; 0 = no search, also for a scene trained without a rate";
     }
 }
 
@@ -188,7 +191,7 @@ keys! {
         /// The same at the end of the fine stage.
         learning_rate_final: f64 = 5e-4; RATE, "ours";
         /// As `compression.steps.search_tolerance`, for this step.
-        search_tolerance: f64 = 0.0; TOLERANCE, "ours";
+        search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
 }
 
@@ -213,7 +216,7 @@ keys! {
         sh_dc: f32 = step("sh_dc"); STEP, "ours";
         /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.
         /// 0: the steps are used as they are.
-        search_tolerance: f64 = 0.05; TOLERANCE, "ours", "dB of training PSNR";
+        search_tolerance: f64 = 0.05; DECIBELS, "ours", "dB of training PSNR";
     }
 }
 

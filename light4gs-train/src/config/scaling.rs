@@ -39,9 +39,7 @@ impl Config {
         let most = train.densify.strategies.adaptive.max_gaussians.max(1);
         let ratio = bytes as f64 / most as f64 / BYTES_A_GAUSSIAN;
         let mut wishes = vec![format!("compression.target_bytes={bytes}")];
-        if compression.rate.lambda <= 0.0 {
-            wishes.push("compression.rate.lambda=0.007".to_owned());
-        }
+        wishes.extend(self.with_a_rate());
         if compression.rate.attributes {
             let [least, largest] = PRUNED_BOUNDS;
             let pruned = (PRUNED.0 + PRUNED.1 * ratio.ln()).clamp(least, largest);
@@ -53,6 +51,17 @@ impl Config {
             }
         }
         wishes
+    }
+
+    /// For a file with this PSNR on the test views, dB. The trainer corrects the weight of the rate as it goes.
+    pub fn for_target_db(&self, quality: f64) -> Vec<String> {
+        let wish = format!("compression.target_db={quality:?}");
+        std::iter::once(wish).chain(self.with_a_rate()).collect()
+    }
+
+    /// Without a rate in the loss, there is no weight that could follow a wish.
+    fn with_a_rate(&self) -> Option<String> {
+        (self.compression.rate.lambda <= 0.0).then(|| "compression.rate.lambda=0.007".to_owned())
     }
 
     /// The same schedule `factor` times as long: every key that counts iterations of a stage. 0 stays 0, "never".

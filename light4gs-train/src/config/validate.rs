@@ -117,14 +117,19 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
             });
         }
     }
-    check.that(
-        "compression.target_bytes",
-        compression.target_bytes == 0 || compression.profile == FileProfile::Compact,
-        || {
+    let wishes = [
+        ("compression.target_bytes", compression.target_bytes > 0),
+        ("compression.target_db", compression.target_db > 0.0),
+    ];
+    for (key, wished) in wishes {
+        check.that(key, !wished || compression.profile == FileProfile::Compact, || {
             "is set, but only the profile \"compact\" has steps that can follow it; set compression.profile=compact"
                 .to_owned()
-        },
-    );
+        });
+    }
+    check.that("compression.target_db", !wishes.iter().all(|(_, wished)| *wished), || {
+        "is set beside compression.target_bytes; a file follows one of both, set the other to 0".to_owned()
+    });
     let float32 = compression.profile == FileProfile::Float32;
     check.that("compression.layers", compression.layers == 1 || !float32, || {
         format!("is {}, but the profile \"float32\" has one layer; set compression.profile=compact", compression.layers)

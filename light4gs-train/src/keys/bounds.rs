@@ -81,8 +81,8 @@ pub(crate) const THRESHOLD: Bounds = Number { least: 1e-30, most: 1e30 };
 pub(crate) const WEIGHT: Bounds = Number { least: 0.0, most: 1e6 };
 /// A quantization step that the encoder accepts.
 pub(crate) const STEP: Bounds = Number { least: LEAST_STEP as f64, most: 1e3 };
-/// The loss that a search for coarser steps may cause, dB.
-pub(crate) const TOLERANCE: Bounds = Number { least: 0.0, most: 100.0 };
+/// A PSNR, or the loss of it that a search for coarser steps may cause, dB.
+pub(crate) const DECIBELS: Bounds = Number { least: 0.0, most: 100.0 };
 
 impl fmt::Display for Bounds {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {

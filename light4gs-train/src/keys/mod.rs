@@ -19,7 +19,7 @@ mod reference;
 
 pub use bounds::Bounds;
 pub(crate) use bounds::{
-    INTERVAL, ITERATION, ITERATIONS, MOST_GAUSSIANS, MOST_INTEGER, RATE, SHARE, STEP, THRESHOLD, TOLERANCE, WEIGHT,
+    DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_GAUSSIANS, MOST_INTEGER, RATE, SHARE, STEP, THRESHOLD, WEIGHT,
 };
 pub use choice::UnknownChoice;
 pub(crate) use choice::{choice, named, nearest, serde_by_name};

@@ -69,6 +69,7 @@ fn coding_record() -> CodingRecord {
         estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0, attributes: 0.0 },
         coded_bits: BitEstimate { planes: 536.0, sh: 1000.0, attributes: 0.0 },
         planes: vec![plane],
+        missed_quality: None,
     }
 }
 

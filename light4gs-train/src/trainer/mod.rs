@@ -7,7 +7,7 @@
 //! - `views`: the views of an iteration, each with its own tape
 //! - `learning_rates`: the rate of each parameter group
 //! - `rate`: quantization noise, and the rate in the loss
-//! - `size_steering`: the weight of the rate, where the file shall have a certain size
+//! - `rate_steering`: the weight of the rate, where the file shall have a certain size or quality
 //! - `pruning`: pruning by significance
 //!
 //! The parts that a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`],
@@ -20,7 +20,7 @@ mod motion;
 pub mod profile;
 mod pruning;
 mod rate;
-mod size_steering;
+mod rate_steering;
 mod step;
 mod views;
 
@@ -253,7 +253,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let mut report = self.optimize(stage, iteration)?;
         self.control_density(stage, iteration);
         if stage == Stage::Fine {
-            self.steer_size(iteration);
+            self.steer_rate(iteration)?;
         }
         if stage == Stage::Fine && self.config.train.guided_sampling.is_due(iteration) {
             self.sample_guided(iteration)?;

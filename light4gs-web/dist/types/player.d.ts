@@ -98,6 +98,11 @@ export declare class Player extends EventTarget {
     get path(): import("./views/camera.js").DatasetCamera[];
     /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
     get draftScale(): number;
+    /**
+     * The level of detail that is drawn while something moves, of {@link Scene.info}'s `levels`: 0 where there is time for all
+     * Gaussians, and half as many with each further one.
+     */
+    get draftLevel(): number;
     /** Images a second over the last second; 0 where nothing changes. */
     get fps(): number;
     /** Draws again, as after {@link background} was changed. */

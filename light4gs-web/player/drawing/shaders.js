@@ -15,6 +15,8 @@ uniform vec3 translation;
 uniform vec2 focal;
 uniform vec2 principal;
 uniform vec2 size;
+// The share of a Gaussian's weight that may be left out.
+uniform float tail;
 
 uniform highp sampler2D list;
 // Three corners a Gaussian, or four.
@@ -58,7 +60,7 @@ void main() {
   if (!(determinant > 0.0)) return;
 
   // With the covariance as L Lᵀ, the circle of radius reach becomes the ellipse where alpha falls below the threshold.
-  float reach = sqrt(2.0 * log(opacity / MIN_ALPHA));
+  float reach = sqrt(2.0 * log(opacity / max(MIN_ALPHA, tail * opacity)));
   float width = sqrt(xx);
   // A square around the circle of radius 1, or a triangle.
   int number = gl_VertexID - 3 * gaussian;

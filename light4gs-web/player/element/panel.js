@@ -8,6 +8,13 @@ const size = (bytes) => (bytes < 1e3 ? `${bytes} B` : bytes < 1e6 ? `${number.fo
 /** @param {number} value */
 const ms = (value) => `${value.toFixed(value < 10 ? 1 : 0)} ms`;
 
+/** @param {Player} player */
+function whileMoving({ draftScale, draftLevel }) {
+  const shares = draftScale < 1 ? [`${Math.round(100 * draftScale)} % of each side`] : [];
+  if (draftLevel > 0) shares.push(`1/${2 ** draftLevel} of the Gaussians`);
+  return shares.join(", ") || "in full";
+}
+
 /** @param {[string, string][]} rows */
 function body(rows) {
   const part = document.createElement("tbody");
@@ -39,7 +46,7 @@ export function fillPanel(panel, player) {
       ["Harmonics", `degree ${info.shDegree}`],
       ["Frames", info.fps > 0 ? `${info.frameCount} at ${info.fps} a second` : String(info.frameCount)],
       ["Image", `${player.view.width} × ${player.view.height}`],
-      ["While moving", player.draftScale < 1 ? `${Math.round(100 * player.draftScale)} % of each side` : "in full"],
+      ["While moving", whileMoving(player)],
     ]),
     body(info.sections.map(([name, bytes]) => [name.replaceAll("_", " "), size(bytes)])),
     body([

@@ -16,8 +16,10 @@ const SLICE = 8192;
  * @property {() => number} text
  * @property {() => number} text_length
  * @property {() => bigint} digest
+ * @property {(level: number) => number} show_level
+ * @property {() => number} count
  * @property {(time: number, first: number, last: number) => void} evaluate
- * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number) => number} draw_list
+ * @property {(row_x: number, row_y: number, row_z: number, row_w: number, eye_x: number, eye_y: number, eye_z: number, spread: number) => number} draw_list
  * @property {() => number} list_length
  * @property {(time: number) => number} attributes_at
  * @property {() => number} numbers_length
@@ -31,8 +33,10 @@ export class Decoder {
     this.wasm = /** @type {Exports} */ (/** @type {unknown} */ (new WebAssembly.Instance(module, {}).exports));
     /** @type {import("./scene.js").SceneInfo | null} */
     this.info = null;
-    /** Where the Gaussians are: NaN before the first evaluation. */
-    this.time = NaN;
+    /** Where the Gaussians of the scene are, and those of the level beside it: NaN before the first evaluation. */
+    this.times = [NaN, NaN];
+    /** Of the two, the one that is shown. */
+    this.shown = 0;
   }
 
   /**
@@ -95,13 +99,28 @@ export class Decoder {
     const description = JSON.parse(new TextDecoder().decode(text));
     if (!answer) throw new SceneError(description.error, description.message);
     this.info = description;
-    this.time = NaN;
+    this.times = [NaN, NaN];
+    this.shown = 0;
     return description;
   }
 
-  /** Number of Gaussians. */
+  /** Number of Gaussians of the level that is shown. */
   get count() {
-    return this.info ? this.info.count : 0;
+    return this.wasm.count();
+  }
+
+  /** Where the Gaussians of the level that is shown are. */
+  get time() {
+    return this.times[this.shown];
+  }
+
+  /**
+   * Chooses the level of detail of evaluations and lists: 0 is the scene itself.
+   * @param {number} level
+   */
+  showLevel(level) {
+    if (this.wasm.show_level(level)) this.times[1] = NaN;
+    this.shown = Number(level > 0);
   }
 
   /**
@@ -114,7 +133,7 @@ export class Decoder {
       if (first > 0) await pause();
       this.wasm.evaluate(time, first, first + SLICE);
     }
-    this.time = time;
+    this.times[this.shown] = time;
   }
 
   /**
@@ -122,8 +141,8 @@ export class Decoder {
    * @param {import("./scene.js").Viewpoint} viewpoint
    * @param {ArrayBuffer | null} memory  to be used again
    */
-  drawList({ row, eye }, memory) {
-    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2]);
+  drawList({ row, eye, spread = Infinity }, memory) {
+    const at = this.wasm.draw_list(row[0], row[1], row[2], row[3], eye[0], eye[1], eye[2], spread);
     const list = new Float32Array(this.wasm.memory.buffer, at, this.wasm.list_length());
     if (!memory || memory.byteLength < list.byteLength) return list.slice();
     const copy = new Float32Array(memory, 0, list.length);

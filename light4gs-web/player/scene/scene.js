@@ -21,6 +21,7 @@ import { SceneError } from "../errors.js";
  * @property {boolean} moves  whether anything changes with time
  * @property {number} layers  layers of Gaussians that the file has
  * @property {number} layersShown  those that have come
+ * @property {number} levels  levels of detail besides the scene itself; each has half of the Gaussians of the one before
  * @property {[string, number][]} sections  name and bytes of each part of the file
  * @property {Record<string, string>} extra  free notes
  */
@@ -40,6 +41,8 @@ import { SceneError } from "../errors.js";
  * @typedef {object} Viewpoint  where a scene is seen from
  * @property {ArrayLike<number>} row  the depth of a point is `row · (x, y, z, 1)`
  * @property {ArrayLike<number>} eye  the camera's center, world units
+ * @property {number} [spread]  what does not reach into the cone around the view axis is left out: the tangent of its angle to
+ *   the axis; all in front of the camera where not given
  */
 
 /**
@@ -263,10 +266,11 @@ export class Scene extends EventTarget {
    * @param {number} time  in [0, 1]
    * @param {Viewpoint} viewpoint
    * @param {ArrayBuffer | null} [memory]  to be used again
+   * @param {number} [level]  of detail: 0 is the scene itself, at most {@link SceneInfo.levels}
    * @returns {Promise<Frame>}
    */
-  frame(time, viewpoint, memory = null) {
-    return this.#ask({ type: "frame", time, viewpoint, memory }, memory ? [memory] : []);
+  frame(time, viewpoint, memory = null, level = 0) {
+    return this.#ask({ type: "frame", time, viewpoint, memory, level }, memory ? [memory] : []);
   }
 
   /**

@@ -1,47 +1,106 @@
-// How much of the image's resolution there is time for while something moves.
+// How much of the image's resolution and of the Gaussians there is time for while something moves.
 
-/** Shares of the pixels along each side. */
-const SCALES = [1, 0.7, 0.5, 0.35];
-/** Milliseconds of an image: above, the next smaller scale; below, a larger one is tried after a while. */
+/**
+ * Shares of the pixels along each side, and levels of detail, each faster than the one before. Of what takes the same time,
+ * this is what looks best (docs/player.md).
+ */
+const LADDER = [[1, 0], [0.7, 0], [0.7, 1], [0.5, 1], [0.5, 2], [0.35, 2], [0.35, 3], [0.35, 4], [0.35, 5]];
+/** Milliseconds of an image: above, the next faster step; below, a slower one is tried after a while. */
 const [SLOW, FAST] = [28, 14];
-/** Images that are measured before a scale is judged. */
+/** In place of the first, where the next step would look worse than fewer images a second. */
+const VERY_SLOW = 45;
+/** The last step of the ladder that looks well. */
+const LAST_GOOD = LADDER.findIndex(([, level]) => level > 2) - 1;
+/** Images that are measured before a step is judged. */
 const SAMPLES = 4;
-/** Milliseconds until a larger scale is tried. */
+/** Milliseconds until a slower step is tried. */
 const PATIENCE = 4000;
 
-/** Chooses the scale from the time that images take. What stands still is always drawn in full. */
-export class Draft {
-  #step = 0;
+/** Chooses a step from the time that images take. */
+class Steps {
+  step = 0;
   /** @type {number[]} */
   #intervals = [];
   #tried = 0;
 
-  /** The scale to draw moving images at. */
-  get scale() {
-    return SCALES[this.#step];
+  /**
+   * @param {number} last  the fastest step
+   * @param {number} [lastGood]  the fastest one that is worth it where not much time is missing
+   */
+  constructor(last, lastGood = last) {
+    this.last = last;
+    this.lastGood = lastGood;
   }
 
   /**
-   * A moving image took so long.
+   * Something took so long for an image.
    * @param {number} interval  milliseconds
    * @param {number} now
+   * @returns {number} by how many steps that changed the step
    */
   measure(interval, now) {
     // Whoever looked elsewhere for a while says nothing about the machine.
-    if (interval > 5000) return;
+    if (interval > 5000) return 0;
     this.#intervals.push(interval);
     const hopeless = this.#intervals.length > 1 && Math.min(...this.#intervals) > 3 * SLOW;
-    if (this.#intervals.length < SAMPLES && !hopeless) return;
+    if (this.#intervals.length < SAMPLES && !hopeless) return 0;
     const sorted = this.#intervals.sort((a, b) => a - b);
     const median = sorted[Math.floor(sorted.length / 2)];
+    const before = this.step;
     this.#intervals = [];
-    if (median > SLOW && this.#step < SCALES.length - 1) {
+    if (median > (this.step < this.lastGood ? SLOW : VERY_SLOW) && this.step < this.last) {
       // Far too slow: more than one step at once.
-      this.#step = Math.min(this.#step + (median > 3 * SLOW ? 2 : 1), SCALES.length - 1);
+      this.step = Math.min(this.step + (median > 3 * SLOW ? 2 : 1), this.last);
       this.#tried = now;
-    } else if (median < FAST && this.#step > 0 && now - this.#tried > PATIENCE) {
-      this.#step--;
+    } else if (median < FAST && this.step > 0 && now - this.#tried > PATIENCE) {
+      this.step--;
       this.#tried = now + 5 * PATIENCE;
     }
+    return this.step - before;
+  }
+}
+
+/** Chooses scale and level from the time that images take. What stands still is always drawn in full. */
+export class Draft {
+  #drawing = new Steps(LADDER.length - 1, LAST_GOOD);
+  #worker;
+
+  /** @param {number} levels  of detail that the scene has besides itself */
+  constructor(levels) {
+    this.levels = levels;
+    // Each level takes half of the time of the one before.
+    this.#worker = new Steps(levels, 2);
+  }
+
+  /** The scale to draw moving images at: the share of the pixels along each side. */
+  get scale() {
+    return LADDER[this.#drawing.step][0];
+  }
+
+  /** The level of detail of moving images: what both drawing and worker have time for. */
+  get level() {
+    return Math.min(this.levels, Math.max(LADDER[this.#drawing.step][1], this.#worker.step));
+  }
+
+  /**
+   * A moving image was drawn in so long.
+   * @param {number} interval  milliseconds
+   * @param {number} now
+   */
+  measureDrawing(interval, now) {
+    const { scale, level } = this;
+    const steps = this.#drawing;
+    const change = Math.sign(steps.measure(interval, now));
+    // Steps that are none, since the scene has no such level or the worker needs a higher one anyway.
+    while (change !== 0 && scale === this.scale && level === this.level && LADDER[steps.step + change]) steps.step += change;
+  }
+
+  /**
+   * The worker made the list of a moving image in so long.
+   * @param {number} interval  milliseconds
+   * @param {number} now
+   */
+  measureWorker(interval, now) {
+    this.#worker.measure(interval, now);
   }
 }

@@ -49,7 +49,7 @@ fn a_scene_goes_all_the_way() {
     for unknown in ["scene.splat", "scene.gltf", "frames.v3"] {
         assert_refused(
             &w.run(["export", "again.l4gs", "--out", unknown]),
-            &[unknown, ".ply", ".glb", ".4dgs", "slash"],
+            &[unknown, ".ply", ".zip", ".glb", ".4dgs", "slash"],
         );
         assert!(!w.path(unknown).exists());
     }
@@ -240,6 +240,39 @@ fn a_file_has_the_size_that_is_wished() {
         &w.train("paper", &["compression.profile=paper"]).args(["--target-bytes", "6k"]).output().unwrap(),
         &["compression.target_bytes", "compact"],
     );
+}
+
+/// PSNR on the test views, as `eval.json` has it.
+fn test_psnr(w: &Workspace, run: &str) -> f64 {
+    let evaluation: serde_json::Value =
+        serde_json::from_str(&fs::read_to_string(w.path(run).join("eval.json")).unwrap()).unwrap();
+    let splits = evaluation["splits"].as_array().unwrap();
+    splits.iter().find(|split| split["split"] == "test").unwrap()["psnr"].as_f64().unwrap()
+}
+
+#[test]
+fn a_file_has_the_quality_that_is_wished() {
+    let w = Workspace::new(PROGRAM);
+    let overrides = ["model.field=nodes", "compression.rate.attributes=true", "compression.rate.from=1"];
+    assert_success(&w.train("free", &overrides).output().unwrap());
+    let wished = test_psnr(&w, "free") - 0.5;
+    assert_success(&w.train("wished", &overrides).args(["--target-db", &wished.to_string()]).output().unwrap());
+    let above = test_psnr(&w, "wished") - wished;
+    assert!((0.0..0.2).contains(&above), "{above} dB above {wished}");
+
+    let encode = |quality: &str| w.run(["encode", "free", "--out", "other.l4gs", "--target-db", quality]);
+    let size = |name: &str| fs::metadata(w.path(name)).unwrap().len();
+    assert_success(&encode(&wished.to_string()));
+    assert!(size("other.l4gs") < size("free/scene.l4gs"));
+    let best = encode("99");
+    assert_success(&best);
+    let told = String::from_utf8_lossy(&best.stderr).into_owned();
+    assert!(told.contains("compression.target_db is 99") && told.contains("finest steps"), "{told}");
+    assert!(size("other.l4gs") > size("free/scene.l4gs"));
+    assert_refused(&encode("soon"), &["--target-db", "28.5"]);
+    let both = ["encode", "free", "--out", "never.l4gs", "--target-db", "20", "--target-bytes", "6k"];
+    assert_refused(&w.run(both), &["--target-db", "--target-bytes"]);
+    assert!(!w.path("never.l4gs").exists());
 }
 
 #[test]

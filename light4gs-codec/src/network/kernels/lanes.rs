@@ -91,6 +91,7 @@ impl Matrix {
 }
 
 /// A separate and simple function, so that the compiler keeps the sums in vector registers.
+#[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
 #[inline(never)]
 fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
     let mut sums = bias.map(|bias| [bias; LANES]);
@@ -102,4 +103,22 @@ fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANE
         }
     }
     sums
+}
+
+/// As above, with the vectors written out: for WebAssembly the compiler makes scalars of the loops, which take four
+/// times as long. The same products and sums, to the last bit.
+#[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
+#[inline(never)]
+fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
+    use core::arch::wasm32::{f32x4, f32x4_add, f32x4_extract_lane as lane, f32x4_mul, f32x4_splat};
+    let mut sums = bias.map(|bias| [f32x4_splat(bias); 2]);
+    for (weights, &[a, b, c, d, e, f, g, h]) in weights.iter().zip(inputs) {
+        let input = [f32x4(a, b, c, d), f32x4(e, f, g, h)];
+        for (sums, &weight) in sums.iter_mut().zip(weights) {
+            *sums = [0, 1].map(|half| f32x4_add(sums[half], f32x4_mul(f32x4_splat(weight), input[half])));
+        }
+    }
+    sums.map(|[a, b]| {
+        [lane::<0>(a), lane::<1>(a), lane::<2>(a), lane::<3>(a), lane::<0>(b), lane::<1>(b), lane::<2>(b), lane::<3>(b)]
+    })
 }

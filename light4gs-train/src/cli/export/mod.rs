@@ -8,7 +8,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use light4gs_codec::{GaussianArrays, SceneMeta, read_info};
-use light4gs_data::{DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb};
+use light4gs_data::{
+    DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb, write_ply_zip,
+};
 use light4gs_model::{BuiltInField, STILLNESS};
 use light4gs_web::page::{Content, page};
 
@@ -33,7 +35,8 @@ pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
     /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or an existing
-    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs. A scene of
+    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs,
+    /// or as a .zip with the same PLY files as the folder. A scene of
     /// control nodes becomes a .glb with its whole motion (skin and animation), unless --time asks for a single time.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
@@ -66,6 +69,7 @@ pub(super) struct Export {
 #[derive(Clone, Copy, Debug)]
 enum Target {
     PlySequence,
+    PlyZip,
     Ply,
     Glb,
     FourDgs,
@@ -80,10 +84,11 @@ impl Target {
         };
         match suffix.to_string_lossy().to_ascii_lowercase().as_str() {
             "ply" => Ok(Self::Ply),
+            "zip" => Ok(Self::PlyZip),
             "glb" => Ok(Self::Glb),
             "4dgs" => Ok(Self::FourDgs),
             other => Err(TrainError::Input(format!(
-                "--out {}: no file of the kind `.{other}` is written, only .ply, .glb and .4dgs; for a folder of PLY files put a \
+                "--out {}: no file of the kind `.{other}` is written, only .ply, .zip, .glb and .4dgs; for a folder of PLY files put a \
                  slash at the end of the name",
                 path.display()
             ))),
@@ -136,6 +141,10 @@ impl Export {
                     at(time).write(&path.join(format!("{k:04}.ply")))?;
                 }
                 say(format_args!("wrote {frames} PLY files to {out}"))
+            }
+            Target::PlyZip => {
+                write_ply_zip(path, times().map(at))?;
+                say(format_args!("wrote {out} ({frames} PLY files)"))
             }
             Target::Ply => {
                 at(single_time).write(path)?;

@@ -32,17 +32,6 @@ export type View = {
      */
     height: number;
 };
-/**
- * @typedef {object} View  an OpenCV pinhole: +x right, +y down, +z forward
- * @property {ArrayLike<number>} rotation  `[3, 3]` row-major, world to camera
- * @property {ArrayLike<number>} translation  `[3]`: `x_camera = rotation · x_world + translation`
- * @property {number} fx  focal length, pixels
- * @property {number} fy  focal length, pixels
- * @property {number} cx  principal point, pixels from the left edge
- * @property {number} cy  principal point, pixels from the upper edge
- * @property {number} width  pixels
- * @property {number} height  pixels
- */
 export declare class SplatRenderer {
     #private;
     canvas: HTMLCanvasElement | OffscreenCanvas;
@@ -63,6 +52,7 @@ export declare class SplatRenderer {
         focal: WebGLUniformLocation | null;
         principal: WebGLUniformLocation | null;
         size: WebGLUniformLocation | null;
+        tail: WebGLUniformLocation | null;
         triangles: WebGLUniformLocation | null;
         target: WebGLTexture;
         framebuffer: WebGLFramebuffer;

@@ -60,6 +60,10 @@ export type SceneInfo = {
      */
     layersShown: number;
     /**
+     * levels of detail besides the scene itself; each has half of the Gaussians of the one before
+     */
+    levels: number;
+    /**
      * name and bytes of each part of the file
      */
     sections: [string, number][];
@@ -107,6 +111,11 @@ export type Viewpoint = {
      * the camera's center, world units
      */
     eye: ArrayLike<number>;
+    /**
+     * what does not reach into the cone around the view axis is left out: the tangent of its angle to
+     * the axis; all in front of the camera where not given
+     */
+    spread?: number;
 };
 export type Frame = {
     /**
@@ -160,9 +169,10 @@ export declare class Scene extends EventTarget {
      * @param {number} time  in [0, 1]
      * @param {Viewpoint} viewpoint
      * @param {ArrayBuffer | null} [memory]  to be used again
+     * @param {number} [level]  of detail: 0 is the scene itself, at most {@link SceneInfo.levels}
      * @returns {Promise<Frame>}
      */
-    frame(time: number, viewpoint: Viewpoint, memory?: ArrayBuffer | null): Promise<Frame>;
+    frame(time: number, viewpoint: Viewpoint, memory?: ArrayBuffer | null, level?: number): Promise<Frame>;
     /**
      * One number for all bits of the scene that a file decodes to, as 16 hexadecimal digits: the same on every machine.
      * @param {ArrayBuffer} bytes

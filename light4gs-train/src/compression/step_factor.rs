@@ -1,0 +1,228 @@
+//! One factor for the steps of all attributes, so that the file has a wished size or quality (`compression.target_bytes`,
+//! `compression.target_db`).
+//!
+//! Learned steps are such that a bit more costs the same everywhere. One factor for all keeps that balance.
+
+use std::fmt;
+
+use light4gs_codec::{CodecError, CompressionInput, Encoded, SceneData, ShCoding, checks, encode_compressed};
+use serde::{Deserialize, Serialize};
+
+use crate::error::TrainError;
+
+/// Steps become finer by at most this factor: beyond it, more bytes show nothing.
+const FINEST: f32 = 0.25;
+/// Steps become coarser by at most this factor: beyond it, nothing can be recognized.
+const COARSEST: f32 = 16.0;
+/// The search is over when the file fills this share of the bytes.
+const FILLED: f64 = 0.98;
+/// The search is over when the PSNR is no higher than the wished one by this, dB.
+const ABOVE: f64 = 0.01;
+/// Files that are tried: the factor is then known to 0.1 %.
+const TRIES: usize = 12;
+
+/// A quality that a file does not have although it was wished, dB.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MissedQuality {
+    /// What was wished.
+    pub wished: f64,
+    /// What the file with the finest steps has.
+    pub reached: f64,
+}
+
+impl fmt::Display for MissedQuality {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { wished, reached } = self;
+        write!(
+            formatter,
+            "compression.target_db is {wished}, but this scene has {reached:.2} dB with the finest steps. For more, train \
+             longer, with a smaller weight of the rate (compression.rate.attribute_lambda) or with more Gaussians \
+             (train.prune.fraction, train.densify.adaptive.max_gaussians)"
+        )
+    }
+}
+
+/// A file, and how it was made.
+pub(super) struct ScaledFile {
+    /// By how much steps are coarser than the given ones.
+    pub(super) factor: f32,
+    /// The input with these steps.
+    pub(super) input: CompressionInput,
+    /// The file.
+    pub(super) encoded: Encoded,
+}
+
+impl ScaledFile {
+    fn bytes(&self) -> usize {
+        self.encoded.bytes.len()
+    }
+}
+
+/// What a try says about the factor.
+enum Verdict {
+    /// The file is as wished; one with finer or coarser steps may be better.
+    Fits { coarser: bool, well: bool },
+    /// It is not; look among finer or coarser steps.
+    Misses { coarser: bool },
+}
+
+/// The largest file of at most `target` bytes.
+///
+/// # Errors
+/// What the codec refuses, and a scene that takes more bytes even with the coarsest steps.
+pub(super) fn encode_to_size(
+    data: &SceneData,
+    given: &CompressionInput,
+    target: usize,
+) -> Result<ScaledFile, TrainError> {
+    let found = bisect(data, given, |file| {
+        Ok(match file.bytes() <= target {
+            true => Verdict::Fits { coarser: false, well: file.bytes() as f64 >= FILLED * target as f64 },
+            false => Verdict::Misses { coarser: true },
+        })
+    })?;
+    found.ok_or(()).or_else(|()| {
+        let smallest = scaled(data, given, COARSEST)?;
+        match smallest.bytes() {
+            bytes if bytes <= target => Ok(smallest),
+            bytes => Err(TrainError::Input(format!(
+                "compression.target_bytes is {target}, but this scene takes {bytes} bytes with the coarsest steps. Allow more \
+                 bytes, or train fewer Gaussians (train.prune.fraction, train.densify.adaptive.max_gaussians)"
+            ))),
+        }
+    })
+}
+
+/// The smallest file whose decoded scene has at least `target` dB; `psnr` measures one. If none has, the one with the finest
+/// steps, and what it has.
+///
+/// # Errors
+/// What the codec refuses, and what `psnr` returns.
+pub(super) fn encode_to_quality(
+    data: &SceneData,
+    given: &CompressionInput,
+    target: f64,
+    psnr: &dyn Fn(&SceneData) -> Result<f64, TrainError>,
+) -> Result<(ScaledFile, Option<MissedQuality>), TrainError> {
+    let found = bisect(data, given, |file| {
+        let above = psnr(&file.encoded.decoded)? - target;
+        Ok(match above >= 0.0 {
+            true => Verdict::Fits { coarser: true, well: above <= ABOVE },
+            false => Verdict::Misses { coarser: false },
+        })
+    })?;
+    if let Some(file) = found {
+        return Ok((file, None));
+    }
+    let best = scaled(data, given, FINEST)?;
+    let reached = psnr(&best.encoded.decoded)?;
+    Ok((best, (reached < target).then_some(MissedQuality { wished: target, reached })))
+}
+
+/// Halves the range of factors until a file fits well. Returns the last that fits.
+fn bisect(
+    data: &SceneData,
+    given: &CompressionInput,
+    judge: impl Fn(&ScaledFile) -> Result<Verdict, TrainError>,
+) -> Result<Option<ScaledFile>, TrainError> {
+    let mut found = None;
+    let (mut fine, mut coarse) = (FINEST.ln(), COARSEST.ln());
+    let mut at = 0.0_f32;
+    for _ in 0..TRIES {
+        let coarser = match scaled(data, given, at.exp()) {
+            Ok(file) => match judge(&file)? {
+                Verdict::Fits { coarser, well } => {
+                    found = Some(file);
+                    if well {
+                        break;
+                    }
+                    coarser
+                }
+                Verdict::Misses { coarser } => coarser,
+            },
+            // Values may be legal with the given steps, and too many of the finer ones.
+            Err(_) if at < 0.0 => true,
+            Err(problem) => return Err(problem.into()),
+        };
+        *(if coarser { &mut fine } else { &mut coarse }) = at;
+        at = 0.5 * (fine + coarse);
+    }
+    Ok(found)
+}
+
+/// The file with steps that are coarser by a factor. Planes stay as they are: their models know their steps.
+fn scaled(data: &SceneData, given: &CompressionInput, factor: f32) -> Result<ScaledFile, CodecError> {
+    let mut input = given.clone();
+    let steps = given.attributes.iter().map(|(name, step)| (name.to_owned(), step * factor));
+    input.attributes = steps.fold(given.attributes.clone(), |all, (name, step)| all.with(&name, step)).clamped();
+    if let ShCoding::Channels { step } = &mut input.sh {
+        *step = checks::nearest_sh_step(*step * factor);
+    }
+    Ok(ScaledFile { factor, encoded: encode_compressed(data, &input)?, input })
+}
+
+#[cfg(test)]
+mod tests {
+    use light4gs_codec::attributes::AttributeSteps;
+    use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
+
+    use super::*;
+    use crate::compression::attribute_step_search::tests::scene;
+
+    fn input() -> CompressionInput {
+        CompressionInput {
+            profile: Profile::Compact,
+            planes: None,
+            sh: ShCoding::Channels { step: 0.02 },
+            attributes: AttributeSteps::default(),
+            weights: WeightPrecisions::default(),
+            layers: GaussianLayers::default(),
+        }
+    }
+
+    #[test]
+    fn a_file_fills_the_bytes_that_it_may_have() {
+        let given = encode_compressed(&scene(), &input()).unwrap().bytes.len();
+        for target in [given, given * 2 / 3, given * 5 / 4] {
+            let file = encode_to_size(&scene(), &input(), target).unwrap();
+            let bytes = file.bytes();
+            assert!(bytes <= target && bytes as f64 >= 0.95 * target as f64, "{bytes} of {target}");
+            assert_eq!(file.factor > 1.0, target < given, "{target}");
+        }
+    }
+
+    #[test]
+    fn too_few_bytes_are_refused() {
+        let problem = encode_to_size(&scene(), &input(), 300).err().unwrap().to_string();
+        assert!(problem.contains("compression.target_bytes is 300, but this scene takes"), "{problem}");
+    }
+
+    /// "PSNR" of colors against the exact ones.
+    fn quality(decoded: &SceneData) -> Result<f64, TrainError> {
+        let errors = |(a, b): (&f32, &f32)| f64::from(a - b).powi(2);
+        let (found, exact) = (&decoded.gaussians.sh_dc, &scene().gaussians.sh_dc);
+        let sum: f64 = found.as_flattened().iter().zip(exact.as_flattened()).map(errors).sum();
+        Ok(-10.0 * (sum / found.as_flattened().len() as f64).log10())
+    }
+
+    #[test]
+    fn a_file_is_as_good_as_it_must_be_and_no_larger() {
+        let at = |target| encode_to_quality(&scene(), &input(), target, &quality).unwrap().0;
+        let given = encode_compressed(&scene(), &input()).unwrap();
+        let reached = quality(&given.decoded).unwrap();
+        for target in [reached - 6.0, reached, reached + 3.0] {
+            let file = at(target);
+            let above = quality(&file.encoded.decoded).unwrap() - target;
+            assert!((0.0..0.3).contains(&above), "{above} above {target}");
+        }
+        assert!(at(reached - 6.0).bytes() < given.bytes.len());
+    }
+
+    #[test]
+    fn too_much_quality_is_missed_by_the_best_file() {
+        let (file, missed) = encode_to_quality(&scene(), &input(), 120.0, &quality).unwrap();
+        let missed = missed.unwrap();
+        assert_eq!((missed.wished, missed.reached), (120.0, quality(&file.encoded.decoded).unwrap()));
+        assert_eq!(file.factor, FINEST);
+    }
+}
