@@ -14,8 +14,8 @@ use crate::gaussians::{opacity, scales};
 const FEWEST: usize = 3000;
 /// Each level has half of the Gaussians of the one before.
 const MOST_LEVELS: u32 = 5;
-/// When the significance is looked at: each time takes as long as an image of all Gaussians.
-const TIMES: [f32; 3] = [0.0, 0.5, 1.0];
+/// When the significance is looked at besides: each time takes as long as an image of all Gaussians.
+const TIMES: [f32; 2] = [0.5, 1.0];
 
 /// What a level is made of.
 #[derive(Debug, Default, PartialEq)]
@@ -31,10 +31,15 @@ pub(crate) fn levels(count: usize) -> u32 {
     (1..=MOST_LEVELS).take_while(|&level| count >> level >= FEWEST).count() as u32
 }
 
-/// What each Gaussian covers where it covers most: of the canonical Gaussians and those at some times. An opacity may
-/// change so that it is seen at some times only.
-pub(crate) fn most_significance(canonical: &GaussianArrays, evaluator: &MotionEvaluator) -> Vec<f32> {
-    let mut most: Vec<f32> = (0..canonical.len()).map(|index| significance(canonical, index)).collect();
+/// What each Gaussian covers where it covers most: of the canonical Gaussians, of those that are `moved` to some time, and
+/// of those at further times. An opacity may change so that it is seen at some times only.
+pub(crate) fn most_significance(
+    canonical: &GaussianArrays,
+    moved: &GaussianArrays,
+    evaluator: &MotionEvaluator,
+) -> Vec<f32> {
+    let both = |index: usize| significance(canonical, index).max(significance(moved, index));
+    let mut most: Vec<f32> = (0..canonical.len()).map(both).collect();
     if evaluator.changes(MotionOutput::OpacityLogit) || evaluator.changes(MotionOutput::LogScale) {
         let mut moved = canonical.clone();
         for time in TIMES {
@@ -146,7 +151,7 @@ mod tests {
 
     fn chosen(all: &GaussianArrays, count: usize) -> Selection {
         let still = MotionEvaluator::new(&SceneData::default()).expect("a scene without motion");
-        select(&all.means, &most_significance(all, &still), count)
+        select(&all.means, &most_significance(all, all, &still), count)
     }
 
     fn total(gaussians: &GaussianArrays) -> f64 {

@@ -88,7 +88,7 @@ impl OpenScene {
     /// level has half of the Gaussians of the one before. The description says how many there are; beyond the last one it
     /// is taken. Returns whether the level was made anew: nothing of it is evaluated then.
     pub fn show_level(&mut self, level: u32) -> bool {
-        let canonical = &self.full.canonical;
+        let Level { canonical, moved, evaluator, .. } = &self.full;
         let level = level.min(levels(canonical.len()));
         self.shows_reduced = level > 0;
         if level == 0 || self.reduced.as_ref().is_some_and(|(made, _)| *made == level) {
@@ -96,7 +96,7 @@ impl OpenScene {
         }
         // The memory of the one before comes back first.
         self.reduced = None;
-        let significance = self.significance.get_or_insert_with(|| most_significance(canonical, &self.full.evaluator));
+        let significance = self.significance.get_or_insert_with(|| most_significance(canonical, moved, evaluator));
         let Selection { indices, growth } = select(&canonical.means, significance, canonical.len() >> level);
         self.scene.gaussians = canonical.gathered(&indices);
         // What was possible with all Gaussians is possible with some of them.
@@ -170,7 +170,8 @@ mod tests {
         let OpenScene { full: Level { canonical, evaluator, .. }, .. } = scene();
         let still = MotionEvaluator::new(&SceneData::default()).expect("a scene without motion");
         let seen = |significance: &[f32]| significance.iter().filter(|&&value| value > 0.0).count();
-        let [once, most] = [&still, &evaluator].map(|evaluator| seen(&most_significance(&canonical, evaluator)));
+        let [once, most] =
+            [&still, &evaluator].map(|evaluator| seen(&most_significance(&canonical, &canonical, evaluator)));
         assert!(most > once && once > 1000, "{once} of {most}");
     }
 

@@ -37,8 +37,8 @@ const inTurn = (/** @type {() => void | Promise<void>} */ work) => {
 /** @param {any} request */
 async function frame({ id, time, viewpoint, memory, level }) {
   if (!decoder) throw new Error("no scene is open");
-  const start = performance.now();
   decoder.showLevel(level);
+  const start = performance.now();
   const moved = time !== decoder.time;
   if (moved) await decoder.evaluate(time, pause);
   const evaluated = performance.now();

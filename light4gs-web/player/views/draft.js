@@ -50,7 +50,8 @@ class Steps {
     this.#intervals = [];
     if (median > (this.step < this.lastGood ? SLOW : VERY_SLOW) && this.step < this.last) {
       // Far too slow: more than one step at once.
-      this.step = Math.min(this.step + (median > 3 * SLOW ? 2 : 1), this.last);
+      const steps = median > 6 * SLOW ? 4 : median > 3 * SLOW ? 2 : 1;
+      this.step = Math.min(this.step + steps, this.last);
       this.#tried = now;
     } else if (median < FAST && this.step > 0 && now - this.#tried > PATIENCE) {
       this.step--;
