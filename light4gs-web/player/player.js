@@ -115,6 +115,8 @@ export class Player extends EventTarget {
   /** More Gaussians of the scene have come. */
   #more = () => {
     this.#shownTime = -1;
+    // With more Gaussians there are more levels, and other times.
+    this.#draft = new Draft(this.scene.info.levels);
   };
 
   #lost = (/** @type {Event} */ event) => event.preventDefault();
