@@ -2,6 +2,7 @@
 
 use std::ffi::CString;
 
+use light4gs_codec::SectionInfo;
 use light4gs_render::PlayableScene;
 
 use crate::failure::c_string;
@@ -24,7 +25,8 @@ impl L4gsScene {
         let info = playable.info();
         let name = c_string(&info.meta.name);
         let extras = info.meta.extra.iter().map(|(key, value)| (c_string(key), c_string(value))).collect();
-        let sections = info.sections.iter().map(|section| (c_string(section.name), section.bytes)).collect();
+        let sections = SectionInfo::bytes_by_name(&info.sections);
+        let sections = sections.into_iter().map(|(name, bytes)| (c_string(name), bytes)).collect();
         let attributes = playable.further().iter().map(|attribute| c_string(&attribute.name)).collect();
         Self { name, extras, attributes, sections, playable }
     }

@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 
 use glam::{DMat3, DVec3};
-use light4gs_codec::{CodecError, Limits};
+use light4gs_codec::{CodecError, Limits, SectionInfo};
 use light4gs_data::{Camera, Intrinsics};
 use light4gs_render::PlayableScene;
 use light4gs_render::conventions::{Gsplat, Inria};
@@ -116,8 +116,7 @@ impl Scene {
         dict.set_item("gaussian_count", info.gaussian_count)?;
         dict.set_item("sh_degree", info.sh_degree)?;
         dict.set_item("bytes", info.bytes)?;
-        let sections: Vec<_> = info.sections.iter().map(|section| (section.name, section.bytes)).collect();
-        dict.set_item("sections", sections)?;
+        dict.set_item("sections", SectionInfo::bytes_by_name(&info.sections))?;
         Ok(dict)
     }
 

@@ -15,24 +15,10 @@ pub(crate) struct Facts<'a> {
     pub(crate) sections: &'a [SectionInfo],
 }
 
-impl Facts<'_> {
-    /// Names and bytes of the sections; those of further layers are added to the first.
-    fn sizes(&self) -> Vec<(&str, u64)> {
-        let mut sizes: Vec<(&str, u64)> = Vec::new();
-        for section in self.sections {
-            match sizes.iter_mut().find(|(name, _)| *name == section.name) {
-                Some((_, sum)) => *sum += section.bytes,
-                None => sizes.push((section.name, section.bytes)),
-            }
-        }
-        sizes
-    }
-}
-
 /// The description of a scene with so many levels of detail: `{"name": ..., "sections": [...]}`.
 pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>, levels: u32) -> String {
     let SceneMeta { name, frame_count, fps, bounds, background, width, height, fov_x, extra, .. } = &scene.meta;
-    let sizes = facts.sizes();
+    let sizes = SectionInfo::bytes_by_name(facts.sections);
     let sections = sizes.iter().map(|(name, bytes)| format!("[{},{bytes}]", text(name)));
     let extra = extra.iter().map(|(key, value)| format!("{}:{}", text(key), text(value)));
     format!(

@@ -83,6 +83,20 @@ pub struct LayerInfo {
     pub bytes_to_show: u64,
 }
 
+impl SectionInfo {
+    /// Names of sections with their bytes, in the order of the stream; the sections of all layers together.
+    pub fn bytes_by_name(sections: &[Self]) -> Vec<(&'static str, u64)> {
+        let mut sums: Vec<(&'static str, u64)> = Vec::new();
+        for section in sections {
+            match sums.iter_mut().find(|(name, _)| *name == section.name) {
+                Some((_, sum)) => *sum += section.bytes,
+                None => sums.push((section.name, section.bytes)),
+            }
+        }
+        sums
+    }
+}
+
 impl StreamInfo {
     /// Bytes from the beginning of the stream that a player needs for the first image.
     pub fn bytes_to_first_image(&self) -> u64 {

@@ -7,8 +7,8 @@ use common::{
     sample,
 };
 use light4gs_codec::{
-    CodecError, CompressionInput, Demand, GaussianArrays, GaussianLayers, Limits, Profile, SceneData, ShCoding,
-    StreamDecoder, decode, decode_with_limits, encode, encode_compressed, info,
+    CodecError, CompressionInput, Demand, GaussianArrays, GaussianLayers, Limits, Profile, SceneData, SectionInfo,
+    ShCoding, StreamDecoder, decode, decode_with_limits, encode, encode_compressed, info,
 };
 use proptest::prelude::*;
 
@@ -79,8 +79,10 @@ fn info_tells_the_bytes_to_the_first_image() {
         assert_eq!(sizes, input.layers.sizes(37));
         assert_eq!((info.gaussian_count, info.sh_degree), (37, 2));
         let attributes: u64 = info.attributes.iter().map(|attribute| attribute.bytes).sum();
-        let sections = info.sections.iter().filter(|section| section.name == "gaussians");
-        assert!(attributes < sections.map(|section| section.bytes).sum());
+        let by_name = SectionInfo::bytes_by_name(&info.sections);
+        let gaussians = by_name.iter().find(|(name, _)| *name == "gaussians").unwrap().1;
+        assert!(attributes < gaussians);
+        assert_eq!(by_name.iter().map(|(_, bytes)| bytes).sum::<u64>() + info.header_bytes, info.bytes);
 
         // So many bytes suffice, one less does not.
         for (index, layer) in info.layers.iter().enumerate() {

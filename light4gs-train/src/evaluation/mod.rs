@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use burn::tensor::Device;
-use light4gs_codec::{Limits, SceneData, StreamInfo};
+use light4gs_codec::{Limits, SceneData, SectionInfo, StreamInfo};
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
 use serde::Serialize;
@@ -210,15 +210,10 @@ impl<F: DeformationField> DecodedScene<F> {
 
 /// Sections of a file with the header in front; their sizes add up to that of the file.
 pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
-    let mut sizes = vec![SectionSize { name: "header".into(), bytes: info.header_bytes }];
-    for section in &info.sections {
-        // Layers of Gaussians have a section each.
-        match sizes.iter_mut().find(|size| size.name == section.name) {
-            Some(size) => size.bytes += section.bytes,
-            None => sizes.push(SectionSize { name: section.name.to_owned(), bytes: section.bytes }),
-        }
-    }
-    sizes
+    let header = SectionSize { name: "header".into(), bytes: info.header_bytes };
+    let sections = SectionInfo::bytes_by_name(&info.sections).into_iter();
+    let sections = sections.map(|(name, bytes)| SectionSize { name: name.to_owned(), bytes });
+    std::iter::once(header).chain(sections).collect()
 }
 
 impl Evaluation {
