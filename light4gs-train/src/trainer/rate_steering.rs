@@ -16,8 +16,11 @@ const POWER: f64 = 0.7;
 /// A correction multiplies the weight by this for each dB above the wished PSNR. A dB is a factor of 20 to 50 in the
 /// weight, which the scene follows slowly.
 const FACTOR_OF_A_DECIBEL: f64 = 2.0;
-/// A quality is steered to in this last share of the fine stage: before, a scene is not yet as good as it will be.
+/// A quality is steered to in this last share of the fine stage: before, a scene is not yet nearly as good as it will be.
 const STEERED_BY_QUALITY: f64 = 0.4;
+/// The weight becomes smaller than the configured one in this last share only: until then a scene that is not good enough
+/// may still become so.
+const RELIEVED: f64 = 0.15;
 /// Views by which the quality is measured at most.
 const VIEWS: usize = 16;
 /// The weight stays within this factor of the configured one, up and down.
@@ -36,9 +39,11 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if !steered || !iteration.is_multiple_of(interval) || !self.gaussian_rate_is_active(iteration) {
             return Ok(());
         }
-        if settings.target_db > 0.0 && (iteration as f64) < (1.0 - STEERED_BY_QUALITY) * iterations as f64 {
+        let left = 1.0 - iteration as f64 / iterations as f64;
+        if settings.target_db > 0.0 && left > STEERED_BY_QUALITY {
             return Ok(());
         }
+        let least = if settings.target_db > 0.0 && left > RELIEVED { 1.0 } else { 1.0 / MOST };
         let Some(compression) = &self.state.compression else { return Ok(()) };
         let meta = scene_meta(&self.config, &self.data);
         // A scene that cannot be coded has diverged, and the trainer says so.
@@ -48,7 +53,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             target => (self.expected_bytes(&encoded, iteration) / target as f64).powf(POWER),
         };
         let weight = &mut self.state.rate_weight;
-        *weight = (*weight * factor).clamp(1.0 / MOST, MOST);
+        *weight = (*weight * factor).clamp(least, MOST);
         self.profile.lap("size of the file");
         Ok(())
     }
