@@ -59,8 +59,9 @@ pub extern "C" fn begin() {
     state().arrival = Some(Arrival::default());
 }
 
-/// Takes the input as the next piece of the file, which may be empty, and frees it. Decodes at most one layer. Returns 1 if the scene is another one now, since there is
-/// more to be seen; 2 if it is not; 0 if the file is damaged. [`text`] has the description or the error.
+/// Takes the input as the next piece of the file, which may be empty, and frees it. Decodes at most one layer. Returns 1 if the
+/// scene is another one now, since there is more to be seen; 2 if it is not; 0 if the file is damaged. [`text`] has the
+/// description or the error.
 #[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
 pub extern "C" fn push() -> u32 {
     let state = &mut *state();

@@ -7,7 +7,7 @@ use light4gs_model::{DeformationField, DynamicScene, Splatter};
 
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
-use crate::metrics::decibels;
+use crate::metrics::{image_tensor, psnr};
 
 /// The views by which a wished PSNR is measured: those of the test split, as in a report; where there are none, those of
 /// training.
@@ -33,8 +33,7 @@ pub fn mean_psnr<'f, F: DeformationField>(
         let pixels = image.clamp(0.0, 1.0).into_data().iter::<f32>().collect();
         let render = RgbImage32 { width: frame.camera.width, height: frame.camera.height, pixels }.to_u8();
         let truth = images.image(frame)?;
-        let errors = render.pixels.iter().zip(&truth.pixels).map(|(&a, &b)| f64::from(a.abs_diff(b)).powi(2));
-        values.push(decibels(errors.sum::<f64>() / truth.pixels.len() as f64 / 255.0f64.powi(2)));
+        values.push(psnr(image_tensor(&render, device), image_tensor(&truth, device)));
     }
     Ok(values.iter().sum::<f64>() / values.len() as f64)
 }
