@@ -30,8 +30,8 @@ const largePath = process.env.LIGHT4GS_LARGE ?? `${folder}/large.l4gs`;
 
 function makeLargeScene() {
   if (existsSync(largePath)) return;
-  const write = ["test", "--release", "--locked", "--package", "light4gs-web", "--test", "large_scene", "--", "--ignored"];
-  execFileSync("cargo", write, { cwd: root, env: { ...process.env, LIGHT4GS_LARGE: largePath }, stdio: "ignore" });
+  const example = ["run", "--quiet", "--release", "--locked", "--package", "light4gs-codec", "--example", "large_scene", "--"];
+  execFileSync("cargo", [...example, scenePath, largePath, "100000"], { cwd: root, stdio: "ignore" });
 }
 
 /** What the server of the watched page has. */

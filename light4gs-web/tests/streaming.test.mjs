@@ -1,5 +1,5 @@
 // Scenes that are shown while they come, from a server that gives 1 MB a second. LIGHT4GS_WEB_LAYERED names the file; without
-// it, one of 5 MB is made by `cargo run --example layered`.
+// it, one of 5 MB is made by `cargo run --example large_scene`.
 
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
@@ -26,7 +26,7 @@ function layeredFile() {
   const given = process.env.LIGHT4GS_WEB_LAYERED;
   if (given) return readFileSync(given);
   const made = `${folder}/layered.l4gs`;
-  const example = ["run", "--quiet", "--release", "--locked", "--package", "light4gs-codec", "--example", "layered", "--"];
+  const example = ["run", "--quiet", "--release", "--locked", "--package", "light4gs-codec", "--example", "large_scene", "--"];
   execFileSync("cargo", [...example, scenePath, made, String(GAUSSIANS), String(LAYERS)], { cwd: root, stdio: "inherit" });
   return readFileSync(made);
 }

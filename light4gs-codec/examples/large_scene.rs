@@ -1,13 +1,13 @@
-//! Makes a large file of several layers of a small one, for tests of files that are shown while they come: layered FILE OUT
-//! GAUSSIANS LAYERS.
+//! Makes a large scene of a small one, for tests and measurements of the player: large_scene FILE OUT GAUSSIANS [LAYERS].
 //!
-//! Each Gaussian is replaced by smaller ones around it. Planes, motion and what belongs to them are copied byte by byte.
+//! Each Gaussian is replaced by smaller ones around it. Without LAYERS the file is without loss. With them it is compressed, so
+//! its Gaussians are made to differ; planes, motion and what belongs to them are copied byte by byte.
 
 use std::process::ExitCode;
 
 use light4gs_codec::{
     CompressionInput, GaussianArrays, GaussianLayers, Profile, SceneData, ShCoding, WeightPrecisions,
-    attributes::AttributeSteps, decode, encode_compressed, info,
+    attributes::AttributeSteps, decode, encode, encode_compressed, info,
 };
 
 const PRELUDE: usize = 32;
@@ -15,11 +15,12 @@ const ENTRY: usize = 16;
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [file, out, gaussians, layers] = &arguments[..] else {
-        eprintln!("usage: layered FILE OUT GAUSSIANS LAYERS");
+    let [file, out, gaussians, layers @ ..] = &arguments[..] else {
+        eprintln!("usage: large_scene FILE OUT GAUSSIANS [LAYERS]");
         return ExitCode::from(64);
     };
-    let made = make(file, gaussians, layers).and_then(|bytes| std::fs::write(out, bytes).map_err(|e| e.to_string()));
+    let made =
+        make(file, gaussians, layers.first()).and_then(|bytes| std::fs::write(out, bytes).map_err(|e| e.to_string()));
     match made {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
@@ -29,10 +30,15 @@ fn main() -> ExitCode {
     }
 }
 
-fn make(file: &str, gaussians: &str, layers: &str) -> Result<Vec<u8>, String> {
+fn make(file: &str, gaussians: &str, layers: Option<&String>) -> Result<Vec<u8>, String> {
     let number = |text: &str| text.parse::<u32>().map_err(|error| format!("{text}: {error}"));
     let bytes = std::fs::read(file).map_err(|error| format!("{file}: {error}"))?;
     let scene = decode(&bytes).map_err(|error| format!("{file}: {error}"))?;
+    let count = number(gaussians)? as usize;
+    let Some(layers) = layers else {
+        let gaussians = divided(&scene.gaussians, count);
+        return encode(&SceneData { gaussians, ..scene }).map_err(|error| error.to_string());
+    };
     let input = CompressionInput {
         profile: Profile::Compact,
         planes: None,
@@ -42,7 +48,7 @@ fn make(file: &str, gaussians: &str, layers: &str) -> Result<Vec<u8>, String> {
         weights: WeightPrecisions::default(),
         layers: GaussianLayers::new(number(layers)?),
     };
-    let gaussians = divided(&of_degree_1(&scene.gaussians), number(gaussians)? as usize);
+    let gaussians = different(divided(&of_degree_1(&scene.gaussians), count));
     let still = SceneData { meta: scene.meta, gaussians, ..SceneData::default() };
     let coded = encode_compressed(&still, &input).map_err(|error| error.to_string())?;
     let bytes = with_shared(&bytes, &coded.bytes);
@@ -85,7 +91,8 @@ fn of_degree_1(gaussians: &GaussianArrays) -> GaussianArrays {
     GaussianArrays { sh_degree: 1, sh_rest, ..gaussians.clone() }
 }
 
-/// `count` Gaussians in place of fewer: the parts of one lie around its center, and together have its area.
+/// `count` Gaussians in place of fewer. The parts of one have its opacity and colors, a normal distribution around its
+/// center, and together its area and its covariance.
 fn divided(gaussians: &GaussianArrays, count: usize) -> GaussianArrays {
     let sources = gaussians.len().max(1);
     let indices: Vec<u32> = (0..count).map(|index| (index % sources) as u32).collect();
@@ -93,16 +100,37 @@ fn divided(gaussians: &GaussianArrays, count: usize) -> GaussianArrays {
     let mut random = Random(1);
     for index in 0..count {
         let share = 1.0 / (index % sources..count).step_by(sources).len() as f32;
-        for axis in 0..3 {
-            let scale = parts.log_scales[index][axis].exp();
-            parts.means[index][axis] += scale * (1.0 - share).sqrt() * random.normal();
-            parts.log_scales[index][axis] += 0.5 * share.ln() + 0.1 * random.normal();
-            parts.sh_dc[index][axis] += 0.05 * random.normal();
-        }
-        parts.quats[index].iter_mut().for_each(|value| *value += 0.05 * random.normal());
-        parts.sh_rest[9 * index..][..9].iter_mut().for_each(|value| *value += 0.05 * random.normal());
+        let scales = parts.log_scales[index].map(f32::exp);
+        let offset = scales.map(|scale| scale * (1.0 - share).sqrt() * random.normal());
+        let offset = rotated(parts.quats[index], offset);
+        parts.means[index].iter_mut().zip(offset).for_each(|(mean, offset)| *mean += offset);
+        parts.log_scales[index].iter_mut().for_each(|scale| *scale += 0.5 * share.ln());
     }
     parts
+}
+
+/// Gaussians of degree 1 with numbers of their own, which take bytes.
+fn different(mut gaussians: GaussianArrays) -> GaussianArrays {
+    let mut random = Random(2);
+    let mut vary = |numbers: &mut [f32], by: f32| numbers.iter_mut().for_each(|number| *number += by * random.normal());
+    vary(gaussians.log_scales.as_flattened_mut(), 0.1);
+    vary(gaussians.quats.as_flattened_mut(), 0.05);
+    vary(gaussians.sh_dc.as_flattened_mut(), 0.05);
+    vary(&mut gaussians.sh_rest, 0.05);
+    gaussians
+}
+
+/// A vector turned by a quaternion of any length but 0.
+fn rotated(quaternion: [f32; 4], [x, y, z]: [f32; 3]) -> [f32; 3] {
+    let length = quaternion.iter().map(|q| q * q).sum::<f32>().sqrt().max(f32::MIN_POSITIVE);
+    let [w, a, b, c] = quaternion.map(|q| q / length);
+    // v + 2 q × (q × v + w v)
+    let cross = [b * z - c * y + w * x, c * x - a * z + w * y, a * y - b * x + w * z];
+    [
+        x + 2.0 * (b * cross[2] - c * cross[1]),
+        y + 2.0 * (c * cross[0] - a * cross[2]),
+        z + 2.0 * (a * cross[1] - b * cross[0]),
+    ]
 }
 
 /// The same numbers everywhere.
