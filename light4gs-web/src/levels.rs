@@ -5,6 +5,7 @@
 //! times opacity stays as it is, and what covers much is not changed at all. The choice is systematic along a Morton
 //! curve: of neighbors that are dropped together, about one in `1 / p` stays and covers the others.
 
+use light4gs_codec::attributes::CodingOrder;
 use light4gs_codec::rendering::MIN_ALPHA;
 use light4gs_codec::{GaussianArrays, MotionEvaluator, MotionOutput};
 
@@ -97,38 +98,11 @@ fn threshold(significance: &[f32], count: usize) -> f64 {
     }
 }
 
-/// The indices of points in the order of a Morton curve.
+/// The indices of points in the order of a Morton curve; as they are, where one is not finite.
 fn along_curve(points: &[[f32; 3]]) -> Vec<u32> {
-    const CELLS: f32 = (1 << 21) as f32;
-    let mut corners = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-    for point in points.iter().filter(|point| point.iter().all(|x| x.is_finite())) {
-        for (axis, &x) in point.iter().enumerate() {
-            corners[0][axis] = corners[0][axis].min(x);
-            corners[1][axis] = corners[1][axis].max(x);
-        }
-    }
-    let side = (0..3).map(|axis| corners[1][axis] - corners[0][axis]).fold(f32::MIN_POSITIVE, f32::max);
-    let code = |point: &[f32; 3]| {
-        let cell = |axis: usize| ((point[axis] - corners[0][axis]) / side * CELLS).min(CELLS - 1.0) as u64;
-        (0..3).fold(0, |code, axis| code | spread(cell(axis)) << axis)
-    };
-    let mut keys: Vec<(u64, u32)> = points.iter().map(code).zip(0..).collect();
-    keys.sort_unstable();
-    keys.into_iter().map(|(_, index)| index).collect()
-}
-
-/// The lowest 21 bits with two zeros between each and the next.
-fn spread(mut bits: u64) -> u64 {
-    for (shift, mask) in [
-        (32, 0x001f_0000_0000_ffff),
-        (16, 0x001f_0000_ff00_00ff),
-        (8, 0x100f_00f0_0f00_f00f),
-        (4, 0x10c3_0c30_c30c_30c3),
-        (2, 0x1249_2492_4924_9249),
-    ] {
-        bits = (bits | bits << shift) & mask;
-    }
-    bits
+    // The smallest step stands for the finest grid that there is.
+    let order = CodingOrder::new(points, f32::MIN_POSITIVE);
+    order.map_or_else(|_| (0..points.len() as u32).collect(), |order| order.rows().to_vec())
 }
 
 #[cfg(test)]
@@ -225,9 +199,7 @@ mod tests {
 
     #[test]
     fn neighbors_on_the_curve_are_neighbors_in_space() {
-        let points: Vec<[f32; 3]> = [0.0, 1.0, 2.0, 3.0].map(|x| [x, 0.0, -x]).to_vec();
-        assert_eq!(along_curve(&points), [3, 2, 1, 0]);
-        assert_eq!(spread(0b101), 0b100_0001);
-        assert_eq!(spread((1 << 21) - 1).count_ones(), 21);
+        let points: Vec<[f32; 3]> = [2.0, 0.0, 3.0, 1.0].map(|x| [x, 0.0, -x]).to_vec();
+        assert_eq!(along_curve(&points), [1, 3, 0, 2]);
     }
 }

@@ -42,6 +42,11 @@ impl CodingOrder {
         Ok(Self { rows, places, points })
     }
 
+    /// The rows of the Gaussians, `[N]`, along the Morton curve.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
     /// The rows of the nearest Gaussians that are coded before one, nearest first. The first one has its own row.
     ///
     /// # Panics
