@@ -298,6 +298,17 @@ impl Camera {
         }
     }
 
+    /// The same view with fewer pixels, each the size of `factor`×`factor` of these. What is left at the right and at the
+    /// lower edge is not seen. The image for it is [`crate::RgbImage8::reduced`].
+    ///
+    /// # Panics
+    /// If `factor` is 0.
+    pub fn reduced(&self, factor: u32) -> Self {
+        let Self { width, height, .. } = *self;
+        let whole = Self { width: width - width % factor, height: height - height % factor, ..*self };
+        whole.resized(width / factor, height / factor)
+    }
+
     /// `(tan(fov_x / 2), tan(fov_y / 2))`, as if the principal point were in the middle.
     pub fn tan_half_fov(&self) -> (f32, f32) {
         (self.width as f32 / (2.0 * self.fx), self.height as f32 / (2.0 * self.fy))
@@ -373,6 +384,20 @@ mod tests {
         assert!(higher < v, "+y points down");
         assert!((camera.center() - Vec3::new(3.0, -2.0, 1.5)).length() < 1e-5);
         assert!((camera.rotation.determinant() - 1.0).abs() < 1e-5);
+    }
+
+    #[test]
+    fn a_reduced_camera_sees_the_same_in_larger_pixels() {
+        let camera = Camera { width: 101, height: 59, ..example() };
+        let reduced = camera.reduced(4);
+        assert_eq!((reduced.width, reduced.height), (25, 14));
+        let point = camera.center() + camera.rotation.transpose() * Vec3::new(0.2, -0.1, 3.0);
+        let ((u, v, z), (reduced_u, reduced_v, reduced_z)) = (camera.project(point), reduced.project(point));
+        // Centers of pixels are at whole numbers.
+        for (coordinate, reduced) in [(u, reduced_u), (v, reduced_v)] {
+            assert!((coordinate + 0.5 - 4.0 * (reduced + 0.5)).abs() < 1e-3, "{coordinate} {reduced}");
+        }
+        assert_eq!(z, reduced_z);
     }
 
     #[test]

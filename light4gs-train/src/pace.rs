@@ -1,7 +1,8 @@
 //! How long a training takes on this machine, from a dozen iterations of each kind.
 //!
 //! An iteration becomes slower as Gaussians are added, and slower again when it has a rate. So the run's own scene is
-//! trained for a moment in memory: with the Gaussians of the beginning, with as many as there may be, and with the rate.
+//! trained for a moment in memory: with the Gaussians of the beginning, with as many as there may be and images of each size,
+//! and with the rate.
 //! Nothing of it is kept.
 
 use std::time::Instant;
@@ -15,7 +16,7 @@ use crate::trainer::Trainer;
 
 /// Iterations of the coarse stage that are measured.
 const COARSE: usize = 6;
-/// Iterations of the fine stage with the Gaussians of the beginning, with all, and with the rate.
+/// Iterations of the fine stage with the Gaussians of the beginning, and with all at each size of the images.
 const PLAIN: usize = 9;
 /// Every so many of the last iterations have the rate, however seldom it is due in the run.
 const RATE_INTERVAL: usize = 3;
@@ -30,23 +31,33 @@ const VIEWS: usize = 12;
 const GROWN: f64 = 0.3;
 
 /// Seconds of the iterations of a run.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pace {
-    /// Gaussians at the beginning.
-    pub first_count: usize,
-    /// Gaussians after densification.
-    pub full_count: usize,
     /// An iteration of the coarse stage.
     pub coarse: f64,
     /// One of the fine stage, at the beginning.
-    pub first: f64,
-    /// One after densification.
-    pub full: f64,
-    /// One after densification, in the mean, where every few of them have a rate.
-    pub with_rate: f64,
+    pub first: Iteration,
+    /// One with the most Gaussians, at each of the run's image sizes; the last is that of whole images.
+    pub full: Vec<Iteration>,
+    /// What a rate adds to an iteration after densification, in the mean, where every few of them have one.
+    pub rate: f64,
+}
+
+/// An iteration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Iteration {
+    /// Gaussians in it.
+    pub gaussians: usize,
+    /// How long it takes.
+    pub seconds: f64,
 }
 
 impl Pace {
+    /// The most Gaussians of the run.
+    pub fn full_count(&self) -> usize {
+        self.full.last().map_or(self.first.gaussians, |iteration| iteration.gaussians)
+    }
+
     /// Trains the scene of a run for a moment.
     ///
     /// # Errors
@@ -54,38 +65,37 @@ impl Pace {
     pub fn measure(config: &Config, mut data: Scene) -> Result<Self, TrainError> {
         let apart = data.train.len().div_ceil(VIEWS).max(1);
         data.train = data.train.into_iter().step_by(apart).collect();
-        let first_count = data.points.positions.len();
         let mut trainer = Trainer::builder(moment_of(config), data).build()?;
         let (mut coarse, mut fine) = (Vec::new(), Vec::new());
-        let mut full_count = first_count;
         loop {
             let begin = Instant::now();
             let Some(report) = trainer.step()? else { break };
-            let times = if report.stage == Stage::Coarse { &mut coarse } else { &mut fine };
-            times.push(begin.elapsed().as_secs_f64());
-            full_count = report.gaussians;
+            let seconds = begin.elapsed().as_secs_f64();
+            match report.stage {
+                Stage::Coarse => coarse.push(seconds),
+                Stage::Fine => fine.push(Iteration { gaussians: report.gaussians, seconds }),
+            }
         }
-        let (first, full, rate) = (&fine[..PLAIN], &fine[PLAIN + GROWTH..][..PLAIN], &fine[2 * PLAIN + GROWTH..]);
-        let rounds: Vec<f64> = rate.chunks_exact(RATE_INTERVAL).map(|round| round.iter().sum()).collect();
-        let full = median(full);
+        let (first, rest) = fine.split_at(PLAIN);
+        let (sizes, rate) = rest.split_at((GROWTH + PLAIN) * sizes(config).len());
+        let full: Vec<_> = sizes.chunks_exact(GROWTH + PLAIN).map(|size| typical(&size[GROWTH..])).collect();
+        let rounds =
+            rate.chunks_exact(RATE_INTERVAL).map(|round| round.iter().map(|iteration| iteration.seconds).sum());
         // What one iteration with the rate takes beyond a plain one, spread over those without.
-        let more = (median(&rounds) - RATE_INTERVAL as f64 * full) / config.compression.rate.interval as f64;
-        Ok(Self {
-            first_count,
-            full_count,
-            coarse: median(&coarse),
-            first: median(first),
-            full,
-            with_rate: full + more.max(0.0),
-        })
+        let whole = full.last().expect("whole images are one of the sizes").seconds;
+        let rate = (median(rounds.collect()) - RATE_INTERVAL as f64 * whole) / config.compression.rate.interval as f64;
+        Ok(Self { coarse: median(coarse), first: typical(first), full, rate: rate.max(0.0) })
     }
 
-    /// Seconds that the training of a configuration takes, without coding and measuring.
+    /// Seconds that the training of a configuration takes, without coding and measuring. It has the image sizes of that
+    /// which was measured.
     pub fn training_seconds(&self, config: &Config) -> f64 {
         let train = &config.train;
         let adaptive = &train.densify.strategies.adaptive;
-        let growth = (self.full - self.first) / (self.full_count as f64 - self.first_count as f64).max(1.0);
-        let rate = if config.compression.rate.lambda > 0.0 { self.with_rate / self.full } else { 1.0 };
+        let (first, full_count) = (self.first, self.full_count());
+        let added = self.full[0].gaussians as f64 - first.gaussians as f64;
+        let growth = (self.full[0].seconds - first.seconds) / added.max(1.0);
+        let rate = if config.compression.rate.lambda > 0.0 { self.rate } else { 0.0 };
         // Planes have a rate while Gaussians are still added.
         let planes = config.model.field == FieldKind::HexPlane;
         let rate_from =
@@ -98,47 +108,74 @@ impl Pace {
             true => train.prune.iterations.iter().map(|&iteration| iteration as f64).collect(),
             false => Vec::new(),
         };
-        let seconds_at = |iteration: f64| {
-            let (first, full) = (self.first_count as f64, self.full_count as f64);
+        let sizes = sizes(config);
+        let seconds_at = |progress: f64| {
+            let iteration = progress * end as f64;
             let reached = ((iteration - from) / (grown - from).max(1.0)).clamp(0.0, 1.0);
             let passes = prunings.iter().filter(|&&pass| pass < iteration).count();
-            let count = (first + (full - first) * reached) * (1.0 - train.prune.fraction).powi(passes as i32);
-            let plain = (self.first + growth * (count - first)).max(0.0);
-            if iteration >= rate_from as f64 { plain * rate } else { plain }
+            let size = sizes.iter().take_while(|until| progress >= **until).count();
+            let full = self.full[size];
+            let grown = first.gaussians as f64 + (full_count as f64 - first.gaussians as f64) * reached;
+            let count = grown.min(full.gaussians as f64) * (1.0 - train.prune.fraction).powi(passes as i32);
+            let plain = (full.seconds + growth * (count - full.gaussians as f64)).max(0.0);
+            if iteration >= rate_from as f64 { plain + rate * count / full_count.max(1) as f64 } else { plain }
         };
         // A thousand samples say it as well as every iteration.
         let samples = end.clamp(1, 1000);
-        let each = end as f64 / samples as f64;
-        let fine: f64 = (0..samples).map(|sample| each * seconds_at((sample as f64 + 0.5) * each)).sum();
-        fine + train.coarse_iterations as f64 * self.coarse
+        let fine: f64 = (0..samples).map(|sample| seconds_at((sample as f64 + 0.5) / samples as f64)).sum();
+        fine * end as f64 / samples as f64 + train.coarse_iterations as f64 * self.coarse
     }
 }
 
-/// The configuration of the moment that is measured.
+/// The sizes of a run's images: the share of the fine stage until which it has each, in the order of the run.
+fn sizes(config: &Config) -> Vec<f64> {
+    let coarse_to_fine = &config.train.coarse_to_fine;
+    let mut sizes = vec![coarse_to_fine.quarter_until, coarse_to_fine.half_until, 1.0];
+    sizes.retain(|until| *until > 0.0);
+    sizes.sort_by(f64::total_cmp);
+    sizes
+}
+
+/// The configuration of the moment that is measured: a few iterations with the Gaussians of the beginning, then at each size
+/// of the images growth and a few with all, then a few with a rate.
 fn moment_of(config: &Config) -> Config {
     let mut moment = config.clone();
     let train = &mut moment.train;
     train.coarse_iterations = COARSE;
-    train.fine_iterations = 2 * PLAIN + GROWTH + RATE_ROUNDS * RATE_INTERVAL;
+    let plain = PLAIN + (GROWTH + PLAIN) * sizes(config).len();
+    train.fine_iterations = plain + RATE_ROUNDS * RATE_INTERVAL;
+    let coarse_to_fine = &mut train.coarse_to_fine;
+    let mut until = PLAIN;
+    for share in [&mut coarse_to_fine.quarter_until, &mut coarse_to_fine.half_until] {
+        if *share > 0.0 {
+            until += GROWTH + PLAIN;
+            *share = until as f64 / train.fine_iterations as f64;
+        }
+    }
     train.sh_degree_interval = 1;
     train.prune.fraction = 0.0;
     train.guided_sampling.iterations = Vec::new();
     let adaptive = &mut train.densify.strategies.adaptive;
-    (adaptive.from, adaptive.until, adaptive.interval) = (PLAIN, PLAIN + GROWTH, 1);
+    (adaptive.from, adaptive.until, adaptive.interval) = (PLAIN, plain - PLAIN, 1);
     let thresholds = [&mut adaptive.grad_threshold_fine_init, &mut adaptive.grad_threshold_fine_final];
     // Every Gaussian that is seen.
     thresholds.into_iter().for_each(|threshold| *threshold = 1e-30);
     adaptive.prune_from = train.fine_iterations;
     adaptive.opacity_reset_interval = 0;
-    moment.compression.rate.from = 2 * PLAIN + GROWTH;
+    moment.compression.rate.from = plain;
     moment.compression.rate.interval = RATE_INTERVAL;
     moment.compression.rate.planes_until = 0;
     moment.eval.interval = 0;
     moment
 }
 
-fn median(times: &[f64]) -> f64 {
-    let mut sorted = times.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(0.0)
+/// The last number of Gaussians, and the median of the times.
+fn typical(iterations: &[Iteration]) -> Iteration {
+    let gaussians = iterations.last().map_or(0, |iteration| iteration.gaussians);
+    Iteration { gaussians, seconds: median(iterations.iter().map(|iteration| iteration.seconds).collect()) }
+}
+
+fn median(mut times: Vec<f64>) -> f64 {
+    times.sort_by(f64::total_cmp);
+    times.get(times.len() / 2).copied().unwrap_or(0.0)
 }

@@ -6,6 +6,7 @@ mod decode;
 mod header;
 mod large;
 mod mask;
+mod reduce;
 mod region;
 mod resize;
 mod rgb;

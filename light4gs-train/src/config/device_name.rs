@@ -15,9 +15,10 @@ pub const DEVICES: &[&str] = &["ndarray", "flex", "wgpu"];
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum DeviceName {
     /// Burn's `ndarray` back end, on the processor.
-    #[default]
+    #[cfg_attr(not(feature = "flex"), default)]
     NdArray,
-    /// Burn's `flex` back end, on the processor.
+    /// Burn's `flex` back end, on the processor: the faster one.
+    #[cfg_attr(feature = "flex", default)]
     Flex,
     /// Burn's `wgpu` back end, on a graphics adapter.
     Wgpu(Adapter),

@@ -49,7 +49,7 @@ pub use error::{ConfigError, Origin, Problem};
 pub use eval::{EvalConfig, EvalSplit};
 pub use layering::presets::preset_names;
 pub use model::{CoordinatesTable, DeformationTable, FieldKind, HexPlaneTable, ModelConfig};
-pub use train::{LearningRates, RegularizerConfig, TrainConfig};
+pub use train::{CoarseToFineConfig, LearningRates, RegularizerConfig, TrainConfig};
 
 /// Far longer than any real configuration.
 pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;
@@ -61,7 +61,7 @@ keys! {
         seed: u64 = 0; Whole { least: 0, most: MOST_INTEGER }, "ours";
         /// Back end that computes: `ndarray`, `flex`, or `wgpu`, the last with an adapter if wanted: `wgpu:0` (by
         /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
-        device: DeviceName = DeviceName::NdArray; Device(DEVICES), "ours", "or \"flex\", \"wgpu\", \"wgpu:0\"";
+        device: DeviceName = DeviceName::default(); Device(DEVICES), "ours", "or \"ndarray\", \"wgpu\", \"wgpu:0\"";
         /// What is trained on.
         data: DataConfig;
         /// What is trained.

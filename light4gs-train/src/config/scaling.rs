@@ -3,10 +3,7 @@
 //! The changes are overrides as [`Config::load`] takes them, so that what a user sets by hand, laid on top, wins.
 
 use super::Config;
-
-/// How the number of Gaussians grows with the side of the images. A surface seen at twice the size shows less than four
-/// times the detail; 1.4 makes 41 000 Gaussians at 480 pixels of 12 000 at 200, about what was chosen by hand.
-const GAUSSIANS_BY_SIDE: f64 = 1.4;
+use crate::density::gaussians_for_images;
 
 /// Bytes for each Gaussian that may be trained, with which a file has the next two values on the measured hull
 /// (docs/results.md, sizes). Fewer bytes come from fewer Gaussians and from a dearer byte together.
@@ -24,7 +21,7 @@ impl Config {
         let before = f64::from(self.data.resolution.unwrap_or(longest));
         let ratio = f64::from(pixels.min(longest)) / before;
         let train = &self.train;
-        let scaled = |count: usize| (count as f64 * ratio.powf(GAUSSIANS_BY_SIDE)).round().max(1.0);
+        let scaled = |count| gaussians_for_images(count, ratio);
         vec![
             format!("data.resolution={pixels}"),
             format!("train.densify.adaptive.max_gaussians={}", scaled(train.densify.strategies.adaptive.max_gaussians)),

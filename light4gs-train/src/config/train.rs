@@ -1,10 +1,11 @@
 //! `[train]`: how it is trained.
 
+use light4gs_data::Camera;
 use light4gs_model::regularizer::PlaneRegularizer;
 
 use crate::density::{DensifyConfig, GuidedSamplingConfig, PruneConfig};
 use crate::keys::Bounds::{Flag, Kind, Number, Whole};
-use crate::keys::{INTERVAL, ITERATION, ITERATIONS, RATE, WEIGHT, keys, optional};
+use crate::keys::{INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, WEIGHT, keys, optional};
 use crate::loss::{LossKind, Losses};
 use crate::sampling::{SamplerKind, Samplers};
 use crate::stage::Stage;
@@ -46,6 +47,8 @@ keys! {
         log_interval: usize = 10; INTERVAL, "ours";
         /// Number of checkpoints that are kept, the newest ones.
         keep_checkpoints: usize = 2; INTERVAL, "ours";
+        /// Smaller images first.
+        coarse_to_fine: CoarseToFineConfig;
         /// Learning rates by parameter group.
         learning_rate: LearningRates;
         /// Cloning, splitting, pruning and opacity reset.
@@ -68,11 +71,47 @@ impl TrainConfig {
         }
     }
 
+    /// The share of the fine stage that is over before this iteration of a stage.
+    pub fn progress(&self, stage: Stage, iteration: usize) -> f64 {
+        match stage {
+            Stage::Coarse => 0.0,
+            Stage::Fine => iteration.saturating_sub(1) as f64 / self.fine_iterations.max(1) as f64,
+        }
+    }
+
     /// Iterations of a stage.
     pub fn iterations(&self, stage: Stage) -> usize {
         match stage {
             Stage::Coarse => self.coarse_iterations,
             Stage::Fine => self.fine_iterations,
+        }
+    }
+}
+
+keys! {
+    /// Smaller images first, and fewer Gaussians for them: such an iteration takes a fraction of the time. The coarse stage has
+    /// the size with which the fine stage begins. No side of an image is made shorter than 120 pixels.
+    pub struct CoarseToFineConfig {
+        /// Images have a quarter of their width and height until this share of the fine stage is over. 0: never.
+        quarter_until: f64 = 0.0; SHARE, "ours", "of the fine stage; 0 = never";
+        /// They have half of them until this share is over.
+        half_until: f64 = 0.0; SHARE, "ours", "of the fine stage; 0 = never";
+    }
+}
+
+/// Smaller images keep at least so many pixels on their shorter side: an iteration takes little time then, and most of it
+/// for the Gaussians.
+const FEWEST_PIXELS: u32 = 120;
+
+impl CoarseToFineConfig {
+    /// Images of this camera have `1 / factor` of their width and height when this share of the fine stage is over; in
+    /// the coarse stage that is 0.
+    pub fn factor(&self, progress: f64, camera: &Camera) -> u32 {
+        let most = camera.width.min(camera.height) / FEWEST_PIXELS;
+        match () {
+            () if progress < self.quarter_until && most >= 4 => 4,
+            () if progress < self.quarter_until.max(self.half_until) && most >= 2 => 2,
+            () => 1,
         }
     }
 }
@@ -131,5 +170,26 @@ impl RegularizerConfig {
     pub fn build(&self) -> PlaneRegularizer {
         let Self { plane_smoothness, time_smoothness, time_l1 } = *self;
         PlaneRegularizer { plane_smoothness, time_smoothness, time_l1 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn images_grow_from_coarse_to_fine() {
+        let coarse_to_fine = CoarseToFineConfig { quarter_until: 0.1, half_until: 0.5 };
+        let view = Camera::look_at(Vec3::X, Vec3::ZERO, Vec3::Z, 1.0, 960, 540);
+        assert_eq!(
+            [0.0, 0.09, 0.1, 0.49, 0.5, 1.0].map(|progress| coarse_to_fine.factor(progress, &view)),
+            [4, 4, 2, 2, 1, 1]
+        );
+        // Not below 120 pixels.
+        let of_height = |height| coarse_to_fine.factor(0.0, &Camera { height, ..view });
+        assert_eq!([480, 479, 240, 239, 1].map(of_height), [4, 2, 2, 1, 1]);
+        assert_eq!(CoarseToFineConfig::default().factor(0.0, &view), 1);
     }
 }

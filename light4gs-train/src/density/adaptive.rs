@@ -8,7 +8,10 @@ use burn::tensor::{Device, Tensor};
 use super::clone_and_split::{
     DensifyMasks, SizeLimit, densify, largest_scales, least_of_largest, reset_opacity, survivors,
 };
-use super::{DensityConfig, DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
+use super::{
+    DensityConfig, DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics,
+    gaussians_for_images,
+};
 use crate::keys::Bounds::{Number, Whole};
 use crate::keys::{INTERVAL, ITERATION, MOST_GAUSSIANS, SHARE, THRESHOLD, keys};
 use crate::randomness::standard_normal;
@@ -101,6 +104,11 @@ impl AdaptiveDensityControl {
         }
     }
 
+    /// The most Gaussians; smaller images need fewer.
+    fn most(&self, position: &TrainingPosition) -> usize {
+        gaussians_for_images(self.config.max_gaussians, 1.0 / f64::from(position.image_factor))
+    }
+
     fn prune(&mut self, gaussians: &mut GaussianEditor, min_opacity: f32, position: &TrainingPosition) {
         let Some(statistics) = &self.statistics else { return };
         let interval = self.config.opacity_reset_interval;
@@ -118,7 +126,7 @@ impl AdaptiveDensityControl {
         let Some(statistics) = &self.statistics else { return };
         let gradients = statistics.mean_gradients();
         // Each that is cloned or split adds one.
-        let room = self.config.max_gaussians.saturating_sub(gaussians.len());
+        let room = self.most(position).saturating_sub(gaussians.len());
         let masks = DensifyMasks::new(
             &gradients,
             &largest_scales(gaussians.gaussians()),
@@ -161,7 +169,7 @@ impl DensityStrategy for AdaptiveDensityControl {
         if due(prune_from, prune_interval) && gaussians.len() > self.config.prune_above {
             self.prune(gaussians, min_opacity, position);
         }
-        if due(from, interval) && gaussians.len() < self.config.max_gaussians {
+        if due(from, interval) && gaussians.len() < self.most(position) {
             self.clone_and_split(gaussians, threshold, position);
         }
         if due(0, self.config.opacity_reset_interval) && iteration < until {

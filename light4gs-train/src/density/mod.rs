@@ -87,6 +87,8 @@ pub struct TrainingPosition {
     pub stage: Stage,
     /// Iteration of the stage, from 1.
     pub iteration: usize,
+    /// Images have `1 / image_factor` of their width and height (`train.coarse_to_fine`).
+    pub image_factor: u32,
     /// Extent of the scene, world units: 1.1 times the largest distance of a training camera from their mean.
     pub extent: f32,
     /// Of the run.
@@ -99,6 +101,15 @@ impl TrainingPosition {
     pub fn generator(&self) -> impl Rng + use<> {
         generator(self.seed, Purpose::Split, self.stage, self.iteration)
     }
+}
+
+/// How the number of Gaussians grows with the side of the images. A surface seen at twice the size shows less than four
+/// times the detail; 1.4 makes 41 000 Gaussians at 480 pixels of 12 000 at 200, about what was chosen by hand.
+const GAUSSIANS_BY_SIDE: f64 = 1.4;
+
+/// How many Gaussians show in images of `ratio` times the side what `count` show now; at least 1.
+pub(crate) fn gaussians_for_images(count: usize, ratio: f64) -> usize {
+    (count as f64 * ratio.powf(GAUSSIANS_BY_SIDE)).round().max(1.0) as usize
 }
 
 /// Statistics of the `N` Gaussians from a differentiated view. No tensor is on a tape.

@@ -153,7 +153,13 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 
     fn training_position(&self, stage: Stage, iteration: usize) -> TrainingPosition {
-        TrainingPosition { stage, iteration, extent: self.data.extent, seed: self.config.seed }
+        let train = &self.config.train;
+        let progress = train.progress(stage, iteration);
+        // Cameras may differ in size: that of the most pixels counts.
+        let largest =
+            self.data.train.iter().map(|frame| &frame.camera).max_by_key(|camera| camera.width * camera.height);
+        let image_factor = largest.map_or(1, |camera| train.coarse_to_fine.factor(progress, camera));
+        TrainingPosition { stage, iteration, image_factor, extent: self.data.extent, seed: self.config.seed }
     }
 
     /// Cloning, splitting and pruning, where they are due.

@@ -9,6 +9,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use super::Trainer;
 use super::profile::Profile;
 use crate::compression::EntropyModels;
+use crate::config::CoarseToFineConfig;
 use crate::dataset::ImageSource;
 use crate::density::ViewStatistics;
 use crate::error::TrainError;
@@ -25,6 +26,9 @@ pub(super) struct ViewPass<'a> {
     pub(super) images: &'a dyn ImageSource,
     pub(super) device: &'a Device,
     pub(super) loss: &'a dyn Loss,
+    pub(super) coarse_to_fine: &'a CoarseToFineConfig,
+    /// The share of the fine stage that is over.
+    pub(super) progress: f64,
     /// Views of an iteration. The loss is their mean.
     pub(super) batch: usize,
 }
@@ -77,6 +81,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             images: &*self.images,
             device: &self.device,
             loss: &*self.loss,
+            coarse_to_fine: &self.config.train.coarse_to_fine,
+            progress: self.config.train.progress(stage, iteration),
             batch,
         }
     }
@@ -132,14 +138,16 @@ impl ViewPass<'_> {
             Stage::Fine => scene.at(frame.time),
         };
         profile.lap("Gaussians at the time");
+        let factor = self.coarse_to_fine.factor(self.progress, &frame.camera);
+        let reduced = Frame { camera: frame.camera.reduced(factor), ..frame.clone() };
         let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
-        let rendering = self.splatter.render(gaussians, &frame.camera, Some(offsets.clone()));
+        let rendering = self.splatter.render(gaussians, &reduced.camera, Some(offsets.clone()));
         profile.lap("splatting");
-        let mut truth = image_tensor(&*self.images.image(frame)?, self.device);
+        let mut truth = image_tensor(&self.images.image(frame)?.reduced(factor), self.device);
         let mut image = rendering.image;
         if let Some(mask) = self.images.trained_pixels(frame)? {
             // Black in both images, so that these pixels are equal for any loss.
-            let mask = mask_tensor(&mask, self.device).unsqueeze_dim::<3>(2);
+            let mask = mask_tensor(&mask.reduced(factor), self.device).unsqueeze_dim::<3>(2);
             image = image * mask.clone();
             truth = truth * mask;
         }
@@ -149,7 +157,7 @@ impl ViewPass<'_> {
             alpha: rendering.alpha,
             depth: rendering.depth,
             truth: truth.clone(),
-            frame,
+            frame: &reduced,
             stage: self.stage,
             iteration: self.iteration,
         });
@@ -166,7 +174,7 @@ impl ViewPass<'_> {
             // The loss is a mean over the batch; thresholds are those for a single view.
             statistics: ViewStatistics {
                 screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),
-                radii: rendering.radii,
+                radii: rendering.radii * i64::from(factor),
             },
             image: image.inner(),
             truth: truth.inner(),
@@ -176,7 +184,43 @@ impl ViewPass<'_> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use light4gs_data::{Camera, PointCloud, RgbImage8, Scene, SplitFrames};
+
     use super::*;
+    use crate::config::{Config, DeviceName};
+    use crate::dataset::MemoryImages;
+
+    /// Small images and few Gaussians until half of the fine stage is over.
+    #[test]
+    fn training_goes_from_coarse_to_fine() {
+        const SIDE: u32 = 241;
+        let mut config = Config::from_preset("dnerf-cpu").unwrap();
+        config.device = DeviceName::Flex;
+        (config.train.coarse_iterations, config.train.fine_iterations) = (1, 4);
+        config.train.coarse_to_fine.half_until = 0.5;
+        config.train.prune.fraction = 0.0;
+        config.eval.interval = 0;
+        let adaptive = &mut config.train.densify.strategies.adaptive;
+        (adaptive.from, adaptive.until, adaptive.interval, adaptive.max_gaussians) = (0, 4, 1, 100);
+        (adaptive.prune_from, adaptive.grad_threshold_fine_init, adaptive.grad_threshold_fine_final) =
+            (9, 1e-30, 1e-30);
+        let camera = Camera::look_at([4.0, 0.0, 0.5].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, SIDE, SIDE);
+        let frame = Frame::without_image("view", camera, 0.5);
+        let image = RgbImage8 { width: SIDE, height: SIDE, pixels: vec![100; (SIDE * SIDE * 3) as usize] };
+        let images: MemoryImages = [(frame.name.clone(), image)].into_iter().collect();
+        let frames = SplitFrames { train: vec![frame.clone()], test: vec![frame], ..SplitFrames::default() };
+        let data = Scene::new("memory", Path::new("gray"), frames, PointCloud::random(60, 0.8, 0), [1.0; 3]).unwrap();
+        let mut trainer = Trainer::builder(config, data).images(images).build().unwrap();
+        let mut steps = Vec::new();
+        while let Some(report) = trainer.step().unwrap() {
+            assert_eq!(report.image.dims(), report.truth.dims());
+            steps.push((report.image.dims()[0], report.gaussians > 60));
+        }
+        // One row and one column are left over.
+        assert_eq!(steps, [(120, false), (120, false), (120, false), (241, true), (241, true)]);
+    }
 
     #[test]
     fn pools_have_all_threads_and_no_more() {
