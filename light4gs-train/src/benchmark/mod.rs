@@ -1,29 +1,25 @@
 //! Timing of every part of a training step, on scenes that anybody can make.
 
 pub mod codec;
+mod steps;
 
 use std::path::Path;
 use std::time::Instant;
 
 use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
-use light4gs_data::{Camera, DataError, PointCloud};
+use light4gs_data::{Camera, DataError};
 use light4gs_model::ops::skinning::{SkinningInputs, skin};
-use light4gs_model::{
-    DeformationConfig, DynamicScene, DynamicSceneConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter,
-};
+use light4gs_model::{DeformationConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 
-use crate::compression::{Compression, ConfiguredModels};
+use self::steps::StepNames;
 use crate::config::{Config, DeviceName};
 use crate::device::adapter_name;
 use crate::error::TrainError;
-use crate::metrics::l1;
-use crate::optimization::adam::Adam;
-use crate::optimization::gradients::GradientSums;
 use crate::report::table::{Align, Table};
 
 /// Untimed repetitions before the timed ones.
@@ -166,15 +162,6 @@ impl BenchScene {
         })
     }
 
-    /// A dynamic scene over these Gaussians, with the planes and the network of a preset.
-    fn dynamic(&self, config: &DynamicSceneConfig, device: &Device) -> DynamicScene {
-        let positions = self.means.as_chunks::<3>().0.to_vec();
-        let colors = vec![[0.5; 3]; positions.len()];
-        let mut scene = config.init(&PointCloud { positions, colors }, device);
-        scene.gaussians = self.gaussians(device);
-        scene
-    }
-
     /// The camera turned a little about the vertical, so that frames of a series differ.
     fn camera_at(&self, frame: usize) -> Camera {
         let turn = Mat3::from_quat(Quat::from_rotation_z(0.02 * frame as f32));
@@ -228,6 +215,10 @@ fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T,
         }
         drop(output);
     }
+    median_of(times)
+}
+
+fn median_of(mut times: Vec<f64>) -> f64 {
     times.sort_by(f64::total_cmp);
     times[times.len() / 2]
 }
@@ -260,18 +251,27 @@ pub fn benchmark(
     let matrix = || Tensor::<2>::random([CALIBRATION, CALIBRATION], Distribution::Default, device);
     let (a, b) = (matrix(), matrix());
     let calibration_ms = median(device, repeats, || (a.clone(), b.clone()), |(a, b)| a.matmul(b));
-    let small = Config::from_preset("dnerf-cpu")?;
+    let presets = [
+        (Config::from_preset("dnerf-cpu")?, steps::HEXPLANE),
+        (Config::load("dnerf-cpu+nodes+medium", &[])?, steps::NODES),
+    ];
     let scenes = scenes
         .iter()
         .map(|scene| SceneTimes {
             scene: scene.name.clone(),
-            timings: timings(scene, device, &autodiff, &small, repeats),
+            timings: timings(scene, device, &autodiff, &presets, repeats),
         })
         .collect();
     Ok(DeviceTimes { device: name.to_string(), adapter: adapter_name(name, device), calibration_ms, scenes })
 }
 
-fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Config, repeats: usize) -> Vec<Timing> {
+fn timings(
+    scene: &BenchScene,
+    device: &Device,
+    autodiff: &Device,
+    presets: &[(Config, StepNames)],
+    repeats: usize,
+) -> Vec<Timing> {
     let mut out = Vec::new();
     let mut add = |name: &'static str, milliseconds: f64| out.push(Timing { name, milliseconds });
     let splatter = Splatter::new(scene.background, 3);
@@ -328,80 +328,9 @@ fn timings(scene: &BenchScene, device: &Device, autodiff: &Device, small: &Confi
     add("deformation forward", median(device, repeats, || features.clone(), &deform));
     add("deformation backward", median(device, repeats, || deform(features.clone()), |loss| loss.backward()));
 
-    let config = small.model.build();
-    let mut dynamic = scene.dynamic(&config, autodiff);
-    let truth = Tensor::<3>::zeros([height, width, 3], autodiff);
-    let regularizer = small.train.regularizer.build();
-    let loss_of = |scene_model: &DynamicScene, frame: usize| {
-        let image = splatter.render(scene_model.at(0.3), &scene.camera_at(frame), None).image;
-        l1(image, truth.clone()) + regularizer.loss(scene_model.planes().expect("the preset's field has planes"))
-    };
-    let mut adam = Adam::default();
-    // Rates so small that the scene does not change while it is timed.
-    let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
-        adam.step_module("", dynamic, &mut gradients, |_, _| Some(1e-12));
-    };
-    let mut times = [Vec::new(), Vec::new()];
-    for repetition in 0..WARM_UP + repeats {
-        let begin = Instant::now();
-        let mut tape = loss_of(&dynamic, repetition).backward();
-        let mut gradients = GradientSums::default();
-        gradients.add_module(&dynamic, &mut tape);
-        let _ = device.sync();
-        let middle = Instant::now();
-        update(&mut dynamic, gradients);
-        let _ = device.sync();
-        if repetition >= WARM_UP {
-            times[0].push(middle.elapsed().as_secs_f64() * 1e3);
-            times[1].push(begin.elapsed().as_secs_f64() * 1e3);
-        }
+    for (config, names) in presets {
+        steps::timings(scene, config, names, device, repeats, &mut add);
     }
-    let [adam_ms, step_ms] = times.map(|mut t| {
-        t.sort_by(f64::total_cmp);
-        t[t.len() / 2]
-    });
-    add("Adam step", adam_ms);
-    add("training step", step_ms);
-
-    let compression = Compression::new(&ConfiguredModels, small, dynamic.planes(), autodiff)
-        .expect("the preset's models fit its planes");
-    let fraction = small.compression.rate.fraction;
-    let lambda = 0.05;
-    for (name, with_rate) in [("training step, noise", false), ("training step, noise and rate", true)] {
-        let mut random = ChaCha8Rng::seed_from_u64(1);
-        let step = median(
-            autodiff,
-            repeats,
-            || (),
-            |()| {
-                let noisy = compression.noisy(&dynamic, true, true);
-                let mut sums = GradientSums::default();
-                let image = splatter.render(noisy.scene.at(0.3), &scene.camera, None).image;
-                sums.add_module(&noisy.scene, &mut l1(image, truth.clone()).backward());
-                if with_rate {
-                    let rate = compression.rate(&noisy, fraction, true, &mut random);
-                    sums.add_module(&noisy.scene, &mut (rate.megabytes() * lambda).backward());
-                }
-                update(&mut dynamic, sums);
-            },
-        );
-        add(name, step);
-    }
-
-    let decoded = scene.dynamic(&config, device);
-    let mut frame = 0;
-    add(
-        "render",
-        median(
-            device,
-            repeats,
-            || (),
-            |()| {
-                frame += 1;
-                splatter.render(decoded.at(0.3), &scene.camera_at(frame), None).image
-            },
-        ),
-    );
     out
 }
 
@@ -427,8 +356,10 @@ pub fn table(results: &[DeviceTimes]) -> String {
             1e3 / scene.timings.iter().find(|timing| timing.name == name).map_or(f64::NAN, |timing| timing.milliseconds)
         }
     };
-    table.row(cells("training it/s", &timing_of("training step")));
-    table.row(cells("render FPS", &timing_of("render")));
+    for (field, names) in [("hexplane", steps::HEXPLANE), ("nodes", steps::NODES)] {
+        table.row(cells(&format!("{field}, training it/s"), &timing_of(names.plain)));
+        table.row(cells(&format!("{field}, render FPS"), &timing_of(names.render)));
+    }
     table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
     let adapters = results.iter().filter_map(|device| Some((&device.device, device.adapter.as_ref()?)));
     adapters.fold(table.to_string(), |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
