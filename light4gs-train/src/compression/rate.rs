@@ -1,7 +1,8 @@
 //! Noise in place of rounding, and the file size that the noisy values estimate (paper III-C, IV-B).
 
-use burn::module::{Module, Param};
+use burn::module::Param;
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
+use light4gs_model::parameters::on_a_new_tape;
 use light4gs_model::{
     Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy,
     PlaneSteps, PlaneTensors, ShKnown,
@@ -104,8 +105,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
 
     /// Also begins a new tape.
     fn with_noisy_gaussians<F: DeformationField>(&self, scene: DynamicScene<F>, noisy: bool) -> DynamicScene<F> {
-        let device = scene.gaussians.means.device();
-        let mut scene = scene.fork(&device);
+        let mut scene = on_a_new_tape(scene);
         if !noisy {
             return scene;
         }

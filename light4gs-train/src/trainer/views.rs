@@ -1,8 +1,8 @@
 //! The views of a training step. Each has its own tape, so that they can be rendered and differentiated side by side.
 
-use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_data::Frame;
+use light4gs_model::parameters::on_a_new_tape;
 use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
@@ -99,7 +99,7 @@ impl ViewPass<'_> {
     ) -> Result<Vec<View>, TrainError> {
         // Copies share the scene's memory; each begins its own tape.
         let with_copies = |frames: &[&'f Frame]| -> Vec<_> {
-            frames.iter().map(|frame| (scene.clone().fork(self.device), *frame)).collect()
+            frames.iter().map(|frame| (on_a_new_tape(scene.clone()), *frame)).collect()
         };
         let ViewPools(pools) = pools;
         if pools.is_empty() {
