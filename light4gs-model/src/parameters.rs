@@ -160,20 +160,25 @@ mod tests {
     use super::*;
     use crate::HexPlaneConfig;
 
-    /// Copies of a module that nothing updates, as of a field in the coarse stage: the thousandth backward pass takes no
-    /// longer than the first.
+    /// Copies of a module that nothing updates, as of a field in the coarse stage, do not make later ones slower.
     #[test]
     fn tapes_do_not_remember_earlier_copies() {
+        const ROUND: usize = 200;
         let device = Device::flex().autodiff();
         let module = HexPlaneConfig::new().with_channels(1).with_resolution([4, 4, 4, 4]).init(&device);
-        for pass in 0..3000 {
-            let copy = on_a_new_tape(module.clone());
-            let first = copy.planes[0].val();
-            assert_eq!((copy.planes[0].id, first.is_require_grad()), (module.planes[0].id, true));
+        let round = || {
             let begin = Instant::now();
-            let gradients = first.clone().sum().backward();
-            assert!(begin.elapsed() < Duration::from_secs(1), "backward pass {pass} took {:?}", begin.elapsed());
-            assert!(first.grad(&gradients).is_some());
-        }
+            for _ in 0..ROUND {
+                let copy = on_a_new_tape(module.clone());
+                let first = copy.planes[0].val();
+                assert_eq!((copy.planes[0].id, first.is_require_grad()), (module.planes[0].id, true));
+                let gradients = first.clone().sum().backward();
+                assert!(first.grad(&gradients).is_some());
+            }
+            begin.elapsed()
+        };
+        // Every backward pass looks through all tapes there are, those of other tests too: the quickest round counts.
+        let [early, late] = [(); 2].map(|()| (0..5).map(|_| round()).min().expect("rounds"));
+        assert!(late < 4 * early + Duration::from_millis(50), "{ROUND} passes took {early:?}, later {late:?}");
     }
 }

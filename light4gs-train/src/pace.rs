@@ -132,7 +132,6 @@ fn sizes(config: &Config) -> Vec<f64> {
     let coarse_to_fine = &config.train.coarse_to_fine;
     let mut sizes = vec![coarse_to_fine.quarter_until, coarse_to_fine.half_until, 1.0];
     sizes.retain(|until| *until > 0.0);
-    sizes.sort_by(f64::total_cmp);
     sizes
 }
 

@@ -9,9 +9,6 @@ impl RgbImage8 {
     /// # Panics
     /// If `factor` is 0.
     pub fn reduced(&self, factor: u32) -> Self {
-        if factor == 1 {
-            return self.clone();
-        }
         let size = [self.width / factor, self.height / factor];
         let pixels = reduce::<3>(&self.pixels, self.width, size, factor, |sum, count| (sum + count / 2) / count);
         Self { width: size[0], height: size[1], pixels }

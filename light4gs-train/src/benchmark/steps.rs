@@ -5,15 +5,14 @@ use std::time::Instant;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_data::PointCloud;
-use light4gs_model::{
-    Attribute, AttributeMapper, DeformationField, DynamicScene, FinePosition, GaussianTensors, SceneAtRest, Splatter,
-};
+use light4gs_model::{DeformationField, DynamicScene, FinePosition, GaussianTensors, SceneAtRest, Splatter};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
 use super::{BenchScene, WARM_UP, median, median_of};
 use crate::compression::{Compression, ConfiguredModels};
 use crate::config::Config;
+use crate::density::GaussianEditor;
 use crate::metrics::l1;
 use crate::optimization::adam::Adam;
 use crate::optimization::gradients::GradientSums;
@@ -155,24 +154,15 @@ fn dynamic(scene: &BenchScene, config: &Config, position: &FinePosition, device:
     let positions = scene.means.as_chunks::<3>().0.to_vec();
     let colors = vec![[0.5; 3]; positions.len()];
     let mut dynamic = config.model.build().init(&PointCloud { positions, colors }, device);
-    let own = dynamic.gaussians.tensors();
-    let gaussians = scene.gaussians(device).tensors();
-    let sh_rest = gaussians.sh_rest.narrow(1, 0, own.sh_rest.dims()[1]);
-    let all = GaussianTensors { sh_rest, further: own.further, ..gaussians };
-    dynamic.gaussians.set_tensors(all.map(&mut OffTape));
+    let gaussians = scene.gaussians(&device.clone().inner()).tensors();
+    GaussianEditor::new(&mut dynamic.gaussians, &mut Adam::default()).update(|own| {
+        let sh_rest = gaussians.sh_rest.narrow(1, 0, own.sh_rest.dims()[1]);
+        GaussianTensors { sh_rest, further: own.further, ..gaussians }
+    });
     let begin = FinePosition { iteration: 0, ..*position };
     let DynamicScene { gaussians, coordinates, field, .. } = &mut dynamic;
     field.begin_motion(&SceneAtRest { gaussians, coordinates, extent: 1.0 }, &begin);
     dynamic
-}
-
-/// Values that no tape knows, so that they can become parameters.
-struct OffTape;
-
-impl AttributeMapper for OffTape {
-    fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
-        Tensor::from_inner(values.inner())
-    }
 }
 
 fn at_rest(model: &DynamicScene) -> SceneAtRest<'_> {

@@ -6,8 +6,8 @@ use serde_json::Value;
 
 use super::model::{FieldKind, MOST_PLANE_RESOLUTION};
 use super::{
-    CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, HexPlaneTable, KEYS, Key, ModelConfig, Problem,
-    TrainConfig,
+    CoarseToFineConfig, CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, HexPlaneTable, KEYS, Key,
+    ModelConfig, Problem, TrainConfig,
 };
 use crate::density::PruneConfig;
 
@@ -73,6 +73,12 @@ fn train(check: &mut Check, train: &TrainConfig) {
         check.problems.push(Problem { key, message: problem });
     }
     prune(check, &train.prune, train, density.end());
+    let CoarseToFineConfig { quarter_until, half_until } = train.coarse_to_fine;
+    check.that("train.coarse_to_fine.half_until", half_until == 0.0 || half_until >= quarter_until, || {
+        format!(
+            "is {half_until}; it must be 0 (never) or not below train.coarse_to_fine.quarter_until, {quarter_until}"
+        )
+    });
 }
 
 /// What is there for a moment only needs a lifetime.

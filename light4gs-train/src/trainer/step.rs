@@ -155,10 +155,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     fn training_position(&self, stage: Stage, iteration: usize) -> TrainingPosition {
         let train = &self.config.train;
         let progress = train.progress(stage, iteration);
-        // Cameras may differ in size: that of the most pixels counts.
-        let largest =
-            self.data.train.iter().map(|frame| &frame.camera).max_by_key(|camera| camera.width * camera.height);
-        let image_factor = largest.map_or(1, |camera| train.coarse_to_fine.factor(progress, camera));
+        // Cameras may differ in size: the largest images count.
+        let factors = self.data.train.iter().map(|frame| train.coarse_to_fine.factor(progress, &frame.camera));
+        let image_factor = factors.max().unwrap_or(1);
         TrainingPosition { stage, iteration, image_factor, extent: self.data.extent, seed: self.config.seed }
     }
 

@@ -1,7 +1,9 @@
 //! The views of a training step. Each has its own tape, so that they can be rendered and differentiated side by side.
 
+use std::sync::Arc;
+
 use burn::tensor::{Device, Tensor};
-use light4gs_data::Frame;
+use light4gs_data::{Frame, PixelMask, RgbImage8};
 use light4gs_model::parameters::on_a_new_tape;
 use light4gs_model::{DeformationField, DynamicScene, Splatter};
 use rayon::{ThreadPool, ThreadPoolBuilder};
@@ -139,15 +141,15 @@ impl ViewPass<'_> {
         };
         profile.lap("Gaussians at the time");
         let factor = self.coarse_to_fine.factor(self.progress, &frame.camera);
-        let reduced = Frame { camera: frame.camera.reduced(factor), ..frame.clone() };
+        let seen = Frame { camera: frame.camera.reduced(factor), ..frame.clone() };
         let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
-        let rendering = self.splatter.render(gaussians, &reduced.camera, Some(offsets.clone()));
+        let rendering = self.splatter.render(gaussians, &seen.camera, Some(offsets.clone()));
         profile.lap("splatting");
-        let mut truth = image_tensor(&self.images.image(frame)?.reduced(factor), self.device);
+        let mut truth = image_tensor(&reduced(self.images.image(frame)?, factor, RgbImage8::reduced), self.device);
         let mut image = rendering.image;
         if let Some(mask) = self.images.trained_pixels(frame)? {
             // Black in both images, so that these pixels are equal for any loss.
-            let mask = mask_tensor(&mask.reduced(factor), self.device).unsqueeze_dim::<3>(2);
+            let mask = mask_tensor(&reduced(mask, factor, PixelMask::reduced), self.device).unsqueeze_dim::<3>(2);
             image = image * mask.clone();
             truth = truth * mask;
         }
@@ -157,7 +159,7 @@ impl ViewPass<'_> {
             alpha: rendering.alpha,
             depth: rendering.depth,
             truth: truth.clone(),
-            frame: &reduced,
+            frame: &seen,
             stage: self.stage,
             iteration: self.iteration,
         });
@@ -174,7 +176,7 @@ impl ViewPass<'_> {
             // The loss is a mean over the batch; thresholds are those for a single view.
             statistics: ViewStatistics {
                 screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),
-                radii: rendering.radii * i64::from(factor),
+                radii: if factor == 1 { rendering.radii } else { rendering.radii * i64::from(factor) },
             },
             image: image.inner(),
             truth: truth.inner(),
@@ -182,11 +184,16 @@ impl ViewPass<'_> {
     }
 }
 
+/// An image or a mask for a training step; whole ones are not copied.
+fn reduced<T>(whole: Arc<T>, factor: u32, reduce: fn(&T, u32) -> T) -> Arc<T> {
+    if factor == 1 { whole } else { Arc::new(reduce(&whole, factor)) }
+}
+
 #[cfg(test)]
 mod tests {
     use std::path::Path;
 
-    use light4gs_data::{Camera, PointCloud, RgbImage8, Scene, SplitFrames};
+    use light4gs_data::{Camera, PointCloud, Scene, SplitFrames};
 
     use super::*;
     use crate::config::{Config, DeviceName};
