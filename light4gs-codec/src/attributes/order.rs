@@ -3,8 +3,9 @@
 use super::{
     neighbors::{NEIGHBORS, nearest_before},
     position_grid::{PositionGrid, cell_point, morton_cell},
+    positions,
 };
-use crate::CodecError;
+use crate::{CodecError, adaptive::BitEncoder};
 
 /// Which Gaussians each one is predicted from, for a training whose rate shall know it.
 ///
@@ -23,6 +24,9 @@ pub struct CodingOrder {
     rows: Vec<u32>,
     /// The place of each row in the order.
     places: Vec<u32>,
+    /// Morton codes of the cells, in order, and their bits.
+    codes: Vec<u64>,
+    code_bits: u32,
     /// Cells, in order.
     points: Vec<[f64; 3]>,
 }
@@ -33,13 +37,21 @@ impl CodingOrder {
     /// # Errors
     /// Positions that are not finite, or beyond ±1e30.
     pub fn new(means: &[[f32; 3]], step: f32) -> Result<Self, CodecError> {
-        let (rows, codes) = PositionGrid::new(means, step)?.sorted(means);
+        let grid = PositionGrid::new(means, step)?;
+        let (rows, codes) = grid.sorted(means);
         let mut places = vec![0; rows.len()];
         for (place, &row) in rows.iter().enumerate() {
             places[row as usize] = place as u32;
         }
-        let points = codes.into_iter().map(|code| cell_point(morton_cell(code))).collect();
-        Ok(Self { rows, places, points })
+        let points = codes.iter().map(|&code| cell_point(morton_cell(code))).collect();
+        Ok(Self { rows, places, codes, code_bits: grid.code_bits(), points })
+    }
+
+    /// The bits that the positions take, without the grid.
+    pub fn position_bits(&self) -> u64 {
+        let mut encoder = BitEncoder::default();
+        positions::code(&mut encoder, &mut self.codes.clone(), self.code_bits).expect("an encoder is never damaged");
+        8 * encoder.finish().len() as u64
     }
 
     /// The rows of the Gaussians, `[N]`, along the Morton curve.

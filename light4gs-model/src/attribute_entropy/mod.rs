@@ -119,10 +119,15 @@ impl AttributeEntropy {
         gaussians.map(&mut Noise(self))
     }
 
-    /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.
+    /// Bits of all attributes of Gaussians together, `[1]`; as [`AttributeEntropy::bits_of_each`].
+    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> Tensor<1> {
+        self.bits_of_each(gaussians, rows).sum()
+    }
+
+    /// Bits of every attribute of Gaussians, `[A]`: of noisy ones in training, of quantized ones in an evaluation.
     /// Differentiable in the Gaussians, the steps, the predictions and the densities. With `rows`, the densities see only
     /// these rows and their neighbors, and the result is an estimate for all.
-    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> Tensor<1> {
+    pub fn bits_of_each(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> Tensor<1> {
         let count = gaussians.means.dims()[0];
         let positions = self.position_bits(gaussians.means.clone());
         let all: Vec<i64>;
@@ -138,7 +143,17 @@ impl AttributeEntropy {
         let residuals = self.prediction.residuals(self.channels(own), near);
         let widths = self.widths(self.log_steps.val().exp());
         let likelihood = self.mixture.interval_likelihood(residuals, widths);
-        positions + bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum() * share
+        // [C].
+        let channels = bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum_dim(1).squeeze_dim::<1>(1) * share;
+        let mut first = 0;
+        let each = self.attributes.iter().map(|attribute| match has_density(&attribute.name) {
+            true => {
+                first += attribute.width;
+                channels.clone().narrow(0, first - attribute.width, attribute.width).sum()
+            }
+            false => positions.clone(),
+        });
+        Tensor::cat(each.collect(), 0)
     }
 
     /// The Gaussians from which each of some rows is predicted, one after the other.

@@ -339,9 +339,10 @@ pub(super) fn coding_table(record: &CodingRecord) -> Option<Table> {
         ("bits in the file", Align::Right),
         ("difference", Align::Right),
     ]);
-    for part in parts {
+    let attributes = record.attribute_parts().map(|part| CodedPart { name: format!("  {}", part.name), ..part });
+    for part in parts.into_iter().chain(attributes) {
         let (expected, coded) = (format!("{:.0}", part.expected), format!("{:.0}", part.coded));
-        table.row([part.name.to_owned(), expected, coded, part.difference()]);
+        table.row([part.name.clone(), expected, coded, part.difference()]);
     }
     Some(table)
 }

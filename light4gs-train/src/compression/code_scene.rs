@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use light4gs_codec::{Kind, PlaneBytes, Profile, SceneData};
+use light4gs_codec::{Kind, Limits, PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
 use serde::{Deserialize, Serialize};
@@ -39,6 +39,9 @@ pub struct CodingRecord {
     pub estimated_bits: BitEstimate,
     /// Bits in the file, without models and tables.
     pub coded_bits: BitEstimate,
+    /// Of every attribute of the Gaussians with a trained model.
+    #[serde(default)]
+    pub attributes: Vec<AttributeRecord>,
     /// Of every plane.
     pub planes: Vec<PlaneRecord>,
     /// The wished quality, if the file does not have it.
@@ -46,11 +49,22 @@ pub struct CodingRecord {
     pub missed_quality: Option<MissedQuality>,
 }
 
+/// How an attribute was coded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AttributeRecord {
+    /// Its name in the table of attributes.
+    pub name: String,
+    /// Bits that the model of the training expects.
+    pub estimated_bits: f64,
+    /// Bits in the file.
+    pub coded_bits: f64,
+}
+
 /// A part of a file with trained models: the expected and the written bits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct CodedPart {
     /// Its name.
-    pub name: &'static str,
+    pub name: String,
     /// Bits that the models of the training expect.
     pub expected: f64,
     /// Bits in the file.
@@ -77,11 +91,21 @@ impl CodingRecord {
     /// The parts that may have trained models.
     pub fn parts(&self) -> [CodedPart; 3] {
         let (expected, coded) = (self.estimated_bits, self.coded_bits);
+        let part = |name: &str, expected, coded| CodedPart { name: name.to_owned(), expected, coded };
         [
-            CodedPart { name: "feature planes", expected: expected.planes, coded: coded.planes },
-            CodedPart { name: "spherical harmonics", expected: expected.sh, coded: coded.sh },
-            CodedPart { name: "other attributes", expected: expected.attributes, coded: coded.attributes },
+            part("feature planes", expected.planes, coded.planes),
+            part("spherical harmonics", expected.sh, coded.sh),
+            part("other attributes", expected.attributes, coded.attributes),
         ]
+    }
+
+    /// Each of the other attributes.
+    pub fn attribute_parts(&self) -> impl Iterator<Item = CodedPart> {
+        self.attributes.iter().map(|attribute| CodedPart {
+            name: attribute.name.clone(),
+            expected: attribute.estimated_bits,
+            coded: attribute.coded_bits,
+        })
     }
 }
 
@@ -206,6 +230,7 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
             sh: 8.0 * sh_bytes as f64,
             attributes: 8.0 * attribute_bytes as f64,
         },
+        attributes: if models_attributes { attribute_records(&encoded)? } else { Vec::new() },
         planes: plane_records(&encoded, &compression),
         missed_quality: encoded.coded.missed,
     };
@@ -219,6 +244,21 @@ fn searches<C: PlaneEntropy, S: ShModel>(settings: &CompressionConfig, trained: 
     let learned = trained.is_some_and(|models| models.learned_attributes().is_some());
     let wished = settings.target_db > 0.0;
     wished || (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
+}
+
+fn attribute_records(encoded: &EncodedScene) -> Result<Vec<AttributeRecord>, TrainError> {
+    let in_file = light4gs_codec::info_with_limits(&encoded.bytes, &Limits::large())?.attributes;
+    let sh_bytes: u64 = encoded.coded.report.sh.degrees.iter().sum();
+    let coded = |name: &str| match in_file.iter().find(|attribute| attribute.name == name) {
+        Some(attribute) => attribute.bytes,
+        None => sh_bytes,
+    };
+    let record = |(name, bits): &(String, f64)| AttributeRecord {
+        name: name.clone(),
+        estimated_bits: *bits,
+        coded_bits: 8.0 * coded(name) as f64,
+    };
+    Ok(encoded.coded.attributes.iter().map(record).collect())
 }
 
 fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Compression<C, S>) -> Vec<PlaneRecord> {

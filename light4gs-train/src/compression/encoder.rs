@@ -35,7 +35,9 @@ pub struct CodedSizes {
     pub report: CompressionReport,
     /// The bits that the models of the training expect for the decoded scene.
     pub estimate: BitEstimate,
-    /// The same for every place of every plane.
+    /// The expected bits of each attribute with a model, by its name; those of [`BitEstimate::attributes`].
+    pub attributes: Vec<(String, f64)>,
+    /// The expected bits of every place of every plane.
     pub bit_maps: Vec<BitMap>,
     /// The wished quality, if the file does not have it.
     pub missed: Option<MissedQuality>,
@@ -132,9 +134,15 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
             file.encoded
         }
     };
-    let estimate = compression.estimate::<F>(&encoded.decoded, &input.sh, device)?;
+    let decoded = DynamicScene::<F>::from_arrays(&encoded.decoded, device)?;
+    let attributes = compression.attribute_bits(&decoded);
+    let estimate = BitEstimate {
+        planes: compression.plane_bits(&decoded),
+        sh: compression.sh_bits(&decoded, &encoded.decoded.gaussians, &input.sh),
+        attributes: attributes.iter().map(|(_, bits)| bits).sum(),
+    };
     let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
-    let coded = CodedSizes { report: encoded.report, estimate, bit_maps, missed };
+    let coded = CodedSizes { report: encoded.report, estimate, attributes, bit_maps, missed };
     Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
 }
 
@@ -262,30 +270,40 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         }
     }
 
-    /// Bits that the models expect for a decoded scene; `device` is that of the models.
-    pub fn estimate<F: DeformationField>(
-        &self,
-        decoded: &SceneData,
-        coding: &ShCoding,
-        device: &Device,
-    ) -> Result<BitEstimate, TrainError> {
-        let scene = DynamicScene::<F>::from_arrays(decoded, device)?;
-        let planes = plane_tensors(&scene);
+    /// Bits that the model expects for the planes of a decoded scene; 0 without a model.
+    fn plane_bits<F: DeformationField>(&self, decoded: &DynamicScene<F>) -> f64 {
+        let Some(models) = &self.planes else { return 0.0 };
+        let planes = plane_tensors(decoded);
         let all: Vec<usize> = (0..planes.len()).collect();
-        let plane_bits = self.planes.as_ref().map_or(0.0, |models| {
-            let steps = models.quantization.steps_without_gradient();
-            let rates = models.context.rate(&planes, &steps, &all, Latent::Rounded);
-            rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum()
-        });
-        let sh = match &self.sh {
-            Some(sh) if !decoded.gaussians.is_empty() && !matches!(coding, ShCoding::Channels { .. }) => {
-                sh.bits(scene.gaussians.sh_rest.val(), &known(&scene, &planes, None)).sum().into_scalar()
+        let steps = models.quantization.steps_without_gradient();
+        let rates = models.context.rate(&planes, &steps, &all, Latent::Rounded);
+        rates.into_iter().map(|rate| rate.total().into_scalar::<f64>()).sum()
+    }
+
+    /// The same for its spherical harmonics; `gaussians` are those of the scene as plain arrays.
+    fn sh_bits<F: DeformationField>(
+        &self,
+        decoded: &DynamicScene<F>,
+        gaussians: &GaussianArrays,
+        coding: &ShCoding,
+    ) -> f64 {
+        match &self.sh {
+            Some(sh) if !gaussians.is_empty() && !matches!(coding, ShCoding::Channels { .. }) => {
+                let known = known(decoded, &plane_tensors(decoded), None);
+                sh.bits(decoded.gaussians.sh_rest.val(), &known).sum().into_scalar()
             }
-            _ => counted_bits(&decoded.gaussians, coding),
+            _ => counted_bits(gaussians, coding),
+        }
+    }
+
+    /// The same for each attribute with a learned step, by its name.
+    fn attribute_bits<F: DeformationField>(&self, decoded: &DynamicScene<F>) -> Vec<(String, f64)> {
+        let gaussians = decoded.gaussians.tensors();
+        let Some(models) = self.learned_attributes().filter(|_| gaussians.means.dims()[0] > 0) else {
+            return Vec::new();
         };
-        let attributes = self.learned_attributes().filter(|_| !decoded.gaussians.is_empty());
-        let attributes = attributes.map_or(0.0, |models| models.bits(scene.gaussians.tensors(), None).into_scalar());
-        Ok(BitEstimate { planes: plane_bits, sh, attributes })
+        let bits = models.bits_of_each(gaussians, None).into_data();
+        models.attributes().iter().map(|attribute| attribute.name.clone()).zip(bits.iter()).collect()
     }
 
     /// The bit maps of a decoded scene's planes.

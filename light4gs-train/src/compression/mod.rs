@@ -20,7 +20,9 @@ mod quality;
 mod rate;
 mod step_factor;
 
-pub use code_scene::{ASSUMED_PSNR, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
+pub use code_scene::{
+    ASSUMED_PSNR, AttributeRecord, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene,
+};
 pub use encoder::{
     BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, encoded_so_far,
     freeze_planes,

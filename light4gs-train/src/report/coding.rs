@@ -11,30 +11,51 @@ use super::color_map::{css_gradient, inferno};
 use super::format::{count, fixed};
 use super::html::escape;
 use super::images::data_uri;
-use crate::compression::{BitMap, CodedPart};
+use crate::compression::{BitMap, CodedPart, CodingRecord};
 
 pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<String, DataError> {
     let Some(CodingReport { record, bit_maps }) = coding else { return Ok(String::new()) };
     if !record.parts().iter().any(CodedPart::is_modeled) {
         return Ok(String::new());
     }
-    let mut html = String::from(
-        "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">Part</th><th scope=\"col\" class=\"number\">Bits expected</th>\
+    let mut html = String::new();
+    bits_table(&mut html, "Part", record.parts().into_iter().filter(CodedPart::is_modeled), sentence_case);
+    if !record.attributes.is_empty() {
+        html.push_str("<details><summary>Attribute by attribute</summary>\n");
+        bits_table(&mut html, "Attribute", record.attribute_parts(), |name| format!("<code>{}</code>", escape(name)));
+        html.push_str("</details>\n");
+    }
+    if !record.planes.is_empty() {
+        plane_table(&mut html, record);
+    }
+    maps(&mut html, path, bit_maps)?;
+    Ok(html)
+}
+
+/// Expected bits beside those in the file.
+fn bits_table(html: &mut String, what: &str, parts: impl Iterator<Item = CodedPart>, name: impl Fn(&str) -> String) {
+    let _ = write!(
+        html,
+        "<div class=\"scroll\"><table>\n<thead><tr><th scope=\"col\">{what}</th><th scope=\"col\" class=\"number\">Bits expected</th>\
          <th scope=\"col\" class=\"number\">Bits in the file</th><th scope=\"col\" class=\"number\">Difference</th></tr></thead>\n<tbody>\n",
     );
-    for part in record.parts().into_iter().filter(CodedPart::is_modeled) {
+    for part in parts {
         let _ = writeln!(
             html,
             "<tr><th scope=\"row\">{}</th><td class=\"number\">{}</td><td class=\"number\">{}</td>\
              <td class=\"number\">{}</td></tr>",
-            sentence_case(part.name),
+            name(&part.name),
             count(part.expected.round() as u64),
             count(part.coded as u64),
             part.difference().replace(' ', "&nbsp;")
         );
     }
+    html.push_str("</tbody>\n</table></div>\n");
+}
+
+fn plane_table(html: &mut String, record: &CodingRecord) {
     html.push_str(
-        "</tbody>\n</table></div>\n<details><summary>Plane by plane</summary>\n<div class=\"scroll\"><table>\n<thead><tr>\
+        "<details><summary>Plane by plane</summary>\n<div class=\"scroll\"><table>\n<thead><tr>\
          <th scope=\"col\">Plane</th><th scope=\"col\" class=\"number\">Step</th><th scope=\"col\" class=\"number\">Values</th>\
          <th scope=\"col\" class=\"number\">Bytes of values</th><th scope=\"col\" class=\"number\">Bytes of hyperprior</th>\
          <th scope=\"col\" class=\"number\">Bits a value</th></tr></thead>\n<tbody>\n",
@@ -54,8 +75,6 @@ pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<Stri
         );
     }
     html.push_str("</tbody>\n</table></div></details>\n");
-    maps(&mut html, path, bit_maps)?;
-    Ok(html)
 }
 
 /// The text with a capital at its beginning.

@@ -1,5 +1,5 @@
 use super::*;
-use crate::compression::{BitEstimate, PlaneRecord};
+use crate::compression::{AttributeRecord, BitEstimate, PlaneRecord};
 use crate::metrics::Metric;
 use crate::metrics::lpips::LpipsNetwork;
 use crate::stage::Stage;
@@ -62,12 +62,14 @@ fn bit_map() -> BitMap {
 
 fn coding_record() -> CodingRecord {
     let plane = PlaneRecord { name: "0.xy".into(), step: 0.05, symbols: 512, latent_bytes: 3, value_bytes: 64 };
+    let attribute = AttributeRecord { name: "<age>".into(), estimated_bits: 707.0, coded_bits: 700.0 };
     CodingRecord {
         profile: crate::config::FileProfile::Compact,
         fit_seconds: None,
         encode_seconds: 0.5,
-        estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0, attributes: 0.0 },
-        coded_bits: BitEstimate { planes: 536.0, sh: 1000.0, attributes: 0.0 },
+        estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0, attributes: 707.0 },
+        coded_bits: BitEstimate { planes: 536.0, sh: 1000.0, attributes: 700.0 },
+        attributes: vec![attribute],
         planes: vec![plane],
         missed_quality: None,
     }
@@ -78,6 +80,7 @@ fn expected_bits_stand_beside_real_ones() {
     let html = page(Path::new("report.html"), &sample()).unwrap();
     assert!(html.contains("530") && html.contains("536") && html.contains("-1.12"), "bits of the planes");
     assert!(html.contains("Bits of plane 0.xy"), "the bit map");
+    assert!(html.contains("<code>&lt;age&gt;</code>") && html.contains("707"), "bits of an attribute");
 }
 
 /// Every tag that is opened is closed, in order.
