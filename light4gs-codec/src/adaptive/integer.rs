@@ -11,11 +11,12 @@ const LEADING: u32 = 3;
 ///
 /// A value is a zero flag, a sign, and its magnitude `m >= 1` as an Exp-Golomb code: `floor(log2 m)` in unary, then the
 /// binary digits below the first. Flag, sign, unary part and the leading digits adapt, separately in each of the
-/// caller's contexts; the other digits are written raw. So a value takes few decisions whatever its size, and after
+/// caller's contexts (flag and sign may have contexts of their own); the other digits are written raw. So a value takes few decisions whatever its size, and after
 /// some hundred values of a smooth distribution the code is within a fraction of a percent of its entropy.
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptiveInteger {
-    contexts: Vec<Context>,
+    signs: Vec<Sign>,
+    magnitudes: Vec<Magnitude>,
 }
 
 /// A context index for an expected magnitude: two levels an octave; 0 for 0, the last one for all large magnitudes.
@@ -35,9 +36,13 @@ pub(crate) fn magnitude_level(magnitude: u64, last: usize) -> usize {
 }
 
 #[derive(Clone, Debug, Default)]
-struct Context {
+struct Sign {
     zero: AdaptiveBit,
     negative: AdaptiveBit,
+}
+
+#[derive(Clone, Debug, Default)]
+struct Magnitude {
     /// `longer[e]`: the magnitude is at least `2^(e + 1)`, given that it is at least `2^e`.
     longer: [AdaptiveBit; 31],
     /// The leading digits of magnitudes in `2^e..2^(e + 1)`, as a binary tree with its root at 1.
@@ -47,7 +52,12 @@ struct Context {
 impl AdaptiveInteger {
     /// A coder with `contexts` independent statistics.
     pub(crate) fn new(contexts: usize) -> Self {
-        Self { contexts: vec![Context::default(); contexts] }
+        Self::with_signs(contexts, contexts)
+    }
+
+    /// As [`AdaptiveInteger::new`], with another number of statistics for flag and sign.
+    pub(crate) fn with_signs(contexts: usize, signs: usize) -> Self {
+        Self { signs: vec![Sign::default(); signs], magnitudes: vec![Magnitude::default(); contexts] }
     }
 
     /// Codes one value under the statistics of one context. Symmetric, see [`BitCoder::bit`].
@@ -55,21 +65,26 @@ impl AdaptiveInteger {
     /// # Panics
     /// Where the context is not below the number of contexts.
     pub(crate) fn code(&mut self, coder: &mut impl BitCoder, context: usize, value: i32) -> i32 {
-        let context = &mut self.contexts[context];
-        if context.zero.code(coder, value == 0) {
+        self.code_with_sign(coder, context, context, value)
+    }
+
+    /// As [`AdaptiveInteger::code`], with a context of its own for flag and sign.
+    pub(crate) fn code_with_sign(&mut self, coder: &mut impl BitCoder, context: usize, sign: usize, value: i32) -> i32 {
+        let sign = &mut self.signs[sign];
+        if sign.zero.code(coder, value == 0) {
             return 0;
         }
-        let negative = context.negative.code(coder, value < 0);
-        let magnitude = context.magnitude(coder, value.unsigned_abs());
+        let negative = sign.negative.code(coder, value < 0);
+        let magnitude = self.magnitudes[context].code(coder, value.unsigned_abs());
         // Hostile bytes may hold a magnitude of 2^31 and more, which then wraps.
         if negative { magnitude.wrapping_neg() as i32 } else { magnitude as i32 }
     }
 }
 
-impl Context {
+impl Magnitude {
     /// Codes `magnitude`, which is not 0. A decoder may pass any value.
     #[inline]
-    fn magnitude(&mut self, coder: &mut impl BitCoder, magnitude: u32) -> u32 {
+    fn code(&mut self, coder: &mut impl BitCoder, magnitude: u32) -> u32 {
         let exponent = magnitude.checked_ilog2().unwrap_or(0);
         let mut digits = 0;
         while let Some(longer) = self.longer.get_mut(digits as usize)

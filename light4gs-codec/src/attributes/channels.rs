@@ -2,12 +2,16 @@
 
 use super::{
     neighbors::NEIGHBORS,
-    prediction::{Channel, LinearPrediction},
+    prediction::{Channel, LinearPrediction, Prediction},
 };
 use crate::adaptive::{AdaptiveInteger, BitCoder, BitDecoder, BitEncoder, Damaged, magnitude_level};
 
 /// The last level of an expected residual: 64 steps.
 const LAST_LEVEL: usize = 13;
+/// The levels up to which flag and sign of a residual know how far its prediction was rounded, and in how many parts of
+/// half a step. Where residuals are larger, that says nothing.
+const EXACT_LEVELS: usize = 2;
+const EXACT_PARTS: usize = 4;
 /// The most that a residual counts for the context, so that one extreme value does not spoil the contexts of its
 /// neighbors.
 const LARGEST_RESIDUAL: u32 = 1 << 16;
@@ -30,10 +34,11 @@ pub(crate) fn decode(bytes: &[u8], count: usize, neighbors: &[[u32; NEIGHBORS]])
     Ok(channels)
 }
 
-/// Codes channel after channel: mean and weights of its prediction, then the residuals.
+/// Codes channel after channel: center and weights of its prediction, then the residuals.
 ///
 /// The context of a residual is its expected magnitude, from the residuals of the neighbors, and from that of the same
-/// Gaussian in the channel before.
+/// Gaussian in the channel before. All channels have the same statistics: a channel of a few thousand small numbers would
+/// spend a good part of its bits on learning its own.
 fn code(
     coder: &mut impl BitCoder,
     channels: &mut [Vec<i32>],
@@ -43,9 +48,10 @@ fn code(
     let mut numbers = AdaptiveInteger::new(1);
     let mut before: Vec<Channel> = Vec::with_capacity(channels.len());
     let mut missed: Vec<u32> = Vec::new();
+    let mut residuals = AdaptiveInteger::with_signs(LAST_LEVEL + 1, LAST_LEVEL + 1 + EXACT_LEVELS * (EXACT_PARTS - 1));
     for values in channels.iter_mut() {
-        let mean = numbers.code(coder, 0, mean(values));
-        let mut own = Channel::new(std::mem::take(values), mean);
+        let center = numbers.code(coder, 0, if encoding { center(values) } else { 0 });
+        let mut own = Channel::new(std::mem::take(values), center);
         let last = &before[before.len().saturating_sub(MOST_BEFORE)..];
         let mut prediction = LinearPrediction::zero(last.len());
         if encoding {
@@ -55,15 +61,18 @@ fn code(
         }
         prediction.code(coder, &mut numbers);
 
-        let mut residuals = AdaptiveInteger::new(LAST_LEVEL + 1);
         let missed_before = std::mem::replace(&mut missed, Vec::with_capacity(neighbors.len()));
         for (index, near) in neighbors.iter().enumerate() {
             coder.check()?;
             own.gather(near);
             let predicted = prediction.predict(&own, last, near, index);
             let level = expected_level(&missed, missed_before.get(index), near);
-            let residual = residuals.code(coder, level, own.values[index].wrapping_sub(predicted));
-            own.values[index] = predicted.wrapping_add(residual);
+            let sign = sign_context(level, &predicted);
+            // Where residuals are larger than a step, their sides are not alike, and keep their signs.
+            let turn = |residual| if level < EXACT_LEVELS { predicted.turn(residual) } else { residual };
+            let residual = turn(own.values[index].wrapping_sub(predicted.value));
+            let residual = residuals.code_with_sign(coder, level, sign, residual);
+            own.values[index] = predicted.value.wrapping_add(turn(residual));
             missed.push(residual.unsigned_abs().min(LARGEST_RESIDUAL));
         }
         before.push(own);
@@ -85,7 +94,18 @@ fn expected_level(missed: &[u32], missed_before: Option<&u32>, near: &[u32; NEIG
     magnitude_level((around + before) / NEIGHBORS as u64, LAST_LEVEL)
 }
 
-fn mean(values: &[i32]) -> i32 {
-    let sum: i64 = values.iter().map(|&value| i64::from(value)).sum();
-    (sum / values.len().max(1) as i64) as i32
+/// The context of a residual's flag and sign.
+#[inline]
+fn sign_context(level: usize, predicted: &Prediction) -> usize {
+    match level.checked_sub(EXACT_LEVELS) {
+        None => level * EXACT_PARTS + predicted.distance(EXACT_PARTS),
+        Some(beyond) => EXACT_LEVELS * EXACT_PARTS + beyond,
+    }
+}
+
+/// The median: what a channel is where nothing else tells.
+fn center(values: &[i32]) -> i32 {
+    let mut values = values.to_vec();
+    let middle = values.len() / 2;
+    if values.is_empty() { 0 } else { *values.select_nth_unstable(middle).1 }
 }

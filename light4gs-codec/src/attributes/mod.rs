@@ -30,6 +30,7 @@
 //! ```
 
 pub(crate) mod channels;
+mod least_squares;
 mod neighbors;
 mod order;
 mod position_grid;
@@ -39,12 +40,12 @@ mod quantized;
 mod section;
 mod steps;
 
+pub use least_squares::least_squares;
 pub use neighbors::NEIGHBORS;
 pub(crate) use neighbors::all_nearest_before;
 pub use order::CodingOrder;
 pub(crate) use position_grid::check_positions;
 use position_grid::{PositionGrid, cell_point, morton_cell};
-pub use prediction::least_squares;
 pub use quantized::typical_size;
 use quantized::{Quantized, join};
 pub use section::AttributeInfo;

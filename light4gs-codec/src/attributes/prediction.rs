@@ -1,13 +1,13 @@
 //! Linear prediction of a channel from values that a decoder already has.
 //!
-//! The encoder fits the weights by least squares, in floating point, and writes them. Encoder and decoder then predict
+//! The encoder fits the weights by robust least squares, in floating point, and writes them. Encoder and decoder then predict
 //! with integers. So the fit need not be exact to the bit, and no two machines can disagree about a prediction.
 
-use super::neighbors::NEIGHBORS;
+use super::{least_squares::robust_least_squares, neighbors::NEIGHBORS};
 use crate::adaptive::{AdaptiveInteger, BitCoder};
 
 /// Fractional bits of a weight.
-const FRACTION: u32 = 12;
+const FRACTION: u32 = 9;
 /// With fewer Gaussians, weights take more bytes than they save.
 const FEWEST: usize = 200;
 /// Added to the diagonal of the normal equations for each Gaussian, so that channels without variation can be solved.
@@ -17,22 +17,22 @@ const RIDGE: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub(super) struct Channel {
     pub(super) values: Vec<i32>,
-    mean: i32,
-    /// For each Gaussian the sum over its neighbors of value minus mean; 0 for the first, which has none.
+    center: i32,
+    /// For each Gaussian the sum over its neighbors of value minus center; 0 for the first, which has none.
     around: Vec<i64>,
 }
 
 impl Channel {
-    /// A channel with a given mean, without sums yet.
-    pub(super) fn new(values: Vec<i32>, mean: i32) -> Self {
+    /// A channel with a given center, without sums yet.
+    pub(super) fn new(values: Vec<i32>, center: i32) -> Self {
         let around = Vec::with_capacity(values.len());
-        Self { values, mean, around }
+        Self { values, center, around }
     }
 
-    /// Value minus mean.
+    /// Value minus center.
     #[inline]
     fn centered(&self, index: usize) -> i64 {
-        i64::from(self.values[index]) - i64::from(self.mean)
+        i64::from(self.values[index]) - i64::from(self.center)
     }
 
     /// Adds the sum of the next Gaussian; its neighbors come before it.
@@ -45,8 +45,8 @@ impl Channel {
 }
 
 /// What a channel is predicted from: the sum over the neighbors, the nearest neighbor, and for every channel coded
-/// before it the Gaussian's own value and the sum over its neighbors. The channel's mean is subtracted from every
-/// value.
+/// before it the Gaussian's own value and the sum over its neighbors. The channel's center is subtracted
+/// from every value.
 #[inline]
 fn inputs<'a>(
     own: &'a Channel,
@@ -57,6 +57,33 @@ fn inputs<'a>(
     let nearest = if index == 0 { 0 } else { own.centered(neighbors[0] as usize) };
     let others = before.iter().flat_map(move |channel| [channel.centered(index), channel.around[index]]);
     [own.around[index], nearest].into_iter().chain(others)
+}
+
+/// What a Gaussian's number is expected to be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Prediction {
+    /// The nearest integer.
+    pub(super) value: i32,
+    /// What was rounded away, in `-HALF..HALF`: where it is positive, the number is rather larger than the integer.
+    beyond: i32,
+}
+
+/// Half a step in the units of [`Prediction::beyond`].
+const HALF: u32 = 1 << (FRACTION - 1);
+
+impl Prediction {
+    /// The number minus the integer, with the sign such that a positive one is at least as likely as a negative one; its
+    /// own inverse.
+    #[inline]
+    pub(super) fn turn(&self, residual: i32) -> i32 {
+        if self.beyond < 0 { residual.wrapping_neg() } else { residual }
+    }
+
+    /// How far the integer is from what was predicted: `0..parts`, from no distance to half a step.
+    #[inline]
+    pub(super) fn distance(&self, parts: usize) -> usize {
+        (self.beyond.unsigned_abs() as usize * parts / HALF as usize).min(parts - 1)
+    }
 }
 
 /// The weights of a prediction.
@@ -72,13 +99,14 @@ impl LinearPrediction {
         Self { weights: vec![0; 2 + 2 * before] }
     }
 
-    /// The weights of the least squared error over all Gaussians.
+    /// The weights that leave the fewest bits, about. The bits of a residual grow with the logarithm of its size: few large
+    /// ones do not matter, as they would in a sum of squares.
     pub(super) fn fit(own: &Channel, before: &[Channel], neighbors: &[[u32; NEIGHBORS]]) -> Self {
         let mut prediction = Self::zero(before.len());
         if neighbors.len() < FEWEST {
             return prediction;
         }
-        let exact = least_squares(prediction.weights.len(), neighbors.len(), RIDGE, |index, row| {
+        let exact = robust_least_squares(prediction.weights.len(), neighbors.len(), RIDGE, |index, row| {
             for (number, input) in row.iter_mut().zip(inputs(own, before, &neighbors[index], index)) {
                 *number = input as f64;
             }
@@ -97,71 +125,27 @@ impl LinearPrediction {
         }
     }
 
-    /// The expected value of a channel at a Gaussian.
+    /// What is expected of a channel at a Gaussian.
     #[inline]
-    pub(super) fn predict(&self, own: &Channel, before: &[Channel], neighbors: &[u32; NEIGHBORS], index: usize) -> i32 {
+    pub(super) fn predict(
+        &self,
+        own: &Channel,
+        before: &[Channel],
+        neighbors: &[u32; NEIGHBORS],
+        index: usize,
+    ) -> Prediction {
         let inputs = inputs(own, before, neighbors, index);
         let sum: i64 = self.weights.iter().zip(inputs).map(|(&weight, input)| i64::from(weight) * input).sum();
         let rounded = (sum + (1 << (FRACTION - 1))) >> FRACTION;
         // Only damaged streams have sums beyond 32 bits.
-        own.mean.wrapping_add(rounded as i32)
+        let beyond = (sum - (rounded << FRACTION)) as i32;
+        Prediction { value: own.center.wrapping_add(rounded as i32), beyond }
     }
-}
-
-/// The weights with which `inputs` numbers predict another with the least squared error, over `count` examples. `example`
-/// sets the inputs of one of them, and returns what they predict. `ridge` is added to the diagonal of the normal equations
-/// for each example, so that inputs without variation do no harm.
-pub fn least_squares(
-    inputs: usize,
-    count: usize,
-    ridge: f64,
-    mut example: impl FnMut(usize, &mut [f64]) -> f64,
-) -> Vec<f64> {
-    // The right side is the last column.
-    let mut equations = vec![vec![0.0; inputs + 1]; inputs];
-    let mut row = vec![0.0; inputs + 1];
-    for index in 0..count {
-        row[inputs] = example(index, &mut row[..inputs]);
-        for (equation, &number) in equations.iter_mut().zip(&row) {
-            equation.iter_mut().zip(&row).for_each(|(sum, other)| *sum += number * other);
-        }
-    }
-    for (diagonal, equation) in equations.iter_mut().enumerate() {
-        equation[diagonal] += ridge * count as f64;
-    }
-    solve(equations)
-}
-
-/// Solves positive definite equations whose last column is the right side, by elimination.
-fn solve(mut equations: Vec<Vec<f64>>) -> Vec<f64> {
-    let size = equations.len();
-    for pivot in 0..size {
-        let (done, below) = equations.split_at_mut(pivot + 1);
-        let row = &done[pivot];
-        for equation in below {
-            let factor = equation[pivot] / row[pivot];
-            equation[pivot..].iter_mut().zip(&row[pivot..]).for_each(|(number, above)| *number -= factor * above);
-        }
-    }
-    let mut solution = vec![0.0; size];
-    for row in (0..size).rev() {
-        let known: f64 = (row + 1..size).map(|column| equations[row][column] * solution[column]).sum();
-        solution[row] = (equations[row][size] - known) / equations[row][row];
-    }
-    solution
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn equations_are_solved() {
-        let solution = solve(vec![vec![4.0, 1.0, 2.0, 12.0], vec![1.0, 3.0, 0.0, 7.0], vec![2.0, 0.0, 5.0, 17.0]]);
-        for (found, expected) in solution.iter().zip([1.0, 2.0, 3.0]) {
-            assert!((found - expected).abs() < 1e-12, "{solution:?}");
-        }
-    }
 
     /// A channel that is half of another is predicted as that.
     #[test]
@@ -177,7 +161,7 @@ mod tests {
         let before = [whole];
         let prediction = LinearPrediction::fit(&half, &before, &neighbors);
         let exact =
-            (0..1000).filter(|&i| prediction.predict(&half, &before, &neighbors[i], i) == half.values[i]).count();
+            (0..1000).filter(|&i| prediction.predict(&half, &before, &neighbors[i], i).value == half.values[i]).count();
         assert!(exact > 990, "{exact} of 1000");
     }
 }

@@ -2,8 +2,8 @@
 //!
 //! The codec codes attributes adaptively, from neighbors and from channels before (`light4gs_codec::attributes`). No
 //! such coder has a gradient. In training each channel is predicted from the same values by a linear prediction, and a
-//! density of what is left stands for the coder: so the scene learns to be predictable. For positions stands the
-//! information of a set of points, which the codec's splitting of counts comes close to (Devillers and Gandoin 2000). Every
+//! density of what is left stands for the coder: so the scene learns to be predictable. Positions take what the codec writes
+//! for them, and only their step has a gradient: how points cluster is not learned. Every
 //! attribute has one learned step. A rate on all attributes with learned steps is after HAC++ (Chen et al. 2025), which
 //! modulates the steps of each Gaussian besides.
 
@@ -11,7 +11,7 @@ mod prediction;
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Distribution, Int, Tensor, TensorData};
-use light4gs_codec::attributes::{AttributeSteps, typical_size};
+use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 
 use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
@@ -80,7 +80,8 @@ impl AttributeEntropy {
         replace(&mut self.size, size);
         let gaussians = gaussians.clone().inner();
         let rows: Vec<i64> = (0..gaussians.means.dims()[0] as i64).collect();
-        let near = self.channels(self.neighbors(&gaussians, &rows));
+        let order = self.coding_order(&gaussians);
+        let near = self.channels(selected(&gaussians, &neighbor_rows(order.as_ref(), &rows)));
         let own = self.channels(gaussians);
         let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
         let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
@@ -129,7 +130,8 @@ impl AttributeEntropy {
     /// these rows and their neighbors, and the result is an estimate for all.
     pub fn bits_of_each(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> Tensor<1> {
         let count = gaussians.means.dims()[0];
-        let positions = self.position_bits(gaussians.means.clone());
+        let order = self.coding_order(&gaussians);
+        let positions = self.position_bits(gaussians.means.clone(), order.as_ref());
         let all: Vec<i64>;
         let (rows, own) = match rows {
             Some(rows) => (rows, selected(&gaussians, rows)),
@@ -139,7 +141,7 @@ impl AttributeEntropy {
             }
         };
         let share = count as f64 / rows.len().max(1) as f64;
-        let near = self.channels(self.neighbors(&gaussians, rows));
+        let near = self.channels(selected(&gaussians, &neighbor_rows(order.as_ref(), rows)));
         let residuals = self.prediction.residuals(self.channels(own), near);
         let widths = self.widths(self.log_steps.val().exp());
         let likelihood = self.mixture.interval_likelihood(residuals, widths);
@@ -156,16 +158,18 @@ impl AttributeEntropy {
         Tensor::cat(each.collect(), 0)
     }
 
-    /// The Gaussians from which each of some rows is predicted, one after the other.
-    fn neighbors(&self, gaussians: &GaussianTensors, rows: &[i64]) -> GaussianTensors {
+    /// The order in which the codec would code the Gaussians; `None` where positions are not finite: the trainer stops
+    /// for them, after this.
+    fn coding_order(&self, gaussians: &GaussianTensors) -> Option<CodingOrder> {
         let place = self.place(&MEANS.name);
         let step = place.map_or(0.0, |place| self.step_values()[place] * self.size.val().into_scalar::<f32>());
-        selected(gaussians, &neighbor_rows(off_tape(gaussians.means.clone()), step, rows))
+        let means: Vec<f32> = off_tape(gaussians.means.clone()).into_data().iter().collect();
+        CodingOrder::new(means.as_chunks().0, step).ok()
     }
 
-    /// What a set of points takes that are uniform in their box: their cells one by one, without the order. It depends
-    /// on the step only.
-    fn position_bits(&self, means: Tensor<2>) -> Tensor<1> {
+    /// What the codec writes for the positions. The derivative for the step is that of points which are uniform in their
+    /// box: one bit an axis for half the step.
+    fn position_bits(&self, means: Tensor<2>, order: Option<&CodingOrder>) -> Tensor<1> {
         let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &means.device()) };
         let count = means.dims()[0].max(1) as f64;
         let means = untracked(means);
@@ -173,8 +177,7 @@ impl AttributeEntropy {
         let extent = (means.clone().max_dim(0) - means.min_dim(0)) / untracked(self.size.val()).unsqueeze::<2>();
         let step = self.log_steps.val().narrow(0, place, 1).exp().unsqueeze::<2>();
         let cells = (extent / step + 1.0).log().sum() * (count * std::f64::consts::LOG2_E);
-        // Stirling's formula for the orders that are not told apart.
-        cells - count * (count.log2() - std::f64::consts::LOG2_E)
+        cells.clone() - untracked(cells.detach()) + order.map_or(0.0, |order| order.position_bits() as f64)
     }
 
     /// The steps as the codec takes them, for Gaussians with these logarithms of scales: those of `given` for attributes

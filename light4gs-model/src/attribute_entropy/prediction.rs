@@ -97,13 +97,10 @@ impl ChannelPrediction {
     }
 }
 
-/// The rows of the neighbors of each of some Gaussians, [`NEIGHBORS`] each, if the positions, `[N, 3]`, are rounded to a grid
-/// with this step in world units.
-pub(super) fn neighbor_rows(means: Tensor<2>, step: f32, rows: &[i64]) -> Vec<i64> {
-    let means: Vec<f32> = means.into_data().iter().collect();
-    match CodingOrder::new(means.as_chunks().0, step) {
-        Ok(order) => rows.iter().flat_map(|&row| order.neighbors(row as usize)).map(i64::from).collect(),
-        // Positions that are not finite: the trainer stops for them, after this.
-        Err(_) => rows.iter().flat_map(|&row| [row; NEIGHBORS]).collect(),
+/// The rows of the neighbors of each of some Gaussians, [`NEIGHBORS`] each. Without an order each is its own neighbor.
+pub(super) fn neighbor_rows(order: Option<&CodingOrder>, rows: &[i64]) -> Vec<i64> {
+    match order {
+        Some(order) => rows.iter().flat_map(|&row| order.neighbors(row as usize)).map(i64::from).collect(),
+        None => rows.iter().flat_map(|&row| [row; NEIGHBORS]).collect(),
     }
 }

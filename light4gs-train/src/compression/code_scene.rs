@@ -312,7 +312,7 @@ mod tests {
 
     #[test]
     fn a_share_of_nothing_is_no_share() {
-        let difference = |expected, coded| CodedPart { name: "planes", expected, coded }.difference();
+        let difference = |expected, coded| CodedPart { name: "planes".into(), expected, coded }.difference();
         assert_eq!(difference(101.0, 100.0), "+1.00 %");
         assert_eq!(difference(108_299.0, 0.0), "nothing coded");
         assert_eq!(difference(0.0, 0.0), "-");

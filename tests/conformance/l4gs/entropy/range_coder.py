@@ -116,10 +116,12 @@ class AdaptiveInteger:
         self._longer = [AdaptiveBit() for _ in range(_LONGEST)]
         self._trees = [[AdaptiveBit() for _ in range(8)] for _ in range(_EXPONENTS_WITH_TREE)]
 
-    def read(self, decoder: RangeDecoder) -> int:
-        if self._zero.read(decoder):
+    def read(self, decoder: RangeDecoder, sign: AdaptiveInteger | None = None) -> int:
+        """The next integer; whether it is 0 and its sign under another context, if one is given."""
+        sign = sign or self
+        if sign._zero.read(decoder):
             return 0
-        negative = self._negative.read(decoder)
+        negative = sign._negative.read(decoder)
         exponent = 0
         while exponent < _LONGEST and self._longer[exponent].read(decoder):
             exponent += 1
