@@ -1,10 +1,11 @@
 //! Kernels of the wgpu back end: the host side of the WGSL in `shaders/`.
 //!
 //! Public are the kernels as text ([`kernels`]) and launches as data ([`record`]), so that compilers and adapters other than
-//! those of this machine can be tried: `.ci/webgpu` does.
+//! those of this machine can be tried: `.ci/webgpu` does; and the number of launches ([`LaunchCounter`]).
 
 mod adam;
 mod context;
+mod counting;
 mod elementwise;
 mod kernel;
 mod launch;
@@ -18,6 +19,7 @@ mod subgroups;
 mod team;
 
 pub(crate) use adam::adam_on_gpu;
+pub use counting::{LaunchCounter, LaunchCounts};
 pub(crate) use elementwise::{lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
 pub use kernel::Kernel;
 pub use recording::{RecordedBuffer, RecordedLaunch, record};

@@ -1,8 +1,10 @@
 //! Timing of every part of a training step, on scenes that anybody can make.
 
 pub mod codec;
+mod launches;
 mod steps;
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::time::Instant;
 
@@ -16,6 +18,7 @@ use rand_chacha::ChaCha8Rng;
 use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 
+use self::launches::Launches;
 use self::steps::StepNames;
 use crate::config::{Config, DeviceName};
 use crate::device::adapter_name;
@@ -169,13 +172,24 @@ impl BenchScene {
     }
 }
 
-/// Median milliseconds of one part.
+/// One part.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
     /// Its name.
     pub name: &'static str,
+    /// What it takes.
+    #[serde(flatten)]
+    pub cost: Cost,
+}
+
+/// What a part takes.
+#[derive(Clone, Debug, Serialize)]
+pub struct Cost {
     /// Median over the repetitions.
     pub milliseconds: f64,
+    /// Kernel launches of one repetition, by the kernel's name; empty on devices that launch none.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub launches: BTreeMap<String, u64>,
 }
 
 /// All parts on one scene.
@@ -200,22 +214,34 @@ pub struct DeviceTimes {
     pub scenes: Vec<SceneTimes>,
 }
 
-/// Median wall time of `run` in milliseconds; `prepare` is not timed.
-fn median<T, R>(device: &Device, repeats: usize, mut prepare: impl FnMut() -> T, mut run: impl FnMut(T) -> R) -> f64 {
-    let mut times = Vec::with_capacity(repeats);
-    for repetition in 0..WARM_UP + repeats {
-        let input = prepare();
-        // A device that cannot wait has nothing to wait for.
-        let _ = device.sync();
-        let begin = Instant::now();
-        let output = run(input);
-        let _ = device.sync();
-        if repetition >= WARM_UP {
-            times.push(begin.elapsed().as_secs_f64() * 1e3);
+/// Measures parts on a device.
+struct Meter<'a> {
+    device: &'a Device,
+    repeats: usize,
+    launches: &'a Launches,
+}
+
+impl Meter<'_> {
+    /// What `run` takes; `prepare` does not count.
+    fn measure<T, R>(&self, mut prepare: impl FnMut() -> T, mut run: impl FnMut(T) -> R) -> Cost {
+        let mut times = Vec::with_capacity(self.repeats);
+        let mut launches = BTreeMap::new();
+        for repetition in 0..WARM_UP + self.repeats {
+            let input = prepare();
+            // A device that cannot wait has nothing to wait for.
+            let _ = self.device.sync();
+            self.launches.take();
+            let begin = Instant::now();
+            let output = run(input);
+            let _ = self.device.sync();
+            if repetition >= WARM_UP {
+                times.push(begin.elapsed().as_secs_f64() * 1e3);
+            }
+            launches = self.launches.take();
+            drop(output);
         }
-        drop(output);
+        Cost { milliseconds: median_of(times), launches }
     }
-    median_of(times)
 }
 
 fn median_of(mut times: Vec<f64>) -> f64 {
@@ -250,39 +276,36 @@ pub fn benchmark(
     let autodiff = device.clone().autodiff();
     let matrix = || Tensor::<2>::random([CALIBRATION, CALIBRATION], Distribution::Default, device);
     let (a, b) = (matrix(), matrix());
-    let calibration_ms = median(device, repeats, || (a.clone(), b.clone()), |(a, b)| a.matmul(b));
+    let launches = &Launches::on(name);
+    let meter = &Meter { device, repeats, launches };
+    let calibration = meter.measure(|| (a.clone(), b.clone()), |(a, b)| a.matmul(b));
     let presets = [
         (Config::from_preset("dnerf-cpu")?, steps::HEXPLANE),
         (Config::load("dnerf-cpu+nodes+medium", &[])?, steps::NODES),
     ];
     let scenes = scenes
         .iter()
-        .map(|scene| SceneTimes {
-            scene: scene.name.clone(),
-            timings: timings(scene, device, &autodiff, &presets, repeats),
-        })
+        .map(|scene| SceneTimes { scene: scene.name.clone(), timings: timings(scene, meter, &autodiff, &presets) })
         .collect();
-    Ok(DeviceTimes { device: name.to_string(), adapter: adapter_name(name, device), calibration_ms, scenes })
+    Ok(DeviceTimes {
+        device: name.to_string(),
+        adapter: adapter_name(name, device),
+        calibration_ms: calibration.milliseconds,
+        scenes,
+    })
 }
 
-fn timings(
-    scene: &BenchScene,
-    device: &Device,
-    autodiff: &Device,
-    presets: &[(Config, StepNames)],
-    repeats: usize,
-) -> Vec<Timing> {
+fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device, presets: &[(Config, StepNames)]) -> Vec<Timing> {
     let mut out = Vec::new();
-    let mut add = |name: &'static str, milliseconds: f64| out.push(Timing { name, milliseconds });
+    let mut add = |name: &'static str, cost: Cost| out.push(Timing { name, cost });
+    let device = meter.device;
     let splatter = Splatter::new(scene.background, 3);
     let [height, width] = [scene.camera.height as usize, scene.camera.width as usize];
 
     let still = scene.gaussians(device);
     add(
         "project",
-        median(
-            device,
-            repeats,
+        meter.measure(
             || still.tensors(),
             |g| {
                 // An image of one pixel, so that almost nothing but blending is left out.
@@ -291,31 +314,31 @@ fn timings(
             },
         ),
     );
-    let forward = median(device, repeats, || still.tensors(), |g| splatter.render(g, &scene.camera, None).image);
+    let forward = meter.measure(|| still.tensors(), |g| splatter.render(g, &scene.camera, None).image);
     add("splat forward", forward);
 
     let trained = scene.gaussians(autodiff);
     let weights = Tensor::<3>::random([height, width, 3], Distribution::Default, autodiff);
     let weighted = |g: GaussianTensors| (splatter.render(g, &scene.camera, None).image * weights.clone()).sum();
-    add("splat backward", median(device, repeats, || weighted(trained.tensors()), |loss| loss.backward()));
-    add("splat forward + backward", median(device, repeats, || trained.tensors(), |g| weighted(g).backward()));
+    add("splat backward", meter.measure(|| weighted(trained.tensors()), |loss| loss.backward()));
+    add("splat forward + backward", meter.measure(|| trained.tensors(), |g| weighted(g).backward()));
 
     let count = scene.count();
     let planes = HexPlaneConfig::new().with_resolution([64, 64, 64, 24]).init(autodiff);
     let points = Tensor::<2>::random([count, 4], Distribution::Uniform(-1.0, 1.0), autodiff).require_grad();
     let upstream = Tensor::<2>::random([count, planes.feature_size()], Distribution::Default, autodiff);
-    add("hexplane forward", median(device, repeats, || points.clone(), |points| planes.query(points)));
+    add("hexplane forward", meter.measure(|| points.clone(), |points| planes.query(points)));
     let query = |points: Tensor<2>| (planes.query(points) * upstream.clone()).sum();
-    add("hexplane backward", median(device, repeats, || query(points.clone()), |loss| loss.backward()));
-    let both = median(device, repeats, || points.clone(), |points| query(points).backward());
+    add("hexplane backward", meter.measure(|| query(points.clone()), |loss| loss.backward()));
+    let both = meter.measure(|| points.clone(), |points| query(points).backward());
     add("hexplane forward + backward", both);
 
     let inputs = skinning_inputs(count, SKINNING_NODES, autodiff);
     let upstream = Tensor::<2>::random([count, 10], Distribution::Default, autodiff);
-    add("skinning forward", median(device, repeats, || inputs.clone(), skin));
+    add("skinning forward", meter.measure(|| inputs.clone(), skin));
     let skinned = |inputs: SkinningInputs| (skin(inputs) * upstream.clone()).sum();
-    add("skinning backward", median(device, repeats, || skinned(inputs.clone()), |loss| loss.backward()));
-    let both = median(device, repeats, || inputs.clone(), |inputs| skinned(inputs).backward());
+    add("skinning backward", meter.measure(|| skinned(inputs.clone()), |loss| loss.backward()));
+    let both = meter.measure(|| inputs.clone(), |inputs| skinned(inputs).backward());
     add("skinning forward + backward", both);
 
     let network = DeformationConfig::new(64).init(autodiff);
@@ -325,11 +348,11 @@ fn timings(
         let parts = [deltas.position, deltas.scale, deltas.rotation];
         parts.into_iter().flatten().map(|t| t.sum()).reduce(|a, b| a + b).expect("three heads")
     };
-    add("deformation forward", median(device, repeats, || features.clone(), &deform));
-    add("deformation backward", median(device, repeats, || deform(features.clone()), |loss| loss.backward()));
+    add("deformation forward", meter.measure(|| features.clone(), &deform));
+    add("deformation backward", meter.measure(|| deform(features.clone()), |loss| loss.backward()));
 
     for (config, names) in presets {
-        steps::timings(scene, config, names, device, repeats, &mut add);
+        steps::timings(scene, config, names, meter, &mut add);
     }
     out
 }
@@ -349,11 +372,12 @@ pub fn table(results: &[DeviceTimes]) -> String {
             .collect::<Vec<_>>()
     };
     for (i, timing) in first.timings.iter().enumerate() {
-        table.row(cells(timing.name, &|_, scene| scene.timings[i].milliseconds));
+        table.row(cells(timing.name, &|_, scene| scene.timings[i].cost.milliseconds));
     }
     let timing_of = |name: &'static str| {
         move |_: &DeviceTimes, scene: &SceneTimes| {
-            1e3 / scene.timings.iter().find(|timing| timing.name == name).map_or(f64::NAN, |timing| timing.milliseconds)
+            let timing = scene.timings.iter().find(|timing| timing.name == name);
+            1e3 / timing.map_or(f64::NAN, |timing| timing.cost.milliseconds)
         }
     };
     for (field, names) in [("hexplane", steps::HEXPLANE), ("nodes", steps::NODES)] {
@@ -361,6 +385,25 @@ pub fn table(results: &[DeviceTimes]) -> String {
         table.row(cells(&format!("{field}, render FPS"), &timing_of(names.render)));
     }
     table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
+    let launches = launch_table(results).unwrap_or_default();
     let adapters = results.iter().filter_map(|device| Some((&device.device, device.adapter.as_ref()?)));
-    adapters.fold(table.to_string(), |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
+    adapters.fold(table.to_string() + &launches, |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
+}
+
+/// The launches of each part on devices that have any; each device launches as many on every scene, but for the passes of a
+/// sort, so the first is shown.
+fn launch_table(results: &[DeviceTimes]) -> Option<String> {
+    let launching: Vec<(&str, &SceneTimes)> = results
+        .iter()
+        .filter_map(|device| Some((device.device.as_str(), device.scenes.first()?)))
+        .filter(|(_, scene)| scene.timings.iter().any(|timing| !timing.cost.launches.is_empty()))
+        .collect();
+    let (_, first) = launching.first()?;
+    let columns = launching.iter().map(|(device, scene)| (format!("{device} {}", scene.scene), Align::Right));
+    let mut table = Table::new(std::iter::once(("kernel launches".to_owned(), Align::Left)).chain(columns));
+    for (i, timing) in first.timings.iter().enumerate() {
+        let sums = launching.iter().map(|(_, scene)| scene.timings[i].cost.launches.values().sum::<u64>().to_string());
+        table.row(std::iter::once(timing.name.to_owned()).chain(sums));
+    }
+    Some(format!("\n{table}"))
 }

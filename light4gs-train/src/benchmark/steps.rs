@@ -1,5 +1,6 @@
 //! Timing of whole training steps, each of one view, and of rendering, with the field and the rate of a preset.
 
+use std::collections::BTreeMap;
 use std::time::Instant;
 
 use burn::module::Module;
@@ -9,7 +10,7 @@ use light4gs_model::{DeformationField, DynamicScene, FinePosition, GaussianTenso
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use super::{BenchScene, WARM_UP, median, median_of};
+use super::{BenchScene, Cost, Meter, WARM_UP, median_of};
 use crate::compression::{Compression, ConfiguredModels};
 use crate::config::Config;
 use crate::density::GaussianEditor;
@@ -53,10 +54,10 @@ pub(super) fn timings(
     scene: &BenchScene,
     config: &Config,
     names: &StepNames,
-    device: &Device,
-    repeats: usize,
-    add: &mut impl FnMut(&'static str, f64),
+    meter: &Meter,
+    add: &mut impl FnMut(&'static str, Cost),
 ) {
+    let Meter { device, repeats, launches } = *meter;
     let autodiff = &device.clone().autodiff();
     let splatter = Splatter::new(scene.background, config.model.sh_degree.into());
     let [height, width] = [scene.camera.height as usize, scene.camera.width as usize];
@@ -89,23 +90,30 @@ pub(super) fn timings(
         adam.step_module("", dynamic, &mut gradients, |_, _| Some(1e-12));
     };
     let mut times = [Vec::new(), Vec::new()];
+    let mut counts = [BTreeMap::new(), BTreeMap::new()];
     for repetition in 0..WARM_UP + repeats {
+        launches.take();
         let begin = Instant::now();
         let mut tape = loss_of(&dynamic, repetition).backward();
         let mut gradients = GradientSums::default();
         gradients.add_module(&dynamic, &mut tape);
         let _ = device.sync();
+        let of_gradients = launches.take();
         let middle = Instant::now();
         update(&mut dynamic, gradients);
         let _ = device.sync();
+        counts = [launches.take(), of_gradients];
         if repetition >= WARM_UP {
             times[0].push(middle.elapsed().as_secs_f64() * 1e3);
             times[1].push(begin.elapsed().as_secs_f64() * 1e3);
         }
     }
     let [adam_ms, step_ms] = times.map(median_of);
-    add(names.adam, adam_ms);
-    add(names.plain, step_ms);
+    let [of_adam, of_gradients] = counts;
+    let mut of_step = of_adam.clone();
+    of_gradients.into_iter().for_each(|(kernel, count)| *of_step.entry(kernel).or_default() += count);
+    add(names.adam, Cost { milliseconds: adam_ms, launches: of_adam });
+    add(names.plain, Cost { milliseconds: step_ms, launches: of_step });
 
     let mut config = config.clone();
     config.compression.rate.lambda = LAMBDA;
@@ -114,9 +122,7 @@ pub(super) fn timings(
     compression.start_attributes_from(&dynamic.gaussians);
     for (name, with_rate) in [(names.noise, false), (names.rate, true)] {
         let mut random = ChaCha8Rng::seed_from_u64(1);
-        let step = median(
-            autodiff,
-            repeats,
+        let step = meter.measure(
             || (),
             |()| {
                 let noisy = compression.noisy(&dynamic, true, true);
@@ -137,9 +143,7 @@ pub(super) fn timings(
 
     let decoded = dynamic.valid();
     let mut frame = 0;
-    let render = median(
-        device,
-        repeats,
+    let render = meter.measure(
         || (),
         |()| {
             frame += 1;

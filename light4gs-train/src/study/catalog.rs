@@ -22,6 +22,7 @@ studies![
     "pruning",
     "sizes",
     "motion",
+    "attribute-rate",
 ];
 
 /// The text of a study.

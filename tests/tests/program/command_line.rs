@@ -470,6 +470,35 @@ fn bench_prints_a_table_and_json() {
     assert_eq!(json[0]["device"], "flex");
 }
 
+/// Each launch costs the host some microseconds on any GPU, and software drivers do not show it. Fewer are welcome: then lower
+/// the bound. How many there are depends on neither the adapter nor the scene, but for the passes of a sort.
+#[test]
+fn a_step_does_not_launch_more_kernels_than_before() {
+    let w = Workspace::new(PROGRAM);
+    let small = ["bench", "--device", "wgpu", "--gaussians", "200", "--size", "40", "--repeats", "1", "--json"];
+    let output = w.run(small);
+    assert_success(&output);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let timings = json[0]["scenes"][0]["timings"].as_array().unwrap();
+    let launches = |part: &str| -> u64 {
+        let timing = timings.iter().find(|timing| timing["name"] == part).unwrap_or_else(|| panic!("no row {part}"));
+        timing["launches"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum()
+    };
+    for (part, bound) in [
+        ("splat forward + backward", 59),
+        ("skinning forward + backward", 11),
+        ("nodes, Adam step", 13),
+        ("nodes, training step", 413),
+        ("nodes, step with noise and rate", 647),
+        ("nodes, render", 98),
+        ("hexplane, training step", 630),
+        ("hexplane, step with noise and rate", 1148),
+    ] {
+        let found = launches(part);
+        assert!((1..=bound).contains(&found), "{part}: {found} launches, {bound} before");
+    }
+}
+
 #[test]
 fn an_error_of_the_gpu_is_reported_like_any_other() {
     let w = Workspace::new(PROGRAM);

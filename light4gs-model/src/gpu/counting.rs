@@ -1,0 +1,51 @@
+//! How many kernels are launched: on a GPU each launch costs the host some microseconds, whatever the kernel does.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use cubecl::config::{TypeNameFormatLevel, type_name_format};
+use cubecl::logging::{LaunchObservation, LaunchObserver};
+
+/// Launches by the kernel's name, those of Burn's own kernels too.
+pub type LaunchCounts = BTreeMap<String, u64>;
+
+/// Counts all launches of the process from its beginning on, on whatever thread and adapter. Only the one that began last
+/// counts.
+pub struct LaunchCounter {
+    counts: Arc<Counts>,
+    _observation: LaunchObservation,
+}
+
+#[derive(Default)]
+struct Counts(Mutex<BTreeMap<&'static str, u64>>);
+
+impl LaunchObserver for Counts {
+    fn launched(&self, kernel: &'static str) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner).entry(kernel).or_default() += 1;
+    }
+}
+
+impl LaunchCounter {
+    /// Begins to count.
+    pub fn begin() -> Self {
+        let counts = Arc::<Counts>::default();
+        Self { _observation: LaunchObservation::new(counts.clone()), counts }
+    }
+
+    /// The launches since the beginning, or since the last time that they were taken.
+    pub fn take(&self) -> LaunchCounts {
+        let counts = std::mem::take(&mut *self.counts.0.lock().unwrap_or_else(PoisonError::into_inner));
+        let mut named = LaunchCounts::new();
+        for (kernel, count) in counts {
+            *named.entry(type_name_format(kernel, TypeNameFormatLevel::Balanced)).or_default() += count;
+        }
+        named
+    }
+}
+
+impl fmt::Debug for LaunchCounter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("LaunchCounter").finish_non_exhaustive()
+    }
+}
