@@ -202,7 +202,7 @@ mod tests {
     /// Small images and few Gaussians until half of the fine stage is over.
     #[test]
     fn training_goes_from_coarse_to_fine() {
-        const SIDE: u32 = 241;
+        const SIDE: u32 = 401;
         let mut config = Config::from_preset("dnerf-cpu").unwrap();
         config.device = DeviceName::Flex;
         (config.train.coarse_iterations, config.train.fine_iterations) = (1, 4);
@@ -226,7 +226,7 @@ mod tests {
             steps.push((report.image.dims()[0], report.gaussians > 60));
         }
         // One row and one column are left over.
-        assert_eq!(steps, [(120, false), (120, false), (120, false), (241, true), (241, true)]);
+        assert_eq!(steps, [(200, false), (200, false), (200, false), (401, true), (401, true)]);
     }
 
     #[test]
