@@ -11,8 +11,9 @@ const LEADING: u32 = 3;
 ///
 /// A value is a zero flag, a sign, and its magnitude `m >= 1` as an Exp-Golomb code: `floor(log2 m)` in unary, then the
 /// binary digits below the first. Flag, sign, unary part and the leading digits adapt, separately in each of the
-/// caller's contexts (flag and sign may have contexts of their own); the other digits are written raw. So a value takes few decisions whatever its size, and after
-/// some hundred values of a smooth distribution the code is within a fraction of a percent of its entropy.
+/// caller's contexts (flag and sign may have contexts of their own); the other digits are written raw. So a value
+/// takes few decisions whatever its size, and after some hundred values of a smooth distribution the code is within a
+/// fraction of a percent of its entropy.
 #[derive(Clone, Debug)]
 pub(crate) struct AdaptiveInteger {
     signs: Vec<Sign>,

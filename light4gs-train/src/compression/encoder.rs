@@ -302,7 +302,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let Some(models) = self.learned_attributes().filter(|_| gaussians.means.dims()[0] > 0) else {
             return Vec::new();
         };
-        let bits = models.bits_of_each(gaussians, None).into_data();
+        let bits = models.bits_of_each(gaussians).into_data();
         models.attributes().iter().map(|attribute| attribute.name.clone()).zip(bits.iter()).collect()
     }
 
