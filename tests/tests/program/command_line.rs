@@ -489,7 +489,7 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("skinning forward + backward", 11),
         ("nodes, Adam step", 13),
         ("nodes, training step", 413),
-        ("nodes, step with noise and rate", 647),
+        ("nodes, step with noise and rate", 576),
         ("nodes, render", 98),
         ("hexplane, training step", 630),
         ("hexplane, step with noise and rate", 1148),
