@@ -1,11 +1,10 @@
 //! A decoded file, of which any time can be computed and drawn.
 
-use std::path::Path;
 
 use light4gs_codec::rendering::{TILE, opacity, scale};
 use light4gs_codec::{
     CodecError, FurtherAttribute, GaussianArrays, Limits, MotionEvaluator, MotionSource, SceneData, StreamInfo,
-    decode_with_limits, info_with_limits, read_file_and,
+    decode_with_limits, info_with_limits,
 };
 use light4gs_data::Camera;
 
@@ -60,12 +59,13 @@ impl PlayableScene {
         Ok(Self { canonical: scene.gaussians, info, evaluator, limits: *limits, memory_bytes })
     }
 
-    /// Decodes a file.
+    /// Decodes a file. Not in a browser, which has none.
     ///
     /// # Errors
     /// As [`PlayableScene::decode`], and what the system refuses to read; the message names the file.
-    pub fn open(path: &Path, limits: &Limits) -> Result<Self, CodecError> {
-        read_file_and(path, limits, |bytes| Self::decode(bytes, limits))
+    #[cfg(not(target_arch = "wasm32"))]
+    pub fn open(path: &std::path::Path, limits: &Limits) -> Result<Self, CodecError> {
+        light4gs_codec::read_file_and(path, limits, |bytes| Self::decode(bytes, limits))
     }
 
     /// What the file holds: metadata, counts, sections.
