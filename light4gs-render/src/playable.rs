@@ -1,6 +1,5 @@
 //! A decoded file, of which any time can be computed and drawn.
 
-
 use light4gs_codec::rendering::{TILE, opacity, scale};
 use light4gs_codec::{
     CodecError, FurtherAttribute, GaussianArrays, Limits, MotionEvaluator, MotionSource, SceneData, StreamInfo,
