@@ -390,8 +390,8 @@ pub fn table(results: &[DeviceTimes]) -> String {
     adapters.fold(table.to_string() + &launches, |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
 }
 
-/// The launches of each part on devices that have any; each device launches as many on every scene, but for the passes of a
-/// sort, so the first is shown.
+/// The launches of each part on devices that have any; a scene changes little about them (the passes of a
+/// sort, and which planes the rate sees), so the first is shown.
 fn launch_table(results: &[DeviceTimes]) -> Option<String> {
     let launching: Vec<(&str, &SceneTimes)> = results
         .iter()

@@ -69,9 +69,25 @@ fn the_estimate_is_near_the_bytes_of_the_codec() {
         let steps = model.steps(AttributeSteps::default().with("age", 1.0), &arrays.log_scales);
         assert!((steps.of("age").unwrap() - 0.1).abs() < 1e-6, "{name}: {steps:?}");
         assert!((steps.of("means").unwrap() - 0.05).abs() < 1e-4, "{name}: {steps:?}");
-        let coded = 8.0 * attributes::encode(&arrays, &steps).unwrap().bytes.len() as f64;
+        let encoded = attributes::encode(&arrays, &steps).unwrap();
+        let coded = 8.0 * encoded.bytes.len() as f64;
         // The densities have not been trained yet, and a mixture of three logistics is not a normal distribution.
         assert!((bits / coded - 1.0).abs() < 0.03, "{name}: {bits} expected, {coded} coded");
+        let each = values_of(&model.bits_of_each(gaussians.tensors()));
+        assert!((each.iter().map(|bits| f64::from(*bits)).sum::<f64>() / bits - 1.0).abs() < 1e-5, "{name}: {each:?}");
+        for ((attribute, bits), (coded_name, bytes)) in
+            model.attributes().iter().zip(each).zip(encoded.sizes.attributes)
+        {
+            let (bits, coded) = (f64::from(bits), 8.0 * bytes as f64);
+            assert_eq!(attribute.name, coded_name);
+            // Positions are counted by the coder itself: nothing but the grid, 17 bytes, is missing.
+            let near = if coded_name == "means" {
+                (coded - bits).abs() <= 8.0 * 18.0
+            } else {
+                (bits / coded - 1.0).abs() < 0.04
+            };
+            assert!(near, "{name}, {coded_name}: {bits} expected, {coded} coded");
+        }
     }
 }
 

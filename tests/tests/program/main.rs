@@ -1,6 +1,7 @@
 //! The program as its users run it: commands, damaged inputs, kills, resumed runs, studies.
 
 mod animated_glb;
+mod bench;
 mod command_line;
 mod hostile_runs;
 #[cfg(unix)]

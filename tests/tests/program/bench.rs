@@ -1,0 +1,65 @@
+//! `light4gs bench`: its table, its counts of launches, and adapters that are missing or too small.
+
+use crate::PROGRAM;
+use light4gs_tests::program::{Workspace, assert_refused, assert_success};
+
+#[test]
+fn bench_prints_a_table_and_json() {
+    let w = Workspace::new(PROGRAM);
+    let small = ["bench", "--gaussians", "200", "--size", "40", "--repeats", "1"];
+    let output = w.run(small);
+    assert_success(&output);
+    assert!(String::from_utf8_lossy(&output.stdout).contains("matmul"));
+    let output = w.run(small.into_iter().chain(["--json", "--device", "flex"]));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(json[0]["device"], "flex");
+}
+
+/// Each launch costs the host some microseconds on any GPU, and software drivers do not show it. Fewer are welcome: then lower
+/// the bound. Bounds are those of Mesa's software driver; on SwiftShader a step launches a few more.
+#[test]
+fn a_step_does_not_launch_more_kernels_than_before() {
+    let w = Workspace::new(PROGRAM);
+    let small = ["bench", "--device", "wgpu", "--gaussians", "200", "--size", "40", "--repeats", "1", "--json"];
+    let output = w.run(small);
+    assert_success(&output);
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let timings = json[0]["scenes"][0]["timings"].as_array().unwrap();
+    let launches = |part: &str| -> u64 {
+        let timing = timings.iter().find(|timing| timing["name"] == part).unwrap_or_else(|| panic!("no row {part}"));
+        timing["launches"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum()
+    };
+    let adapter = json[0]["adapter"].as_str().unwrap();
+    let more = if adapter.contains("llvmpipe") { 0 } else { 10 };
+    for (part, bound) in [
+        ("splat forward + backward", 59),
+        ("skinning forward + backward", 11),
+        ("nodes, Adam step", 13),
+        ("nodes, training step", 413),
+        ("nodes, step with noise and rate", 576),
+        ("nodes, render", 98),
+        ("hexplane, training step", 630),
+        ("hexplane, step with noise and rate", 1148),
+    ] {
+        let found = launches(part);
+        assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");
+    }
+}
+
+#[test]
+fn an_error_of_the_gpu_is_reported_like_any_other() {
+    let w = Workspace::new(PROGRAM);
+    // 5 GiB of pixels are more than any adapter binds.
+    let output = w.run(["bench", "--device", "wgpu", "--gaussians", "10", "--size", "16384", "--repeats", "1"]);
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{text}");
+    assert!(!text.contains("panicked") && text.contains("error: ") && text.contains("adapter"), "{text}");
+}
+
+#[test]
+fn adapters_that_are_not_there_are_refused() {
+    let w = Workspace::new(PROGRAM);
+    let bench = |device| w.run(["bench", "--device", device, "--gaussians", "10", "--size", "16"]);
+    assert_refused(&bench("wgpu:77"), &["wgpu:77", "mesa-vulkan-drivers", "--device flex"]);
+    assert_refused(&bench("vulkan"), &["vulkan", "ndarray, flex, wgpu", "wgpu:0"]);
+}
