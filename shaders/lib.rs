@@ -6,7 +6,7 @@
 #![no_std]
 
 use include::{
-    AFFINITY, ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, PIXELS, PLANES, POSE, QUATERNION,
+    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, NODE, NODE_MOTION, PIXELS, PLANES, POSE, QUATERNION,
     SPHERICAL_HARMONICS, SPLAT, VIEW,
 };
 
@@ -55,6 +55,14 @@ shaders! {
     /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
     /// (Ballé et al. 2018).
     LOWER_BOUND_BACKWARD = "elementwise" / "lower_bound_backward" [];
+    /// Control nodes at a time: their poses.
+    NODE_POSES = "nodes" / "node_poses" [QUATERNION, NODE_MOTION];
+    /// Derivative of the poses of control nodes.
+    NODE_POSES_BACKWARD = "nodes" / "node_poses_backward" [QUATERNION, NODE_MOTION];
+    /// Second half of the regularizer of control nodes: the loss, and all gradients.
+    NODE_REGULARIZER = "nodes" / "node_regularizer" [QUATERNION, NODE_MOTION];
+    /// First half of the regularizer of control nodes: how far they are from where their neighbors see them.
+    NODE_STRAIN = "nodes" / "node_strain" [EXPONENTIAL, QUATERNION, NODE_MOTION];
     /// The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error
     /// everywhere (Press et al., Numerical Recipes, section 6.2): the coefficients and the order of operations of
     /// `light4gs-model/src/ops`.
@@ -77,21 +85,23 @@ shaders! {
     RASTERIZE = "splatting" / "rasterize" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Derivative of the blending with respect to every splat, front to back like the forward pass.
     RASTERIZE_BACKWARD = "splatting" / "rasterize_backward" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
+    /// Every value times one factor that stands on the device.
+    SCALE = "elementwise" / "scale" [];
     /// The contributions of every splat to one image, without its color: the sums for significance pruning
     /// (paper III-B).
     SIGNIFICANCE = "splatting" / "significance" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Adds up every Gaussian's sums over its cells.
     SIGNIFICANCE_GATHER = "splatting" / "significance_gather" [];
     /// Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
-    SKINNING = "skinning" / "skinning" [EXPONENTIAL, QUATERNION, POSE, AFFINITY];
+    SKINNING = "skinning" / "skinning" [EXPONENTIAL, QUATERNION, POSE, NODE];
     /// One of the parts of skinning's derivative: the gradients of the Gaussians' affinities.
-    SKINNING_AFFINITIES = "skinning" / "skinning_affinities" [EXPONENTIAL, POSE, AFFINITY];
+    SKINNING_AFFINITIES = "skinning" / "skinning_affinities" [EXPONENTIAL, POSE, NODE];
     /// First of the parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
     SKINNING_BACKWARD = "skinning" / "skinning_backward" [QUATERNION, POSE];
     /// Last of the parts of skinning's derivative: adds up the slices, in their order.
     SKINNING_GATHER = "skinning" / "skinning_gather" [];
     /// One of the parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
-    SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE, AFFINITY];
+    SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE, NODE];
     /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
     SUBGROUPS = "elementwise" / "subgroups" [];
 }
@@ -105,8 +115,6 @@ pub mod include {
     }
 
     wgsl! {
-        /// What the affinities of a Gaussian and a node add to the logit of its weight.
-        AFFINITY = "include/affinity";
         /// Finite numbers, and sums of products term by term.
         ARITHMETIC = "include/arithmetic";
         /// The steps of the EWA projection that both directions need (Zwicker et al. 2001): from a Gaussian
@@ -118,6 +126,10 @@ pub mod include {
         EXPONENTIAL = "include/exponential";
         /// A splat's alpha at four pixels of a column.
         FOOTPRINT = "include/footprint";
+        /// A node at one time.
+        NODE = "include/node";
+        /// How a control node is moved and turned at a time.
+        NODE_MOTION = "include/node_motion";
         /// Bilinear samples of the planes of a scale.
         PLANES = "include/planes";
         /// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows

@@ -7,12 +7,14 @@
 //! | [`PlayableScene`] | a decoded file: its Gaussians at a time, images of them |
 //! | [`conventions`] | the Gaussians as other programs take them |
 //! | [`GaussianSlices`], [`View`], [`TileLists`], [`rasterize`], [`assemble`], [`splat_backward`], [`significance`] | the kernels |
+//! | [`rotation`] | rotations of quaternions, and their gradients |
 //! | [`spherical_harmonics`] | the basis functions of colors |
 //! | [`lanes`] | eight float32 numbers at once, as the processor has them |
 
 pub mod conventions;
 pub mod lanes;
 mod playable;
+pub mod rotation;
 pub mod spherical_harmonics;
 mod splatting;
 mod view;

@@ -15,17 +15,14 @@ struct Parameters {
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> orientations: array<f32>;
 @group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
-@group(0) @binding(3) var<storage, read_write> anchors: array<f32>;
-@group(0) @binding(4) var<storage, read_write> precisions: array<f32>;
-@group(0) @binding(5) var<storage, read_write> poses: array<f32>;
-@group(0) @binding(6) var<storage, read_write> moved: array<f32>;
-@group(0) @binding(7) var<storage, read_write> blended: array<vec4<f32>>;
-@group(0) @binding(8) var<uniform> parameters: Parameters;
+@group(0) @binding(3) var<storage, read_write> nodes: array<f32>;
+@group(0) @binding(4) var<storage, read_write> moved: array<f32>;
+@group(0) @binding(5) var<storage, read_write> blended: array<vec4<f32>>;
+@group(0) @binding(6) var<uniform> parameters: Parameters;
 
 fn exponent_of(mean: vec3<f32>, i: u32, node: u32) -> f32 {
-    let at = (3u + AFFINITIES) * node;
-    let offset = mean - vec3<f32>(anchors[at], anchors[at + 1u], anchors[at + 2u]);
-    return affinity_between(i, node) - precisions[node] * dot(offset, offset);
+    let offset = mean - anchor_of(node);
+    return affinity_between(i, node) - precision_of(node) * dot(offset, offset);
 }
 
 @compute @workgroup_size(WORKGROUP)
@@ -54,12 +51,12 @@ fn main(
     );
     for (var node = 0u; node < parameters.nodes; node++) {
         let weight = exponential(exponent_of(mean, i, node) - largest);
-        let at = 16u * node;
+        let of_node = pose_of(node);
         sum += weight;
-        pose.row_x += weight * vec4<f32>(poses[at], poses[at + 1u], poses[at + 2u], poses[at + 9u]);
-        pose.row_y += weight * vec4<f32>(poses[at + 3u], poses[at + 4u], poses[at + 5u], poses[at + 10u]);
-        pose.row_z += weight * vec4<f32>(poses[at + 6u], poses[at + 7u], poses[at + 8u], poses[at + 11u]);
-        pose.turn += weight * vec4<f32>(poses[at + 12u], poses[at + 13u], poses[at + 14u], poses[at + 15u]);
+        pose.row_x += weight * of_node.row_x;
+        pose.row_y += weight * of_node.row_y;
+        pose.row_z += weight * of_node.row_z;
+        pose.turn += weight * of_node.turn;
     }
     let inverse_sum = 1.0 / sum;
     pose.row_x *= inverse_sum;

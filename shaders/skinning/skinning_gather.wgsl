@@ -1,16 +1,11 @@
 // Last of the parts of skinning's derivative: adds up the slices, in their order.
 //
 // One invocation owns one of the SUMS numbers of a node: twenty, and four more where there are affinities. Reads the sums of
-// `skinning_nodes.wgsl`. Writes the gradients of anchors [B, 3 + AFFINITIES], precisions [B, 1] and poses [B, 16], each from its
-// place in `gradients`.
+// `skinning_nodes.wgsl`. Writes the gradients of the nodes [B, 20 + AFFINITIES].
 
 struct Parameters {
     nodes: u32,
     slices: u32,
-    // Where the gradients begin.
-    anchors: u32,
-    precisions: u32,
-    poses: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> sums: array<f32>;
@@ -32,17 +27,8 @@ fn main(
     for (var slice = 0u; slice < parameters.slices; slice++) {
         sum += sums[slice * stride + own];
     }
-    let node = own / SUMS;
     let k = own % SUMS;
-    var at = parameters.anchors + (3u + AFFINITIES) * node + k;
-    if (k == 3u) {
-        at = parameters.precisions + node;
-    } else if (k >= 20u + AFFINITIES) {
-        return;
-    } else if (k >= 20u) {
-        at = parameters.anchors + (3u + AFFINITIES) * node + k - 17u;
-    } else if (k > 3u) {
-        at = parameters.poses + 16u * node + k - 4u;
+    if (k < 20u + AFFINITIES) {
+        gradients[(20u + AFFINITIES) * (own / SUMS) + k] = sum;
     }
-    gradients[at] = sum;
 }

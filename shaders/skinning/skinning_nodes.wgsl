@@ -12,12 +12,10 @@ struct Parameters {
 }
 
 @group(0) @binding(0) var<storage, read_write> handed: array<vec4<f32>>;
-@group(0) @binding(1) var<storage, read_write> anchors: array<f32>;
-@group(0) @binding(2) var<storage, read_write> precisions: array<f32>;
-@group(0) @binding(3) var<storage, read_write> poses: array<f32>;
-@group(0) @binding(4) var<storage, read_write> stillness: array<f32>;
-@group(0) @binding(5) var<storage, read_write> sums: array<vec4<f32>>;
-@group(0) @binding(6) var<uniform> parameters: Parameters;
+@group(0) @binding(1) var<storage, read_write> nodes: array<f32>;
+@group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
+@group(0) @binding(3) var<storage, read_write> sums: array<vec4<f32>>;
+@group(0) @binding(4) var<uniform> parameters: Parameters;
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -33,16 +31,9 @@ fn main(
     }
     let end = min(begin + parameters.slice, parameters.count);
     let node = own % parameters.nodes;
-    let place = (3u + AFFINITIES) * node;
-    let anchor = vec3<f32>(anchors[place], anchors[place + 1u], anchors[place + 2u]);
-    let sharpness = precisions[node];
-    let at = 16u * node;
-    let pose = Pose(
-        vec4<f32>(poses[at], poses[at + 1u], poses[at + 2u], poses[at + 9u]),
-        vec4<f32>(poses[at + 3u], poses[at + 4u], poses[at + 5u], poses[at + 10u]),
-        vec4<f32>(poses[at + 6u], poses[at + 7u], poses[at + 8u], poses[at + 11u]),
-        vec4<f32>(poses[at + 12u], poses[at + 13u], poses[at + 14u], poses[at + 15u]),
-    );
+    let anchor = anchor_of(node);
+    let sharpness = precision_of(node);
+    let pose = pose_of(node);
 
     // Of the logit's gradient times the offset from the anchor, and times the squared distance.
     var of_place = vec4<f32>(0.0);

@@ -7,7 +7,7 @@
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use crate::kernels::skinning::{MOVED, ORIENTATION, POSE};
+use crate::kernels::skinning::{MOVED, ORIENTATION, PLACE, POSE, POSED};
 
 /// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.
 pub(crate) const CHUNK: usize = 256;
@@ -28,20 +28,13 @@ pub(crate) struct SkinningSlices<'a> {
     pub(crate) orientations: &'a [f32],
     /// `[N, W]`: stillness, then affinities
     pub(crate) stillness: &'a [f32],
-    /// `[B, 2 + W]`: anchors, then affinities
-    pub(crate) anchors: &'a [f32],
-    /// `[B, 1]`
-    pub(crate) precisions: &'a [f32],
-    /// `[B, 16]`
-    pub(crate) poses: &'a [f32],
+    /// `[B, 19 + W]`: anchor, precision, pose, affinities
+    pub(crate) nodes: &'a [f32],
+    /// `W - 1`
+    pub(crate) affinities: usize,
 }
 
 impl SkinningSlices<'_> {
-    /// `W`: one more than there are affinities.
-    pub(crate) fn width(&self) -> usize {
-        self.anchors.len() / self.precisions.len() - 2
-    }
-
     /// Gaussians.
     pub(crate) fn count(&self) -> usize {
         self.means.len() / 3
@@ -49,15 +42,14 @@ impl SkinningSlices<'_> {
 
     /// The nodes, each with its numbers next to each other.
     pub(crate) fn nodes<const W: usize>(&self) -> Vec<Node<W>> {
-        let rows = self.anchors.chunks_exact(2 + W).zip(self.poses.as_chunks::<POSE>().0);
-        let nodes = rows.zip(self.precisions).map(|((place, pose), precision)| {
+        let nodes = self.nodes.chunks_exact(POSED + self.affinities).map(|row| {
             let mut affinities = [0.0; W];
-            affinities[1..].copy_from_slice(&place[3..]);
+            affinities[1..].copy_from_slice(&row[POSED..]);
             Node {
-                anchor: [place[0], place[1], place[2]],
+                anchor: [row[0], row[1], row[2]],
                 affinities,
-                sharpness: -precision * std::f32::consts::LOG2_E,
-                pose: *pose,
+                sharpness: -row[PLACE - 1] * std::f32::consts::LOG2_E,
+                pose: row[PLACE..POSED].try_into().expect("a pose"),
             }
         });
         nodes.collect()
@@ -269,11 +261,11 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
 
 /// Positions, quaternions and vectors `[N, 10]`, and what the backward pass wants to see again.
 pub(crate) fn skin(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
-    match inputs.width() {
-        1 => skin_with::<1>(inputs),
-        2 => skin_with::<2>(inputs),
-        3 => skin_with::<3>(inputs),
-        4 => skin_with::<4>(inputs),
+    match inputs.affinities {
+        0 => skin_with::<1>(inputs),
+        1 => skin_with::<2>(inputs),
+        2 => skin_with::<3>(inputs),
+        3 => skin_with::<4>(inputs),
         _ => skin_with::<5>(inputs),
     }
 }

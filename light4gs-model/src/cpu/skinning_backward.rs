@@ -19,7 +19,7 @@ use super::skinning::{
     BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, orientation, product, to_rows,
     weight,
 };
-use crate::kernels::skinning::{MOVED, ORIENTATION, POSE};
+use crate::kernels::skinning::{MOVED, ORIENTATION, PLACE, POSE, POSED};
 
 /// Tasks at most, so that their sums take no more memory than some thousand Gaussians.
 const MOST_TASKS: usize = 64;
@@ -32,12 +32,8 @@ pub(crate) struct SkinningGradients {
     pub(crate) orientations: Vec<f32>,
     /// `[N, W]`
     pub(crate) stillness: Vec<f32>,
-    /// `[B, 2 + W]`
-    pub(crate) anchors: Vec<f32>,
-    /// `[B, 1]`
-    pub(crate) precisions: Vec<f32>,
-    /// `[B, 16]`
-    pub(crate) poses: Vec<f32>,
+    /// `[B, 19 + W]`
+    pub(crate) nodes: Vec<f32>,
 }
 
 /// What eight Gaussians hand to all nodes.
@@ -280,11 +276,11 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
 
 /// Gradients of all inputs from `upstream [N, 10]`.
 pub(crate) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
-    match inputs.width() {
-        1 => skin_backward_with::<1>(inputs, blended, upstream),
-        2 => skin_backward_with::<2>(inputs, blended, upstream),
-        3 => skin_backward_with::<3>(inputs, blended, upstream),
-        4 => skin_backward_with::<4>(inputs, blended, upstream),
+    match inputs.affinities {
+        0 => skin_backward_with::<1>(inputs, blended, upstream),
+        1 => skin_backward_with::<2>(inputs, blended, upstream),
+        2 => skin_backward_with::<3>(inputs, blended, upstream),
+        3 => skin_backward_with::<4>(inputs, blended, upstream),
         _ => skin_backward_with::<5>(inputs, blended, upstream),
     }
 }
@@ -331,15 +327,10 @@ fn skin_backward_with<const W: usize>(
     for part in &parts {
         totals.iter_mut().zip(part).for_each(|(total, part)| total.add(part));
     }
-    let of_anchors = totals.iter().zip(inputs.precisions).flat_map(|(sums, p)| {
-        sums.offset.map(|sum| 2.0 * p * sum).into_iter().chain(sums.affinities[1..].iter().copied())
+    let rows = inputs.nodes.chunks_exact(POSED + inputs.affinities);
+    let of_nodes = totals.iter().zip(rows).flat_map(|(sums, row)| {
+        let of_anchor = sums.offset.map(|sum| 2.0 * row[PLACE - 1] * sum);
+        of_anchor.into_iter().chain([-sums.squared]).chain(sums.pose).chain(sums.affinities[1..].iter().copied())
     });
-    SkinningGradients {
-        means,
-        orientations,
-        stillness,
-        anchors: of_anchors.collect(),
-        precisions: totals.iter().map(|sums| -sums.squared).collect(),
-        poses: totals.iter().flat_map(|sums| sums.pose).collect(),
-    }
+    SkinningGradients { means, orientations, stillness, nodes: of_nodes.collect() }
 }

@@ -9,6 +9,7 @@ mod counting;
 mod elementwise;
 mod kernel;
 mod launch;
+mod nodes;
 mod planes;
 mod recording;
 mod significance;
@@ -31,6 +32,7 @@ pub fn kernels() -> Vec<Kernel> {
     [
         adam::kernels,
         elementwise::kernels,
+        nodes::kernels,
         planes::kernels,
         significance::kernels,
         skinning::kernels,

@@ -7,11 +7,11 @@ use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 use light4gs_shaders::{SKINNING, SKINNING_AFFINITIES, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
 
-use super::context::{Gpu, Places, buffer_of, first_words};
+use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
-use crate::kernels::skinning::{MOST_AFFINITIES, MOVED, ORIENTATION, POSE, SkinningKernels, SkinningTensors};
+use crate::kernels::skinning::{MOST_AFFINITIES, MOVED, ORIENTATION, POSED, SkinningKernels, SkinningTensors};
 
 /// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five vectors each.
 const BLENDED: usize = 20;
@@ -36,21 +36,19 @@ fn kernel(shader: Shader, affinities: usize) -> Kernel {
 
 /// Sums that a node has of each slice of the Gaussians, in fours.
 fn sums_of(affinities: usize) -> usize {
-    POSE + 3 + 1 + affinities.next_multiple_of(4)
+    POSED + affinities.next_multiple_of(4)
 }
 
 /// State between forward and backward.
 #[derive(Clone, Debug)]
 pub struct GpuSaved {
     count: usize,
-    nodes: usize,
+    node_count: usize,
     affinities: usize,
     means: Handle,
     orientations: Handle,
     stillness: Handle,
-    anchors: Handle,
-    precisions: Handle,
-    poses: Handle,
+    nodes: Handle,
     blended: Handle,
 }
 
@@ -60,33 +58,27 @@ fn words(values: &[usize]) -> Vec<u32> {
 
 fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
     let gpu = Gpu::of(&tensors.means)?;
-    let (count, nodes) = (tensors.means.shape()[0], tensors.anchors.shape()[0]);
-    let affinities = tensors.stillness.shape()[1] - 1;
-    let [means, orientations, stillness, anchors, precisions, poses] = tensors.into_array().map(buffer_of);
+    let (count, node_count) = (tensors.means.shape()[0], tensors.nodes.shape()[0]);
+    let affinities = tensors.nodes.shape()[1] - POSED;
+    let [means, orientations, stillness, nodes] = tensors.into_array().map(buffer_of);
     let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
     Launch::new(&gpu.client, kernel(SKINNING, affinities))
         .reads(&means)
         .reads(&orientations)
         .reads(&stillness)
-        .reads(&anchors)
-        .reads(&precisions)
-        .reads(&poses)
+        .reads(&nodes)
         .writes(&moved)
         .writes(&blended)
-        .uniform(&words(&[count, nodes]))
+        .uniform(&words(&[count, node_count]))
         .invocations(count)?;
     let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
-    Ok((
-        output,
-        GpuSaved { count, nodes, affinities, means, orientations, stillness, anchors, precisions, poses, blended },
-    ))
+    Ok((output, GpuSaved { count, node_count, affinities, means, orientations, stillness, nodes, blended }))
 }
 
 fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let GpuSaved { count, nodes, affinities, means, orientations, stillness, anchors, precisions, poses, blended } =
-        saved;
+    let GpuSaved { count, node_count, affinities, means, orientations, stillness, nodes, blended } = saved;
     let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
     let of_means = gpu.allocate("gradients of means", 3 * count)?;
     let of_orientations = gpu.allocate("gradients of orientations", ORIENTATION * count)?;
@@ -105,49 +97,41 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
     if affinities > 0 {
         Launch::new(&gpu.client, kernel(SKINNING_AFFINITIES, affinities))
             .reads(&handed)
-            .reads(&anchors)
-            .reads(&precisions)
-            .reads(&poses)
+            .reads(&nodes)
             .reads(&stillness)
             .updates(&of_stillness)
-            .uniform(&words(&[count, nodes]))
+            .uniform(&words(&[count, node_count]))
             .invocations(count)?;
     }
 
     let slice = count.div_ceil(MOST_SLICES).clamp(SLICE, gpu.longest_loop());
     let slices = count.div_ceil(slice);
     let of_node = sums_of(affinities);
-    let sums = gpu.allocate("sums of slices", of_node * nodes * slices)?;
+    let sums = gpu.allocate("sums of slices", of_node * node_count * slices)?;
     Launch::new(&gpu.client, kernel(SKINNING_NODES, affinities))
         .reads(&handed)
-        .reads(&anchors)
-        .reads(&precisions)
-        .reads(&poses)
+        .reads(&nodes)
         .reads(&stillness)
         .writes(&sums)
-        .uniform(&words(&[count, nodes, slice]))
-        .invocations(slices * nodes)?;
+        .uniform(&words(&[count, node_count, slice]))
+        .invocations(slices * node_count)?;
 
-    let places = Places::new(&[(3 + affinities) * nodes, nodes, POSE * nodes]);
-    let of_nodes = gpu.allocate("gradients of nodes", places.total)?;
-    let uniform = [&[nodes, slices], places.starts.as_slice()].concat();
+    let columns = POSED + affinities;
+    let of_nodes = gpu.allocate("gradients of nodes", columns * node_count)?;
     Launch::new(&gpu.client, kernel(SKINNING_GATHER, affinities))
         .reads(&sums)
         .writes(&of_nodes)
-        .uniform(&words(&uniform))
-        .invocations(of_node * nodes)?;
+        .uniform(&words(&[node_count, slices]))
+        .invocations(of_node * node_count)?;
 
-    let of_gaussians = |handle: &Handle, columns: usize| {
-        gpu.tensor(first_words(handle, columns * count), Shape::from([count, columns]))
+    let rows = |handle: &Handle, rows: usize, columns: usize| {
+        gpu.tensor(first_words(handle, columns * rows), Shape::from([rows, columns]))
     };
-    let of_nodes = |k: usize, columns: usize| gpu.tensor(places.of(&of_nodes, k), Shape::from([nodes, columns]));
     Ok(SkinningTensors {
-        means: of_gaussians(&of_means, 3),
-        orientations: of_gaussians(&of_orientations, ORIENTATION),
-        stillness: of_gaussians(&of_stillness, 1 + affinities),
-        anchors: of_nodes(0, 3 + affinities),
-        precisions: of_nodes(1, 1),
-        poses: of_nodes(2, POSE),
+        means: rows(&of_means, count, 3),
+        orientations: rows(&of_orientations, count, ORIENTATION),
+        stillness: rows(&of_stillness, count, 1 + affinities),
+        nodes: rows(&of_nodes, node_count, columns),
     })
 }
 

@@ -2,6 +2,9 @@
 //! `cpu/`, `gpu/`.
 
 pub(crate) mod adam;
+pub(crate) mod node_poses;
+pub(crate) mod node_regularizer;
 pub(crate) mod plane_query;
 pub(crate) mod skinning;
 pub(crate) mod splat;
+pub(crate) mod spline;

@@ -7,6 +7,10 @@ use burn::backend::{Backend, ExtensionType};
 
 /// Numbers of a node's pose: rotation matrix row by row (9), offset (3), quaternion (4).
 pub(crate) const POSE: usize = 16;
+/// Where a node's pose begins, behind its anchor (3) and precision (1).
+pub(crate) const PLACE: usize = 4;
+/// Numbers of a posed node before its affinities.
+pub(crate) const POSED: usize = PLACE + POSE;
 /// Numbers of a Gaussian's orientation: quaternion (4), and a vector that turns along (3).
 pub(crate) const ORIENTATION: usize = 7;
 /// Numbers of a moved Gaussian: position (3), quaternion (4), turned vector (3).
@@ -24,26 +28,21 @@ pub struct SkinningTensors<B: Backend> {
     pub orientations: FloatTensor<B>,
     /// `[N, 1 + H]`, logits of the node that stands still, then affinities.
     pub stillness: FloatTensor<B>,
-    /// `[B, 3 + H]`, world units, then affinities.
-    pub anchors: FloatTensor<B>,
-    /// `[B, 1]`, `1 / (2 r²)` of the nodes' radii r.
-    pub precisions: FloatTensor<B>,
-    /// `[B, 16]`: rotation matrix row by row (9), offset (3), quaternion (4).
-    pub poses: FloatTensor<B>,
+    /// `[B, 20 + H]`: anchor (3), precision (1), pose (16): rotation matrix row by row (9), offset (3), quaternion (4); then
+    /// affinities.
+    pub nodes: FloatTensor<B>,
 }
 
 /// Tensors of [`SkinningTensors`].
-pub(crate) const INPUTS: usize = 6;
+pub(crate) const INPUTS: usize = 4;
 
 impl<B: Backend> SkinningTensors<B> {
     pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.means, self.orientations, self.stillness, self.anchors, self.precisions, self.poses]
+        [self.means, self.orientations, self.stillness, self.nodes]
     }
 
-    pub(crate) fn from_array(
-        [means, orientations, stillness, anchors, precisions, poses]: [FloatTensor<B>; INPUTS],
-    ) -> Self {
-        Self { means, orientations, stillness, anchors, precisions, poses }
+    pub(crate) fn from_array([means, orientations, stillness, nodes]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { means, orientations, stillness, nodes }
     }
 }
 

@@ -13,6 +13,8 @@ pub mod adam;
 mod fusion;
 mod host;
 pub mod lower_bound;
+pub mod node_poses;
+pub mod node_regularizer;
 pub mod normal_cdf;
 pub mod plane_query;
 pub mod significance;

@@ -8,7 +8,7 @@ use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
+use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
 use burn::tensor::Tensor;
 #[cfg(feature = "wgpu")]
 use burn_fusion::{Fusion, FusionBackend};
@@ -19,7 +19,7 @@ use super::host::{HostBackend, HostTensor};
 use super::{for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::skinning::{BlendedGroup, SkinningSlices, skin as skin_slices};
 use crate::cpu::skinning_backward::skin_backward;
-use crate::kernels::skinning::{INPUTS, MOVED, ORIENTATION, POSE};
+use crate::kernels::skinning::{INPUTS, MOVED, ORIENTATION, POSED};
 pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTensors};
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
@@ -73,36 +73,36 @@ impl<B: SkinningOps + SkinningKernels, C: CheckpointStrategy> SkinningOps for Au
 #[derive(Clone, Debug)]
 pub struct CpuSaved {
     inputs: [HostTensor; INPUTS],
+    affinities: usize,
     blended: Arc<Vec<BlendedGroup>>,
 }
 
-fn slices(inputs: &[HostTensor; INPUTS]) -> SkinningSlices<'_> {
-    let [means, orientations, stillness, anchors, precisions, poses] = inputs.each_ref().map(HostTensor::as_slice);
-    SkinningSlices { means, orientations, stillness, anchors, precisions, poses }
+fn slices(inputs: &[HostTensor; INPUTS], affinities: usize) -> SkinningSlices<'_> {
+    let [means, orientations, stillness, nodes] = inputs.each_ref().map(HostTensor::as_slice);
+    SkinningSlices { means, orientations, stillness, nodes, affinities }
 }
 
 fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
+    let affinities = tensors.nodes.shape()[1] - POSED;
     let inputs = tensors.into_array().map(B::to_host);
-    let (moved, blended) = skin_slices(&slices(&inputs));
+    let (moved, blended) = skin_slices(&slices(&inputs, affinities));
     let count = moved.len() / MOVED;
-    (B::from_values(moved, [count, MOVED]), CpuSaved { inputs, blended: Arc::new(blended) })
+    (B::from_values(moved, [count, MOVED]), CpuSaved { inputs, affinities, blended: Arc::new(blended) })
 }
 
 fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
     let upstream = B::to_host(gradient);
-    let gradients = skin_backward(&slices(&saved.inputs), &saved.blended, upstream.as_slice());
+    let affinities = saved.affinities;
+    let gradients = skin_backward(&slices(&saved.inputs, affinities), &saved.blended, upstream.as_slice());
     let matrix = |values: Vec<f32>, columns: usize| {
         let rows = values.len() / columns;
         B::from_values(values, [rows, columns])
     };
-    let width = slices(&saved.inputs).width();
     SkinningTensors {
         means: matrix(gradients.means, 3),
         orientations: matrix(gradients.orientations, ORIENTATION),
-        stillness: matrix(gradients.stillness, width),
-        anchors: matrix(gradients.anchors, 2 + width),
-        precisions: matrix(gradients.precisions, 1),
-        poses: matrix(gradients.poses, POSE),
+        stillness: matrix(gradients.stillness, 1 + affinities),
+        nodes: matrix(gradients.nodes, POSED + affinities),
     }
 }
 
@@ -146,13 +146,10 @@ pub struct SkinningInputs {
     /// `[N, 1 + H]`: logit of the node that stands still, for each Gaussian, then its H affinities, 0 to
     /// [`MOST_AFFINITIES`].
     pub stillness: Tensor<2>,
-    /// `[B, 3 + H]`: where the nodes are at rest, world units, then their own affinities.
-    pub anchors: Tensor<2>,
-    /// `[B, 1]`: `1 / (2 r²)` of the nodes' radii r.
-    pub precisions: Tensor<2>,
-    /// `[B, 16]`: what each node does to the space around it: a matrix R row by row (9) and an offset t (3), so that x goes to
-    /// `R x + t`, and R's quaternion (w, x, y, z).
-    pub poses: Tensor<2>,
+    /// `[B, 20 + H]`, the nodes, such as [`pose`](super::node_poses::pose) gives them: where each is at rest (3), world units;
+    /// `1 / (2 r²)` of its radius r; what it does to the space around it: a matrix R row by row (9) and an offset t (3), so that x
+    /// goes to `R x + t`, and R's quaternion (w, x, y, z); its own affinities.
+    pub nodes: Tensor<2>,
 }
 
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
@@ -184,9 +181,10 @@ pub struct SkinningInputs {
 ///     orientations: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 7),
 ///     // The first Gaussian goes with the node, the second stands still.
 ///     stillness: rows(&[-60.0, 60.0], 1),
-///     anchors: rows(&[0.0, 0.0, 0.0], 3),
-///     precisions: rows(&[1.0], 1),
-///     poses: rows(&[0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half], 16),
+///     nodes: rows(&[
+///         0.0, 0.0, 0.0, 1.0,
+///         0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half,
+///     ], 20),
 /// });
 /// let moved = moved.into_data().to_vec::<f32>().unwrap();
 /// assert_eq!(moved[..10], [0.0, 1.0, 2.0, half, 0.0, 0.0, half, 0.0, 1.0, 0.0]);
@@ -196,23 +194,19 @@ pub struct SkinningInputs {
 /// # Panics
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, orientations, stillness, anchors, precisions, poses } = inputs;
-    let (count, nodes) = (means.dims()[0], anchors.dims()[0]);
-    assert!(nodes > 0, "anchors must have one row or more");
+    let SkinningInputs { means, orientations, stillness, nodes } = inputs;
+    let count = means.dims()[0];
+    assert!(nodes.dims()[0] > 0, "nodes must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
     assert_eq!(orientations.dims(), [count, ORIENTATION], "orientations must be [N, 7]");
     let affinities = stillness.dims()[1].saturating_sub(1);
     assert!(affinities <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
     assert_eq!(stillness.dims(), [count, 1 + affinities], "stillness must be [N, 1 + H]");
-    assert_eq!(anchors.dims(), [nodes, 3 + affinities], "anchors must be [B, 3 + H]");
-    assert_eq!(precisions.dims(), [nodes, 1], "precisions must be [B, 1]");
-    assert_eq!(poses.dims(), [nodes, POSE], "poses must be [B, 16]");
+    assert_eq!(nodes.dims()[1], POSED + affinities, "nodes must be [B, 20 + H]");
     Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {
         means: means.into_dispatch(),
         orientations: orientations.into_dispatch(),
         stillness: stillness.into_dispatch(),
-        anchors: anchors.into_dispatch(),
-        precisions: precisions.into_dispatch(),
-        poses: poses.into_dispatch(),
+        nodes: nodes.into_dispatch(),
     }))
 }

@@ -5,6 +5,7 @@ use glam::{Mat3, Vec2, Vec3};
 use light4gs_codec::rendering::{DILATION, FRUSTUM_MARGIN, MIN_ALPHA, NEAR, TILE};
 use light4gs_data::Camera;
 
+use crate::rotation::{normalization_backward, rotation_backward, rotation_matrix};
 use crate::spherical_harmonics::{basis, basis_gradient, coefficient_count};
 use crate::view::View;
 
@@ -84,14 +85,6 @@ struct Geometry {
     /// Clamped x/z and y/z, and whether each was clamped.
     slope: Vec2,
     slope_clamped: [bool; 2],
-}
-
-fn rotation_matrix([w, x, y, z]: [f32; 4]) -> Mat3 {
-    Mat3::from_cols(
-        Vec3::new(1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)),
-        Vec3::new(2.0 * (x * y - w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z + w * x)),
-        Vec3::new(2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)),
-    )
 }
 
 fn geometry(gaussians: &GaussianSlices, i: usize, camera: &Camera) -> Geometry {
@@ -271,8 +264,9 @@ pub(crate) fn project_backward(
     let d_rs: [Vec3; 3] = std::array::from_fn(|j| rows[0] * d_factor[0][j] + rows[1] * d_factor[1][j]);
     let axes = [g.rotation.x_axis, g.rotation.y_axis, g.rotation.z_axis];
     let scale = Vec3::from_array(std::array::from_fn(|j| d_rs[j].dot(axes[j])));
-    let d_axes: [Vec3; 3] = std::array::from_fn(|j| d_rs[j] * g.scale[j]);
-    let quat = rotation_backward(&g, d_axes);
+    let [x_axis, y_axis, z_axis] = std::array::from_fn(|j| d_rs[j] * g.scale[j]);
+    let of_unit = rotation_backward(g.quat, Mat3::from_cols(x_axis, y_axis, z_axis));
+    let quat = normalization_backward(g.quat, g.quat_norm, of_unit);
     // d(J W) = dV (R S)^T
     let d_rows = d_factor.map(|d| g.rotation * (d * g.scale));
 
@@ -301,19 +295,6 @@ pub(crate) fn project_backward(
     mean += color_backward(gaussians, i, view, splat, gradient.color, grad_dc, grad_rest);
     let half = Vec2::new(camera.width as f32, camera.height as f32) * 0.5;
     AttributeGradient { mean, quat, scale, screen_offset: Vec2::from_array(gradient.position) * half }
-}
-
-/// From the gradient of the rotation's columns to that of the given quaternion (before normalization).
-fn rotation_backward(g: &Geometry, [dx, dy, dz]: [Vec3; 3]) -> [f32; 4] {
-    let [w, x, y, z] = g.quat;
-    let d = [
-        2.0 * (z * (dx.y - dy.x) + y * (dz.x - dx.z) + x * (dy.z - dz.y)),
-        2.0 * (y * (dx.y + dy.x) + z * (dx.z + dz.x) + w * (dy.z - dz.y)) - 4.0 * x * (dy.y + dz.z),
-        2.0 * (x * (dx.y + dy.x) + z * (dy.z + dz.y) + w * (dz.x - dx.z)) - 4.0 * y * (dx.x + dz.z),
-        2.0 * (x * (dx.z + dz.x) + y * (dy.z + dz.y) + w * (dx.y - dy.x)) - 4.0 * z * (dx.x + dy.y),
-    ];
-    let along: f32 = (0..4).map(|k| d[k] * g.quat[k]).sum();
-    std::array::from_fn(|k| (d[k] - along * g.quat[k]) / g.quat_norm)
 }
 
 /// SH gradients, and the gradient of the mean through the view direction.

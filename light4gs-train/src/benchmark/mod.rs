@@ -252,17 +252,15 @@ fn median_of(mut times: Vec<f64>) -> f64 {
 /// Gaussians and nodes in a box, a node's radius 0.6 times what would fill it; with gradients on a device that records them.
 pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningInputs {
     let leaf = |tensor: Tensor<2>| if device.is_autodiff() { tensor.require_grad() } else { tensor };
-    let random = |rows: usize, columns: usize| {
-        leaf(Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device))
-    };
+    let random =
+        |rows: usize, columns: usize| Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device);
     let radius = 0.6 * 2.0 / (nodes as f32).cbrt();
+    let precisions = Tensor::full([nodes, 1], 0.5 / (radius * radius), device);
     SkinningInputs {
-        means: random(count, 3),
-        orientations: random(count, 7),
-        stillness: random(count, 1),
-        anchors: random(nodes, 3),
-        precisions: leaf(Tensor::full([nodes, 1], 0.5 / (radius * radius), device)),
-        poses: random(nodes, 16),
+        means: leaf(random(count, 3)),
+        orientations: leaf(random(count, 7)),
+        stillness: leaf(random(count, 1)),
+        nodes: leaf(Tensor::cat(vec![random(nodes, 3), precisions, random(nodes, 16)], 1)),
     }
 }
 

@@ -58,7 +58,12 @@ impl Case {
     ) -> (Vec<f32>, [Vec<f32>; 6]) {
         let leaves = self.leaves(&device.clone().autodiff());
         let [means, orientations, stillness, anchors, precisions, poses] = leaves.clone();
-        let moved = operation(SkinningInputs { means, orientations, stillness, anchors, precisions, poses });
+        let places = anchors.clone().narrow(1, 0, 3);
+        let mut nodes = vec![places, precisions, poses];
+        if self.affinities > 0 {
+            nodes.push(anchors.narrow(1, 3, self.affinities));
+        }
+        let moved = operation(SkinningInputs { means, orientations, stillness, nodes: Tensor::cat(nodes, 1) });
         let weights: Vec<f32> = weights.iter().map(|weight| *weight as f32).collect();
         let weights = Tensor::<2>::from_data(TensorData::new(weights, moved.dims()), &moved.device());
         let gradients = (moved.clone() * weights).sum().backward();
@@ -116,15 +121,16 @@ fn loss_weights(count: usize, random: &mut Random) -> Vec<f64> {
 
 /// The operation in plain ones.
 fn plain(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, orientations, stillness, anchors, precisions, poses } = inputs;
+    let SkinningInputs { means, orientations, stillness, nodes } = inputs;
     let device = means.device();
     let affinities = stillness.dims()[1] - 1;
-    let places = anchors.clone().narrow(1, 0, 3);
+    let [places, precisions, poses] =
+        [(0, 3), (3, 1), (4, 16)].map(|(first, count)| nodes.clone().narrow(1, first, count));
     let offsets = means.clone().detach().unsqueeze_dim::<3>(1) - places.unsqueeze_dim::<3>(0);
     let squared = offsets.powi_scalar(2).sum_dim(2).squeeze_dim::<2>(2);
     let mut logits = -squared * precisions.transpose();
     if affinities > 0 {
-        let liked = stillness.clone().narrow(1, 1, affinities).matmul(anchors.narrow(1, 3, affinities).transpose());
+        let liked = stillness.clone().narrow(1, 1, affinities).matmul(nodes.narrow(1, 20, affinities).transpose());
         logits = logits + liked;
     }
     let weights = softmax(Tensor::cat(vec![logits, stillness.narrow(1, 0, 1)], 1), 1);
@@ -309,17 +315,14 @@ fn tensors_may_lie_in_memory_as_they_like() {
     for (name, device) in devices() {
         let expected = case.run(&device, &weights, skin);
         let found = case.run(&device, &weights, |inputs| {
-            let SkinningInputs { means, orientations, stillness, anchors, precisions, poses } = inputs;
+            let SkinningInputs { means, orientations, stillness, nodes } = inputs;
             let gaussians = Tensor::cat(vec![stillness, means, orientations], 1);
-            let nodes = Tensor::cat(vec![poses.transpose(), precisions.transpose(), anchors.transpose()], 0);
-            let rows = |first: usize, last: usize| nodes.clone().narrow(0, first, last - first).transpose();
+            let nodes = Tensor::cat(vec![nodes.clone().transpose(), nodes.transpose()], 0);
             skin(SkinningInputs {
                 means: gaussians.clone().narrow(1, 3, 3),
                 orientations: gaussians.clone().narrow(1, 6, 7),
                 stillness: gaussians.narrow(1, 0, 3),
-                anchors: rows(17, 22),
-                precisions: rows(16, 17),
-                poses: rows(0, 16),
+                nodes: nodes.narrow(0, 22, 22).transpose(),
             })
         });
         assert!(found == expected, "{name}");
@@ -338,9 +341,9 @@ fn no_gaussian_is_no_error() {
 }
 
 #[test]
-#[should_panic(expected = "precisions must be [B, 1]")]
+#[should_panic(expected = "stillness must be [N, 1 + H]")]
 fn a_wrong_shape_is_named() {
     let mut case = Case::random(5, 3, 0, &mut Random::new(340));
-    case.inputs[4].push(1.0);
+    case.inputs[2].push(1.0);
     case.run(&Device::flex(), &[0.0; 50], skin);
 }

@@ -35,9 +35,9 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("splat forward + backward", 59),
         ("skinning forward + backward", 11),
         ("nodes, Adam step", 13),
-        ("nodes, training step", 413),
-        ("nodes, step with noise and rate", 576),
-        ("nodes, render", 98),
+        ("nodes, training step", 119),
+        ("nodes, step with noise and rate", 466),
+        ("nodes, render", 58),
         ("hexplane, training step", 630),
         ("hexplane, step with noise and rate", 1148),
     ] {

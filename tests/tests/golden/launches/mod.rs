@@ -13,6 +13,8 @@ use burn::tensor::{Device, Tensor};
 use light4gs_model::gpu::{Communication, RecordedLaunch, Team, record, with_team};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
 use light4gs_model::ops::lower_bound::lower_bound;
+use light4gs_model::ops::node_poses::{NodeParameters, pose};
+use light4gs_model::ops::node_regularizer::{Regularization, regularize};
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::ops::skinning::{MOST_AFFINITIES, SkinningInputs, skin};
 use light4gs_model::{PlaneTensors, Significance, Splatter};
@@ -36,6 +38,7 @@ fn launches_of_golden_scenes() {
     crowded(&mut transcript);
     planes(&mut transcript);
     skinning(&mut transcript);
+    control_nodes(&mut transcript);
     elementwise(&mut transcript);
     transcript.assert_complete();
     // SwiftShader's subgroups have four members, for which the program has no team. Here a workgroup of four is a part of a
@@ -209,13 +212,39 @@ fn skinning(transcript: &mut Transcript) {
                 means: tensor(gaussians, 3, -1.0, 1.0),
                 orientations: tensor(gaussians, 7, -1.0, 1.0),
                 stillness: tensor(gaussians, 1 + affinities, -3.0, 1.0),
-                anchors: tensor(nodes, 3 + affinities, -1.0, 1.0),
-                precisions: tensor(nodes, 1, 0.5, 6.0),
-                poses: tensor(nodes, 16, -1.0, 1.0),
+                nodes: tensor(nodes, 20 + affinities, 0.0, 1.0),
             });
             (moved.clone() * moved).sum().backward();
         });
         transcript.add(&format!("skinning, {affinities} affinities"), launches, Vec::new());
+    }
+}
+
+/// Poses of nodes and their regularizer, with gradients.
+fn control_nodes(transcript: &mut Transcript) {
+    for affinities in [0, MOST_AFFINITIES] {
+        let mut random = Random::new(9);
+        let ((), launches) = record(|| {
+            let device = device().autodiff();
+            let mut tensor = |rows: usize, columns: usize| {
+                let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(-0.7, 0.7) as f32).collect();
+                Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
+            };
+            let (nodes, knots) = (77, 9);
+            let parameters = NodeParameters {
+                anchors: tensor(nodes, 3),
+                log_radii: tensor(nodes, 1),
+                translations: tensor(knots, 3 * nodes),
+                rotations: tensor(knots, 4 * nodes),
+                affinities: (affinities > 0).then(|| tensor(nodes, affinities)),
+                unit: Tensor::from_floats([2.5], &device),
+            };
+            let posed = pose(parameters.clone(), 0.3);
+            let regularization = Regularization { rigidity: 0.75, smoothness: 0.5, time: 0.6 };
+            let loss = regularize(parameters, regularization);
+            ((posed.clone() * posed).sum() + loss).backward();
+        });
+        transcript.add(&format!("control nodes, {affinities} affinities"), launches, Vec::new());
     }
 }
 

@@ -1,6 +1,7 @@
 //! Control nodes: what a file describes of them is what trains, and hostile descriptions are refused.
 
 mod golden;
+mod motion;
 mod relocation;
 mod survey;
 

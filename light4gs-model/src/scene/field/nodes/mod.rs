@@ -7,14 +7,13 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `trajectory` | splines over time, and the nodes' poses at a time |
+//! | `trajectory` | trajectories over time, and where nodes are on them |
 //! | `placement` | where the nodes are when motion begins |
 //! | `relocation` | nodes that move to where motion is not explained, while training |
 //! | `survey` | what all times have shown before a window widens |
 //! | `affinity` | which nodes a Gaussian follows beyond its place |
 //! | `lifetime` | what comes and goes |
 //! | `shading` | what turns away from the light |
-//! | `regularizer` | neighbors keep their places as seen from each other; trajectories are smooth |
 //! | `stream` | the same as operations of the codec, in a file |
 //! | `plain` | nodes, Gaussians and poses as plain numbers |
 //! | `weights` | how much each Gaussian follows each node, as numbers |
@@ -23,7 +22,6 @@ mod affinity;
 mod lifetime;
 mod placement;
 mod plain;
-mod regularizer;
 mod relocation;
 mod shading;
 mod stream;
@@ -42,9 +40,10 @@ use light4gs_codec::MotionArrays;
 pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
 pub use shading::SHADING;
-use trajectory::Poses;
 
 use super::{DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest};
+use crate::ops::node_poses::{NodeParameters, pose};
+use crate::ops::node_regularizer::{Regularization, regularize};
 pub use crate::ops::skinning::MOST_AFFINITIES;
 use crate::ops::skinning::{SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
@@ -186,17 +185,25 @@ impl NodesField {
         self.translations.dims()[0]
     }
 
-    /// Moved positions, quaternions and shadings `[N, 10]`, from what each node does to the space around it.
-    fn skinned(&self, canonical: &GaussianTensors, poses: Tensor<2>) -> Tensor<2> {
+    fn parameters(&self) -> NodeParameters {
+        NodeParameters {
+            anchors: self.anchors.val(),
+            log_radii: self.log_radii.val(),
+            translations: self.translations.val(),
+            rotations: self.rotations.val(),
+            affinities: self.affinities.as_ref().map(|affinities| affinities.val()),
+            unit: self.unit.val(),
+        }
+    }
+
+    /// Moved positions, quaternions and shadings `[N, 10]`, from the nodes `[B, 20 + H]` at a time.
+    fn skinned(&self, canonical: &GaussianTensors, nodes: Tensor<2>) -> Tensor<2> {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
             .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
-        let (stillness, anchors) = match (canonical.further(AFFINITY), &self.affinities) {
-            (Some(own), Some(of_nodes)) => (
-                Tensor::cat(vec![stillness, own.clone()], 1),
-                Tensor::cat(vec![self.world_anchors(), of_nodes.val()], 1),
-            ),
-            _ => (stillness, self.world_anchors()),
+        let stillness = match canonical.further(AFFINITY) {
+            Some(own) => Tensor::cat(vec![stillness, own.clone()], 1),
+            None => stillness,
         };
         let shading = canonical.further(SHADING).cloned();
         let shading = shading.unwrap_or_else(|| canonical.means.zeros_like());
@@ -204,9 +211,7 @@ impl NodesField {
             means: canonical.means.clone(),
             orientations: Tensor::cat(vec![canonical.quats.clone(), shading], 1),
             stillness,
-            anchors,
-            precisions: self.precisions(),
-            poses,
+            nodes,
         })
     }
 
@@ -240,8 +245,7 @@ impl DeformationField for NodesField {
 
     /// Weights take positions as constants: a Gaussian does not move only to follow another node.
     fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
-        let Poses { matrices, offsets, quats } = self.poses(time);
-        let moved = self.skinned(&canonical, Tensor::cat(vec![matrices, offsets, quats], 1));
+        let moved = self.skinned(&canonical, pose(self.parameters(), time));
         let part = |columns: Range<usize>| moved.clone().slice(s![.., columns]);
         let opacity_logits = match canonical.further(LIFETIME) {
             Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),
@@ -301,12 +305,9 @@ impl DeformationField for NodesField {
     }
 
     fn regularizer(&self, _: &SceneAtRest<'_>, position: &FinePosition) -> Option<Tensor<1>> {
-        let NodesFieldConfig { rigidity, smoothness, .. } = self.config;
-        let terms = [
-            (smoothness > 0.0).then(|| self.roughness() * smoothness),
-            (rigidity > 0.0 && self.nodes() > 1).then(|| self.strain(position.random_time()) * rigidity),
-        ];
-        terms.into_iter().flatten().reduce(|sum, term| sum + term)
+        let [rigidity, smoothness] = [self.config.rigidity, self.config.smoothness].map(|weight| weight as f32);
+        let regularization = Regularization { rigidity, smoothness, time: position.random_time() };
+        (rigidity > 0.0 || smoothness > 0.0).then(|| regularize(self.parameters(), regularization))
     }
 
     fn learning_rate(&self, path: &str, usual: LearningRate) -> LearningRate {

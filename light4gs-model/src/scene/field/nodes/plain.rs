@@ -5,6 +5,8 @@ use burn::tensor::activation::sigmoid;
 
 use super::placement::square;
 use super::{AFFINITY, NodesField, STILLNESS, numbers};
+use crate::kernels::skinning::{PLACE, POSED};
+use crate::ops::node_poses::pose;
 use crate::scene::field::SceneAtRest;
 
 /// Smallest weight with which a node counts.
@@ -73,14 +75,10 @@ impl PosesAt {
 
 impl NodesField {
     pub(super) fn poses_at(&self, time: f32) -> PosesAt {
-        let poses = self.poses(time);
-        let (matrices, offsets) = (numbers(poses.matrices), numbers(poses.offsets));
-        let rows = matrices.as_chunks::<9>().0.iter().zip(offsets.as_chunks::<3>().0);
-        let pose = |(matrix, offset): (&[f32; 9], &[f32; 3])| {
-            std::array::from_fn(|at| if at < 9 { matrix[at] } else { offset[at - 9] })
-        };
+        let posed = numbers(pose(self.parameters(), time));
+        let rows = posed.chunks_exact(POSED + self.config.affinities);
         let still = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
-        PosesAt(rows.map(pose).chain([still]).collect())
+        PosesAt(rows.map(|row| std::array::from_fn(|at| row[PLACE + at])).chain([still]).collect())
     }
 
     pub(super) fn plain_numbers(&self, scene: &SceneAtRest<'_>) -> Skinned {
@@ -90,12 +88,14 @@ impl NodesField {
             Some(logits) => numbers(logits.clone()),
             None => vec![super::NEVER_STILL; means.len()],
         };
+        let posed = numbers(pose(self.parameters(), 0.0));
+        let nodes = posed.chunks_exact(POSED + self.config.affinities);
         Skinned {
             means,
             opacities: numbers(sigmoid(tensors.opacity_logits.clone())),
             stillness,
-            anchors: numbers(self.world_anchors()).as_chunks::<3>().0.to_vec(),
-            precisions: numbers(self.precisions()),
+            anchors: nodes.clone().map(|row| [row[0], row[1], row[2]]).collect(),
+            precisions: nodes.map(|row| row[PLACE - 1]).collect(),
             affinities: self.config.affinities,
             of_gaussians: tensors.further(AFFINITY).map(|all| numbers(all.clone())).unwrap_or_default(),
             of_nodes: self.affinities.as_ref().map(|all| numbers(all.val())).unwrap_or_default(),

@@ -1,18 +1,11 @@
-//! Trajectories: uniform cubic B-splines over time, and the poses of the nodes at a time.
+//! Trajectories: uniform cubic B-splines over time, and where the nodes are on them.
+
+use std::ops::Range;
 
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
 
-use super::{NodesField, tensor};
-
-/// Where the nodes are at a time: a point x near node b goes to `R x + offset`.
-pub(super) struct Poses {
-    /// `[B, 9]`: R, row by row.
-    pub matrices: Tensor<2>,
-    /// `[B, 3]`, world units.
-    pub offsets: Tensor<2>,
-    /// `[B, 4]`: R as a unit quaternion (w, x, y, z).
-    pub quats: Tensor<2>,
-}
+use super::NodesField;
+use crate::ops::node_poses::pose;
 
 /// Products of the quaternion's components (w, x, y, z) that a rotation matrix is made of: xx yy zz, xy yz xz, wz wx wy.
 pub(super) const FACTORS: [[usize; 9]; 2] = [[1, 2, 3, 1, 2, 1, 0, 0, 0], [1, 2, 3, 2, 3, 3, 3, 1, 2]];
@@ -27,16 +20,6 @@ pub(super) const ELEMENTS: [usize; 9] = [0, 3, 8, 6, 1, 4, 5, 7, 2];
 pub(super) fn columns(tensor: &Tensor<2>, numbers: &[usize]) -> Tensor<2> {
     let numbers: Vec<i64> = numbers.iter().map(|number| *number as i64).collect();
     tensor.clone().select(1, Tensor::<1, Int>::from_data(TensorData::from(&numbers[..]), &tensor.device()))
-}
-
-/// How much each of so many knots counts at a time, `[K]`: the uniform cubic B-spline at its distance.
-pub(super) fn basis(time: f32, knots: usize) -> Vec<f32> {
-    let weight = |knot: usize| {
-        let distance = (time * (knots - 3) as f32 + 1.0 - knot as f32).abs();
-        let [outer, inner] = [2.0, 1.0].map(|end: f32| (end - distance).max(0.0).powi(3) / 6.0);
-        outer - 4.0 * inner
-    };
-    (0..knots).map(weight).collect()
 }
 
 /// How much of the last difference between two knots there is in the next one, where a trajectory is continued.
@@ -106,37 +89,14 @@ impl NodesField {
         self.anchors.val() * self.unit.val().unsqueeze()
     }
 
-    /// `[B, 1]`: 1 / (2 r²), world units.
-    pub(super) fn precisions(&self) -> Tensor<2> {
-        (self.log_radii.val() * -2.0).exp() / (self.unit.val().powi_scalar(2) * 2.0).unsqueeze()
-    }
-
-    /// Translations `[B, 3]`, shares of the unit, and unit quaternions `[B, 4]` at a time.
-    pub(super) fn motion(&self, time: f32) -> (Tensor<2>, Tensor<2>) {
-        let (nodes, device) = (self.nodes(), self.device());
-        let basis = tensor(basis(time, self.knots()), [1, self.knots()], &device);
-        let translations = basis.clone().matmul(self.translations.val()).reshape([nodes, 3]);
-        let one = Tensor::from_floats([[1.0, 0.0, 0.0, 0.0]], &device);
-        let quats = basis.matmul(self.rotations.val()).reshape([nodes, 4]) + one;
-        (translations, quats.clone() / quats.powi_scalar(2).sum_dim(1).sqrt())
-    }
-
-    /// The poses at a time.
-    pub(super) fn poses(&self, time: f32) -> Poses {
-        let nodes = self.nodes();
-        let (translations, quats) = self.motion(time);
-        let matrices = rotation_matrices(&quats);
-        let anchors = self.anchors.val();
-        let turned = (matrices.clone().reshape([nodes, 3, 3]) * anchors.clone().reshape([nodes, 1, 3])).sum_dim(2);
-        let offsets = (anchors + translations - turned.reshape([nodes, 3])) * self.unit.val().unsqueeze();
-        Poses { matrices, offsets, quats }
-    }
-
     /// Where the nodes are at a time, `[B, 3]`, world units, and how they are turned, `[B, 4]`: unit quaternions (w, x, y, z). What is
     /// at x before anything moves goes with a node from the [anchor](Self::world_anchors) a to the place p as `R (x - a) + p`.
     pub fn places(&self, time: f32) -> (Tensor<2>, Tensor<2>) {
-        let (translations, quats) = self.motion(time);
-        ((self.anchors.val() + translations) * self.unit.val().unsqueeze(), quats)
+        let nodes = pose(self.parameters(), time);
+        let part = |columns: Range<usize>| nodes.clone().slice(s![.., columns]);
+        let matrices = part(4..13).reshape([self.nodes(), 3, 3]);
+        let turned = matrices.matmul(part(0..3).unsqueeze_dim(2)).squeeze_dim(2);
+        (turned + part(13..16), part(16..20))
     }
 
     pub(super) fn device(&self) -> Device {
@@ -156,16 +116,7 @@ pub(super) fn rotation_matrices(quats: &Tensor<2>) -> Tensor<2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::field::nodes::numbers;
-
-    #[test]
-    fn the_basis_sums_to_one_and_touches_four_knots() {
-        for time in [0.0, 0.013, 0.5, 0.77, 1.0] {
-            let weights = basis(time, 9);
-            assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{time}");
-            assert!(weights.iter().filter(|weight| **weight > 1e-6).count() <= 4);
-        }
-    }
+    use crate::scene::field::nodes::{numbers, tensor};
 
     #[test]
     fn what_is_not_seen_continues_a_line_ever_slower() {

@@ -1,15 +1,18 @@
 //! How much each Gaussian follows each node, as numbers: for programs that do the skinning themselves.
 
+use std::ops::Range;
+
 use burn::tensor::{Tensor, s};
 
 use super::{NodesField, tensor};
-use crate::kernels::skinning::POSE;
+use crate::kernels::skinning::{PLACE, POSED};
+use crate::ops::node_poses::pose;
 use crate::scene::GaussianTensors;
 
 /// Nodes whose weights one call of the kernel gives.
 const GROUP: usize = 3;
-/// Where a pose's quaternion begins.
-const QUATERNION: usize = 12;
+/// Where the quaternion of a posed node is.
+const QUATERNION: Range<usize> = PLACE + 12..POSED;
 
 impl NodesField {
     /// `[N, B + 1]`: how much each Gaussian follows each node, and in the last column how much it stands still. Rows sum to 1.
@@ -32,12 +35,15 @@ impl NodesField {
         let unturned = GaussianTensors { quats: unturned, ..canonical.clone() };
         // The kernel that skins is asked, so that there is one softmax: if three nodes have the imaginary units as quaternions
         // and all others 0, the blended quaternion has their weights, and before them that of standing still.
+        let at_rest = pose(self.parameters(), 0.0);
         let blended = |first: usize| {
-            let mut poses = vec![0.0; nodes * POSE];
+            let mut quats = vec![0.0; nodes * QUATERNION.len()];
             for (part, node) in (first..nodes).take(GROUP).enumerate() {
-                poses[node * POSE + QUATERNION + 1 + part] = 1.0;
+                quats[node * QUATERNION.len() + 1 + part] = 1.0;
             }
-            self.skinned(&unturned, tensor(poses, [nodes, POSE], &device)).slice(s![.., 3..7])
+            let quats = tensor(quats, [nodes, QUATERNION.len()], &device);
+            let posed = at_rest.clone().slice_assign(s![.., QUATERNION], quats);
+            self.skinned(&unturned, posed).slice(s![.., 3..7])
         };
         let mut columns = Vec::new();
         let mut still = None;

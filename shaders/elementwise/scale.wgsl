@@ -1,0 +1,22 @@
+// Every value times one factor that stands on the device.
+
+struct Parameters {
+    count: u32,
+}
+
+@group(0) @binding(0) var<storage, read_write> values: array<f32>;
+@group(0) @binding(1) var<storage, read_write> factor: array<f32>;
+@group(0) @binding(2) var<storage, read_write> scaled: array<f32>;
+@group(0) @binding(3) var<uniform> parameters: Parameters;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let i = flat_group(group, groups) * WORKGROUP + lane;
+    if (i < parameters.count) {
+        scaled[i] = factor[0] * values[i];
+    }
+}

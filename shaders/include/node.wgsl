@@ -1,0 +1,36 @@
+// A node at one time: a row of `nodes` [B, 20 + AFFINITIES]: anchor (3), precision (1), pose (16), affinities. Those of a Gaussian
+// stand behind its stillness, `stillness` [N, 1 + AFFINITIES].
+
+const NODE: u32 = 20u + AFFINITIES;
+
+fn anchor_of(node: u32) -> vec3<f32> {
+    let at = NODE * node;
+    return vec3<f32>(nodes[at], nodes[at + 1u], nodes[at + 2u]);
+}
+
+fn precision_of(node: u32) -> f32 {
+    return nodes[NODE * node + 3u];
+}
+
+fn pose_of(node: u32) -> Pose {
+    let at = NODE * node + 4u;
+    return Pose(
+        vec4<f32>(nodes[at], nodes[at + 1u], nodes[at + 2u], nodes[at + 9u]),
+        vec4<f32>(nodes[at + 3u], nodes[at + 4u], nodes[at + 5u], nodes[at + 10u]),
+        vec4<f32>(nodes[at + 6u], nodes[at + 7u], nodes[at + 8u], nodes[at + 11u]),
+        vec4<f32>(nodes[at + 12u], nodes[at + 13u], nodes[at + 14u], nodes[at + 15u]),
+    );
+}
+
+fn affinity_of(node: u32, k: u32) -> f32 {
+    return nodes[NODE * node + 20u + k];
+}
+
+// What the affinities of Gaussian `i` and of a node add to the logit by which the one follows the other.
+fn affinity_between(i: u32, node: u32) -> f32 {
+    var sum = 0.0;
+    for (var k = 0u; k < AFFINITIES; k++) {
+        sum += stillness[(1u + AFFINITIES) * i + 1u + k] * affinity_of(node, k);
+    }
+    return sum;
+}
