@@ -9,13 +9,12 @@
 pub unsafe fn keep_freed_memory() {
     #[cfg(all(target_os = "linux", target_env = "gnu"))]
     {
-        /// The largest value that glibc accepts; larger blocks are given back.
-        const LARGEST_KEPT_BLOCK: libc::c_int = 32 << 20;
         const LARGEST_KEPT_REST: libc::c_int = 1 << 30;
         // SAFETY: the caller promises that no other thread runs, and both settings may have any value; a value that is
         // refused changes nothing.
         unsafe {
-            libc::mallopt(libc::M_MMAP_THRESHOLD, LARGEST_KEPT_BLOCK);
+            // No block gets a mapping of its own, which would be given back: with a million Gaussians a tensor has 256 MB.
+            libc::mallopt(libc::M_MMAP_MAX, 0);
             libc::mallopt(libc::M_TRIM_THRESHOLD, LARGEST_KEPT_REST);
         }
     }
