@@ -6,8 +6,8 @@
 #![no_std]
 
 use include::{
-    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, NODE, NODE_MOTION, PIXELS, PLANES, POSE, QUATERNION,
-    SPHERICAL_HARMONICS, SPLAT, VIEW,
+    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, NODE, NODE_MOTION, NODE_SPLINE, PIXELS, PLANES, POSE,
+    QUATERNION, SPHERICAL_HARMONICS, SPLAT, VIEW,
 };
 
 /// One kernel: a file of a folder here, with what it includes.
@@ -56,13 +56,13 @@ shaders! {
     /// (Ballé et al. 2018).
     LOWER_BOUND_BACKWARD = "elementwise" / "lower_bound_backward" [];
     /// Control nodes at a time: their poses.
-    NODE_POSES = "nodes" / "node_poses" [QUATERNION, NODE_MOTION];
+    NODE_POSES = "nodes" / "node_poses" [QUATERNION, NODE_SPLINE, NODE_MOTION];
     /// Derivative of the poses of control nodes.
-    NODE_POSES_BACKWARD = "nodes" / "node_poses_backward" [QUATERNION, NODE_MOTION];
+    NODE_POSES_BACKWARD = "nodes" / "node_poses_backward" [QUATERNION, NODE_SPLINE, NODE_MOTION];
     /// Second half of the regularizer of control nodes: the loss, and all gradients.
-    NODE_REGULARIZER = "nodes" / "node_regularizer" [QUATERNION, NODE_MOTION];
+    NODE_REGULARIZER = "nodes" / "node_regularizer" [NODE_SPLINE];
     /// First half of the regularizer of control nodes: how far they are from where their neighbors see them.
-    NODE_STRAIN = "nodes" / "node_strain" [EXPONENTIAL, QUATERNION, NODE_MOTION];
+    NODE_STRAIN = "nodes" / "node_strain" [EXPONENTIAL, QUATERNION, NODE_SPLINE, NODE_MOTION];
     /// The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error
     /// everywhere (Press et al., Numerical Recipes, section 6.2): the coefficients and the order of operations of
     /// `light4gs-model/src/ops`.
@@ -130,6 +130,8 @@ pub mod include {
         NODE = "include/node";
         /// How a control node is moved and turned at a time.
         NODE_MOTION = "include/node_motion";
+        /// Knots of the splines of control nodes, and those that count at a time.
+        NODE_SPLINE = "include/node_spline";
         /// Bilinear samples of the planes of a scale.
         PLANES = "include/planes";
         /// The pixels of one invocation of a team: one column of the cell, every ROW_STEP-th row, four rows

@@ -12,10 +12,6 @@
 @group(0) @binding(6) var<storage, read_write> posed: array<f32>;
 @group(0) @binding(7) var<uniform> spline: Spline;
 
-fn anchor_at(node: u32) -> vec3<f32> {
-    return vec3<f32>(anchors[3u * node], anchors[3u * node + 1u], anchors[3u * node + 2u]);
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

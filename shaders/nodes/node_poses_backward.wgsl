@@ -26,10 +26,6 @@ fn upstream_at(at: u32) -> vec3<f32> {
     return vec3<f32>(upstream[at], upstream[at + 1u], upstream[at + 2u]);
 }
 
-fn anchor_at(node: u32) -> vec3<f32> {
-    return vec3<f32>(anchors[3u * node], anchors[3u * node + 1u], anchors[3u * node + 2u]);
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

@@ -21,10 +21,6 @@ fn weight_at(node: u32, squared: f32) -> f32 {
     return exponential(-0.25 * exp(-2.0 * log_radii[node]) * squared);
 }
 
-fn anchor_at(node: u32) -> vec3<f32> {
-    return vec3<f32>(anchors[3u * node], anchors[3u * node + 1u], anchors[3u * node + 2u]);
-}
-
 @compute @workgroup_size(WORKGROUP)
 fn main(
     @builtin(workgroup_id) group: vec3<u32>,

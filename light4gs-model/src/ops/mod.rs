@@ -21,6 +21,28 @@ pub mod significance;
 pub mod skinning;
 pub mod splat;
 
+use std::fmt::Debug;
+
+use burn::backend::Backend;
+use burn::backend::autodiff::grads::Gradients;
+use burn::backend::autodiff::ops::Ops;
+use burn::backend::tensor::FloatTensor;
+
+/// The backward pass of an operation whose parents on the tape all get a gradient: `derivative` makes these from its state and
+/// from the gradient of its output.
+fn differentiate<B: Backend, S: Clone + Debug + Send + 'static, const N: usize>(
+    ops: Ops<S, N>,
+    tape: &mut Gradients,
+    derivative: impl FnOnce(S, FloatTensor<B>) -> [FloatTensor<B>; N],
+) {
+    let gradient = tape.consume::<B>(&ops.node);
+    for (parent, gradient) in ops.parents.into_iter().zip(derivative(ops.state, gradient)) {
+        if let Some(parent) = parent {
+            tape.register::<B>(parent.id, gradient);
+        }
+    }
+}
+
 /// Implements a trait with the same items for each CPU back end of this build.
 macro_rules! for_cpu_back_ends {
     ($trait:ident { $($items:item)* }) => {

@@ -13,7 +13,7 @@ use burn_fusion::{Fusion, FusionBackend};
 #[cfg(feature = "wgpu")]
 use super::fusion::{leaf, resolve};
 use super::host::{HostBackend, HostTensor};
-use super::{for_all_back_ends, for_cpu_back_ends};
+use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::node_motion::Knots;
 use crate::cpu::node_poses::{NodeSlices, pose as pose_slices, pose_backward};
 use crate::kernels::node_poses::{INPUTS, LEARNED};
@@ -46,13 +46,7 @@ impl<B: NodePoseOps + NodePoseKernels, C: CheckpointStrategy> NodePoseOps for Au
             type State = B::Posed;
 
             fn backward(self, ops: Ops<Self::State, LEARNED>, grads: &mut Gradients, _: &mut Checkpointer) {
-                let gradient = grads.consume::<B>(&ops.node);
-                let gradients = B::node_poses_backward(ops.state, gradient);
-                for (parent, gradient) in ops.parents.into_iter().zip(gradients) {
-                    if let Some(parent) = parent {
-                        grads.register::<B>(parent.id, gradient);
-                    }
-                }
+                differentiate::<B, _, _>(ops, grads, B::node_poses_backward);
             }
         }
 

@@ -16,7 +16,7 @@ use burn_fusion::{Fusion, FusionBackend};
 use super::fusion::{leaf, resolve};
 use super::host::HostBackend;
 use super::node_poses::NodeParameters;
-use super::{for_all_back_ends, for_cpu_back_ends};
+use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::node_motion::Knots;
 use crate::cpu::node_regularizer::{Regularized, regularize as regularize_slices};
 use crate::kernels::node_regularizer::LEARNED;
@@ -51,13 +51,7 @@ impl<B: NodeRegularizerOps + NodeRegularizerKernels, C: CheckpointStrategy> Node
             type State = B::Derivatives;
 
             fn backward(self, ops: Ops<Self::State, LEARNED>, grads: &mut Gradients, _: &mut Checkpointer) {
-                let gradient = grads.consume::<B>(&ops.node);
-                let gradients = B::node_regularizer_backward(ops.state, gradient);
-                for (parent, gradient) in ops.parents.into_iter().zip(gradients) {
-                    if let Some(parent) = parent {
-                        grads.register::<B>(parent.id, gradient);
-                    }
-                }
+                differentiate::<B, _, _>(ops, grads, B::node_regularizer_backward);
             }
         }
 

@@ -16,7 +16,7 @@ use burn_fusion::{Fusion, FusionBackend};
 #[cfg(feature = "wgpu")]
 use super::fusion::{leaf, resolve};
 use super::host::{HostBackend, HostTensor};
-use super::{for_all_back_ends, for_cpu_back_ends};
+use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::skinning::{BlendedGroup, SkinningSlices, skin as skin_slices};
 use crate::cpu::skinning_backward::skin_backward;
 use crate::kernels::skinning::{INPUTS, MOVED, ORIENTATION, POSED};
@@ -48,13 +48,9 @@ impl<B: SkinningOps + SkinningKernels, C: CheckpointStrategy> SkinningOps for Au
             type State = B::Saved;
 
             fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
-                let gradient = grads.consume::<B>(&ops.node);
-                let gradients = B::skinning_backward(ops.state, gradient).into_array();
-                for (parent, gradient) in ops.parents.into_iter().zip(gradients) {
-                    if let Some(parent) = parent {
-                        grads.register::<B>(parent.id, gradient);
-                    }
-                }
+                differentiate::<B, _, _>(ops, grads, |state, gradient| {
+                    B::skinning_backward(state, gradient).into_array()
+                });
             }
         }
 

@@ -16,7 +16,7 @@ use light4gs_render::{CHANNELS, GaussianSlices, TileLists, TilePixels, View, ass
 #[cfg(feature = "wgpu")]
 use super::fusion::{int_leaf, leaf, resolve};
 use super::host::{HostBackend, HostTensor};
-use super::{for_all_back_ends, for_cpu_back_ends};
+use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 use crate::kernels::splat::INPUTS;
 pub use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
@@ -46,13 +46,7 @@ impl<B: SplatOps + SplatKernels, C: CheckpointStrategy> SplatOps for Autodiff<B,
             type State = B::Saved;
 
             fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
-                let gradient = grads.consume::<B>(&ops.node);
-                let gradients = B::splat_backward(ops.state, gradient).into_array();
-                for (parent, gradient) in ops.parents.into_iter().zip(gradients) {
-                    if let Some(parent) = parent {
-                        grads.register::<B>(parent.id, gradient);
-                    }
-                }
+                differentiate::<B, _, _>(ops, grads, |state, gradient| B::splat_backward(state, gradient).into_array());
             }
         }
 
