@@ -51,6 +51,8 @@ pub struct AttributeEntropy {
     pub log_steps: Param<Tensor<1>>,
     /// `[1]`, not trained: the typical size of the Gaussians that the model was started from, world units; 0 before.
     pub size: Param<Tensor<1>>,
+    /// `[A]`, not trained: how many times the bits that its density expects each attribute counts.
+    pub corrections: Param<Tensor<1>>,
     #[module(skip)]
     attributes: Vec<CodedAttribute>,
 }
@@ -70,6 +72,7 @@ impl AttributeEntropy {
             prediction: ChannelPrediction::new(&widths, device),
             log_steps: Param::from_tensor(Tensor::from_floats(log_steps.as_slice(), device)),
             size: Param::from_tensor(Tensor::zeros([1], device)),
+            corrections: Param::from_tensor(Tensor::ones([attributes.len()], device)),
             attributes,
         }
     }
@@ -89,7 +92,7 @@ impl AttributeEntropy {
         replace(&mut self.prediction.weights, off_tape(weights));
         let values =
             off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), own), on_tape_of(&self.size.val(), near)));
-        let least = self.widths(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
+        let least = self.by_channel(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
         // [C, 1].
         let means = values.clone().mean_dim(1);
         let spreads = (values - means.clone()).square().mean_dim(1).sqrt().max_pair(least);
@@ -160,9 +163,11 @@ impl AttributeEntropy {
         let share = count as f64 / rows.len().max(1) as f64;
         let near = self.channels(selected(&gaussians, &neighbor_rows(order.as_ref(), rows)));
         let residuals = self.prediction.residuals(self.channels(own), near);
-        let widths = self.widths(self.log_steps.val().exp());
+        let widths = self.by_channel(self.log_steps.val().exp());
         let likelihood = self.mixture.interval_likelihood(residuals, widths);
-        (positions, bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum_dim(1).squeeze_dim::<1>(1) * share)
+        let bits = bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum_dim(1);
+        let corrections = self.by_channel(untracked(self.corrections.val()));
+        (positions, (bits * corrections).squeeze_dim::<1>(1) * share)
     }
 
     /// The order in which the codec would code the Gaussians; `None` where positions are not finite: the trainer stops
@@ -205,6 +210,18 @@ impl AttributeEntropy {
             .clamped()
     }
 
+    /// Each attribute counts so many times as much as before, in the order of [`AttributeEntropy::attributes`]. Positions always
+    /// count once: they have no density.
+    ///
+    /// # Panics
+    /// If there are not as many factors as attributes.
+    pub fn correct(&mut self, factors: &[f32]) {
+        assert_eq!(factors.len(), self.attributes.len(), "one factor for each attribute");
+        let corrections = off_tape(self.corrections.val());
+        let factors = Tensor::from_floats(factors, &corrections.device());
+        replace(&mut self.corrections, corrections * factors);
+    }
+
     /// All steps become coarser by a factor.
     pub fn scale_steps(&mut self, factor: f32) {
         let steps = off_tape(self.log_steps.val()) + factor.ln();
@@ -229,11 +246,11 @@ impl AttributeEntropy {
         self.attributes.iter().position(|coded| coded.name == attribute)
     }
 
-    /// The channels' steps, `[C, 1]`, from those of the attributes.
-    fn widths(&self, steps: Tensor<1>) -> Tensor<2> {
+    /// Numbers of the attributes, `[A]`, as numbers of their channels, `[C, 1]`.
+    fn by_channel(&self, numbers: Tensor<1>) -> Tensor<2> {
         let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
         let columns =
-            attributes.map(|(place, attribute)| steps.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
+            attributes.map(|(place, attribute)| numbers.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
         Tensor::cat(columns.collect(), 0).unsqueeze_dim(1)
     }
 

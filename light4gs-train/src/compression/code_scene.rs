@@ -5,12 +5,12 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use light4gs_codec::{Kind, Limits, PlaneBytes, Profile, SceneData};
+use light4gs_codec::{Kind, PlaneBytes, Profile, SceneData};
 use light4gs_data::{Frame, Scene};
-use light4gs_model::attributes::SH_REST;
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
 use serde::{Deserialize, Serialize};
 
+use super::attribute_bits::written_attribute_bits;
 use super::{
     BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, MissedQuality,
     SearchImages, ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search,
@@ -247,19 +247,13 @@ fn searches<C: PlaneEntropy, S: ShModel>(settings: &CompressionConfig, trained: 
     wished || (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
 }
 
-/// Expected and written bits of each attribute with a model; spherical harmonics have a section of their own.
+/// Expected and written bits of each attribute with a model.
 fn attribute_records(encoded: &EncodedScene) -> Result<Vec<AttributeRecord>, TrainError> {
-    let in_file = light4gs_codec::info_with_limits(&encoded.bytes, &Limits::large())?.attributes;
-    let sh_bytes: u64 = encoded.coded.report.sh.degrees.iter().sum();
-    let coded = |name: &str| match in_file.iter().find(|attribute| attribute.name == name) {
-        Some(attribute) => attribute.bytes,
-        None if name == SH_REST.name => sh_bytes,
-        None => 0,
-    };
+    let written = written_attribute_bits(&encoded.bytes, &encoded.coded.report)?;
     let record = |(name, bits): &(String, f64)| AttributeRecord {
         name: name.clone(),
         estimated_bits: *bits,
-        coded_bits: 8.0 * coded(name) as f64,
+        coded_bits: written(name),
     };
     Ok(encoded.coded.attributes.iter().map(record).collect())
 }

@@ -135,7 +135,7 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
         }
     };
     let decoded = DynamicScene::<F>::from_arrays(&encoded.decoded, device)?;
-    let attributes = compression.attribute_bits(&decoded);
+    let attributes = compression.expected_attribute_bits(&decoded);
     let estimate = BitEstimate {
         planes: compression.plane_bits(&decoded),
         sh: compression.sh_bits(&decoded, &encoded.decoded.gaussians, &input.sh),
@@ -294,16 +294,6 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             }
             _ => counted_bits(gaussians, coding),
         }
-    }
-
-    /// The same for each attribute with a learned step, by its name.
-    fn attribute_bits<F: DeformationField>(&self, decoded: &DynamicScene<F>) -> Vec<(String, f64)> {
-        let gaussians = decoded.gaussians.tensors();
-        let Some(models) = self.learned_attributes().filter(|_| gaussians.means.dims()[0] > 0) else {
-            return Vec::new();
-        };
-        let bits = models.bits_of_each(gaussians).into_data();
-        models.attributes().iter().map(|attribute| attribute.name.clone()).zip(bits.iter()).collect()
     }
 
     /// The bit maps of a decoded scene's planes.

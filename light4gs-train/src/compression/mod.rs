@@ -10,6 +10,7 @@
 //! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
 //! - `step_factor`, `quality`: a file of a wished size or quality; what the quality is
 
+mod attribute_bits;
 mod attribute_step_search;
 mod code_scene;
 mod encoder;

@@ -20,6 +20,7 @@ mod motion;
 pub mod profile;
 mod pruning;
 mod rate;
+mod rate_correction;
 mod rate_steering;
 mod step;
 mod views;
@@ -253,6 +254,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let mut report = self.optimize(stage, iteration)?;
         self.control_density(stage, iteration);
         if stage == Stage::Fine {
+            self.correct_expected_bits(iteration);
             self.steer_rate(iteration)?;
         }
         if stage == Stage::Fine && self.config.train.guided_sampling.is_due(iteration) {

@@ -116,6 +116,24 @@ fn the_estimate_knows_neighbors_and_channels_before() {
 }
 
 #[test]
+fn a_correction_multiplies_the_bits_of_its_attribute() {
+    let device = Device::flex();
+    let gaussians = gaussians(&device);
+    let mut model = model(&device, &gaussians.tensors());
+    let before = values_of(&model.bits_of_each(gaussians.tensors()));
+    // Means, scales, rotations, opacity, color, age: positions have no density that could be wrong.
+    let factors = [3.0, 1.0, 1.5, 0.5, 1.0, 1.25];
+    model.correct(&factors);
+    model.correct(&[1.0, 1.0, 2.0, 1.0, 1.0, 1.0]);
+    let expected: Vec<f32> =
+        before.iter().zip([1.0, 1.0, 3.0, 0.5, 1.0, 1.25]).map(|(bits, factor)| bits * factor).collect();
+    let after = values_of(&model.bits_of_each(gaussians.tensors()));
+    for (found, expected) in after.iter().zip(&expected) {
+        assert!((found / expected - 1.0).abs() < 1e-5, "{after:?}, expected {expected:?}");
+    }
+}
+
+#[test]
 fn rows_stand_for_all() {
     let device = Device::flex();
     let gaussians = gaussians(&device);

@@ -183,6 +183,36 @@ fn every_configuration_makes_a_file_that_decodes() {
     }
 }
 
+/// The coder learns its statistics and knows more than a density, so that it writes other bits than are expected, until these are
+/// corrected.
+#[test]
+fn corrected_bits_are_those_that_are_written() {
+    let device = Device::flex().autodiff();
+    let config = config(&["model.sh_degree=1", "compression.rate.attributes=true", "compression.rate.lambda=0.007"]);
+    let scene = scene(&config, &device);
+    let mut compression = Compression::of_run(&ConfiguredModels, &config, &scene, &device).unwrap().unwrap();
+    compression.start_attributes_from(&scene.gaussians);
+    let settings = &config.compression;
+    let coded = |compression: &_| {
+        let encoded =
+            encode(&scene, compression, SceneMeta::default(), settings, profile(&config), None, &device).unwrap();
+        let written = light4gs_codec::info(&encoded.bytes).unwrap().attributes;
+        let expected = encoded.coded.attributes;
+        let ratio = |(name, expected): &(String, f64)| {
+            let written = written.iter().find(|attribute| attribute.name == *name)?.bytes;
+            Some(expected / (8.0 * written as f64))
+        };
+        expected.iter().filter_map(ratio).collect::<Vec<f64>>()
+    };
+    let before = coded(&compression);
+    assert!(before.iter().any(|ratio| (ratio - 1.0).abs() > 0.02), "{before:?}");
+    compression.correct_expected_bits(&scene, SceneMeta::default(), settings).unwrap();
+    let after = coded(&compression);
+    // What a factor of more than 2 would have to mend, and positions, which are counted already.
+    let within = |(before, after): (&f64, &f64)| *before > 1.9 || *before < 0.55 || (after - 1.0).abs() < 0.01;
+    assert!(before.iter().zip(&after).skip(1).all(within), "{before:?}, corrected {after:?}");
+}
+
 /// Frozen planes are the planes of the file, bit for bit, so that the rest of the scene is trained around the values
 /// that it will have.
 #[test]
