@@ -249,9 +249,10 @@ impl AttributeEntropy {
     /// Numbers of the attributes, `[A]`, as numbers of their channels, `[C, 1]`.
     fn by_channel(&self, numbers: Tensor<1>) -> Tensor<2> {
         let attributes = self.attributes.iter().enumerate().filter(|(_, attribute)| has_density(&attribute.name));
-        let columns =
-            attributes.map(|(place, attribute)| numbers.clone().narrow(0, place, 1).repeat_dim(0, attribute.width));
-        Tensor::cat(columns.collect(), 0).unsqueeze_dim(1)
+        let places: Vec<i64> =
+            attributes.flat_map(|(place, attribute)| std::iter::repeat_n(place as i64, attribute.width)).collect();
+        let places = Tensor::<1, Int>::from_data(TensorData::from(places.as_slice()), &numbers.device());
+        numbers.select(0, places).unsqueeze_dim(1)
     }
 
     /// All numbers with a density, `[C, N]`.
