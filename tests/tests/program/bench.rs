@@ -36,7 +36,7 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("skinning forward + backward", 11),
         ("nodes, Adam step", 13),
         ("nodes, training step", 119),
-        ("nodes, step with noise and rate", 466),
+        ("nodes, step with noise and rate", 430),
         ("nodes, render", 58),
         ("hexplane, training step", 630),
         ("hexplane, step with noise and rate", 1148),
