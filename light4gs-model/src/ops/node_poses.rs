@@ -168,7 +168,7 @@ impl NodeParameters {
 /// B-splines, the quaternions of which are normalized afterwards; a node turns about its anchor:
 ///
 /// ```text
-/// R = rotation of q,   q = normalized (1, 0, 0, 0) + spline of the rotations
+/// R = rotation of q,   q = normalized((1, 0, 0, 0) + spline of the rotations)
 /// offset = unit · (anchor + spline of the translations - R anchor)
 /// ```
 ///

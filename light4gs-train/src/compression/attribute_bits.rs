@@ -9,7 +9,7 @@ use super::{Compression, ShModel, encoded_so_far};
 use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
-/// Expected bits are corrected by at most this factor, up or down.
+/// A correction changes expected bits by at most this factor, up or down.
 const MOST: f64 = 2.0;
 
 /// Written bits of each attribute of a file, by its name; 0 for what is not among its attributes. Spherical harmonics

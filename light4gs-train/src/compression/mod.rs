@@ -6,6 +6,7 @@
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: from a scene and its models to the bytes of a file
 //! - `code_scene`: from a trained scene to a file, with a record of expected and written bits
+//! - `attribute_bits`: expected and written bits of each attribute, and how the first follow the second
 //! - `attribute_step_search`: the coarsest steps of the other attributes
 //! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
 //! - `step_factor`, `quality`: a file of a wished size or quality; what the quality is

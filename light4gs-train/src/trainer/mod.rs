@@ -7,6 +7,7 @@
 //! - `views`: the views of an iteration, each with its own tape
 //! - `learning_rates`: the rate of each parameter group
 //! - `rate`: quantization noise, and the rate in the loss
+//! - `rate_correction`: the expected bits of attributes follow those that the coder writes
 //! - `rate_steering`: the weight of the rate, where the file shall have a certain size or quality
 //! - `pruning`: pruning by significance
 //!
