@@ -24,7 +24,7 @@
 // Without a CPU back end the kernels of `cpu/` are unused; otherwise each of them would need a condition of its own.
 #![cfg_attr(
     not(any(feature = "ndarray", feature = "flex")),
-    allow(dead_code, unused_imports, unused_variables, unused_mut, unreachable_code)
+    allow(dead_code, unused_imports, unused_variables, unused_mut, unreachable_code, unreachable_pub)
 )]
 
 mod attribute_entropy;
