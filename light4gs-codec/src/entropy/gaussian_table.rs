@@ -14,34 +14,55 @@ const HALF_RATIO: f64 = 1.030_992_021_060_275_7;
 /// Standard deviations that a row covers on either side. The rest, 2e-9, is left to the escape.
 const REACH: f64 = 6.0;
 
+/// Scales between two powers of two are in so many buckets: so narrow that each has one threshold at most.
+const BUCKETS_OF_OCTAVE: u32 = 32;
+/// Powers of two below the first threshold and above the last.
+const BOUNDS: [f32; 2] = [1.0 / 16.0, 256.0];
+
 /// One distribution for each scale.
 #[derive(Debug)]
 pub(crate) struct GaussianTable {
     /// By ascending scale. Symmetric around 0, except for the rounding of frequencies.
     pub(crate) levels: Vec<Distribution>,
-    /// `thresholds[i]` is the geometric mean of scales `i` and `i + 1`.
-    thresholds: [f32; LEVELS - 1],
+    /// `thresholds[i]` is the geometric mean of scales `i` and `i + 1`, the last one infinite.
+    thresholds: [f32; LEVELS],
+    /// The level of the least scale of each bucket.
+    buckets: Vec<u8>,
+}
+
+/// The bucket of a scale within [`BOUNDS`].
+#[inline]
+fn bucket(scale: f32) -> usize {
+    let of = |scale: f32| scale.to_bits() >> (f32::MANTISSA_DIGITS - 1 - BUCKETS_OF_OCTAVE.ilog2());
+    (of(scale) - of(BOUNDS[0])) as usize
 }
 
 impl GaussianTable {
     /// The level whose scale is nearest to `scale` in logarithm. NaN, negative and small scales have the first level.
     #[inline]
     pub(crate) fn level(&self, scale: f32) -> u16 {
-        self.thresholds.partition_point(|&threshold| threshold < scale) as u16
+        // NaN and what is too small become the least.
+        let bounded = if scale > BOUNDS[0] { scale.min(BOUNDS[1]) } else { BOUNDS[0] };
+        let level = u16::from(self.buckets[bucket(bounded)]);
+        level + u16::from(self.thresholds[usize::from(level)] < bounded)
     }
 
     fn new() -> Self {
         let mut scale = LEAST_SCALE;
         let mut levels = Vec::with_capacity(LEVELS);
-        let mut thresholds = [0.0; LEVELS - 1];
+        let mut thresholds = [f32::INFINITY; LEVELS];
         for level in 0..LEVELS {
             levels.push(rounded_gaussian(scale));
-            if let Some(threshold) = thresholds.get_mut(level) {
-                *threshold = (scale * HALF_RATIO) as f32;
+            if level + 1 < LEVELS {
+                thresholds[level] = (scale * HALF_RATIO) as f32;
             }
             scale *= RATIO;
         }
-        Self { levels, thresholds }
+        let mut buckets = vec![0; bucket(BOUNDS[1]) + 1];
+        for &threshold in &thresholds[..LEVELS - 1] {
+            buckets[bucket(threshold) + 1..].iter_mut().for_each(|level| *level += 1);
+        }
+        Self { levels, thresholds, buckets }
     }
 }
 
@@ -89,6 +110,10 @@ mod tests {
             let scale = 0.11 * (f64::from(i) / 1000.0 * (256.0f64 / 0.11).ln()).exp();
             let nearest = ((scale / 0.11).ln() / RATIO.ln()).round() as u16;
             assert_eq!(table.level(scale as f32), nearest, "{scale}");
+        }
+        for (level, &threshold) in table.thresholds[..LEVELS - 1].iter().enumerate() {
+            assert_eq!(table.level(threshold), level as u16);
+            assert_eq!(table.level(threshold.next_up()), level as u16 + 1);
         }
     }
 

@@ -69,6 +69,10 @@ impl DensityConfig for AdaptiveDensityConfig {
         self.until
     }
 
+    fn most(&self) -> Option<usize> {
+        Some(self.max_gaussians)
+    }
+
     fn problem(&self) -> Option<(&'static str, String)> {
         let problem = || format!("is {}, after `train.densify.adaptive.until`, which is {}", self.from, self.until);
         (self.from > self.until).then(|| ("from", problem()))

@@ -74,6 +74,12 @@ pub trait DensityConfig {
     /// The last iteration of the fine stage after which Gaussians are added; 0 if they never are.
     fn end(&self) -> usize;
 
+    /// The most Gaussians that there may be with whole images, for the estimate of a training's time; `None` if they stay those of the
+    /// cloud, or nobody knows.
+    fn most(&self) -> Option<usize> {
+        None
+    }
+
     /// What is wrong with the keys as a whole, if anything: one of the keys, and the problem.
     fn problem(&self) -> Option<(&'static str, String)> {
         None

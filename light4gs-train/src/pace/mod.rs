@@ -1,9 +1,11 @@
 //! How long a training takes on this machine, from a dozen iterations of each kind.
 //!
 //! An iteration becomes slower as Gaussians are added, and slower again when it has a rate. So the run's own scene is
-//! trained for a moment in memory: with the Gaussians of the beginning, with as many as there may be and images of each size,
-//! and with the rate.
-//! Nothing of it is kept.
+//! trained for a moment in memory: with as many Gaussians as in the beginning, with as many as there may be and images of each size,
+//! and with the rate. They get the sizes that trained Gaussians have, on which the time depends more than on anything
+//! else. Nothing of it is kept.
+
+mod typical;
 
 use std::time::Instant;
 
@@ -13,6 +15,7 @@ use crate::config::{Config, FieldKind};
 use crate::error::TrainError;
 use crate::stage::Stage;
 use crate::trainer::Trainer;
+use typical::TypicalGaussians;
 
 /// Iterations of the coarse stage that are measured.
 const COARSE: usize = 6;
@@ -22,8 +25,6 @@ const PLAIN: usize = 9;
 const RATE_INTERVAL: usize = 3;
 /// So many of them are measured.
 const RATE_ROUNDS: usize = 4;
-/// Iterations in which the Gaussians may double: enough to multiply them by 4000.
-const GROWTH: usize = 12;
 /// Training views that are looked at, spread over all of them: their images are decoded once.
 const VIEWS: usize = 12;
 /// The share of the time between the first and the last cloning after which the most Gaussians are reached, as measured
@@ -69,7 +70,8 @@ impl Pace {
     pub fn measure(config: &Config, mut data: Scene) -> Result<Self, TrainError> {
         let apart = data.train.len().div_ceil(VIEWS).max(1);
         data.train = data.train.into_iter().step_by(apart).collect();
-        let mut trainer = Trainer::builder(moment_of(config), data).build()?;
+        let density = TypicalGaussians::new(config, &data, PLAIN, plain_iterations(config))?;
+        let mut trainer = Trainer::builder(moment_of(config), data).density(density).build()?;
         let (mut coarse, mut fine) = (Vec::new(), Vec::new());
         loop {
             let begin = Instant::now();
@@ -80,15 +82,26 @@ impl Pace {
                 Stage::Fine => fine.push(Iteration { gaussians: report.gaussians, seconds }),
             }
         }
+        Ok(Self::of(config, coarse, &fine))
+    }
+
+    /// From the seconds of a moment's coarse iterations, and its fine ones.
+    fn of(config: &Config, coarse: Vec<f64>, fine: &[Iteration]) -> Self {
         let (first, rest) = fine.split_at(PLAIN);
-        let (sizes, rate) = rest.split_at((GROWTH + PLAIN) * sizes(config).len());
-        let full: Vec<_> = sizes.chunks_exact(GROWTH + PLAIN).map(|size| typical(&size[GROWTH..])).collect();
-        let rounds =
-            rate.chunks_exact(RATE_INTERVAL).map(|round| round.iter().map(|iteration| iteration.seconds).sum());
-        // What one iteration with the rate takes beyond a plain one, spread over those without.
+        let (sizes, rate) = rest.split_at(PLAIN * sizes(config).len());
+        // Gaussians are added in the first.
+        let full: Vec<_> = sizes.chunks_exact(PLAIN).map(|size| typical(&size[1..])).collect();
+        let (with, without): (Vec<_>, Vec<_>) =
+            rate.iter().enumerate().partition(|(k, _)| (k + 1) % RATE_INTERVAL == 0);
+        // Medians, since some iterations also correct the expected bits, which a run does a dozen times only.
+        let seconds = |iterations: Vec<(usize, &Iteration)>| {
+            median(iterations.into_iter().map(|(_, iteration)| iteration.seconds).collect())
+        };
+        // What one iteration with the rate takes beyond those with noise alone, and what the noise takes.
         let whole = full.last().expect("whole images are one of the sizes").seconds;
-        let rate = (median(rounds.collect()) - RATE_INTERVAL as f64 * whole) / config.compression.rate.interval as f64;
-        Ok(Self { coarse: median(coarse), first: typical(first), full, rate: rate.max(0.0) })
+        let noisy = seconds(without);
+        let rate = (seconds(with) - noisy) / config.compression.rate.interval as f64 + noisy - whole;
+        Self { coarse: median(coarse), first: typical(first), full, rate: rate.max(0.0) }
     }
 
     /// Seconds that the training of a configuration takes, without coding and measuring. It has the image sizes of that
@@ -151,35 +164,35 @@ fn sizes(config: &Config) -> Vec<f64> {
     sizes
 }
 
-/// The configuration of the moment that is measured: a few iterations with the Gaussians of the beginning, then at each size
-/// of the images growth and a few with all, then a few with a rate.
+/// Iterations of the moment's fine stage before those with a rate: some with the Gaussians of the beginning, and some with
+/// all at each size of the images.
+fn plain_iterations(config: &Config) -> usize {
+    PLAIN * (1 + sizes(config).len())
+}
+
+/// The configuration of the moment that is measured.
 fn moment_of(config: &Config) -> Config {
     let mut moment = config.clone();
     let train = &mut moment.train;
     train.coarse_iterations = COARSE;
-    let plain = PLAIN + (GROWTH + PLAIN) * sizes(config).len();
+    let plain = plain_iterations(config);
     train.fine_iterations = plain + RATE_ROUNDS * RATE_INTERVAL;
     let coarse_to_fine = &mut train.coarse_to_fine;
     let mut until = PLAIN;
     for share in [&mut coarse_to_fine.quarter_until, &mut coarse_to_fine.half_until] {
         if *share > 0.0 {
-            until += GROWTH + PLAIN;
+            until += PLAIN;
             *share = until as f64 / train.fine_iterations as f64;
         }
     }
     train.sh_degree_interval = 1;
     train.prune.fraction = 0.0;
     train.guided_sampling.iterations = Vec::new();
-    let adaptive = &mut train.densify.strategies.adaptive;
-    (adaptive.from, adaptive.until, adaptive.interval) = (PLAIN, plain - PLAIN, 1);
-    let thresholds = [&mut adaptive.grad_threshold_fine_init, &mut adaptive.grad_threshold_fine_final];
-    // Every Gaussian that is seen.
-    thresholds.into_iter().for_each(|threshold| *threshold = 1e-30);
-    adaptive.prune_from = train.fine_iterations;
-    adaptive.opacity_reset_interval = 0;
     moment.compression.rate.from = plain;
     moment.compression.rate.interval = RATE_INTERVAL;
     moment.compression.rate.planes_until = 0;
+    // In a moment this short every iteration would be followed by a coding.
+    (moment.compression.target_bytes, moment.compression.target_db) = (0, 0.0);
     moment.eval.interval = 0;
     moment
 }
@@ -198,6 +211,27 @@ fn median(mut times: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn corrections_of_expected_bits_are_not_in_the_rate() {
+        let config = Config::load("dnerf-cpu+nodes", &["compression.rate.interval=5".to_owned()]).unwrap();
+        let iteration = |gaussians: usize, seconds: f64| Iteration { gaussians, seconds };
+        let mut fine = vec![iteration(1000, 1.0); PLAIN];
+        for _ in sizes(&config) {
+            // The first one adds Gaussians.
+            fine.push(iteration(9000, 70.0));
+            fine.extend(vec![iteration(9000, 2.0); PLAIN - 1]);
+        }
+        for k in 0..RATE_ROUNDS * RATE_INTERVAL {
+            let correction = if k % 4 == 3 { 100.0 } else { 0.0 };
+            fine.push(iteration(9000, correction + if (k + 1) % RATE_INTERVAL == 0 { 7.0 } else { 4.0 }));
+        }
+        let pace = Pace::of(&config, vec![0.5; COARSE], &fine);
+        assert_eq!((pace.coarse, pace.first, pace.full_count()), (0.5, iteration(1000, 1.0), 9000));
+        assert!(pace.full.iter().all(|full| full.seconds == 2.0));
+        // Three more than noise alone, once in five iterations, and two that the noise takes.
+        assert!((pace.rate - 2.6).abs() < 1e-9, "{}", pace.rate);
+    }
 
     #[test]
     fn gaussians_come_late_under_a_squared_loss() {
