@@ -78,16 +78,23 @@ impl Wishes {
         let camera = data.train.first().map(|frame| frame.camera);
         let pace = Pace::measure(&config, data)?;
         if let Some(minutes) = self.minutes {
-            let factor = 60.0 * minutes / pace.training_seconds(&config);
-            if !(SHORTEST..=LONGEST).contains(&factor) {
-                let [least, most] = [SHORTEST, LONGEST].map(|factor| factor * pace.training_seconds(&config) / 60.0);
+            let scaled = |factor: f64| with(&[&wishes[..], &config.for_schedule(factor)].concat());
+            let minutes_of = |factor: f64| Ok::<_, TrainError>(pace.training_seconds(&scaled(factor)?) / 60.0);
+            let [least, most] = [minutes_of(SHORTEST)?, minutes_of(LONGEST)?];
+            if !(least..=most).contains(&minutes) {
                 return Err(TrainError::Input(format!(
                     "--minutes {minutes}: this scene takes {least:.1} to {most:.0} minutes on this machine; give a number \
                      between them, or another --pixels"
                 )));
             }
-            wishes.extend(config.for_schedule(factor));
-            config = with(&wishes)?;
+            // Not in proportion: in a short schedule there is no time for as many Gaussians. The logarithm is halved until
+            // the factor is known to a thousandth.
+            let [mut below, mut above] = [SHORTEST, LONGEST];
+            while above / below > 1.001 {
+                let middle = (below * above).sqrt();
+                *if minutes_of(middle)? < minutes { &mut below } else { &mut above } = middle;
+            }
+            config = scaled(below)?;
         }
         if !quiet && let Some(camera) = camera {
             let Config { train, .. } = &config;

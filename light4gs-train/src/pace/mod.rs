@@ -27,13 +27,14 @@ const RATE_INTERVAL: usize = 3;
 const RATE_ROUNDS: usize = 4;
 /// Training views that are looked at, spread over all of them: their images are decoded once.
 const VIEWS: usize = 12;
-/// The share of the time between the first and the last cloning after which the most Gaussians are reached, as measured
-/// on `hypernerf_mini` (iteration 1200 of 200 to 3600).
-const GROWN: f64 = 0.3;
-/// Under a squared loss gradients are small, so that few Gaussians are cloned: this share of all that are added, as measured on
-/// *dancer*, *flag*, *bouncing* and *lego* (0.4 to 0.8 in iteration 4000). The others come once it ends, in this share of the time of cloning.
-const ADDED_UNDER_SQUARES: f64 = 0.6;
-const GROWN_AFTER_SQUARES: f64 = 0.06;
+/// Rounds of cloning after which the most Gaussians are reached, as measured on `hypernerf_mini` (iteration 1200, rounds from 200
+/// on, one in 100 iterations).
+const ROUNDS: f64 = 10.0;
+/// Under a squared loss gradients are small, so that few Gaussians are cloned. Of all that are added, a round adds this share,
+/// as measured on *dancer*, *flag*, *bouncing* and *lego* (0.4 to 0.8 in 38 rounds).
+const ADDED_UNDER_SQUARES: f64 = 0.016;
+/// The same once the squared loss has ended.
+const ADDED_AFTER_SQUARES: f64 = 0.2;
 
 /// Seconds of the iterations of a run.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,18 +122,15 @@ impl Pace {
         let end = train.fine_iterations;
         let [from, until] = [adaptive.from, adaptive.until].map(|iteration| iteration.min(end) as f64);
         let squared = (train.losses.photometric.l2_until as f64).min(until);
+        let interval = adaptive.interval.max(1) as f64;
         // The share of the Gaussians to be added that an iteration has.
         let reached = |iteration: f64| {
-            let share = |since: f64, time: f64| (iteration - since) / time.max(1.0);
+            let rounds = |since: f64, until: f64| ((iteration.min(until) - since) / interval).max(0.0);
             let reached = match squared > from {
-                false => share(from, GROWN * (until - from)),
-                true if iteration < squared => ADDED_UNDER_SQUARES * share(from, squared - from),
-                true => {
-                    let time = GROWN_AFTER_SQUARES * (until - from);
-                    ADDED_UNDER_SQUARES + (1.0 - ADDED_UNDER_SQUARES) * share(squared, time)
-                }
+                false => rounds(from, until) / ROUNDS,
+                true => rounds(from, squared) * ADDED_UNDER_SQUARES + rounds(squared, until) * ADDED_AFTER_SQUARES,
             };
-            reached.clamp(0.0, 1.0)
+            reached.min(1.0)
         };
         let prunings: Vec<f64> = match train.prune.fraction > 0.0 {
             true => train.prune.iterations.iter().map(|&iteration| iteration as f64).collect(),
@@ -211,6 +209,7 @@ fn median(mut times: Vec<f64>) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::density::AdaptiveDensityConfig;
 
     #[test]
     fn corrections_of_expected_bits_are_not_in_the_rate() {
@@ -242,13 +241,14 @@ mod tests {
             let overrides: Vec<String> = common.iter().chain(overrides).map(|key| (*key).to_owned()).collect();
             let config = Config::load("dnerf-cpu+nodes", &overrides).unwrap();
             let adaptive = &config.train.densify.strategies.adaptive;
-            assert_eq!((adaptive.from, adaptive.until, config.train.fine_iterations), (200, 5000, 12_000));
+            let AdaptiveDensityConfig { from, until, interval, .. } = *adaptive;
+            assert_eq!((from, until, interval, config.train.fine_iterations), (200, 5000, 100, 12_000));
             let pace = Pace { coarse: 0.0, first, full: vec![full; sizes(&config).len()], rate: 0.0 };
             pace.training_seconds(&config)
         };
         // A second for a thousand Gaussians: 1000 of them, then as many as there are in the mean while they are added, then all.
-        let at_once = 200.0 + 1440.0 * 5.5 + 10_360.0 * 10.0;
-        let late = 200.0 + 3800.0 * 3.7 + 288.0 * 8.2 + 7712.0 * 10.0;
+        let at_once = 200.0 + 1000.0 * 5.5 + 10_800.0 * 10.0;
+        let late = 200.0 + 3800.0 * 3.736 + 196.0 * 8.236 + 7804.0 * 10.0;
         for (until, expected) in [(0, at_once), (4000, late)] {
             let found = seconds(&[&format!("train.photometric.l2_until={until}")]);
             assert!((found / expected - 1.0).abs() < 1e-3, "until {until}: {found}, expected {expected}");
