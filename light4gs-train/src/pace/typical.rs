@@ -21,8 +21,8 @@ const COUNTED: usize = 4;
 /// No Gaussian is nearer to a camera than this share of the scene's extent: one beside a camera would have no size at all.
 const NEAREST: f32 = 1e-3;
 
-/// The density of a timed moment: after the coarse stage, and after the first iteration with each size of the images,
-/// there are as many Gaussians as the run may have for it, as small as they would be, and half opaque.
+/// The density of a timed moment: after the first iteration the Gaussians are as small as trained ones, and half opaque. After
+/// the first one with each size of the images there are as many as the run may have for it, and smaller.
 pub(super) struct TypicalGaussians {
     cameras: Vec<Eye>,
     /// Pixels of a whole image that show something, in the mean.
@@ -99,7 +99,10 @@ impl DensityStrategy for TypicalGaussians {
     fn after_step(&mut self, gaussians: &mut GaussianEditor, position: &TrainingPosition) {
         let TrainingPosition { stage, iteration, image_factor, .. } = *position;
         if stage == Stage::Coarse {
-            return self.shape(gaussians);
+            if iteration == 1 {
+                self.shape(gaussians);
+            }
+            return;
         }
         let before = gaussians.len();
         if iteration <= self.interval || iteration > self.until || iteration % self.interval != 1 || before == 0 {
