@@ -87,12 +87,16 @@ impl Wishes {
                      between them, or another --pixels"
                 )));
             }
-            // Not in proportion: in a short schedule there is no time for as many Gaussians. The logarithm is halved until
-            // the factor is known to a thousandth.
+            // Not in proportion: in a short schedule there is no time for as many Gaussians. So it is
+            // bisected, in the logarithm, until the factor is known to a thousandth.
             let [mut below, mut above] = [SHORTEST, LONGEST];
             while above / below > 1.001 {
                 let middle = (below * above).sqrt();
-                *if minutes_of(middle)? < minutes { &mut below } else { &mut above } = middle;
+                if minutes_of(middle)? < minutes {
+                    below = middle;
+                } else {
+                    above = middle;
+                }
             }
             config = scaled(below)?;
         }

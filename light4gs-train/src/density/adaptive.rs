@@ -69,7 +69,7 @@ impl DensityConfig for AdaptiveDensityConfig {
         self.until
     }
 
-    fn most(&self) -> Option<usize> {
+    fn max_gaussians(&self) -> Option<usize> {
         Some(self.max_gaussians)
     }
 

@@ -76,7 +76,7 @@ pub trait DensityConfig {
 
     /// The most Gaussians that there may be with whole images, for the estimate of a training's time; `None` if they stay those of the
     /// cloud, or nobody knows.
-    fn most(&self) -> Option<usize> {
+    fn max_gaussians(&self) -> Option<usize> {
         None
     }
 

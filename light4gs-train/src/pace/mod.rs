@@ -5,7 +5,7 @@
 //! and with the rate. They get the sizes that trained Gaussians have, on which the time depends more than on anything
 //! else. Nothing of it is kept.
 
-mod typical;
+mod typical_gaussians;
 
 use std::time::Instant;
 
@@ -15,7 +15,7 @@ use crate::config::{Config, FieldKind};
 use crate::error::TrainError;
 use crate::stage::Stage;
 use crate::trainer::Trainer;
-use typical::TypicalGaussians;
+use typical_gaussians::TypicalGaussians;
 
 /// Iterations of the coarse stage that are measured.
 const COARSE: usize = 6;
@@ -23,6 +23,8 @@ const COARSE: usize = 6;
 const PLAIN: usize = 9;
 /// Every so many of the last iterations have the rate, however seldom it is due in the run.
 const RATE_INTERVAL: usize = 3;
+// So that the last of every `RATE_INTERVAL` iterations after the plain ones has it.
+const _: () = assert!(PLAIN % RATE_INTERVAL == 0);
 /// So many of them are measured.
 const RATE_ROUNDS: usize = 4;
 /// Training views that are looked at, spread over all of them: their images are decoded once.

@@ -48,15 +48,15 @@ impl TypicalGaussians {
     /// Of a run's scene, in a moment that has `interval` iterations with each size of the images and adds no Gaussians
     /// after iteration `until`.
     pub(super) fn new(config: &Config, data: &Scene, interval: usize, until: usize) -> Result<Self, TrainError> {
-        let most = config.train.densify.chosen().most().unwrap_or(0);
+        let most = config.train.densify.chosen().max_gaussians().unwrap_or(0);
         let eye = |Frame { camera, .. }: &Frame| Eye { center: camera.center(), focal: (camera.fx + camera.fy) / 2.0 };
         let cameras = data.train.iter().map(eye).collect();
         Ok(Self { cameras, seen: seen(config, data)?, most, interval, until, nearest: NEAREST * data.extent })
     }
 
-    /// Standard deviations of so many Gaussians at these places, world units.
-    fn scales(&self, places: &[Vec3], count: usize) -> Vec<f32> {
-        let pixels = (DEPTH * self.seen / (std::f64::consts::PI * count as f64)).sqrt() as f32;
+    /// Standard deviations of Gaussians at these places, world units.
+    fn scales(&self, places: &[Vec3]) -> Vec<f32> {
+        let pixels = (DEPTH * self.seen / (std::f64::consts::PI * places.len() as f64)).sqrt() as f32;
         let scale = |place: &Vec3| {
             let magnification = |eye: &Eye| eye.focal / eye.center.distance(*place).max(self.nearest);
             pixels * self.cameras.len() as f32 / self.cameras.iter().map(magnification).sum::<f32>()
@@ -65,12 +65,11 @@ impl TypicalGaussians {
     }
 
     fn shape(&self, gaussians: &mut GaussianEditor) {
-        let count = gaussians.len();
         gaussians.update(|tensors| {
             let device = tensors.means.device();
             let places: Vec<f32> = tensors.means.to_data().iter().collect();
             let places: Vec<Vec3> = places.as_chunks().0.iter().copied().map(Vec3::from_array).collect();
-            let scales = TensorData::new(self.scales(&places, count), [count, 1]);
+            let scales = TensorData::new(self.scales(&places), [places.len(), 1]);
             let log_scales = Tensor::<2>::from_data(scales, &device).log().repeat_dim(1, 3);
             let opacity_logits = tensors.opacity_logits.zeros_like();
             GaussianTensors { log_scales, opacity_logits, ..tensors }
@@ -131,7 +130,11 @@ impl DensityStrategy for TypicalGaussians {
 
 #[cfg(test)]
 mod tests {
+    use light4gs_data::PointCloud;
+    use light4gs_model::GaussiansConfig;
+
     use super::*;
+    use crate::optimization::adam::Adam;
 
     fn typical(eyes: &[(Vec3, f32)], seen: f64) -> TypicalGaussians {
         let cameras = eyes.iter().map(|&(center, focal)| Eye { center, focal }).collect();
@@ -149,14 +152,41 @@ mod tests {
                 let pixels = f64::from(scale * 150.0 / place.distance(Vec3::new(0.0, 0.0, -4.0)));
                 std::f64::consts::PI * pixels * pixels
             };
-            let covered: f64 = places.iter().zip(typical.scales(&places, count)).map(area).sum();
+            let covered: f64 = places.iter().zip(typical.scales(&places)).map(area).sum();
             assert!((covered / (DEPTH * seen) - 1.0).abs() < 1e-3, "{count}: {covered}");
         }
     }
 
+    /// A third of the side needs fewer Gaussians than whole images; there are never fewer than before.
+    #[test]
+    fn there_are_as_many_as_the_images_may_have() {
+        let device = Device::flex().autodiff();
+        let cloud =
+            PointCloud { positions: vec![[0.0; 3], [0.1, 0.2, 0.3], [0.0, 0.5, 0.0]], colors: vec![[0.5; 3]; 3] };
+        let mut gaussians = GaussiansConfig::new().init(&cloud, &device);
+        let mut adam = Adam::default();
+        let mut editor = GaussianEditor::new(&mut gaussians, &mut adam);
+        let mut typical = typical(&[(Vec3::new(0.0, 0.0, -4.0), 150.0)], 5000.0);
+        typical.most = 40;
+        let mut counts = Vec::new();
+        for iteration in 1..=12 {
+            let image_factor = if iteration <= 6 { 3 } else { 1 };
+            let position = TrainingPosition { stage: Stage::Fine, iteration, image_factor, extent: 1.0, seed: 0 };
+            typical.after_step(&mut editor, &position);
+            counts.push(editor.len());
+        }
+        // 40 by 3 to the power of -1.4, after iteration 4; then all, after iteration 7.
+        assert_eq!(counts, [3, 3, 3, 9, 9, 9, 40, 40, 40, 40, 40, 40]);
+        let tensors = gaussians.tensors();
+        let largest = tensors.log_scales.exp().max().into_scalar::<f32>();
+        let pixels = f64::from(largest * 150.0) / 4.5;
+        assert!(pixels < (DEPTH * 5000.0 / std::f64::consts::PI / 40.0).sqrt(), "{pixels}");
+        assert_eq!(tensors.opacity_logits.abs().max().into_scalar::<f32>(), 0.0);
+    }
+
     #[test]
     fn what_is_beside_a_camera_has_a_size() {
-        let scales = typical(&[(Vec3::ZERO, 100.0), (Vec3::X, 100.0)], 100.0).scales(&[Vec3::ZERO, Vec3::X], 2);
+        let scales = typical(&[(Vec3::ZERO, 100.0), (Vec3::X, 100.0)], 100.0).scales(&[Vec3::ZERO, Vec3::X]);
         assert!(scales.iter().all(|scale| scale.is_finite() && *scale > 0.0), "{scales:?}");
     }
 }
