@@ -24,7 +24,7 @@ const PLAIN: usize = 9;
 /// Every so many of the last iterations have the rate, however seldom it is due in the run.
 const RATE_INTERVAL: usize = 3;
 // So that the last of every `RATE_INTERVAL` iterations after the plain ones has it.
-const _: () = assert!(PLAIN % RATE_INTERVAL == 0);
+const _: () = assert!(PLAIN.is_multiple_of(RATE_INTERVAL));
 /// So many of them are measured.
 const RATE_ROUNDS: usize = 4;
 /// Training views that are looked at, spread over all of them: their images are decoded once.
