@@ -6,8 +6,8 @@
 #![no_std]
 
 use include::{
-    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, NODE, NODE_MOTION, NODE_SPLINE, PIXELS, PLANES, POSE,
-    QUATERNION, SPHERICAL_HARMONICS, SPLAT, VIEW,
+    ARITHMETIC, COVARIANCE, DISPATCH, EXPONENTIAL, FOOTPRINT, MIXTURE, NODE, NODE_MOTION, NODE_SPLINE, PIXELS, PLANES,
+    POSE, QUATERNION, SPHERICAL_HARMONICS, SPLAT, VIEW,
 };
 
 /// One kernel: a file of a folder here, with what it includes.
@@ -50,11 +50,19 @@ shaders! {
     /// First half of the query's derivative: the gradients from every point to each of its samples, and the
     /// points' own gradients.
     PLANE_QUERY_BACKWARD = "planes" / "plane_query_backward" [PLANES];
+    /// Rows of a table.
+    GATHER_ROWS = "rate" / "gather_rows" [];
+    /// Derivative of rows of a table: every number of the table adds up its gradients.
+    GATHER_ROWS_BACKWARD = "rate" / "gather_rows_backward" [];
     /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
     INTERSECT = "splatting" / "intersect" [ARITHMETIC, VIEW, SPLAT];
     /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
     /// (Ballé et al. 2018).
     LOWER_BOUND_BACKWARD = "elementwise" / "lower_bound_backward" [];
+    /// Bits of the values of channels under mixtures of logistics.
+    MIXTURE_BITS = "rate" / "mixture_bits" [EXPONENTIAL, MIXTURE];
+    /// Derivative of the bits under mixtures of logistics.
+    MIXTURE_BITS_BACKWARD = "rate" / "mixture_bits_backward" [EXPONENTIAL, MIXTURE];
     /// Control nodes at a time: their poses.
     NODE_POSES = "nodes" / "node_poses" [QUATERNION, NODE_SPLINE, NODE_MOTION];
     /// Derivative of the poses of control nodes.
@@ -87,6 +95,10 @@ shaders! {
     RASTERIZE_BACKWARD = "splatting" / "rasterize_backward" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Every value times one factor that stands on the device.
     SCALE = "elementwise" / "scale" [];
+    /// The logistic function.
+    SIGMOID = "elementwise" / "sigmoid" [EXPONENTIAL];
+    /// Derivative of the logistic function: its slope times the upstream gradient.
+    SIGMOID_BACKWARD = "elementwise" / "sigmoid_backward" [];
     /// The contributions of every splat to one image, without its color: the sums for significance pruning
     /// (paper III-B).
     SIGNIFICANCE = "splatting" / "significance" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
@@ -126,6 +138,8 @@ pub mod include {
         EXPONENTIAL = "include/exponential";
         /// A splat's alpha at four pixels of a column.
         FOOTPRINT = "include/footprint";
+        /// The mixture of logistics of a channel, and the mass of the interval around a value.
+        MIXTURE = "include/mixture";
         /// A node at one time.
         NODE = "include/node";
         /// How a control node is moved and turned at a time.

@@ -27,9 +27,21 @@ struct Turning {
     by_turn: vec4<f32>,
 }
 
+fn row_product(row: vec4<f32>, own: Turning) -> vec2<f32> {
+    let place = fma(row.x, own.mean.x, fma(row.y, own.mean.y, fma(row.z, own.mean.z, row.w)));
+    let vector = fma(row.x, own.vector.x, fma(row.y, own.vector.y, row.z * own.vector.z));
+    return vec2<f32>(place, vector);
+}
+
 // The product of a pose with the derivatives by the blended one. Where one weight is 1, the blended pose is that node's own, and the
-// difference of their products has to be exactly 0: Adam would take a step along any rounding error.
+// difference of their products has to be exactly 0: Adam would take a step along any rounding error. So every product but the first of
+// a sum is in an `fma`: compilers fuse others or not as they like, one way in one kernel and another way in the next.
 fn inner_product(pose: Pose, own: Turning) -> f32 {
-    let of_place = dot(own.by_position, position_in(pose, own.mean));
-    return of_place + dot(own.by_vector, vector_in(pose, own.vector)) + dot(own.by_turn, pose.turn);
+    let x = row_product(pose.row_x, own);
+    let y = row_product(pose.row_y, own);
+    let z = row_product(pose.row_z, own);
+    let of_turn = fma(own.by_turn.x, pose.turn.x, fma(own.by_turn.y, pose.turn.y,
+        fma(own.by_turn.z, pose.turn.z, own.by_turn.w * pose.turn.w)));
+    let of_place = fma(own.by_position.x, x.x, fma(own.by_position.y, y.x, fma(own.by_position.z, z.x, of_turn)));
+    return fma(own.by_vector.x, x.y, fma(own.by_vector.y, y.y, fma(own.by_vector.z, z.y, of_place)));
 }

@@ -2,7 +2,8 @@
 //
 // Each invocation computes one Gaussian. It reads its attributes and vector 2 of its splat (`color.wgsl`), and writes
 // the other three vectors, its radius, and its key in the order of depths. Depths are positive, so their bits have the
-// same order; a Gaussian without cells has the largest key.
+// same order, and less those of the nearest depth they fit into DEPTH_BITS, which is fewer digits to sort: all up to 4e9 times the
+// nearest, beyond which all count as equally far. A Gaussian without cells has the largest key.
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> quats: array<f32>;
@@ -14,11 +15,13 @@
 @group(0) @binding(7) var<storage, read_write> radii: array<i32>;
 @group(0) @binding(8) var<uniform> view: View;
 
+const NO_DEPTH: u32 = (1u << DEPTH_BITS) - 1u;
+
 fn write_nothing(i: u32, radius: i32) {
     splats[4u * i] = vec4<f32>(0.0);
     splats[4u * i + 1u] = vec4<f32>(0.0);
     splats[4u * i + 3u] = vec4<f32>(0.0);
-    depth_keys[i] = 0xffffffffu;
+    depth_keys[i] = NO_DEPTH;
     radii[i] = radius;
 }
 
@@ -117,7 +120,7 @@ fn main(
     splats[4u * i] = vec4<f32>(x, y, position.z, opacity);
     splats[4u * i + 1u] = vec4<f32>(splat.conic, splat.reach);
     splats[4u * i + 3u] = vec4<f32>(splat.variance, radius, f32(count));
-    depth_keys[i] = select(bitcast<u32>(position.z), 0xffffffffu, count == 0u);
+    depth_keys[i] = select(min(bitcast<u32>(position.z) - NEAR_BITS, NO_DEPTH - 1u), NO_DEPTH, count == 0u);
     // Larger radii become 2^31 - 1, the largest integer.
     radii[i] = select(i32(min(radius, 2147483520.0)), 2147483647, radius >= 2147483648.0);
 }

@@ -11,12 +11,12 @@
 mod prediction;
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Distribution, Int, Tensor, TensorData};
+use burn::tensor::{Device, Distribution, Int, Tensor, TensorData, Transaction};
 use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 
-use crate::entropy::gaussian_conditional::{LIKELIHOOD_BOUND, bits};
+use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
-use crate::ops::lower_bound::lower_bound;
+use crate::ops::gather_rows::{ChosenRows, gather_rows};
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
 pub use prediction::ChannelPrediction;
@@ -83,10 +83,9 @@ impl AttributeEntropy {
         let size = Tensor::from_floats([size_of(gaussians)], &off_tape(self.size.val()).device());
         replace(&mut self.size, size);
         let gaussians = gaussians.clone().inner();
-        let rows: Vec<i64> = (0..gaussians.means.dims()[0] as i64).collect();
+        let rows: Vec<u32> = (0..gaussians.means.dims()[0] as u32).collect();
         let order = self.coding_order(&gaussians);
-        let near = self.channels(selected(&gaussians, &neighbor_rows(order.as_ref(), &rows)));
-        let own = self.channels(gaussians);
+        let [own, near] = self.own_and_near(gaussians, order.as_ref(), &rows);
         let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
         let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
         replace(&mut self.prediction.weights, off_tape(weights));
@@ -127,7 +126,7 @@ impl AttributeEntropy {
     /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.
     /// Differentiable in the Gaussians, the steps, the predictions and the densities. With `rows`, the densities see only
     /// these rows and their neighbors, positions count as uniform in their box, and the result is an estimate for all.
-    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> Tensor<1> {
+    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<&[u32]>) -> Tensor<1> {
         let (positions, channels) = self.bits_of_parts(gaussians, rows);
         positions + channels.sum()
     }
@@ -147,35 +146,48 @@ impl AttributeEntropy {
     }
 
     /// Bits of the positions, `[1]`, and of each number with a density, `[C]`.
-    fn bits_of_parts(&self, gaussians: GaussianTensors, rows: Option<&[i64]>) -> (Tensor<1>, Tensor<1>) {
+    fn bits_of_parts(&self, gaussians: GaussianTensors, rows: Option<&[u32]>) -> (Tensor<1>, Tensor<1>) {
         let count = gaussians.means.dims()[0];
         let order = self.coding_order(&gaussians);
         let coded = order.as_ref().filter(|_| rows.is_none()).map(CodingOrder::position_bits);
         let positions = self.position_bits(gaussians.means.clone(), coded);
-        let all: Vec<i64>;
-        let (rows, own) = match rows {
-            Some(rows) => (rows, selected(&gaussians, rows)),
+        let all: Vec<u32>;
+        let rows = match rows {
+            Some(rows) => rows,
             None => {
-                all = (0..count as i64).collect();
-                (all.as_slice(), gaussians.clone())
+                all = (0..count as u32).collect();
+                &all
             }
         };
         let share = count as f64 / rows.len().max(1) as f64;
-        let near = self.channels(selected(&gaussians, &neighbor_rows(order.as_ref(), rows)));
-        let residuals = self.prediction.residuals(self.channels(own), near);
+        let [own, near] = self.own_and_near(gaussians, order.as_ref(), rows);
+        let residuals = self.prediction.residuals(own, near);
         let widths = self.by_channel(self.log_steps.val().exp());
-        let likelihood = self.mixture.interval_likelihood(residuals, widths);
-        let bits = bits(lower_bound(likelihood, LIKELIHOOD_BOUND)).sum_dim(1);
-        let corrections = self.by_channel(untracked(self.corrections.val()));
-        (positions, (bits * corrections).squeeze_dim::<1>(1) * share)
+        let bits = self.mixture.interval_bits(residuals, widths, LIKELIHOOD_BOUND);
+        let corrections = self.by_channel(untracked(self.corrections.val())).squeeze_dim::<1>(1);
+        (positions, bits * corrections * share)
+    }
+
+    /// All numbers with a density of some rows, `[C, M]`, and of their neighbors, `[C, M · NEIGHBORS]`.
+    fn own_and_near(&self, gaussians: GaussianTensors, order: Option<&CodingOrder>, rows: &[u32]) -> [Tensor<2>; 2] {
+        let count = gaussians.means.dims()[0];
+        let near = neighbor_rows(order, rows);
+        let numbers = gather_rows(self.numbers(gaussians), ChosenRows::new([rows, &near].concat(), count));
+        [(0, rows.len()), (rows.len(), near.len())].map(|(first, count)| numbers.clone().narrow(0, first, count).transpose())
     }
 
     /// The order in which the codec would code the Gaussians; `None` where positions are not finite: the trainer stops
     /// for them, after this.
     fn coding_order(&self, gaussians: &GaussianTensors) -> Option<CodingOrder> {
-        let place = self.place(&MEANS.name);
-        let step = place.map_or(0.0, |place| self.step_values()[place] * self.size.val().into_scalar::<f32>());
-        let means: Vec<f32> = off_tape(gaussians.means.clone()).into_data().iter().collect();
+        // Together, since a GPU waits for each.
+        let read = Transaction::default()
+            .register(off_tape(gaussians.means.clone()))
+            .register(off_tape(self.log_steps.val()))
+            .register(off_tape(self.size.val()))
+            .execute();
+        let numbers = |data: &TensorData| data.iter::<f32>().collect::<Vec<_>>();
+        let [means, log_steps, size] = [&read[0], &read[1], &read[2]].map(numbers);
+        let step = self.place(&MEANS.name).map_or(0.0, |place| log_steps[place].exp() * size[0]);
         CodingOrder::new(means.as_chunks().0, step).ok()
     }
 
@@ -255,8 +267,8 @@ impl AttributeEntropy {
         numbers.select(0, places).unsqueeze_dim(1)
     }
 
-    /// All numbers with a density, `[C, N]`.
-    fn channels(&self, gaussians: GaussianTensors) -> Tensor<2> {
+    /// All numbers with a density, `[N, C]`.
+    fn numbers(&self, gaussians: GaussianTensors) -> Tensor<2> {
         struct Collect<'a>(&'a AttributeEntropy, Vec<Option<Tensor<2>>>);
         impl AttributeMapper for Collect<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
@@ -269,7 +281,7 @@ impl AttributeEntropy {
         }
         let mut found = Collect(self, vec![None; self.attributes.len()]);
         let _ = gaussians.map(&mut found);
-        Tensor::cat(found.1.into_iter().flatten().collect(), 1).transpose()
+        Tensor::cat(found.1.into_iter().flatten().collect(), 1)
     }
 }
 
@@ -304,18 +316,4 @@ fn replace<const D: usize>(parameter: &mut Param<Tensor<D>>, value: Tensor<D>) {
 /// The same values on the tape's back end of another tensor, as constants.
 fn on_tape_of<const D: usize, const E: usize>(other: &Tensor<E>, values: Tensor<D>) -> Tensor<D> {
     if other.device().is_autodiff() { Tensor::from_inner(values) } else { values }
-}
-
-/// Rows of all attributes.
-fn selected(gaussians: &GaussianTensors, rows: &[i64]) -> GaussianTensors {
-    let data = TensorData::new(rows.to_vec(), [rows.len()]);
-    gaussians.clone().map(&mut Rows(Tensor::from_data(data, &gaussians.means.device())))
-}
-
-struct Rows(Tensor<1, Int>);
-
-impl AttributeMapper for Rows {
-    fn map<const D: usize>(&mut self, _: &Attribute, values: Tensor<D>) -> Tensor<D> {
-        values.select(0, self.0.clone())
-    }
 }

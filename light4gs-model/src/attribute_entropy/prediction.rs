@@ -98,9 +98,9 @@ impl ChannelPrediction {
 }
 
 /// The rows of the neighbors of each of some Gaussians, [`NEIGHBORS`] each. Without an order each is its own neighbor.
-pub(super) fn neighbor_rows(order: Option<&CodingOrder>, rows: &[i64]) -> Vec<i64> {
+pub(super) fn neighbor_rows(order: Option<&CodingOrder>, rows: &[u32]) -> Vec<u32> {
     match order {
-        Some(order) => rows.iter().flat_map(|&row| order.neighbors(row as usize)).map(i64::from).collect(),
+        Some(order) => rows.iter().flat_map(|&row| order.neighbors(row as usize)).collect(),
         None => rows.iter().flat_map(|&row| [row; NEIGHBORS]).collect(),
     }
 }

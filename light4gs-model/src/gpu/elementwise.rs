@@ -1,8 +1,8 @@
-//! Elementwise kernels: the distribution function and the lower bound of the entropy models.
+//! Elementwise kernels: the distribution function and the lower bound of the entropy models, the logistic function.
 
 use burn::backend::TensorMetadata;
 use burn_wgpu::CubeTensor;
-use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, Shader};
+use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, SIGMOID, SIGMOID_BACKWARD, Shader};
 
 use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Kernel;
@@ -11,7 +11,7 @@ use crate::gpu_error::GpuError;
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
-    [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD].map(Kernel::new).into()
+    [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD, SIGMOID, SIGMOID_BACKWARD].map(Kernel::new).into()
 }
 
 /// Launches a kernel that reads tensors of one shape and writes another of the same shape. Its uniform is their size,
@@ -47,4 +47,14 @@ pub(crate) fn normal_cdf_backward_on_gpu(places: CubeTensor, upstream: CubeTenso
 /// The upstream gradient where `values >= bound` or the gradient is negative, else zero.
 pub(crate) fn lower_bound_backward_on_gpu(values: CubeTensor, upstream: CubeTensor, bound: f32) -> CubeTensor {
     raised(launch(LOWER_BOUND_BACKWARD, [values, upstream], &[bound]))
+}
+
+/// The logistic function.
+pub(crate) fn sigmoid_on_gpu(places: CubeTensor) -> CubeTensor {
+    raised(launch(SIGMOID, [places], &[]))
+}
+
+/// The upstream gradient times the slope of the logistic function where it has these values.
+pub(crate) fn sigmoid_backward_on_gpu(values: CubeTensor, upstream: CubeTensor) -> CubeTensor {
+    raised(launch(SIGMOID_BACKWARD, [values, upstream], &[]))
 }

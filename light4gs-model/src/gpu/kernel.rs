@@ -92,7 +92,11 @@ fn rendering_constants() -> String {
         ("MIN_TRANSMITTANCE", MIN_TRANSMITTANCE),
     ];
     let numbers = numbers.map(|(name, value)| format!("const {name}: f32 = {:?};\n", f64::from(value)));
-    numbers.concat() + &format!("const TILE: u32 = {TILE}u;\nconst INVALID_RADIUS: i32 = {INVALID_RADIUS};\n")
+    let near = NEAR.to_bits();
+    numbers.concat()
+        + &format!(
+            "const NEAR_BITS: u32 = {near}u;\nconst TILE: u32 = {TILE}u;\nconst INVALID_RADIUS: i32 = {INVALID_RADIUS};\n"
+        )
 }
 
 impl KernelSource for Kernel {

@@ -11,6 +11,7 @@ mod kernel;
 mod launch;
 mod nodes;
 mod planes;
+mod rate;
 mod recording;
 mod significance;
 mod skinning;
@@ -21,7 +22,9 @@ mod team;
 
 pub(crate) use adam::adam_on_gpu;
 pub use counting::{LaunchCounter, LaunchCounts};
-pub(crate) use elementwise::{lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu};
+pub(crate) use elementwise::{
+    lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu, sigmoid_backward_on_gpu, sigmoid_on_gpu,
+};
 pub use kernel::Kernel;
 pub use recording::{RecordedBuffer, RecordedLaunch, record};
 pub(crate) use significance::significance_on_gpu;
@@ -34,6 +37,7 @@ pub fn kernels() -> Vec<Kernel> {
         elementwise::kernels,
         nodes::kernels,
         planes::kernels,
+        rate::kernels,
         significance::kernels,
         skinning::kernels,
         sort::kernels,

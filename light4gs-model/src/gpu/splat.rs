@@ -20,6 +20,8 @@ use super::team::{CHUNK, Team};
 use crate::gpu_error::GpuError;
 use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
 
+/// Bits of a key in the order of depths: four digits of the sort.
+const DEPTH_BITS: u32 = 28;
 /// Values of an intersection's sums.
 const SUMS: usize = 10;
 
@@ -117,7 +119,7 @@ pub struct GpuSplatSaved {
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
-    let cells = Team::cells().into_iter().flat_map(|cell| [PROJECT, INTERSECT].map(|shader| by_cells(shader, cell)));
+    let cells = Team::cells().into_iter().flat_map(|cell| [projecting(cell), by_cells(INTERSECT, cell)]);
     let teams =
         Team::all().flat_map(|team| [RASTERIZE, RASTERIZE_BACKWARD].map(|shader| Kernel::new(shader).blending(team)));
     cells.chain(teams).chain([COLOR, CELL_COUNTS, PROJECT_BACKWARD].map(Kernel::new)).collect()
@@ -126,6 +128,10 @@ pub(super) fn kernels() -> Vec<Kernel> {
 /// A kernel of Gaussians that counts or lists cells.
 fn by_cells(shader: Shader, cell: u32) -> Kernel {
     Kernel::new(shader).constant("CELL", cell)
+}
+
+fn projecting(cell: u32) -> Kernel {
+    by_cells(PROJECT, cell).constant("DEPTH_BITS", DEPTH_BITS)
 }
 
 fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3], GpuError> {
@@ -141,7 +147,7 @@ fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3
         .writes(&splats)
         .uniform(&uniform)
         .invocations(count)?;
-    Launch::new(&gpu.client, by_cells(PROJECT, frame.team.cell))
+    Launch::new(&gpu.client, projecting(frame.team.cell))
         .reads(&inputs.means)
         .reads(&inputs.quats)
         .reads(&inputs.scales)
@@ -157,7 +163,7 @@ fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3
 
 fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> Result<Intersections, GpuError> {
     let gaussian_count = frame.gaussians;
-    let by_depth = sort(gpu, depth_keys, gaussian_count, 32)?.order;
+    let by_depth = sort(gpu, depth_keys, gaussian_count, DEPTH_BITS)?.order;
     let first_places = gpu.allocate("places of intersections", gaussian_count)?;
     Launch::new(&gpu.client, CELL_COUNTS)
         .reads(&by_depth)

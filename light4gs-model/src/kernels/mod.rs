@@ -2,6 +2,8 @@
 //! `cpu/`, `gpu/`.
 
 pub(crate) mod adam;
+pub(crate) mod gather_rows;
+pub(crate) mod mixture_bits;
 pub(crate) mod node_poses;
 pub(crate) mod node_regularizer;
 pub(crate) mod plane_query;

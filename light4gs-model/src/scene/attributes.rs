@@ -19,12 +19,12 @@
 use std::borrow::Cow;
 
 use burn::tensor::Tensor;
-use burn::tensor::activation::sigmoid;
 use light4gs_codec::legal_attribute_name;
 use light4gs_codec::rendering::MAX_LOGARITHM;
 use light4gs_data::PointCloud;
 
 use super::gaussians::GaussiansConfig;
+use crate::ops::sigmoid::sigmoid;
 
 /// One attribute of every Gaussian.
 #[derive(Clone, Debug)]

@@ -142,14 +142,15 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let plane_bits = plane_bits.unwrap_or_else(|| Tensor::zeros([1], &sh_rest.device()));
 
         let [count, coefficients, colors] = sh_rest.dims();
-        let mut rows = |count: usize| -> Vec<i64> {
-            sample(generator, count, fraction).into_iter().map(|row| row as i64).collect()
+        let mut rows = |count: usize| -> Vec<u32> {
+            sample(generator, count, fraction).into_iter().map(|row| row as u32).collect()
         };
         let sh = self.sh.as_ref().filter(|_| with_gaussians && count > 0).map(|sh| {
             let rows = rows(count);
             let share = count as f64 / rows.len() as f64;
-            let data = TensorData::new(rows.clone(), [rows.len()]);
-            let rows = Tensor::<1, Int>::from_data(data, &sh_rest.device());
+            let count = rows.len();
+            let rows: Vec<i64> = rows.into_iter().map(i64::from).collect();
+            let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [count]), &sh_rest.device());
             let known = match sh.tables() {
                 // Models with tables need none of these, and what is not computed does not stay on the tape.
                 Some(_) => ShKnown::nothing(&rows.device()),

@@ -221,6 +221,10 @@ fn overrides_come_last() {
     assert_eq!(config.device, DeviceName::Flex);
     assert_eq!(config.data.resolution, None);
     assert_eq!(config.eval.splits, [EvalSplit::Val]);
+    for device in ["ndarray", "wgpu", "wgpu:0", "wgpu:discrete", "wgpu:cpu"] {
+        let config = Config::load("dnerf-cpu", &[format!("device={device}")]).expect("a configuration");
+        assert_eq!(config.device.to_string(), device);
+    }
     for (bad, part) in [
         ("train.fine_iteration=200", "the nearest known key is `train.fine_iterations`"),
         ("train.fine_iterations", "expected key=value"),

@@ -1,9 +1,9 @@
 //! The edits of adaptive density control (3DGS, Kerbl et al. 2023, section 5.2): clone small Gaussians and split large
 //! ones where the screen-space gradient is large, remove transparent ones, reset opacities.
 
-use burn::tensor::activation::sigmoid;
 use burn::tensor::{Tensor, TensorData, s};
 use light4gs_model::attributes::OPACITY_LOGITS;
+use light4gs_model::ops::sigmoid::sigmoid;
 use light4gs_model::{GaussianTensors, Gaussians};
 
 use super::GaussianEditor;

@@ -139,7 +139,7 @@ fn rows_stand_for_all() {
     let gaussians = gaussians(&device);
     let model = model(&device, &gaussians.tensors());
     let all: f64 = model.bits(gaussians.tensors(), None).into_scalar();
-    let rows: Vec<i64> = (0..COUNT as i64).step_by(4).collect();
+    let rows: Vec<u32> = (0..COUNT as u32).step_by(4).collect();
     let some: f64 = model.bits(gaussians.tensors(), Some(&rows)).into_scalar();
     assert!((some / all - 1.0).abs() < 0.02, "{some} from a quarter, {all} from all");
 }

@@ -19,7 +19,7 @@ pub(super) fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {
     let quoted = || toml::Value::String(value.to_owned()).to_string();
     let layer = toml::from_str::<Table>(&format!("{key} = {value}"))
         .or_else(|error| {
-            let word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_./".contains(c));
+            let word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_./:".contains(c));
             if word { toml::from_str(&format!("{key} = {}", quoted())) } else { Err(error) }
         })
         .map_err(|error| wrong(format!("not valid TOML: {}", error.message())))?;

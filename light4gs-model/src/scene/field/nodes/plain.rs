@@ -1,12 +1,12 @@
 //! Gaussians, nodes and poses as plain numbers, for what is done now and then while training and takes more decisions than
 //! arithmetic.
 
-use burn::tensor::activation::sigmoid;
 
 use super::placement::square;
 use super::{AFFINITY, NodesField, STILLNESS, numbers};
 use crate::kernels::skinning::{PLACE, POSED};
 use crate::ops::node_poses::pose;
+use crate::ops::sigmoid::sigmoid;
 use crate::scene::field::SceneAtRest;
 
 /// Smallest weight with which a node counts.
