@@ -1,10 +1,10 @@
-// Rows of a table [N, C], in any order.
+// Rows of a table [N, C], in any order, each as a column of the result [C, M].
 //
 // One invocation owns one number of the result.
 
 struct Parameters {
-    // Rows of the result.
-    rows: u32,
+    // M, C
+    chosen: u32,
     columns: u32,
 }
 
@@ -20,8 +20,8 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let i = flat_group(group, groups) * WORKGROUP + lane;
-    if (i >= parameters.rows * parameters.columns) {
+    if (i >= parameters.chosen * parameters.columns) {
         return;
     }
-    gathered[i] = table[rows[i / parameters.columns] * parameters.columns + i % parameters.columns];
+    gathered[i] = table[rows[i % parameters.chosen] * parameters.columns + i / parameters.chosen];
 }

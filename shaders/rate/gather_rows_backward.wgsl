@@ -4,9 +4,10 @@
 // their order.
 
 struct Parameters {
-    // Rows of the table.
+    // N, C, M
     rows: u32,
     columns: u32,
+    chosen: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
@@ -28,7 +29,7 @@ fn main(
     let row = i / parameters.columns;
     var sum = 0.0;
     for (var k = starts[row]; k < starts[row + 1u]; k++) {
-        sum += upstream[places[k] * parameters.columns + i % parameters.columns];
+        sum += upstream[i % parameters.columns * parameters.chosen + places[k]];
     }
     sums[i] = sum;
 }

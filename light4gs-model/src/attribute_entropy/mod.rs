@@ -172,8 +172,8 @@ impl AttributeEntropy {
     fn own_and_near(&self, gaussians: GaussianTensors, order: Option<&CodingOrder>, rows: &[u32]) -> [Tensor<2>; 2] {
         let count = gaussians.means.dims()[0];
         let near = neighbor_rows(order, rows);
-        let numbers = gather_rows(self.numbers(gaussians), ChosenRows::new([rows, &near].concat(), count));
-        [(0, rows.len()), (rows.len(), near.len())].map(|(first, count)| numbers.clone().narrow(0, first, count).transpose())
+        let channels = self.channels(gaussians, &ChosenRows::new([rows, &near].concat(), count));
+        [(0, rows.len()), (rows.len(), near.len())].map(|(first, count)| channels.clone().narrow(1, first, count))
     }
 
     /// The order in which the codec would code the Gaussians; `None` where positions are not finite: the trainer stops
@@ -267,21 +267,21 @@ impl AttributeEntropy {
         numbers.select(0, places).unsqueeze_dim(1)
     }
 
-    /// All numbers with a density, `[N, C]`.
-    fn numbers(&self, gaussians: GaussianTensors) -> Tensor<2> {
-        struct Collect<'a>(&'a AttributeEntropy, Vec<Option<Tensor<2>>>);
+    /// All numbers with a density of these rows, `[C, M]`.
+    fn channels(&self, gaussians: GaussianTensors, rows: &ChosenRows) -> Tensor<2> {
+        struct Collect<'a>(&'a AttributeEntropy, &'a ChosenRows, Vec<Option<Tensor<2>>>);
         impl AttributeMapper for Collect<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
                 if let Some(place) = self.0.place(&attribute.name).filter(|_| has_density(&attribute.name)) {
                     let shape = [values.dims()[0], self.0.attributes[place].width];
-                    self.1[place] = Some(values.clone().reshape(shape));
+                    self.2[place] = Some(gather_rows(values.clone().reshape(shape), self.1.clone()));
                 }
                 values
             }
         }
-        let mut found = Collect(self, vec![None; self.attributes.len()]);
+        let mut found = Collect(self, rows, vec![None; self.attributes.len()]);
         let _ = gaussians.map(&mut found);
-        Tensor::cat(found.1.into_iter().flatten().collect(), 1)
+        Tensor::cat(found.2.into_iter().flatten().collect(), 0)
     }
 }
 

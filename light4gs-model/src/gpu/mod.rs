@@ -26,6 +26,7 @@ pub(crate) use elementwise::{
     lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu, sigmoid_backward_on_gpu, sigmoid_on_gpu,
 };
 pub use kernel::Kernel;
+pub(crate) use rate::UploadedRows;
 pub use recording::{RecordedBuffer, RecordedLaunch, record};
 pub(crate) use significance::significance_on_gpu;
 pub use team::{Communication, Team, with_team};

@@ -25,14 +25,14 @@ pub use crate::kernels::gather_rows::{ChosenRows, GatherRowsKernels};
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait GatherRowsOps: Backend {
-    /// `[M, C]`; see [`gather_rows`].
+    /// `[C, M]`; see [`gather_rows`].
     fn gather_rows(table: FloatTensor<Self>, rows: ChosenRows) -> FloatTensor<Self>;
 }
 
 for_all_back_ends! {
     GatherRowsOps with GatherRowsKernels {
         fn gather_rows(table: FloatTensor<Self>, rows: ChosenRows) -> FloatTensor<Self> {
-            Self::gather_rows_forward(table, rows).0
+            Self::gather_rows_forward(table, &rows)
         }
     }
 }
@@ -43,70 +43,71 @@ impl<B: GatherRowsOps + GatherRowsKernels, C: CheckpointStrategy> GatherRowsOps 
         struct GatherRows;
 
         impl<B: GatherRowsKernels> Backward<B, 1> for GatherRows {
-            type State = B::Chosen;
+            type State = ChosenRows;
 
             fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |chosen, gradient| [B::gather_rows_backward(chosen, gradient)]);
+                differentiate::<B, _, _>(ops, grads, |rows, gradient| [B::gather_rows_backward(&rows, gradient)]);
             }
         }
 
         let node = table.node();
-        let (gathered, chosen) = B::gather_rows_forward(table.into_primitive(), rows);
+        let gathered = B::gather_rows_forward(table.into_primitive(), &rows);
         match GatherRows.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(chosen, gathered),
+            OpsKind::Tracked(prep) => prep.finish(rows, gathered),
             OpsKind::UnTracked(prep) => prep.finish(gathered),
         }
     }
 }
 
-fn forward_on_cpu<B: HostBackend>(table: FloatTensor<B>, rows: ChosenRows) -> (FloatTensor<B>, ChosenRows) {
+fn forward_on_cpu<B: HostBackend>(table: FloatTensor<B>, rows: &ChosenRows) -> FloatTensor<B> {
     let columns = table.shape()[1];
     let table = B::to_host(table);
-    let row = |row: &u32| &table.as_slice()[*row as usize * columns..(*row as usize + 1) * columns];
-    let gathered = rows.rows.iter().flat_map(row).copied().collect();
-    (B::from_values(gathered, [rows.len(), columns]), rows)
+    let values = table.as_slice();
+    let rows = &rows.0.rows;
+    let mut gathered = Vec::with_capacity(rows.len() * columns);
+    for column in 0..columns {
+        gathered.extend(rows.iter().map(|row| values[*row as usize * columns + column]));
+    }
+    B::from_values(gathered, [columns, rows.len()])
 }
 
-fn backward_on_cpu<B: HostBackend>(rows: ChosenRows, gradient: FloatTensor<B>) -> FloatTensor<B> {
-    let columns = gradient.shape()[1];
+fn backward_on_cpu<B: HostBackend>(rows: &ChosenRows, gradient: FloatTensor<B>) -> FloatTensor<B> {
+    let columns = gradient.shape()[0];
     let gradient = B::to_host(gradient);
-    let mut sums = vec![0.0; rows.count * columns];
-    for (place, row) in rows.rows.iter().map(|row| *row as usize).enumerate() {
-        let upstream = &gradient.as_slice()[place * columns..(place + 1) * columns];
-        sums[row * columns..(row + 1) * columns].iter_mut().zip(upstream).for_each(|(sum, value)| *sum += value);
+    let (rows, count) = (&rows.0.rows, rows.0.count);
+    let mut sums = vec![0.0; count * columns];
+    for (column, upstream) in gradient.as_slice().chunks_exact(rows.len().max(1)).enumerate() {
+        for (row, value) in rows.iter().zip(upstream) {
+            sums[*row as usize * columns + column] += value;
+        }
     }
-    B::from_values(sums, [rows.count, columns])
+    B::from_values(sums, [count, columns])
 }
 
 for_cpu_back_ends! {
     GatherRowsKernels {
-        type Chosen = ChosenRows;
-
-        fn gather_rows_forward(table: FloatTensor<Self>, rows: ChosenRows) -> (FloatTensor<Self>, ChosenRows) {
+        fn gather_rows_forward(table: FloatTensor<Self>, rows: &ChosenRows) -> FloatTensor<Self> {
             forward_on_cpu::<Self>(table, rows)
         }
 
-        fn gather_rows_backward(chosen: ChosenRows, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-            backward_on_cpu::<Self>(chosen, gradient)
+        fn gather_rows_backward(rows: &ChosenRows, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
+            backward_on_cpu::<Self>(rows, gradient)
         }
     }
 }
 
 #[cfg(feature = "wgpu")]
 impl<B: FusionBackend + GatherRowsKernels> GatherRowsKernels for Fusion<B> {
-    type Chosen = B::Chosen;
-
-    fn gather_rows_forward(table: FloatTensor<Self>, rows: ChosenRows) -> (FloatTensor<Self>, B::Chosen) {
-        let (gathered, chosen) = B::gather_rows_forward(resolve::<B>(table), rows);
-        (leaf::<B>(gathered), chosen)
+    fn gather_rows_forward(table: FloatTensor<Self>, rows: &ChosenRows) -> FloatTensor<Self> {
+        leaf::<B>(B::gather_rows_forward(resolve::<B>(table), rows))
     }
 
-    fn gather_rows_backward(chosen: B::Chosen, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-        leaf::<B>(B::gather_rows_backward(chosen, resolve::<B>(gradient)))
+    fn gather_rows_backward(rows: &ChosenRows, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
+        leaf::<B>(B::gather_rows_backward(rows, resolve::<B>(gradient)))
     }
 }
 
-/// Rows `[M, C]` of a table `[N, C]`.
+/// Rows of a table `[N, C]`, each as a column of the result `[C, M]`.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
@@ -114,16 +115,16 @@ impl<B: FusionBackend + GatherRowsKernels> GatherRowsKernels for Fusion<B> {
 ///
 /// let device = Device::flex().autodiff();
 /// let table = Tensor::<2>::from_floats([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], &device).require_grad();
-/// let rows = gather_rows(table.clone(), ChosenRows::new(vec![2, 0, 2], 3));
-/// assert_eq!(rows.clone().into_data().to_vec::<f32>().unwrap(), [5.0, 6.0, 1.0, 2.0, 5.0, 6.0]);
+/// let columns = gather_rows(table.clone(), ChosenRows::new(vec![2, 0, 2], 3));
+/// assert_eq!(columns.clone().into_data().to_vec::<f32>().unwrap(), [5.0, 1.0, 5.0, 6.0, 2.0, 6.0]);
 /// // The last row counts twice, that in the middle not at all.
-/// let gradient = table.grad(&rows.sum().backward()).unwrap();
+/// let gradient = table.grad(&columns.sum().backward()).unwrap();
 /// assert_eq!(gradient.into_data().to_vec::<f32>().unwrap(), [1.0, 1.0, 0.0, 0.0, 2.0, 2.0]);
 /// ```
 ///
 /// # Panics
 /// If the rows are of a table with another number of rows.
 pub fn gather_rows(table: Tensor<2>, rows: ChosenRows) -> Tensor<2> {
-    assert_eq!(table.dims()[0], rows.count, "the rows were chosen for another table");
+    assert_eq!(table.dims()[0], rows.0.count, "the rows were chosen for another table");
     Tensor::from_dispatch(Dispatch::gather_rows(table.into_dispatch(), rows))
 }

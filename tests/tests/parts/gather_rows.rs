@@ -5,7 +5,7 @@ use light4gs_model::ops::gather_rows::{ChosenRows, gather_rows};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
 
-/// Rows of a table, and the gradient of the table for a weighted sum of them.
+/// Rows of a table as columns, and the gradient of the table for a weighted sum of them.
 fn run(
     device: &Device,
     table: &[f32],
@@ -16,10 +16,10 @@ fn run(
     let device = device.clone().autodiff();
     let shape = [table.len() / columns, columns];
     let leaf = Tensor::<2>::from_data(TensorData::new(table.to_vec(), shape), &device).require_grad();
-    let rows = chosen(leaf.clone());
-    let weights = Tensor::<2>::from_data(TensorData::new(weights.to_vec(), rows.dims()), &device);
-    let gradients = (rows.clone() * weights).sum().backward();
-    [values_of(&rows), values_of(&leaf.grad(&gradients).expect("the leaf has a gradient"))]
+    let columns = chosen(leaf.clone());
+    let weights = Tensor::<2>::from_data(TensorData::new(weights.to_vec(), columns.dims()), &device);
+    let gradients = (columns.clone() * weights).sum().backward();
+    [values_of(&columns), values_of(&leaf.grad(&gradients).expect("the leaf has a gradient"))]
 }
 
 #[test]
@@ -32,7 +32,7 @@ fn rows_and_gradients_are_those_of_select() {
         let wide: Vec<i64> = rows.iter().map(|row| i64::from(*row)).collect();
         let expected = run(&Device::flex(), &table, columns, &weights, |table| {
             let rows = Tensor::<1, Int>::from_data(TensorData::from(wide.as_slice()), &table.device());
-            table.select(0, rows)
+            table.select(0, rows).transpose()
         });
         for (name, device) in devices() {
             let found = run(&device, &table, columns, &weights, |table| {
@@ -49,7 +49,7 @@ fn rows_and_gradients_are_those_of_select() {
 fn columns_of_a_wider_table() {
     for (name, device) in devices() {
         let table = Tensor::<2>::from_floats([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], &device).narrow(1, 1, 2);
-        let rows = gather_rows(table, ChosenRows::new(vec![1, 1, 0], 2));
-        assert_eq!(values_of(&rows), [5.0, 6.0, 5.0, 6.0, 2.0, 3.0], "{name}");
+        let columns = gather_rows(table, ChosenRows::new(vec![1, 1, 0], 2));
+        assert_eq!(values_of(&columns), [5.0, 5.0, 2.0, 6.0, 6.0, 3.0], "{name}");
     }
 }
