@@ -65,6 +65,7 @@ mod wgpu {
     use std::collections::HashMap;
     use std::sync::{LazyLock, Mutex};
 
+    use burn::tensor::wgpu::WgpuInitError;
     use burn::tensor::{Device, DeviceKind, DeviceType};
 
     use crate::config::{Adapter, DeviceName};
@@ -84,9 +85,7 @@ mod wgpu {
                  apt-get install mesa-vulkan-drivers), or compute with `--device flex`"
             ))
         };
-        let of_kind = |kind: DeviceKind| {
-            Device::wgpu_options().device_kind(kind).init().map_err(|error| missing(error.to_string()))
-        };
+        let of_kind = |kind: DeviceKind| of_kind(kind).map_err(|error| missing(error.to_string()));
         let device = match adapter {
             Adapter::Strongest => of_kind(DeviceKind::DefaultDevice)?,
             Adapter::Discrete => of_kind(DeviceKind::DiscreteGpu(0))?,
@@ -101,6 +100,14 @@ mod wgpu {
         };
         opened.insert(name, device.clone());
         Ok(device)
+    }
+
+    pub(super) fn of_kind(kind: DeviceKind) -> Result<Device, WgpuInitError> {
+        match Device::wgpu_options().device_kind(kind.clone()).init() {
+            // The program has used this adapter before, without this module.
+            Err(WgpuInitError::Registration { .. }) => Ok(Device::wgpu(kind)),
+            opened => opened,
+        }
     }
 }
 
@@ -164,6 +171,16 @@ mod tests {
     fn a_missing_adapter_is_an_error_with_a_remedy() {
         let text = device_by_name("wgpu:99").unwrap_err().to_string();
         assert!(text.contains("wgpu:99") && text.contains("mesa-vulkan-drivers"), "{text}");
+    }
+
+    #[cfg(feature = "wgpu")]
+    #[test]
+    fn an_adapter_that_is_in_use_opens() {
+        for _ in 0..2 {
+            let device = wgpu::of_kind(burn::tensor::DeviceKind::Cpu).expect("a Vulkan driver in software");
+            let two = burn::tensor::Tensor::<1>::ones([2], &device).sum().into_scalar::<f32>();
+            assert_eq!(two, 2.0);
+        }
     }
 
     #[cfg(feature = "wgpu")]

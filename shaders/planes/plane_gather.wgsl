@@ -1,6 +1,6 @@
 // Second half of the query's derivative: every cell adds up the gradients from the samples around it.
 //
-// Each invocation computes one cell of one plane, with all its channels. A sample contributes to its low cell and to
+// Each invocation computes four channels of one cell of one plane. A sample contributes to its low cell and to
 // the next ones along width and height, so a cell reads the samples that begin in it and in three neighbors. Samples
 // are sorted by low cell (`order`, with ranges in `starts`), and within a cell by point. So the four cells are two
 // ranges, every sum has one order, and no atomics are needed. Writes the planes' gradients, each [C, H · W], at the
@@ -33,7 +33,9 @@ fn main(
     @builtin(local_invocation_index) lane: u32,
 ) {
     let planes = parameters.planes;
-    let own = flat_group(group, groups) * WORKGROUP + lane;
+    let index = flat_group(group, groups) * WORKGROUP + lane;
+    let own = index / planes.sizes.y;
+    let quad = index % planes.sizes.y;
     if (own >= planes.first_cells_b.z) {
         return;
     }
@@ -67,36 +69,24 @@ fn main(
     if (plane >= 4u) {
         first = parameters.places.b[plane - 4u];
     }
-    // A single loop over samples and vectors of channels: Mesa's software driver runs the body of an inner loop once
-    // even where it should not run at all, as in most cells.
     var sum = vec4<f32>(0.0);
-    var next = begin;
-    var quad = 0u;
-    while (quad < planes.sizes.y) {
-        if (next < end) {
-            let is_above = next < count_above;
-            let place = select(level.x + next - count_above, above.x + next, is_above);
-            let is_left = place < select(level.y, above.y, is_above);
-            let sample = order[place];
-            let fraction = fractions[sample];
-            let weight = select(1.0 - fraction, fraction, vec2<bool>(is_left, is_above));
-            sum += weight.x * weight.y * handed[sample * planes.sizes.y + quad];
-        }
-        next += 1u;
-        if (next >= end) {
-            for (var k = 0u; k < 4u; k++) {
-                let channel = 4u * quad + k;
-                let at = first + channel * cells + cell;
-                if (channel < planes.sizes.x) {
-                    if (begin > 0u) {
-                        sum[k] += gradients[at];
-                    }
-                    gradients[at] = sum[k];
-                }
+    for (var next = begin; next < end; next++) {
+        let is_above = next < count_above;
+        let place = select(level.x + next - count_above, above.x + next, is_above);
+        let is_left = place < select(level.y, above.y, is_above);
+        let sample = order[place];
+        let fraction = fractions[sample];
+        let weight = select(1.0 - fraction, fraction, vec2<bool>(is_left, is_above));
+        sum += weight.x * weight.y * handed[sample * planes.sizes.y + quad];
+    }
+    for (var k = 0u; k < 4u; k++) {
+        let channel = 4u * quad + k;
+        let at = first + channel * cells + cell;
+        if (channel < planes.sizes.x) {
+            if (begin > 0u) {
+                sum[k] += gradients[at];
             }
-            sum = vec4<f32>(0.0);
-            next = begin;
-            quad += 1u;
+            gradients[at] = sum[k];
         }
     }
 }

@@ -84,7 +84,7 @@ impl AttributeEntropy {
         replace(&mut self.size, size);
         let gaussians = gaussians.clone().inner();
         let rows: Vec<u32> = (0..gaussians.means.dims()[0] as u32).collect();
-        let order = self.coding_order(&gaussians);
+        let order = self.placed(&gaussians).order;
         let [own, near] = self.own_and_near(gaussians, order.as_ref(), &rows);
         let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
         let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
@@ -148,9 +148,9 @@ impl AttributeEntropy {
     /// Bits of the positions, `[1]`, and of each number with a density, `[C]`.
     fn bits_of_parts(&self, gaussians: GaussianTensors, rows: Option<&[u32]>) -> (Tensor<1>, Tensor<1>) {
         let count = gaussians.means.dims()[0];
-        let order = self.coding_order(&gaussians);
+        let Placed { order, extent } = self.placed(&gaussians);
         let coded = order.as_ref().filter(|_| rows.is_none()).map(CodingOrder::position_bits);
-        let positions = self.position_bits(gaussians.means.clone(), coded);
+        let positions = self.position_bits(extent, count, coded);
         let all: Vec<u32>;
         let rows = match rows {
             Some(rows) => rows,
@@ -176,9 +176,8 @@ impl AttributeEntropy {
         [(0, rows.len()), (rows.len(), near.len())].map(|(first, count)| channels.clone().narrow(1, first, count))
     }
 
-    /// The order in which the codec would code the Gaussians; `None` where positions are not finite: the trainer stops
-    /// for them, after this.
-    fn coding_order(&self, gaussians: &GaussianTensors) -> Option<CodingOrder> {
+    /// Looks at the positions, on the host.
+    fn placed(&self, gaussians: &GaussianTensors) -> Placed {
         // Together, since a GPU waits for each.
         let read = Transaction::default()
             .register(off_tape(gaussians.means.clone()))
@@ -187,20 +186,25 @@ impl AttributeEntropy {
             .execute();
         let numbers = |data: &TensorData| data.iter::<f32>().collect::<Vec<_>>();
         let [means, log_steps, size] = [&read[0], &read[1], &read[2]].map(numbers);
-        let step = self.place(&MEANS.name).map_or(0.0, |place| log_steps[place].exp() * size[0]);
-        CodingOrder::new(means.as_chunks().0, step).ok()
+        let (means, size) = (means.as_chunks().0, size[0]);
+        let step = self.place(&MEANS.name).map_or(0.0, |place| log_steps[place].exp() * size);
+        let extent = [0, 1, 2].map(|axis| {
+            let along = means.iter().map(|mean: &[f32; 3]| mean[axis]);
+            let [least, most] = [along.clone().fold(f32::INFINITY, f32::min), along.fold(f32::NEG_INFINITY, f32::max)];
+            (most - least).max(0.0) / size
+        });
+        Placed { order: CodingOrder::new(means, step).ok(), extent }
     }
 
-    /// What the codec writes for the positions, if that is given; else what a set of points takes that are uniform in their
-    /// box: their cells one by one, without the order. The derivative is that of the second: one bit an axis for half the
-    /// step.
-    fn position_bits(&self, means: Tensor<2>, coded: Option<u64>) -> Tensor<1> {
-        let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &means.device()) };
-        let count = means.dims()[0].max(1) as f64;
-        let means = untracked(means);
-        // [1, 3], in units of the size.
-        let extent = (means.clone().max_dim(0) - means.min_dim(0)) / untracked(self.size.val()).unsqueeze::<2>();
-        let step = self.log_steps.val().narrow(0, place, 1).exp().unsqueeze::<2>();
+    /// What the codec writes for the positions of `count` Gaussians, if that is given; else what a set of points takes that
+    /// are uniform in their box: their cells one by one, without the order. The derivative is that of the second: one bit an
+    /// axis for half the step.
+    fn position_bits(&self, extent: [f32; 3], count: usize, coded: Option<u64>) -> Tensor<1> {
+        let log_steps = self.log_steps.val();
+        let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &log_steps.device()) };
+        let count = count.max(1) as f64;
+        let extent = Tensor::<1>::from_floats(extent, &log_steps.device());
+        let step = log_steps.narrow(0, place, 1).exp();
         let cells = (extent / step + 1.0).log().sum() * (count * std::f64::consts::LOG2_E);
         match coded {
             Some(bits) => cells.clone() - untracked(cells.detach()) + bits as f64,
@@ -283,6 +287,15 @@ impl AttributeEntropy {
         let _ = gaussians.map(&mut found);
         Tensor::cat(found.2.into_iter().flatten().collect(), 0)
     }
+}
+
+/// What the positions of Gaussians say.
+struct Placed {
+    /// The order in which the codec would code them; `None` where positions are not finite: the trainer stops for them,
+    /// after this.
+    order: Option<CodingOrder>,
+    /// Of their box, in units of the Gaussians' size.
+    extent: [f32; 3],
 }
 
 /// Positions are coded as a set; every other number has a density.

@@ -4,6 +4,8 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::attributes::{CodingOrder, NEIGHBORS, least_squares};
 
+use crate::ops::linear::linear;
+
 /// Added to the normal equations for each Gaussian, in units of a channel's variance.
 const RIDGE: f64 = 1e-3;
 
@@ -35,7 +37,9 @@ impl ChannelPrediction {
         let around = near.clone().mean_dim(2).squeeze_dim::<2>(2);
         let nearest = near.narrow(2, 0, 1).squeeze_dim::<2>(2);
         let inputs = Tensor::cat(vec![own.clone(), around, nearest], 0);
-        own - (self.weights.val() * self.mask(&inputs.device())).matmul(inputs)
+        let weights = self.weights.val() * self.mask(&inputs.device());
+        let nothing = Tensor::zeros([channels], &inputs.device());
+        own - linear(inputs.transpose(), weights.transpose(), nothing).transpose()
     }
 
     /// The weights of the least squared error for channels as [`ChannelPrediction::residuals`] takes them, row by row.

@@ -151,8 +151,8 @@ fn backward(
     let mut firsts = places.starts.clone();
     firsts.resize(MOST_PLANES, places.total);
     let gradients = gpu.allocate("gradients of planes", places.total)?;
-    // No cell has more samples than there are points, and each takes one iteration of a loop for each vector.
-    let at_most = (gpu.longest_loop() / layout.quads()).clamp(1, layout.points.max(1));
+    // No cell has more samples than there are points.
+    let at_most = gpu.longest_loop().min(layout.points.max(1));
     for begin in (0..layout.points.max(1)).step_by(at_most) {
         let mut uniform = layout.uniform();
         uniform.extend(firsts.iter().chain(&[begin, at_most]).map(|value| *value as u32));
@@ -163,7 +163,7 @@ fn backward(
             .reads(&handed)
             .updates_if(begin > 0, &gradients)
             .uniform(&uniform)
-            .invocations(layout.cells())?;
+            .invocations(layout.cells() * layout.quads())?;
     }
     gpu.check("the gradients of the planes", &[&gradients])?;
 

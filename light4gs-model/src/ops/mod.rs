@@ -13,6 +13,7 @@ pub mod adam;
 mod fusion;
 pub mod gather_rows;
 mod host;
+pub mod linear;
 pub mod lower_bound;
 pub mod mixture_bits;
 pub mod node_poses;

@@ -12,6 +12,7 @@ mod finite_differences;
 mod gather_rows;
 mod gpu_kernels;
 mod import;
+mod linear;
 mod mixture_bits;
 mod plane_convolutions;
 mod plane_query;

@@ -9,6 +9,7 @@ use light4gs_codec::network::{Layer, Value};
 use light4gs_codec::{CodecError, MotionNetwork, MotionOutput, MotionSource, Network, checks};
 
 use super::Offsets;
+use crate::ops::linear::layer;
 use crate::scene::ModelError;
 
 /// Configuration of a [`Deformation`].
@@ -103,7 +104,7 @@ pub struct DeformationHead {
 impl DeformationHead {
     /// `rectified [N, W]` is the trunk's output after its ReLU, which all heads share.
     fn forward(&self, rectified: Tensor<2>) -> Tensor<2> {
-        self.output.forward(relu(self.hidden.forward(rectified)))
+        layer(&self.output, relu(layer(&self.hidden, rectified)))
     }
 
     /// The same computation as [`Self::forward`], for the codec's exact executor.
@@ -146,8 +147,8 @@ impl Deformation {
     /// The trunk's output `[N, W]`, before the heads' ReLU, from features `[N, F]`.
     pub fn hidden(&self, features: Tensor<2>) -> Tensor<2> {
         let mut layers = self.trunk.iter();
-        let first = layers.next().expect("a trunk has at least one layer").forward(features);
-        layers.fold(first, |hidden, layer| layer.forward(relu(hidden)))
+        let first = layer(layers.next().expect("a trunk has at least one layer"), features);
+        layers.fold(first, |hidden, next| layer(next, relu(hidden)))
     }
 
     /// Changes of the attributes from features `[N, F]`.
