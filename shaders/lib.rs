@@ -116,6 +116,8 @@ shaders! {
     SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE, NODE];
     /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
     SUBGROUPS = "elementwise" / "subgroups" [];
+    /// Values with uniform noise.
+    UNIFORM_NOISE = "elementwise" / "uniform_noise" [];
 }
 
 /// Code that several kernels share.

@@ -16,12 +16,14 @@ pub(crate) enum Purpose {
     Split,
     /// The views on which significance is measured.
     PruningViews,
-    /// Quantization noise and the choice of planes and Gaussians for the rate.
+    /// Quantization noise of planes and the choice of planes and Gaussians for the rate.
     Rate,
     /// Random numbers of a deformation field.
     Motion,
     /// Views and pixels at which Gaussians are added.
     GuidedSampling,
+    /// Quantization noise of the attributes of Gaussians.
+    Noise,
 }
 
 /// A generator for one purpose at one position, which is an iteration or a pass over the data.

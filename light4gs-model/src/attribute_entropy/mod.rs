@@ -11,12 +11,13 @@
 mod prediction;
 
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Distribution, Int, Tensor, TensorData, Transaction};
+use burn::tensor::{Device, Int, Tensor, TensorData, Transaction};
 use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 
 use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
 use crate::ops::gather_rows::{ChosenRows, gather_rows};
+use crate::ops::uniform_noise::add_uniform_noise;
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
 pub use prediction::ChannelPrediction;
@@ -107,20 +108,28 @@ impl AttributeEntropy {
         self.size.val().into_scalar::<f32>() > 0.0
     }
 
-    /// The Gaussians with uniform noise as wide as the steps, off the tape.
-    pub fn add_noise(&self, gaussians: GaussianTensors) -> GaussianTensors {
-        struct Noise<'a>(&'a AttributeEntropy);
+    /// The Gaussians with uniform noise as wide as the steps, off the tape. The same seed gives the same noise.
+    pub fn add_noise(&self, gaussians: GaussianTensors, seed: u64) -> GaussianTensors {
+        struct Noise<'a> {
+            model: &'a AttributeEntropy,
+            /// `[A]`.
+            steps: Tensor<1>,
+            seed: u64,
+        }
         impl AttributeMapper for Noise<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
-                let values = untracked(values);
-                let Some(place) = self.0.place(&attribute.name) else { return values };
-                let noise = Tensor::random(values.dims(), Distribution::Uniform(-0.5, 0.5), &values.device());
-                let step = untracked(self.0.log_steps.val()).narrow(0, place, 1).exp();
-                let step = if has_density(&attribute.name) { step } else { step * untracked(self.0.size.val()) };
-                values + noise * step.unsqueeze::<D>()
+                let Some(place) = self.model.place(&attribute.name) else { return untracked(values) };
+                let step = self.steps.clone().narrow(0, place, 1);
+                let step = if has_density(&attribute.name) { step } else { step * off_tape(self.model.size.val()) };
+                // Attributes are as far apart in the seeds as can be (the golden ratio in 64 bits).
+                let seed = self.seed.wrapping_add((place as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
+                let device = values.device();
+                let noisy = add_uniform_noise(off_tape(values), step, seed);
+                if device.is_autodiff() { Tensor::from_inner(noisy) } else { noisy }
             }
         }
-        gaussians.map(&mut Noise(self))
+        let steps = off_tape(self.log_steps.val()).exp();
+        gaussians.map(&mut Noise { model: self, steps, seed })
     }
 
     /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.

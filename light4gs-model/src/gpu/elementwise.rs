@@ -1,8 +1,11 @@
-//! Elementwise kernels: the distribution function and the lower bound of the entropy models, the logistic function.
+//! Elementwise kernels: the distribution function and the lower bound of the entropy models, the logistic function,
+//! noise.
 
 use burn::backend::TensorMetadata;
 use burn_wgpu::CubeTensor;
-use light4gs_shaders::{LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, SIGMOID, SIGMOID_BACKWARD, Shader};
+use light4gs_shaders::{
+    LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, SIGMOID, SIGMOID_BACKWARD, Shader, UNIFORM_NOISE,
+};
 
 use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Kernel;
@@ -11,7 +14,9 @@ use crate::gpu_error::GpuError;
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
-    [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD, SIGMOID, SIGMOID_BACKWARD].map(Kernel::new).into()
+    [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD, SIGMOID, SIGMOID_BACKWARD, UNIFORM_NOISE]
+        .map(Kernel::new)
+        .into()
 }
 
 /// Launches a kernel that reads tensors of one shape and writes another of the same shape. Its uniform is their size,
@@ -57,4 +62,21 @@ pub(crate) fn sigmoid_on_gpu(places: CubeTensor) -> CubeTensor {
 /// The upstream gradient times the slope of the logistic function where it has these values.
 pub(crate) fn sigmoid_backward_on_gpu(values: CubeTensor, upstream: CubeTensor) -> CubeTensor {
     raised(launch(SIGMOID_BACKWARD, [values, upstream], &[]))
+}
+
+/// Values with noise of a width `[1]`.
+pub(crate) fn uniform_noise_on_gpu(values: CubeTensor, width: CubeTensor, seed: [u32; 2]) -> CubeTensor {
+    let noisy = |gpu: &Gpu| {
+        let shape = values.shape();
+        let count = shape.num_elements();
+        let output = gpu.allocate("noisy values", count)?;
+        Launch::new(&gpu.client, UNIFORM_NOISE)
+            .reads(&buffer_of(values))
+            .reads(&buffer_of(width.clone()))
+            .writes(&output)
+            .uniform(&[count as u32, seed[0], seed[1]])
+            .invocations(count)?;
+        Ok(gpu.tensor(first_words(&output, count), shape))
+    };
+    raised(Gpu::of(&width).and_then(|gpu| noisy(&gpu)))
 }

@@ -23,7 +23,8 @@ mod team;
 pub(crate) use adam::adam_on_gpu;
 pub use counting::{LaunchCounter, LaunchCounts};
 pub(crate) use elementwise::{
-    lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu, sigmoid_backward_on_gpu, sigmoid_on_gpu,
+    lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu, sigmoid_backward_on_gpu,
+    sigmoid_on_gpu, uniform_noise_on_gpu,
 };
 pub use kernel::Kernel;
 pub(crate) use rate::UploadedRows;

@@ -31,9 +31,7 @@ impl<B: Backend> MixtureTensors<B> {
         [self.values, self.widths, self.weight_logits, self.means, self.log_scales]
     }
 
-    pub(crate) fn from_array(
-        [values, widths, weight_logits, means, log_scales]: [FloatTensor<B>; INPUTS],
-    ) -> Self {
+    pub(crate) fn from_array([values, widths, weight_logits, means, log_scales]: [FloatTensor<B>; INPUTS]) -> Self {
         Self { values, widths, weight_logits, means, log_scales }
     }
 }

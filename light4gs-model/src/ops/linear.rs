@@ -91,8 +91,9 @@ fn sums_over_parts<B: Backend>(a: FloatTensor<B>, b: FloatTensor<B>) -> [FloatTe
         }
     };
     let whole = parts * part;
-    let in_parts =
-        |tensor: &FloatTensor<B>, columns| B::float_reshape(rows(tensor, 0, whole), Shape::from([parts, part, columns]));
+    let in_parts = |tensor: &FloatTensor<B>, columns| {
+        B::float_reshape(rows(tensor, 0, whole), Shape::from([parts, part, columns]))
+    };
     let (a_in_parts, b_in_parts) = (in_parts(&a, inputs), in_parts(&b, outputs));
     let of_bias = B::float_sum_dim(B::float_sum_dim(b_in_parts.clone(), 1), 0);
     let of_weight = B::float_sum_dim(B::float_matmul(B::float_transpose(a_in_parts), b_in_parts), 0);

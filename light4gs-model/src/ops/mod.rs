@@ -24,6 +24,7 @@ pub mod sigmoid;
 pub mod significance;
 pub mod skinning;
 pub mod splat;
+pub mod uniform_noise;
 
 use std::fmt::Debug;
 

@@ -125,7 +125,7 @@ pub(super) fn timings(
         let step = meter.measure(
             || (),
             |()| {
-                let noisy = compression.noisy(&dynamic, true, true);
+                let noisy = compression.noisy(&dynamic, true, true, 0);
                 let mut sums = GradientSums::default();
                 let image = splatter.render(noisy.scene.at(TIME), &scene.camera, None).image;
                 sums.add_module(&noisy.scene, &mut l1(image, truth.clone()).backward());

@@ -2,6 +2,7 @@
 
 use burn::tensor::Device;
 use light4gs_model::{DeformationField, DynamicScene};
+use rand::Rng;
 
 use super::encoder::is_superseded;
 use super::{Compression, CompressionOf, EntropyModels};
@@ -45,7 +46,12 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
     for iteration in 1..=iterations {
         seed_device(device, config.seed, Stage::Fine, iteration);
         let mut random = generator(config.seed, Purpose::Rate, Stage::Fine, iteration);
-        let noisy = compression.noisy(scene, false, true);
+        let noisy = compression.noisy(
+            scene,
+            false,
+            true,
+            generator(config.seed, Purpose::Noise, Stage::Fine, iteration).random(),
+        );
         let rate = compression.rate(&noisy, settings.rate.fraction, true, &mut random);
         let mut gradients = GradientSums::default();
         gradients.add_module(&compression, &mut rate.megabytes().backward());

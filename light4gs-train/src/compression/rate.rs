@@ -68,12 +68,14 @@ impl Rate {
 
 impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// The scene with uniform noise as wide as the steps. With `learn_steps` the steps get gradients; with
-    /// `with_gaussians` the Gaussians have noise too, in the attributes that have an entropy model.
+    /// `with_gaussians` the Gaussians have noise too, in the attributes that have an entropy model. The noise of planes and of
+    /// harmonics with a model of their own is from the device's generator, that of the other attributes from `seed`.
     pub fn noisy<F: DeformationField>(
         &self,
         scene: &DynamicScene<F>,
         learn_steps: bool,
         with_gaussians: bool,
+        seed: u64,
     ) -> NoisyScene<F> {
         let mut noisy = scene.clone();
         let steps = match (&self.planes, noisy.planes_mut()) {
@@ -87,7 +89,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             }
             _ => None,
         };
-        NoisyScene { scene: self.with_noisy_gaussians(noisy, with_gaussians), steps }
+        NoisyScene { scene: self.with_noisy_gaussians(noisy, with_gaussians.then_some(seed)), steps }
     }
 
     /// The same for a scene with frozen planes.
@@ -95,22 +97,21 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         &self,
         scene: &DynamicScene<F>,
         with_gaussians: bool,
+        seed: u64,
     ) -> NoisyScene<F> {
         let mut scene = scene.clone();
         for plane in scene.planes_mut().into_iter().flat_map(|planes| &mut planes.planes) {
             *plane = plane.clone().set_require_grad(false);
         }
-        NoisyScene { scene: self.with_noisy_gaussians(scene, with_gaussians), steps: None }
+        NoisyScene { scene: self.with_noisy_gaussians(scene, with_gaussians.then_some(seed)), steps: None }
     }
 
-    /// Also begins a new tape.
-    fn with_noisy_gaussians<F: DeformationField>(&self, scene: DynamicScene<F>, noisy: bool) -> DynamicScene<F> {
+    /// Noise from a seed, if there is one. Also begins a new tape.
+    fn with_noisy_gaussians<F: DeformationField>(&self, scene: DynamicScene<F>, seed: Option<u64>) -> DynamicScene<F> {
         let mut scene = on_a_new_tape(scene);
-        if !noisy {
-            return scene;
-        }
+        let Some(seed) = seed else { return scene };
         if let Some(attributes) = &self.attributes {
-            let noisy = attributes.add_noise(scene.gaussians.tensors());
+            let noisy = attributes.add_noise(scene.gaussians.tensors(), seed);
             scene.gaussians.set_tensors(noisy.map(&mut Leaves));
         }
         if let Some(sh) = &self.sh {

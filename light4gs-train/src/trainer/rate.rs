@@ -7,6 +7,7 @@ use burn::tensor::Tensor;
 use light4gs_model::attributes::attribute_of_path;
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 use light4gs_model::{AttributeEntropy, CodedAttribute, DeformationField, DynamicScene};
+use rand::Rng;
 
 use super::Trainer;
 use crate::compression::{Compression, EntropyModels, NoisyScene, freeze_planes};
@@ -46,10 +47,11 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             }
         }
         seed_device(&self.device, *seed, stage, iteration);
+        let noise_seed = generator(*seed, Purpose::Noise, stage, iteration).random();
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
         Ok(Some(match frozen {
-            true => compression.noisy_beside_frozen_planes(scene, with_gaussians),
-            false => compression.noisy(scene, learn_steps, with_gaussians),
+            true => compression.noisy_beside_frozen_planes(scene, with_gaussians, noise_seed),
+            false => compression.noisy(scene, learn_steps, with_gaussians, noise_seed),
         }))
     }
 
@@ -192,7 +194,7 @@ mod tests {
         let mut compression = Compression::of_run(&ConfiguredModels, &config, &scene, &device).unwrap().unwrap();
         assert!(compression.learned_attributes().is_none());
         compression.start_attributes_from(&scene.gaussians);
-        let noisy = compression.noisy(&scene, false, true);
+        let noisy = compression.noisy(&scene, false, true, 0);
         // A different derivative for every number, and the same as a sum over noise of any width.
         let sum = |scene: &DynamicScene| {
             let gaussians = scene.gaussians.tensors();
@@ -230,7 +232,7 @@ mod tests {
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let scene = config.model.build().init(&cloud, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
-        let noisy = compression.noisy(&scene, true, false);
+        let noisy = compression.noisy(&scene, true, false, 0);
         // A term that depends on both planes and steps, different in each plane.
         let loss = |planes: &[Tensor<3>], steps: &dyn Fn(usize) -> Tensor<1>| {
             let terms = planes.iter().enumerate().map(|(i, plane)| {

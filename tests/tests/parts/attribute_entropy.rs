@@ -173,10 +173,9 @@ fn derivatives_of_the_steps_are_those_of_differences() {
 #[test]
 fn noise_is_as_wide_as_the_steps() {
     let device = Device::flex().autodiff();
-    device.seed(3);
     let gaussians = gaussians(&device);
     let model = model(&device, &gaussians.tensors());
-    let noisy = model.add_noise(gaussians.tensors());
+    let noisy = model.add_noise(gaussians.tensors(), 3);
     let check = |name: &str, exact: Vec<f32>, noisy: Vec<f32>| {
         // Positions are in units of the Gaussians' size.
         let unit = if name == "means" { values_of(&model.size.val())[0] } else { 1.0 };

@@ -110,7 +110,7 @@ fn the_rate_on_a_part_is_unbiased() {
     let config = config(&[]);
     let scene = scene(&config, &device);
     let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
-    let noisy = compression.noisy(&scene, false, true);
+    let noisy = compression.noisy(&scene, false, true, 0);
     // The hyperprior's noise is drawn anew each time. Seeding it gives all draws the same noise.
     let estimate = |fraction: f64, seed: u64| {
         device.seed(1);

@@ -26,7 +26,8 @@ fn run(
 fn rows_and_gradients_are_those_of_select() {
     let mut random = Random::new(500);
     for (count, columns, chosen) in [(1, 1, 1), (5, 3, 4), (7, 30, 100), (1000, 26, 700), (3, 2, 5000)] {
-        let mut numbers = |count: usize| -> Vec<f32> { random.normals(count).iter().map(|value| *value as f32).collect() };
+        let mut numbers =
+            |count: usize| -> Vec<f32> { random.normals(count).iter().map(|value| *value as f32).collect() };
         let (table, weights) = (numbers(count * columns), numbers(chosen * columns));
         let rows: Vec<u32> = (0..chosen).map(|_| random.uniform(0.0, count as f64) as u32).collect();
         let wide: Vec<i64> = rows.iter().map(|row| i64::from(*row)).collect();

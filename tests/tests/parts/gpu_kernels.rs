@@ -5,6 +5,7 @@ use burn::tensor::{Device, Tensor};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::ops::sigmoid::sigmoid;
+use light4gs_model::ops::uniform_noise::add_uniform_noise;
 use light4gs_model::{HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
 
@@ -103,4 +104,15 @@ fn a_crowded_cell() {
     for (found, expected) in found.iter().zip(&expected) {
         assert!((found - expected).abs() <= 1e-3 * expected.abs(), "{found} against {expected}");
     }
+}
+
+/// The same noise everywhere, to the last bit of the noise itself.
+#[test]
+fn noise_is_that_of_the_cpu() {
+    let run = |device: Device| -> Vec<f32> {
+        let noisy =
+            add_uniform_noise(Tensor::<1>::zeros([70_000], &device), Tensor::from_floats([0.5], &device), 1 << 40 | 3);
+        noisy.into_data().iter().collect()
+    };
+    assert_eq!(run(Device::wgpu(Default::default())), run(Device::flex()));
 }

@@ -33,9 +33,8 @@ fn outputs_and_gradients_are_those_of_products_and_sums() {
         let values = shapes.map(|[rows, columns]| -> Vec<f32> {
             random.normals(rows * columns).iter().map(|value| *value as f32).collect()
         });
-        let expected = run(&Device::flex(), shapes, &values, |input, weight, bias| {
-            input.matmul(weight) + bias.unsqueeze_dim(0)
-        });
+        let expected =
+            run(&Device::flex(), shapes, &values, |input, weight, bias| input.matmul(weight) + bias.unsqueeze_dim(0));
         for (name, device) in devices() {
             let found = run(&device, shapes, &values, linear);
             for (k, what) in ["output", "gradient of input", "of weight", "of bias"].into_iter().enumerate() {

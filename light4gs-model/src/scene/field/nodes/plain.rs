@@ -1,7 +1,6 @@
 //! Gaussians, nodes and poses as plain numbers, for what is done now and then while training and takes more decisions than
 //! arithmetic.
 
-
 use super::placement::square;
 use super::{AFFINITY, NodesField, STILLNESS, numbers};
 use crate::kernels::skinning::{PLACE, POSED};
