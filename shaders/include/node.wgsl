@@ -30,7 +30,18 @@ fn affinity_of(node: u32, k: u32) -> f32 {
 fn affinity_between(i: u32, node: u32) -> f32 {
     var sum = 0.0;
     for (var k = 0u; k < AFFINITIES; k++) {
-        sum += stillness[(1u + AFFINITIES) * i + 1u + k] * affinity_of(node, k);
+        sum = fma(stillness[(1u + AFFINITIES) * i + 1u + k], affinity_of(node, k), sum);
     }
     return sum;
+}
+
+fn squared_length(v: vec3<f32>) -> f32 {
+    return fma(v.x, v.x, fma(v.y, v.y, v.z * v.z));
+}
+
+// The logit by which Gaussian `i` follows a node that is so far away, in squares. Forward and backward have to find the same number
+// to the last bit, since a logit may be so large that its rounding is a noticeable weight. So every product that can be is in an `fma`:
+// compilers fuse others or not as they like, one way in one kernel and another way in the next.
+fn exponent_between(i: u32, node: u32, squared: f32) -> f32 {
+    return fma(-precision_of(node), squared, affinity_between(i, node));
 }

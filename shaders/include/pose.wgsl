@@ -34,8 +34,8 @@ fn row_product(row: vec4<f32>, own: Turning) -> vec2<f32> {
 }
 
 // The product of a pose with the derivatives by the blended one. Where one weight is 1, the blended pose is that node's own, and the
-// difference of their products has to be exactly 0: Adam would take a step along any rounding error. So every product but the first of
-// a sum is in an `fma`: compilers fuse others or not as they like, one way in one kernel and another way in the next.
+// difference of their products has to be exactly 0: Adam would take a step along any rounding error. So every product that can be is in
+// an `fma`, as in `exponent_between`.
 fn inner_product(pose: Pose, own: Turning) -> f32 {
     let x = row_product(pose.row_x, own);
     let y = row_product(pose.row_y, own);

@@ -21,8 +21,7 @@ struct Parameters {
 @group(0) @binding(6) var<uniform> parameters: Parameters;
 
 fn exponent_of(mean: vec3<f32>, i: u32, node: u32) -> f32 {
-    let offset = mean - anchor_of(node);
-    return affinity_between(i, node) - precision_of(node) * dot(offset, offset);
+    return exponent_between(i, node, squared_length(mean - anchor_of(node)));
 }
 
 @compute @workgroup_size(WORKGROUP)

@@ -30,8 +30,7 @@ fn main(
     let own = Turning(mean.xyz, handed[5u * i + 4u].xyz, by_position.xyz, by_vector.xyz, handed[5u * i + 1u]);
     var sums = vec4<f32>(0.0);
     for (var node = 0u; node < parameters.nodes; node++) {
-        let offset = mean.xyz - anchor_of(node);
-        let exponent = affinity_between(i, node) - precision_of(node) * dot(offset, offset);
+        let exponent = exponent_between(i, node, squared_length(mean.xyz - anchor_of(node)));
         let weight = exponential(exponent - mean.w) * by_vector.w;
         let by_logit = weight * (inner_product(pose_of(node), own) - by_position.w);
         for (var k = 0u; k < AFFINITIES; k++) {

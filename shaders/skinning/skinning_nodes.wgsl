@@ -48,8 +48,8 @@ fn main(
         let by_vector = handed[5u * i + 3u];
         let other = Turning(mean.xyz, handed[5u * i + 4u].xyz, by_position.xyz, by_vector.xyz, handed[5u * i + 1u]);
         let offset = mean.xyz - anchor;
-        let squared = dot(offset, offset);
-        let exponent = affinity_between(i, node) - sharpness * squared;
+        let squared = squared_length(offset);
+        let exponent = exponent_between(i, node, squared);
         let weight = exponential(exponent - mean.w) * by_vector.w;
         let point = vec4<f32>(mean.xyz, 1.0);
         let vector = vec4<f32>(other.vector, 0.0);

@@ -16,8 +16,8 @@ use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 
 use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
-use crate::ops::gather_rows::{ChosenRows, gather_rows};
-use crate::ops::uniform_noise::add_uniform_noise;
+use crate::ops::rate::gather_rows::{ChosenRows, gather_rows};
+use crate::ops::rate::uniform_noise::add_uniform_noise;
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
 pub use prediction::ChannelPrediction;

@@ -7,7 +7,7 @@ use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 
 use super::factorized_density::{logistic_interval, plain_logistic_interval};
-use crate::ops::mixture_bits::{MixtureInputs, mixture_bits};
+use crate::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
 
 /// Configuration of a [`LogisticMixture`].
 #[derive(Config, Debug)]

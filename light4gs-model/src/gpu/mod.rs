@@ -27,7 +27,6 @@ pub(crate) use elementwise::{
     sigmoid_on_gpu, uniform_noise_on_gpu,
 };
 pub use kernel::Kernel;
-pub(crate) use rate::UploadedRows;
 pub use recording::{RecordedBuffer, RecordedLaunch, record};
 pub(crate) use significance::significance_on_gpu;
 pub use team::{Communication, Team, with_team};

@@ -1,5 +1,6 @@
 //! Rows of tables: which ones, and what a back end does with them.
 
+use std::any::Any;
 use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};
 
@@ -15,9 +16,8 @@ pub struct ChosenRows(pub(crate) Arc<Chosen>);
 pub(crate) struct Chosen {
     pub(crate) rows: Vec<u32>,
     pub(crate) count: usize,
-    /// On the GPU whose table came first.
-    #[cfg(feature = "wgpu")]
-    pub(crate) uploaded: OnceLock<crate::gpu::UploadedRows>,
+    /// What the first back end makes of the rows, to find it again for the next table.
+    pub(crate) made: OnceLock<Box<dyn Any + Send + Sync>>,
     places: OnceLock<Places>,
 }
 
@@ -37,13 +37,7 @@ impl ChosenRows {
     pub fn new(rows: Vec<u32>, count: usize) -> Self {
         let beyond = rows.iter().find(|&&row| row as usize >= count);
         assert_eq!(beyond, None, "a row beyond the {count} of the table");
-        Self(Arc::new(Chosen {
-            rows,
-            count,
-            #[cfg(feature = "wgpu")]
-            uploaded: OnceLock::new(),
-            places: OnceLock::new(),
-        }))
+        Self(Arc::new(Chosen { rows, count, made: OnceLock::new(), places: OnceLock::new() }))
     }
 }
 
@@ -69,7 +63,7 @@ impl Chosen {
     }
 }
 
-/// A back end's kernels. [`GatherRowsOps`](crate::ops::gather_rows::GatherRowsOps) adds the dispatch and the tape.
+/// A back end's kernels. [`GatherRowsOps`](crate::ops::rate::gather_rows::GatherRowsOps) adds the dispatch and the tape.
 pub trait GatherRowsKernels: Backend {
     /// `[C, M]` of `table [N, C]`: a column for each chosen row.
     fn gather_rows_forward(table: FloatTensor<Self>, rows: &ChosenRows) -> FloatTensor<Self>;

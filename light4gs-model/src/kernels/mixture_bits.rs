@@ -36,7 +36,7 @@ impl<B: Backend> MixtureTensors<B> {
     }
 }
 
-/// A back end's kernels. [`MixtureBitsOps`](crate::ops::mixture_bits::MixtureBitsOps) adds the dispatch and the tape.
+/// A back end's kernels. [`MixtureBitsOps`](crate::ops::rate::mixture_bits::MixtureBitsOps) adds the dispatch and the tape.
 pub trait MixtureBitsKernels: Backend {
     /// What the backward pass wants to see again.
     type Inputs: Clone + Debug + Send + 'static;

@@ -11,20 +11,18 @@
 pub mod adam;
 #[cfg(feature = "wgpu")]
 mod fusion;
-pub mod gather_rows;
 mod host;
 pub mod linear;
 pub mod lower_bound;
-pub mod mixture_bits;
 pub mod node_poses;
 pub mod node_regularizer;
 pub mod normal_cdf;
 pub mod plane_query;
+pub mod rate;
 pub mod sigmoid;
 pub mod significance;
 pub mod skinning;
 pub mod splat;
-pub mod uniform_noise;
 
 use std::fmt::Debug;
 

@@ -4,8 +4,8 @@
 use burn::tensor::{Device, Tensor};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
+use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
 use light4gs_model::ops::sigmoid::sigmoid;
-use light4gs_model::ops::uniform_noise::add_uniform_noise;
 use light4gs_model::{HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
 

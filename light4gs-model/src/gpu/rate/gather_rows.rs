@@ -21,7 +21,7 @@ pub(super) fn kernels() -> Vec<Kernel> {
 
 /// Chosen rows, and where each was chosen, on a GPU.
 #[derive(Clone, Debug)]
-pub(crate) struct UploadedRows {
+struct UploadedRows {
     device: DeviceId,
     rows: Handle,
     starts: Handle,
@@ -45,8 +45,11 @@ impl UploadedRows {
     }
 
     fn of(gpu: &Gpu, chosen: &Chosen) -> Self {
-        let first = chosen.uploaded.get_or_init(|| Self::new(gpu, chosen));
-        if first.device == gpu.client.service_id().device { first.clone() } else { Self::new(gpu, chosen) }
+        let made = chosen.made.get_or_init(|| Box::new(Self::new(gpu, chosen))).downcast_ref::<Self>();
+        match made.filter(|made| made.device == gpu.client.service_id().device) {
+            Some(made) => made.clone(),
+            None => Self::new(gpu, chosen),
+        }
     }
 }
 

@@ -3,8 +3,6 @@
 mod gather_rows;
 mod mixture_bits;
 
-pub(crate) use gather_rows::UploadedRows;
-
 use super::kernel::Kernel;
 
 /// The kernels of this folder.

@@ -16,6 +16,10 @@ use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::node_poses::{NodeParameters, pose};
 use light4gs_model::ops::node_regularizer::{Regularization, regularize};
 use light4gs_model::ops::normal_cdf::normal_cdf;
+use light4gs_model::ops::rate::gather_rows::{ChosenRows, gather_rows};
+use light4gs_model::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
+use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
+use light4gs_model::ops::sigmoid::sigmoid;
 use light4gs_model::ops::skinning::{MOST_AFFINITIES, SkinningInputs, skin};
 use light4gs_model::{PlaneTensors, Significance, Splatter};
 use light4gs_tests::golden::{Golden, values_of};
@@ -39,6 +43,7 @@ fn launches_of_golden_scenes() {
     planes(&mut transcript);
     skinning(&mut transcript);
     control_nodes(&mut transcript);
+    rate(&mut transcript);
     elementwise(&mut transcript);
     transcript.assert_complete();
     // SwiftShader's subgroups have four members, for which the program has no team. Here a workgroup of four is a part of a
@@ -248,11 +253,36 @@ fn control_nodes(transcript: &mut Transcript) {
     }
 }
 
+/// Bits of rows of a table, some of which are chosen several times, and their derivative.
+fn rate(transcript: &mut Transcript) {
+    let mut random = Random::new(10);
+    let ((), launches) = record(|| {
+        let device = device().autodiff();
+        let mut tensor = |rows: usize, columns: usize, low: f64, high: f64| {
+            let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(low, high) as f32).collect();
+            Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
+        };
+        let (count, channels, components) = (321, 7, 3);
+        let rows = (0..500).map(|place| place * place % count as u32).collect();
+        let table = tensor(count, channels, -2.0, 2.0);
+        let inputs = MixtureInputs {
+            values: gather_rows(table, ChosenRows::new(rows, count)),
+            widths: tensor(channels, 1, 0.01, 0.5),
+            weight_logits: tensor(channels, components, -1.0, 1.0),
+            means: tensor(channels, components, -0.5, 0.5),
+            log_scales: tensor(channels, components, -3.0, 0.0),
+        };
+        let bits = mixture_bits(inputs, 1e-9);
+        (bits.clone() * bits).sum().backward();
+    });
+    transcript.add("rate of attributes", launches, Vec::new());
+}
+
 /// The entropy models' functions far into their tails, and a step of the optimizer.
 fn elementwise(transcript: &mut Transcript) {
     let places: Vec<f32> = (0..2600).map(|i| i as f32 * 0.01 - 13.0).collect();
     let leaf = |device: &Device| Tensor::<1>::from_floats(places.as_slice(), device);
-    let functions = [normal_cdf as fn(Tensor<1>) -> Tensor<1>, |x| lower_bound(x, 0.11)];
+    let functions = [normal_cdf as fn(Tensor<1>) -> Tensor<1>, |x| lower_bound(x, 0.11), sigmoid];
     let ((), launches): (_, Vec<RecordedLaunch>) = record(|| {
         for function in functions {
             let upstream = leaf(&device().autodiff()).sin();
@@ -261,6 +291,7 @@ fn elementwise(transcript: &mut Transcript) {
         let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 3 };
         let moments = [leaf(&device()).cos(), leaf(&device()).sin() * 0.1, leaf(&device()).abs() * 0.01];
         adam_step(moments, leaf(&device()), step);
+        add_uniform_noise(leaf(&device()), Tensor::from_floats([0.25], &device()), 1 << 40 | 5);
     });
     transcript.add("elementwise", launches, Vec::new());
 }

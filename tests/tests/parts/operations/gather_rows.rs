@@ -1,7 +1,7 @@
 //! Rows of tables against Burn's `select`.
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
-use light4gs_model::ops::gather_rows::{ChosenRows, gather_rows};
+use light4gs_model::ops::rate::gather_rows::{ChosenRows, gather_rows};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
 

@@ -10,10 +10,10 @@ use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::CubeBackend;
 use rayon::prelude::*;
 
-use super::for_cpu_back_ends;
+use super::super::for_cpu_back_ends;
 #[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::HostBackend;
+use super::super::fusion::{leaf, resolve};
+use super::super::host::HostBackend;
 #[cfg(feature = "wgpu")]
 use crate::gpu::uniform_noise_on_gpu;
 
@@ -78,7 +78,7 @@ impl<B: FusionBackend + UniformNoiseOps> UniformNoiseOps for Fusion<B> {
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::uniform_noise::add_uniform_noise;
+/// use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
 ///
 /// let device = Device::flex();
 /// let width = Tensor::from_floats([0.5], &device);
@@ -97,7 +97,7 @@ pub fn add_uniform_noise<const D: usize>(values: Tensor<D>, width: Tensor<1>, se
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::super::*;
 
     /// Mean, variance and correlation of neighbors, of other seeds and of twice the place, within five standard deviations.
     #[test]

@@ -15,9 +15,9 @@ use burn::tensor::Tensor;
 use burn_fusion::{Fusion, FusionBackend};
 
 #[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::HostBackend;
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
+use super::super::fusion::{leaf, resolve};
+use super::super::host::HostBackend;
+use super::super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 pub use crate::kernels::gather_rows::{ChosenRows, GatherRowsKernels};
 
 /// The rows on every back end that has [`GatherRowsKernels`], differentiable under [`Autodiff`].
@@ -111,7 +111,7 @@ impl<B: FusionBackend + GatherRowsKernels> GatherRowsKernels for Fusion<B> {
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::gather_rows::{ChosenRows, gather_rows};
+/// use light4gs_model::ops::rate::gather_rows::{ChosenRows, gather_rows};
 ///
 /// let device = Device::flex().autodiff();
 /// let table = Tensor::<2>::from_floats([[1.0, 2.0], [3.0, 4.0], [5.0, 6.0]], &device).require_grad();

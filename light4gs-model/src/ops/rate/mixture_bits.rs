@@ -12,9 +12,9 @@ use burn::tensor::Tensor;
 use burn_fusion::{Fusion, FusionBackend};
 
 #[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::{HostBackend, HostTensor};
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
+use super::super::fusion::{leaf, resolve};
+use super::super::host::{HostBackend, HostTensor};
+use super::super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 use crate::cpu::mixture_bits::{MixtureSlices, mixture_bits as bits_of_slices, mixture_bits_backward};
 use crate::kernels::mixture_bits::INPUTS;
 pub use crate::kernels::mixture_bits::{MOST_COMPONENTS, MixtureBitsKernels, MixtureTensors};
@@ -146,11 +146,11 @@ pub struct MixtureInputs {
 }
 
 /// The bits of each channel `[C]`: the sum of `-log2` of the probabilities of the intervals around its values, each of which is
-/// raised to `bound` with the gradient of [`lower_bound`](super::lower_bound::lower_bound).
+/// raised to `bound` with the gradient of [`lower_bound`](crate::ops::lower_bound::lower_bound).
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::mixture_bits::{MixtureInputs, mixture_bits};
+/// use light4gs_model::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
 ///
 /// let device = Device::flex();
 /// let zeros = Tensor::<2>::zeros([1, 1], &device);
