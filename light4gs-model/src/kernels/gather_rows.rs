@@ -1,5 +1,8 @@
 //! Rows of tables: which ones, and what a back end does with them.
 
+// Only a GPU asks where each row was chosen.
+#![cfg_attr(not(feature = "wgpu"), allow(dead_code))]
+
 use std::any::Any;
 use std::fmt::Debug;
 use std::sync::{Arc, OnceLock};

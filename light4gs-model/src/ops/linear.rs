@@ -11,16 +11,20 @@ use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, TensorMetadata, backend_extension};
 use burn::nn::Linear;
-use burn::tensor::{Shape, Slice, Tensor};
+#[cfg(feature = "wgpu")]
+use burn::tensor::Slice;
+use burn::tensor::{Shape, Tensor};
 #[cfg(feature = "wgpu")]
 use burn_fusion::{Fusion, FusionBackend};
 #[cfg(feature = "wgpu")]
 use burn_wgpu::CubeBackend;
 
-use super::{differentiate, for_cpu_back_ends};
+use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
 
 /// Rows of a part, unless there are so many parts then that adding them up takes longer than they save.
+#[cfg(feature = "wgpu")]
 const PART: usize = 128;
+#[cfg(feature = "wgpu")]
 const MOST_PARTS: usize = 256;
 
 /// The differentiable inputs, or their gradients, in the order that gradients are registered in.
@@ -84,11 +88,10 @@ fn sums_over_parts<B: Backend>(a: FloatTensor<B>, b: FloatTensor<B>) -> [FloatTe
         return sums_over_rows::<B>(a, b);
     }
     let rows = |tensor: &FloatTensor<B>, from: usize, to: usize| {
-        let all = [0..count, 0..tensor.shape()[1]];
-        match (from, to) {
-            (0, to) if to == count => tensor.clone(),
-            _ => B::float_slice(tensor.clone(), &[Slice::from(from..to), Slice::from(all[1].clone())]),
+        if to - from == count {
+            return tensor.clone();
         }
+        B::float_slice(tensor.clone(), &[Slice::from(from..to), Slice::from(0..tensor.shape()[1])])
     };
     let whole = parts * part;
     let in_parts = |tensor: &FloatTensor<B>, columns| {
@@ -124,8 +127,8 @@ fn backward<B: Backend>(
     [of_input, of_weight, of_bias]
 }
 
-for_cpu_back_ends! {
-    LinearOps {
+for_all_back_ends! {
+    LinearOps with LinearKernels {
         fn linear_layer(tensors: LinearTensors<Self>) -> FloatTensor<Self> {
             forward(tensors)
         }
@@ -145,13 +148,6 @@ for_cpu_back_ends! {
 }
 
 #[cfg(feature = "wgpu")]
-impl LinearOps for CubeBackend {
-    fn linear_layer(tensors: LinearTensors<Self>) -> FloatTensor<Self> {
-        forward(tensors)
-    }
-}
-
-#[cfg(feature = "wgpu")]
 impl LinearKernels for CubeBackend {
     fn linear_backward(
         input: FloatTensor<Self>,
@@ -163,13 +159,6 @@ impl LinearKernels for CubeBackend {
 }
 
 /// A fusion stream fuses these operations without our help.
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend> LinearOps for Fusion<B> {
-    fn linear_layer(tensors: LinearTensors<Self>) -> FloatTensor<Self> {
-        forward(tensors)
-    }
-}
-
 #[cfg(feature = "wgpu")]
 impl<B: FusionBackend> LinearKernels for Fusion<B> {
     fn linear_backward(

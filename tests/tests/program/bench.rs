@@ -32,14 +32,14 @@ fn a_step_does_not_launch_more_kernels_than_before() {
     let adapter = json[0]["adapter"].as_str().unwrap();
     let more = if adapter.contains("llvmpipe") { 0 } else { 10 };
     for (part, bound) in [
-        ("splat forward + backward", 59),
+        ("splat forward + backward", 42),
         ("skinning forward + backward", 11),
         ("nodes, Adam step", 13),
-        ("nodes, training step", 119),
-        ("nodes, step with noise and rate", 430),
-        ("nodes, render", 58),
-        ("hexplane, training step", 630),
-        ("hexplane, step with noise and rate", 1148),
+        ("nodes, training step", 102),
+        ("nodes, step with noise and rate", 232),
+        ("nodes, render", 50),
+        ("hexplane, training step", 613),
+        ("hexplane, step with noise and rate", 1131),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");

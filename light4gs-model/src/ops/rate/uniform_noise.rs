@@ -97,7 +97,7 @@ pub fn add_uniform_noise<const D: usize>(values: Tensor<D>, width: Tensor<1>, se
 
 #[cfg(test)]
 mod tests {
-    use super::super::*;
+    use super::*;
 
     /// Mean, variance and correlation of neighbors, of other seeds and of twice the place, within five standard deviations.
     #[test]
