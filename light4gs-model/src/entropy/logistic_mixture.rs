@@ -71,7 +71,11 @@ impl LogisticMixture {
     }
 
     /// Bits of each channel `[C]`: of the intervals of `widths [C, 1]` around each of `x [C, N]`. Likelihoods below `bound` are
-    /// raised to it.
+    /// raised to it, with the gradient of [`lower_bound`](crate::ops::lower_bound::lower_bound).
+    ///
+    /// # Panics
+    /// If there are more logistics than [`MOST_COMPONENTS`](crate::ops::rate::mixture_bits::MOST_COMPONENTS), or the shapes do
+    /// not belong together.
     pub fn interval_bits(&self, x: Tensor<2>, widths: Tensor<2>, bound: f32) -> Tensor<1> {
         let inputs = MixtureInputs {
             values: x,
