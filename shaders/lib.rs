@@ -36,15 +36,15 @@ macro_rules! shaders {
 
 shaders! {
     /// One Adam step, fused: one pass over parameter, gradient and both moments (Kingma and Ba, 2015).
-    ADAM = "elementwise" / "adam" [];
+    ADAM = "training" / "adam" [];
     /// Sorts the Gaussians' numbers of cells by depth.
     CELL_COUNTS = "splatting" / "cell_counts" [];
-    /// Color of every Gaussian from its spherical harmonics, seen from the camera.
-    COLOR = "splatting" / "color" [ARITHMETIC, VIEW, COVARIANCE, QUATERNION, SPHERICAL_HARMONICS];
     /// Second half of the query's derivative: every cell adds up the gradients from the samples around it.
     PLANE_GATHER = "planes" / "plane_gather" [PLANES];
     /// Converts one plane from [C, H · W] to the layout of `include/planes.wgsl`.
     PLANE_PACK = "planes" / "plane_pack" [];
+    /// Some columns of a matrix in their place, and zeros elsewhere.
+    PLACE_COLUMNS = "elementwise" / "place_columns" [];
     /// Features at points: the product over the planes of a scale of their bilinear samples.
     PLANE_QUERY = "planes" / "plane_query" [PLANES];
     /// First half of the query's derivative: the gradients from every point to each of its samples, and the
@@ -54,6 +54,12 @@ shaders! {
     GATHER_ROWS = "rate" / "gather_rows" [];
     /// Derivative of rows of a table: every number of the table adds up its gradients.
     GATHER_ROWS_BACKWARD = "rate" / "gather_rows_backward" [];
+    /// Sums of the differences of two images, block by block.
+    IMAGE_DIFFERENCE = "training" / "image_difference" [];
+    /// Derivative of the mean difference of two images by the first.
+    IMAGE_DIFFERENCE_BACKWARD = "training" / "image_difference_backward" [];
+    /// A mean from the sums of blocks.
+    MEAN_OF_SUMS = "training" / "mean_of_sums" [];
     /// Lists the intersections, the pairs of a cell and a Gaussian that touches it, nearest Gaussian first.
     INTERSECT = "splatting" / "intersect" [ARITHMETIC, VIEW, SPLAT];
     /// Gradient through max(x, bound) that also passes below the bound where a descent step would increase x
@@ -80,7 +86,7 @@ shaders! {
     /// Exclusive prefix sum, in place.
     PREFIX_SUM = "sorting" / "prefix_sum" [];
     /// Projects every Gaussian to the screen and counts the cells that it touches.
-    PROJECT = "splatting" / "project" [ARITHMETIC, VIEW, SPLAT, QUATERNION, COVARIANCE];
+    PROJECT = "splatting" / "project" [ARITHMETIC, VIEW, SPLAT, QUATERNION, COVARIANCE, SPHERICAL_HARMONICS];
     /// Adds up every Gaussian's sums over its cells, and computes from these the gradients of its attributes.
     PROJECT_BACKWARD = "splatting" / "project_backward" [ARITHMETIC, VIEW, QUATERNION, COVARIANCE, SPHERICAL_HARMONICS];
     /// First half of a pass of the radix sort: how often each digit occurs in each block.
@@ -95,6 +101,10 @@ shaders! {
     RASTERIZE_BACKWARD = "splatting" / "rasterize_backward" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Every value times one factor that stands on the device.
     SCALE = "elementwise" / "scale" [];
+    /// The exponential of what is at most a bound.
+    BOUNDED_EXPONENTIAL = "elementwise" / "bounded_exponential" [EXPONENTIAL];
+    /// Derivative of the bounded exponential: its slope times the upstream gradient.
+    BOUNDED_EXPONENTIAL_BACKWARD = "elementwise" / "bounded_exponential_backward" [];
     /// The logistic function.
     SIGMOID = "elementwise" / "sigmoid" [EXPONENTIAL];
     /// Derivative of the logistic function: its slope times the upstream gradient.

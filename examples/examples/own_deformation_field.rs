@@ -13,7 +13,9 @@ use light4gs_codec::network::Operation;
 use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, decode};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, linear_from_layer, linear_to_layer, tiny_config, tiny_scene};
-use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, HexPlaneField, ModelError};
+use light4gs_model::{
+    DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, HexPlaneField, ModelError, ScenePoints,
+};
 use light4gs_train::dataset::load_options;
 use light4gs_train::trainer::Trainer;
 
@@ -66,9 +68,10 @@ impl DeformationField for SharedTrajectories {
         }
     }
 
-    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {
         let branch =
             |[first, second]: &[Linear; 2], input| second.forward(leaky_relu(first.forward(input), SLOPE.into()));
+        let points = points.normalized();
         let [count, _] = points.dims();
         let time = Tensor::full([count, 1], time, &points.device());
         let along = branch(&self.place, points) * branch(&self.pace, time);

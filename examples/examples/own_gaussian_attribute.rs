@@ -13,7 +13,9 @@ use light4gs_codec::{
 };
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{Attribute, DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, ModelError};
+use light4gs_model::{
+    Attribute, DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, ModelError, ScenePoints,
+};
 use light4gs_train::dataset::load_options;
 use light4gs_train::run::RunFolder;
 use light4gs_train::trainer::Trainer;
@@ -43,7 +45,7 @@ impl DeformationField for Lifetimes {
 
     /// With the opacity `1 / (1 + e)`, where `e = exp(-logit)`, and the bell curve `b`, the new logit is
     /// `log b - log(1 - b + e)`.
-    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, _: ScenePoints<'_>, time: f32) -> GaussianTensors {
         let lifetime = canonical.further(LIFETIME).expect("the field has asked for it").clone();
         let center = lifetime.clone().slice(s![.., 0..1]);
         let width = lifetime.slice(s![.., 1..2]).exp();

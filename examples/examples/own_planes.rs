@@ -19,7 +19,7 @@ use light4gs_codec::{
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, linear_from_layer, linear_to_layer, tiny_config, tiny_scene};
 use light4gs_model::{
-    DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, Latent, ModelError, PlaneEntropy,
+    DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, Latent, ModelError, PlaneEntropy, ScenePoints,
 };
 use light4gs_train::compression::PlaneModels;
 use light4gs_train::dataset::load_options;
@@ -71,7 +71,8 @@ impl DeformationField for TriPlaneField {
         Self { planes, hidden, output }
     }
 
-    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {
+        let points = points.normalized();
         let [count, _] = points.dims();
         let time = Tensor::full([count, 1], time, &points.device());
         let known = Tensor::cat(vec![self.planes.tensors().query_space(points), time], 1);

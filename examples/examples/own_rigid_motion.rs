@@ -18,7 +18,8 @@ use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput,
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
 use light4gs_model::{
-    DeformationField, DynamicScene, FeaturePlanes, FinePosition, GaussianTensors, LearningRate, ModelError, SceneAtRest,
+    DeformationField, DynamicScene, FeaturePlanes, FinePosition, GaussianTensors, LearningRate, ModelError,
+    SceneAtRest, ScenePoints,
 };
 use light4gs_train::Stage;
 use light4gs_train::dataset::load_options;
@@ -252,7 +253,7 @@ impl DeformationField for RigidNodes {
         Self::zeros(1, config.knots, config.nodes, device)
     }
 
-    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, _: ScenePoints<'_>, time: f32) -> GaussianTensors {
         let blended = self.weights(&canonical.means).matmul(self.poses(time).transpose());
         let means =
             products(blended.clone().slice(s![.., 0..9]), &canonical.means) + blended.clone().slice(s![.., 9..12]);

@@ -6,7 +6,7 @@ use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, s};
 use light4gs_data::{Scene, Split};
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
-use light4gs_model::{DeformationField, GaussianTensors};
+use light4gs_model::{DeformationField, GaussianTensors, ScenePoints};
 use light4gs_train::dataset::load_options;
 use light4gs_train::trainer::Trainer;
 
@@ -25,7 +25,7 @@ impl DeformationField for Turntable {
         Self { angle: Param::from_tensor(Tensor::zeros([1], device)) }
     }
 
-    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, _: ScenePoints<'_>, time: f32) -> GaussianTensors {
         let angle = (self.angle.val() * time).unsqueeze::<2>();
         let (cos, sin) = (angle.clone().cos(), angle.sin());
         let [x, y, z] = [0, 1, 2].map(|axis| canonical.means.clone().slice(s![.., axis..axis + 1]));

@@ -89,6 +89,7 @@ mod scene;
 mod sh;
 mod steps;
 mod stream;
+mod vectors;
 
 pub use budget::Demand;
 pub use bytes::{

@@ -1,9 +1,12 @@
 //! Differentiable rendering of Gaussians (3DGS, Kerbl et al. 2023).
 
+use std::ops::Range;
+
 use burn::backend::Dispatch;
-use burn::tensor::{Bool, Int, Tensor, s};
+use burn::tensor::{Bool, Int, Tensor};
 use light4gs_data::Camera;
 
+use crate::ops::columns::columns;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 
@@ -88,10 +91,13 @@ impl Splatter {
         let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels = width * height;
+        // Channel by channel: those of all pixels are columns of a matrix with one row.
+        let rendering = rendering.reshape([1, 5 * pixels]);
+        let part = |channels: Range<usize>| columns(rendering.clone(), channels.start * pixels..channels.end * pixels);
         Rendering {
-            image: rendering.clone().slice(s![0..3 * pixels]).reshape([height, width, 3]),
-            alpha: rendering.clone().slice(s![3 * pixels..4 * pixels]).reshape([height, width]),
-            depth: rendering.slice(s![4 * pixels..5 * pixels]).reshape([height, width]),
+            image: part(0..3).reshape([height, width, 3]),
+            alpha: part(3..4).reshape([height, width]),
+            depth: part(4..5).reshape([height, width]),
             radii,
         }
     }

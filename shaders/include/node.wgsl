@@ -1,5 +1,5 @@
-// A node at one time: a row of `nodes` [B, 20 + AFFINITIES]: anchor (3), precision (1), pose (16), affinities. Those of a Gaussian
-// stand behind its stillness, `stillness` [N, 1 + AFFINITIES].
+// A node at one time: a row of `nodes` [B, 20 + AFFINITIES]: anchor (3), precision (1), pose (16), affinities. Those of the Gaussians
+// are `affinities` [N, AFFINITIES].
 
 const NODE: u32 = 20u + AFFINITIES;
 
@@ -30,7 +30,7 @@ fn affinity_of(node: u32, k: u32) -> f32 {
 fn affinity_between(i: u32, node: u32) -> f32 {
     var sum = 0.0;
     for (var k = 0u; k < AFFINITIES; k++) {
-        sum = fma(stillness[(1u + AFFINITIES) * i + 1u + k], affinity_of(node, k), sum);
+        sum = fma(affinities[AFFINITIES * i + k], affinity_of(node, k), sum);
     }
     return sum;
 }

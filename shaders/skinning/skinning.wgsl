@@ -1,7 +1,8 @@
 // Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
 //
 // One invocation owns one Gaussian and meets all nodes twice: first for the largest exponent, then for the blended pose. Reads
-// Gaussians and nodes. Writes `moved` [N, 10]: position, quaternion, turned vector. Saves five vectors of `blended` for the backward pass:
+// Gaussians and nodes. Writes `moved` [N, 7 + VECTOR]: position,
+// quaternion, turned vector if there are any. Saves five vectors of `blended` for the backward pass:
 //
 //   0, 1, 2: rows of the blended matrix, each with its component of the blended offset
 //   3: the blended quaternion
@@ -13,12 +14,14 @@ struct Parameters {
 }
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
-@group(0) @binding(1) var<storage, read_write> orientations: array<f32>;
-@group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
-@group(0) @binding(3) var<storage, read_write> nodes: array<f32>;
-@group(0) @binding(4) var<storage, read_write> moved: array<f32>;
-@group(0) @binding(5) var<storage, read_write> blended: array<vec4<f32>>;
-@group(0) @binding(6) var<uniform> parameters: Parameters;
+@group(0) @binding(1) var<storage, read_write> quats: array<f32>;
+@group(0) @binding(2) var<storage, read_write> vectors: array<f32>;
+@group(0) @binding(3) var<storage, read_write> stillness: array<f32>;
+@group(0) @binding(4) var<storage, read_write> affinities: array<f32>;
+@group(0) @binding(5) var<storage, read_write> nodes: array<f32>;
+@group(0) @binding(6) var<storage, read_write> moved: array<f32>;
+@group(0) @binding(7) var<storage, read_write> blended: array<vec4<f32>>;
+@group(0) @binding(8) var<uniform> parameters: Parameters;
 
 fn exponent_of(mean: vec3<f32>, i: u32, node: u32) -> f32 {
     return exponent_between(i, node, squared_length(mean - anchor_of(node)));
@@ -35,7 +38,7 @@ fn main(
         return;
     }
     let mean = vec3<f32>(means[3u * i], means[3u * i + 1u], means[3u * i + 2u]);
-    let own_stillness = stillness[(1u + AFFINITIES) * i];
+    let own_stillness = stillness[i];
     var largest = own_stillness;
     for (var node = 0u; node < parameters.nodes; node++) {
         largest = max(largest, exponent_of(mean, i, node));
@@ -63,18 +66,21 @@ fn main(
     pose.row_z *= inverse_sum;
     pose.turn *= inverse_sum;
 
-    let own = 7u * i;
-    let quat = vec4<f32>(orientations[own], orientations[own + 1u], orientations[own + 2u], orientations[own + 3u]);
-    let vector = vec3<f32>(orientations[own + 4u], orientations[own + 5u], orientations[own + 6u]);
+    let quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
     let position = position_in(pose, mean);
     let turned = hamilton_product(pose.turn, quat);
-    let turned_vector = vector_in(pose, vector);
+    let own = (7u + VECTOR) * i;
     for (var k = 0u; k < 3u; k++) {
-        moved[10u * i + k] = position[k];
-        moved[10u * i + 7u + k] = turned_vector[k];
+        moved[own + k] = position[k];
     }
     for (var k = 0u; k < 4u; k++) {
-        moved[10u * i + 3u + k] = turned[k];
+        moved[own + 3u + k] = turned[k];
+    }
+    if (VECTOR > 0u) {
+        let turned_vector = vector_in(pose, vec3<f32>(vectors[3u * i], vectors[3u * i + 1u], vectors[3u * i + 2u]));
+        for (var k = 0u; k < 3u; k++) {
+            moved[own + 7u + k] = turned_vector[k];
+        }
     }
     blended[5u * i] = pose.row_x;
     blended[5u * i + 1u] = pose.row_y;

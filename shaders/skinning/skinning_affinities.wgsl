@@ -1,7 +1,7 @@
 // One of the parts of skinning's derivative: the gradients of the Gaussians' affinities.
 //
 // One invocation owns one Gaussian and meets all nodes. Reads what it has handed over (see `skinning_backward.wgsl`), its
-// affinities and the nodes. Writes all columns but the first of `of_stillness` [N, 1 + AFFINITIES].
+// affinities and the nodes. Writes `of_affinities` [N, AFFINITIES].
 
 struct Parameters {
     count: u32,
@@ -10,8 +10,8 @@ struct Parameters {
 
 @group(0) @binding(0) var<storage, read_write> handed: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> nodes: array<f32>;
-@group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
-@group(0) @binding(3) var<storage, read_write> of_stillness: array<f32>;
+@group(0) @binding(2) var<storage, read_write> affinities: array<f32>;
+@group(0) @binding(3) var<storage, read_write> of_affinities: array<f32>;
 @group(0) @binding(4) var<uniform> parameters: Parameters;
 
 @compute @workgroup_size(WORKGROUP)
@@ -38,6 +38,6 @@ fn main(
         }
     }
     for (var k = 0u; k < AFFINITIES; k++) {
-        of_stillness[(1u + AFFINITIES) * i + 1u + k] = sums[k];
+        of_affinities[AFFINITIES * i + k] = sums[k];
     }
 }

@@ -13,7 +13,7 @@ struct Parameters {
 
 @group(0) @binding(0) var<storage, read_write> handed: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> nodes: array<f32>;
-@group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
+@group(0) @binding(2) var<storage, read_write> affinities: array<f32>;
 @group(0) @binding(3) var<storage, read_write> sums: array<vec4<f32>>;
 @group(0) @binding(4) var<uniform> parameters: Parameters;
 
@@ -60,7 +60,7 @@ fn main(
         of_row_z += weight * (by_position.z * point + by_vector.z * vector);
         of_turn += weight * other.by_turn;
         for (var k = 0u; k < AFFINITIES; k++) {
-            of_affinities[k] += by_logit * stillness[(1u + AFFINITIES) * i + 1u + k];
+            of_affinities[k] += by_logit * affinities[AFFINITIES * i + k];
         }
     }
     let at_sums = SUMS / 4u * own;

@@ -1,16 +1,15 @@
-// First half of a pass of the radix sort: how often each digit occurs in each block.
+// Beginning of a radix sort: how often each digit of the first pass occurs in each block.
 //
 // A workgroup owns a block of BLOCK keys, an invocation EACH neighboring keys; a digit has RADIX_BITS bits. Writes
-// `table[digit * blocks + block]`, whose prefix sum is the position for the block's keys with that digit.
+// `tables[digit * blocks + block]`, and zeros to the tables of the PASSES - 1 further passes, which `radix_scatter` counts for.
 
 struct Parameters {
     count: u32,
-    shift: u32,
     blocks: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> keys: array<u32>;
-@group(0) @binding(1) var<storage, read_write> table: array<u32>;
+@group(0) @binding(1) var<storage, read_write> tables: array<u32>;
 @group(0) @binding(2) var<uniform> parameters: Parameters;
 
 const EACH: u32 = BLOCK / WORKGROUP;
@@ -31,7 +30,7 @@ fn main(
     }
     let first = block * BLOCK + lane * EACH;
     for (var k = first; k < min(first + EACH, parameters.count); k++) {
-        let digit = (keys[k] >> parameters.shift) & (DIGITS - 1u);
+        let digit = keys[k] & (DIGITS - 1u);
         counters[digit * WORKGROUP + lane] += 1u;
     }
     workgroupBarrier();
@@ -43,6 +42,10 @@ fn main(
         for (var member = 0u; member < WORKGROUP; member++) {
             sum += counters[digit * WORKGROUP + member];
         }
-        table[digit * parameters.blocks + block] = sum;
+        let at = digit * parameters.blocks + block;
+        tables[at] = sum;
+        for (var pass_number = 1u; pass_number < PASSES; pass_number++) {
+            tables[pass_number * DIGITS * parameters.blocks + at] = 0u;
+        }
     }
 }

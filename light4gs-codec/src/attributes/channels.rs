@@ -60,12 +60,13 @@ fn code(
             prediction = LinearPrediction::fit(&whole, last, neighbors);
         }
         prediction.code(coder, &mut numbers);
+        let of_channels = prediction.of_channels(last, neighbors.len());
 
         let missed_before = std::mem::replace(&mut missed, Vec::with_capacity(neighbors.len()));
         for (index, near) in neighbors.iter().enumerate() {
             coder.check()?;
             own.gather(near);
-            let predicted = prediction.predict(&own, last, near, index);
+            let predicted = prediction.predict(&own, of_channels[index], near, index);
             let level = expected_level(&missed, missed_before.get(index), near);
             let sign = sign_context(level, &predicted);
             // Where residuals are larger than a step, their sides are not alike, and keep their signs.

@@ -1,6 +1,6 @@
 //! For each Gaussian, the nearest ones of those that a decoder already has.
 
-use crate::parallel;
+use crate::{parallel, vectors::vectorized};
 
 /// How many neighbors a Gaussian has.
 pub const NEIGHBORS: usize = 4;
@@ -18,10 +18,19 @@ pub(crate) fn all_nearest_before(points: &[[f64; 3]]) -> Vec<[u32; NEIGHBORS]> {
 /// their nearest neighbor. Points that are not a finite distance away are no neighbors; where all are, it is the one before. A distance is a sum of rounded squares in a fixed order, so all machines agree.
 pub(super) fn nearest_before(points: &[[f64; 3]], index: usize) -> [u32; NEIGHBORS] {
     let point = points[index];
+    let first = index.saturating_sub(WINDOW);
+    let mut distances = [0.0; WINDOW];
+    vectorized(
+        #[inline(always)]
+        || {
+            for (distance, other) in distances.iter_mut().zip(&points[first..index]) {
+                let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - other[axis]);
+                *distance = x * x + y * y + z * z;
+            }
+        },
+    );
     let mut nearest = [(f64::INFINITY, index); NEIGHBORS];
-    for other in (index.saturating_sub(WINDOW)..index).rev() {
-        let [x, y, z] = [0, 1, 2].map(|axis| point[axis] - points[other][axis]);
-        let candidate = (x * x + y * y + z * z, other);
+    for candidate in distances[..index - first].iter().copied().zip(first..index).rev() {
         if candidate.0 < nearest[NEIGHBORS - 1].0 {
             let place = nearest.partition_point(|kept| kept.0 <= candidate.0);
             nearest[place..].rotate_right(1);

@@ -10,6 +10,8 @@ use crate::adaptive::{AdaptiveInteger, BitCoder};
 const FRACTION: u32 = 9;
 /// With fewer Gaussians, weights take more bytes than they save.
 const FEWEST: usize = 200;
+/// Inputs of a prediction that come from the channel itself.
+const OWN: usize = 2;
 /// Added to the diagonal of the normal equations for each Gaussian, so that channels without variation can be solved.
 const RIDGE: f64 = 1e-3;
 
@@ -47,16 +49,21 @@ impl Channel {
 /// What a channel is predicted from: the sum over the neighbors, the nearest neighbor, and for every channel coded
 /// before it the Gaussian's own value and the sum over its neighbors. The channel's center is subtracted
 /// from every value.
-#[inline]
 fn inputs<'a>(
     own: &'a Channel,
     before: &'a [Channel],
     neighbors: &'a [u32; NEIGHBORS],
     index: usize,
 ) -> impl Iterator<Item = i64> + 'a {
-    let nearest = if index == 0 { 0 } else { own.centered(neighbors[0] as usize) };
     let others = before.iter().flat_map(move |channel| [channel.centered(index), channel.around[index]]);
-    [own.around[index], nearest].into_iter().chain(others)
+    own_inputs(own, neighbors, index).into_iter().chain(others)
+}
+
+/// The inputs that come from the channel itself.
+#[inline]
+fn own_inputs(own: &Channel, neighbors: &[u32; NEIGHBORS], index: usize) -> [i64; OWN] {
+    let nearest = if index == 0 { 0 } else { own.centered(neighbors[0] as usize) };
+    [own.around[index], nearest]
 }
 
 /// What a Gaussian's number is expected to be.
@@ -96,7 +103,7 @@ pub(super) struct LinearPrediction {
 impl LinearPrediction {
     /// All weights zero, for a channel with `before` channels before it.
     pub(super) fn zero(before: usize) -> Self {
-        Self { weights: vec![0; 2 + 2 * before] }
+        Self { weights: vec![0; OWN + 2 * before] }
     }
 
     /// The weights that leave the fewest bits, about. The bits of a residual grow with the logarithm of its size: few large
@@ -125,17 +132,30 @@ impl LinearPrediction {
         }
     }
 
-    /// What is expected of a channel at a Gaussian.
+    /// For each of `count` Gaussians, what the channels before say: all at once, since these are complete.
+    pub(super) fn of_channels(&self, before: &[Channel], count: usize) -> Vec<i64> {
+        let mut sums = vec![0; count];
+        for (channel, weights) in before.iter().zip(self.weights[OWN..].as_chunks::<2>().0) {
+            let [at_it, around] = weights.map(i64::from);
+            let center = i64::from(channel.center);
+            for ((sum, &value), &others) in sums.iter_mut().zip(&channel.values).zip(&channel.around) {
+                *sum += at_it * (i64::from(value) - center) + around * others;
+            }
+        }
+        sums
+    }
+
+    /// What is expected of a channel at a Gaussian, for which [`LinearPrediction::of_channels`] has this.
     #[inline]
     pub(super) fn predict(
         &self,
         own: &Channel,
-        before: &[Channel],
+        of_channels: i64,
         neighbors: &[u32; NEIGHBORS],
         index: usize,
     ) -> Prediction {
-        let inputs = inputs(own, before, neighbors, index);
-        let sum: i64 = self.weights.iter().zip(inputs).map(|(&weight, input)| i64::from(weight) * input).sum();
+        let inputs = own_inputs(own, neighbors, index);
+        let sum = of_channels + i64::from(self.weights[0]) * inputs[0] + i64::from(self.weights[1]) * inputs[1];
         let rounded = (sum + (1 << (FRACTION - 1))) >> FRACTION;
         // Only damaged streams have sums beyond 32 bits.
         let beyond = (sum - (rounded << FRACTION)) as i32;
@@ -160,8 +180,10 @@ mod tests {
         let (whole, half) = (channel(2), channel(1));
         let before = [whole];
         let prediction = LinearPrediction::fit(&half, &before, &neighbors);
-        let exact =
-            (0..1000).filter(|&i| prediction.predict(&half, &before, &neighbors[i], i).value == half.values[i]).count();
+        let of_channels = prediction.of_channels(&before, neighbors.len());
+        let is_exact =
+            |i: &usize| prediction.predict(&half, of_channels[*i], &neighbors[*i], *i).value == half.values[*i];
+        let exact = (0..1000).filter(is_exact).count();
         assert!(exact > 990, "{exact} of 1000");
     }
 }

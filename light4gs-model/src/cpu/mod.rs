@@ -1,6 +1,7 @@
 //! Kernels of the CPU back ends, on plain slices, without Burn. Those of rendering are in `light4gs-render`.
 
 pub(crate) mod adam;
+pub(crate) mod image_difference;
 pub(crate) mod mixture_bits;
 pub(crate) mod node_motion;
 pub(crate) mod node_poses;

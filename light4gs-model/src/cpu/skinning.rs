@@ -7,7 +7,12 @@
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use crate::kernels::skinning::{MOVED, ORIENTATION, PLACE, POSE, POSED};
+use crate::kernels::skinning::{self, PLACE, POSE, POSED, VECTOR};
+
+/// Numbers of a Gaussian's orientation: quaternion, and a vector that turns along, here for all.
+pub(crate) const ORIENTATION: usize = 4 + VECTOR;
+/// Numbers of a moved Gaussian: position, quaternion, turned vector.
+pub(crate) const MOVED: usize = skinning::MOVED + VECTOR;
 
 /// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.
 pub(crate) const CHUNK: usize = 256;

@@ -19,7 +19,8 @@ use super::skinning::{
     BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, orientation, product, to_rows,
     weight,
 };
-use crate::kernels::skinning::{MOVED, ORIENTATION, PLACE, POSE, POSED};
+use crate::cpu::skinning::{MOVED, ORIENTATION};
+use crate::kernels::skinning::{PLACE, POSE, POSED};
 
 /// Tasks at most, so that their sums take no more memory than some thousand Gaussians.
 const MOST_TASKS: usize = 64;

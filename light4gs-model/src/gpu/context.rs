@@ -90,6 +90,12 @@ pub(super) fn first_words(buffer: &Handle, count: usize) -> Handle {
     buffer.clone().offset_end(unused)
 }
 
+/// Some words of a buffer. Where they begin must be a multiple of [`PLACE_ALIGNMENT`].
+pub(super) fn words(buffer: &Handle, start: usize, count: usize) -> Handle {
+    let (start, end) = (4 * start as u64, 4 * (start + count) as u64);
+    buffer.clone().offset_start(start).offset_end(buffer.size_in_used() - end)
+}
+
 /// Several arrays in one buffer, each beginning where it can be bound.
 pub(super) struct Places {
     pub(super) starts: Vec<usize>,
@@ -111,11 +117,10 @@ impl Places {
         Self { starts, lengths: lengths.to_vec(), total }
     }
 
-    /// Array `k` of the buffer that holds them all.
+    /// Array `k` of the buffer that holds them all. An empty one is a place that can be bound.
     pub(super) fn of(&self, buffer: &Handle, k: usize) -> Handle {
-        let start = 4 * self.starts[k] as u64;
-        let end = start + 4 * self.lengths[k].max(1) as u64;
-        buffer.clone().offset_start(start).offset_end(buffer.size_in_used() - end)
+        let length = self.lengths[k];
+        words(buffer, self.starts[k], if length == 0 { PLACE_ALIGNMENT } else { length })
     }
 }
 

@@ -1,22 +1,26 @@
-//! Elementwise kernels: the distribution function and the lower bound of the entropy models, the logistic function,
-//! noise.
+//! Elementwise kernels: activations of attributes, the distribution function and the lower bound of the entropy models, columns of
+//! matrices, noise.
 
 use burn::backend::TensorMetadata;
+use burn::tensor::Shape;
 use burn_wgpu::CubeTensor;
+use light4gs_codec::rendering::MAX_LOGARITHM;
 use light4gs_shaders::{
-    LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD, SIGMOID, SIGMOID_BACKWARD, Shader, UNIFORM_NOISE,
+    BOUNDED_EXPONENTIAL, BOUNDED_EXPONENTIAL_BACKWARD, LOWER_BOUND_BACKWARD, NORMAL_CDF, NORMAL_CDF_BACKWARD,
+    PLACE_COLUMNS, SIGMOID, SIGMOID_BACKWARD, Shader, UNIFORM_NOISE,
 };
 
 use super::context::{Gpu, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
+use crate::kernels::activation::{Curve, bound_reached};
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
-    [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD, SIGMOID, SIGMOID_BACKWARD, UNIFORM_NOISE]
-        .map(Kernel::new)
-        .into()
+    let activations = [SIGMOID, SIGMOID_BACKWARD, BOUNDED_EXPONENTIAL, BOUNDED_EXPONENTIAL_BACKWARD];
+    let others = [NORMAL_CDF, NORMAL_CDF_BACKWARD, LOWER_BOUND_BACKWARD, PLACE_COLUMNS, UNIFORM_NOISE];
+    activations.into_iter().chain(others).map(Kernel::new).collect()
 }
 
 /// Launches a kernel that reads tensors of one shape and writes another of the same shape. Its uniform is their size,
@@ -54,14 +58,36 @@ pub(crate) fn lower_bound_backward_on_gpu(values: CubeTensor, upstream: CubeTens
     raised(launch(LOWER_BOUND_BACKWARD, [values, upstream], &[bound]))
 }
 
-/// The logistic function.
-pub(crate) fn sigmoid_on_gpu(places: CubeTensor) -> CubeTensor {
-    raised(launch(SIGMOID, [places], &[]))
+/// An activation of attributes.
+pub(crate) fn activation_on_gpu(curve: Curve, places: CubeTensor) -> CubeTensor {
+    raised(match curve {
+        Curve::Sigmoid => launch(SIGMOID, [places], &[]),
+        Curve::BoundedExponential => launch(BOUNDED_EXPONENTIAL, [places], &[MAX_LOGARITHM]),
+    })
 }
 
-/// The upstream gradient times the slope of the logistic function where it has these values.
-pub(crate) fn sigmoid_backward_on_gpu(values: CubeTensor, upstream: CubeTensor) -> CubeTensor {
-    raised(launch(SIGMOID_BACKWARD, [values, upstream], &[]))
+/// The upstream gradient times the slope of the activation where it has these values.
+pub(crate) fn activation_backward_on_gpu(curve: Curve, values: CubeTensor, upstream: CubeTensor) -> CubeTensor {
+    raised(match curve {
+        Curve::Sigmoid => launch(SIGMOID_BACKWARD, [values, upstream], &[]),
+        Curve::BoundedExponential => launch(BOUNDED_EXPONENTIAL_BACKWARD, [values, upstream], &[bound_reached()]),
+    })
+}
+
+/// A matrix `[R, width]` with these columns, from `first` on, and zeros elsewhere.
+pub(crate) fn place_columns_on_gpu(columns: CubeTensor, first: usize, width: usize) -> CubeTensor {
+    let placed = |gpu: &Gpu| {
+        let [rows, count] = columns.shape().dims();
+        let size = rows * width;
+        let matrix = gpu.allocate("columns among zeros", size)?;
+        Launch::new(&gpu.client, PLACE_COLUMNS)
+            .reads(&buffer_of(columns.clone()))
+            .writes(&matrix)
+            .uniform(&[size, width, first, count].map(|number| number as u32))
+            .invocations(size)?;
+        Ok(gpu.tensor(first_words(&matrix, size), Shape::from([rows, width])))
+    };
+    raised(Gpu::of(&columns).and_then(|gpu| placed(&gpu)))
 }
 
 /// Values with noise of a width `[1]`.

@@ -3,7 +3,6 @@
 //! Public are the kernels as text ([`kernels`]) and launches as data ([`record`]), so that compilers and adapters other than
 //! those of this machine can be tried: `.ci/webgpu` does; and the number of launches ([`LaunchCounter`]).
 
-mod adam;
 mod context;
 mod counting;
 mod elementwise;
@@ -19,22 +18,22 @@ mod sort;
 mod splat;
 mod subgroups;
 mod team;
+mod training;
 
-pub(crate) use adam::adam_on_gpu;
 pub use counting::{LaunchCounter, LaunchCounts};
 pub(crate) use elementwise::{
-    lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu, normal_cdf_on_gpu, sigmoid_backward_on_gpu,
-    sigmoid_on_gpu, uniform_noise_on_gpu,
+    activation_backward_on_gpu, activation_on_gpu, lower_bound_backward_on_gpu, normal_cdf_backward_on_gpu,
+    normal_cdf_on_gpu, place_columns_on_gpu, uniform_noise_on_gpu,
 };
 pub use kernel::Kernel;
 pub use recording::{RecordedBuffer, RecordedLaunch, record};
 pub(crate) use significance::significance_on_gpu;
 pub use team::{Communication, Team, with_team};
+pub(crate) use training::adam_on_gpu;
 
 /// Every kernel that the program can launch, on any adapter and with any configuration.
 pub fn kernels() -> Vec<Kernel> {
     [
-        adam::kernels,
         elementwise::kernels,
         nodes::kernels,
         planes::kernels,
@@ -44,6 +43,7 @@ pub fn kernels() -> Vec<Kernel> {
         sort::kernels,
         splat::kernels,
         subgroups::kernels,
+        training::kernels,
     ]
     .into_iter()
     .flat_map(|kernels| kernels())

@@ -7,11 +7,11 @@ use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 use light4gs_shaders::{SKINNING, SKINNING_AFFINITIES, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
 
-use super::context::{Gpu, buffer_of, first_words};
+use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
-use crate::kernels::skinning::{MOST_AFFINITIES, MOVED, ORIENTATION, POSED, SkinningKernels, SkinningTensors};
+use crate::kernels::skinning::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningKernels, SkinningTensors, VECTOR};
 
 /// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five vectors each.
 const BLENDED: usize = 20;
@@ -21,13 +21,23 @@ const HANDED: usize = 20;
 const SLICE: usize = 64;
 const MOST_SLICES: usize = 256;
 
-/// The kernels of this file, for every number of affinities.
+/// The kernels of this file, with vectors or without, for every number of affinities.
 pub(super) fn kernels() -> Vec<Kernel> {
-    let of_all = |affinities| {
-        [SKINNING, SKINNING_BACKWARD, SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities))
+    let by_affinities = |affinities| {
+        let moving = [0, VECTOR].map(|vector| moving(affinities, vector));
+        moving.into_iter().chain([SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities)))
     };
-    let of_some = |affinities| kernel(SKINNING_AFFINITIES, affinities);
-    (0..=MOST_AFFINITIES).flat_map(of_all).chain((1..=MOST_AFFINITIES).map(of_some)).collect()
+    let of_affinities = (1..=MOST_AFFINITIES).map(|affinities| kernel(SKINNING_AFFINITIES, affinities));
+    let backward = [0, VECTOR].map(moving_back);
+    (0..=MOST_AFFINITIES).flat_map(by_affinities).chain(of_affinities).chain(backward).collect()
+}
+
+fn moving(affinities: usize, vector: usize) -> Kernel {
+    kernel(SKINNING, affinities).constant("VECTOR", vector as u32)
+}
+
+fn moving_back(vector: usize) -> Kernel {
+    Kernel::new(SKINNING_BACKWARD).constant("VECTOR", vector as u32)
 }
 
 fn kernel(shader: Shader, affinities: usize) -> Kernel {
@@ -45,9 +55,12 @@ pub struct GpuSaved {
     count: usize,
     node_count: usize,
     affinities: usize,
+    /// Numbers of a vector: none or three.
+    vector: usize,
     means: Handle,
-    orientations: Handle,
-    stillness: Handle,
+    quats: Handle,
+    vectors: Handle,
+    of_gaussians: Handle,
     nodes: Handle,
     blended: Handle,
 }
@@ -59,47 +72,51 @@ fn words(values: &[usize]) -> Vec<u32> {
 fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
     let gpu = Gpu::of(&tensors.means)?;
     let (count, node_count) = (tensors.means.shape()[0], tensors.nodes.shape()[0]);
-    let affinities = tensors.nodes.shape()[1] - POSED;
-    let [means, orientations, stillness, nodes] = tensors.into_array().map(buffer_of);
-    let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
+    let (affinities, vector) = (tensors.affinities.shape()[1], tensors.vectors.shape()[1]);
+    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(buffer_of);
+    let columns = MOVED + vector;
+    let moved = gpu.allocate("moved Gaussians", columns * count)?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
-    Launch::new(&gpu.client, kernel(SKINNING, affinities))
+    Launch::new(&gpu.client, moving(affinities, vector))
         .reads(&means)
-        .reads(&orientations)
+        .reads(&quats)
+        .reads(&vectors)
         .reads(&stillness)
+        .reads(&of_gaussians)
         .reads(&nodes)
         .writes(&moved)
         .writes(&blended)
         .uniform(&words(&[count, node_count]))
         .invocations(count)?;
-    let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
-    Ok((output, GpuSaved { count, node_count, affinities, means, orientations, stillness, nodes, blended }))
+    let output = gpu.tensor(first_words(&moved, columns * count), Shape::from([count, columns]));
+    let saved = GpuSaved { count, node_count, affinities, vector, means, quats, vectors, of_gaussians, nodes, blended };
+    Ok((output, saved))
 }
 
 fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let GpuSaved { count, node_count, affinities, means, orientations, stillness, nodes, blended } = saved;
+    let GpuSaved { count, node_count, affinities, vector, means, quats, vectors, of_gaussians, nodes, blended } = saved;
     let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
-    let of_means = gpu.allocate("gradients of means", 3 * count)?;
-    let of_orientations = gpu.allocate("gradients of orientations", ORIENTATION * count)?;
-    let of_stillness = gpu.allocate("gradients of stillness and affinities", (1 + affinities) * count)?;
-    Launch::new(&gpu.client, kernel(SKINNING_BACKWARD, affinities))
+    // Those of the Gaussians in one buffer, in the order of the inputs.
+    let widths = [3, 4, vector, 1, affinities];
+    let layout = Places::new(&widths.map(|width| width * count));
+    let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
+    Launch::new(&gpu.client, moving_back(vector))
         .reads(&means)
-        .reads(&orientations)
+        .reads(&quats)
+        .reads(&vectors)
         .reads(&blended)
         .reads(&buffer_of(upstream))
         .writes(&handed)
-        .writes(&of_means)
-        .writes(&of_orientations)
-        .writes(&of_stillness)
-        .uniform(&words(&[count]))
+        .writes(&gradients)
+        .uniform(&words(&[count, layout.starts[1], layout.starts[2], layout.starts[3]]))
         .invocations(count)?;
     if affinities > 0 {
         Launch::new(&gpu.client, kernel(SKINNING_AFFINITIES, affinities))
             .reads(&handed)
             .reads(&nodes)
-            .reads(&stillness)
-            .updates(&of_stillness)
+            .reads(&of_gaussians)
+            .writes(&layout.of(&gradients, 4))
             .uniform(&words(&[count, node_count]))
             .invocations(count)?;
     }
@@ -111,7 +128,7 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
     Launch::new(&gpu.client, kernel(SKINNING_NODES, affinities))
         .reads(&handed)
         .reads(&nodes)
-        .reads(&stillness)
+        .reads(&of_gaussians)
         .writes(&sums)
         .uniform(&words(&[count, node_count, slice]))
         .invocations(slices * node_count)?;
@@ -124,15 +141,11 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
         .uniform(&words(&[node_count, slices]))
         .invocations(of_node * node_count)?;
 
-    let rows = |handle: &Handle, rows: usize, columns: usize| {
-        gpu.tensor(first_words(handle, columns * rows), Shape::from([rows, columns]))
-    };
-    Ok(SkinningTensors {
-        means: rows(&of_means, count, 3),
-        orientations: rows(&of_orientations, count, ORIENTATION),
-        stillness: rows(&of_stillness, count, 1 + affinities),
-        nodes: rows(&of_nodes, node_count, columns),
-    })
+    let of_nodes = gpu.tensor(first_words(&of_nodes, columns * node_count), Shape::from([node_count, columns]));
+    let mut of_gaussians =
+        (0..INPUTS - 1).map(|k| gpu.tensor(layout.of(&gradients, k), Shape::from([count, widths[k]])));
+    let mut next = || of_gaussians.next().expect("a piece for each input");
+    Ok(SkinningTensors::from_array([next(), next(), next(), next(), next(), of_nodes]))
 }
 
 impl SkinningKernels for CubeBackend {

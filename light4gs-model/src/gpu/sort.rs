@@ -3,7 +3,7 @@
 use cubecl::server::Handle;
 use light4gs_shaders::{PREFIX_SUM, RADIX_COUNT, RADIX_SCATTER, RANGES, Shader};
 
-use super::context::Gpu;
+use super::context::{Gpu, words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
@@ -17,12 +17,19 @@ const SORT_BLOCK: usize = 1024;
 /// Invocations of such a workgroup, each with a counter for every digit: 16 KiB of workgroup memory.
 const SORT_GROUP: u32 = 32;
 const RADIX_BITS: u32 = 7;
+/// Up to so many blocks, each adds up what it needs of a pass's table itself; more would read too much of it.
+const BLOCKS_ALONE: usize = 128;
+/// Passes over the widest keys.
+const MOST_PASSES: u32 = u32::BITS.div_ceil(RADIX_BITS);
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
+    let flags = [false, true];
     let sums = (0..3).map(summing);
-    let scattering = [true, false].map(scattering);
-    sums.chain([by_digit(RADIX_COUNT)]).chain(scattering).chain([RANGES.into()]).collect()
+    let scattering = flags.into_iter().flat_map(move |summed| {
+        flags.into_iter().flat_map(move |first| flags.map(|last| Scattering { summed, first, last }.kernel()))
+    });
+    sums.chain((1..=MOST_PASSES).map(counting)).chain(scattering).chain([RANGES.into()]).collect()
 }
 
 /// A step of the prefix sum; 1 takes a single workgroup.
@@ -35,8 +42,25 @@ fn by_digit(shader: Shader) -> Kernel {
     kernel.constant("BLOCK", SORT_BLOCK as u32).constant("RADIX_BITS", RADIX_BITS)
 }
 
-fn scattering(first: bool) -> Kernel {
-    by_digit(RADIX_SCATTER).constant("FIRST", u32::from(first))
+fn counting(passes: u32) -> Kernel {
+    by_digit(RADIX_COUNT).constant("PASSES", passes)
+}
+
+/// What a pass of the sort finds and leaves.
+struct Scattering {
+    /// Its table has been replaced by prefix sums.
+    summed: bool,
+    first: bool,
+    last: bool,
+}
+
+impl Scattering {
+    fn kernel(&self) -> Kernel {
+        by_digit(RADIX_SCATTER)
+            .constant("SUMMED", self.summed.into())
+            .constant("FIRST", self.first.into())
+            .constant("LAST", self.last.into())
+    }
 }
 
 /// Replaces `count` words by their exclusive prefix sums. Returns a buffer that holds the total.
@@ -68,38 +92,42 @@ pub(super) struct Sorted {
 /// Sorts `count` keys of which only the lowest `bits` bits differ. Equal keys keep their order.
 pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<Sorted, GpuError> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
-    let digits = 1usize << RADIX_BITS;
-    let table = gpu.allocate("digits of a sort", digits * blocks)?;
-    let passes = bits.div_ceil(RADIX_BITS).max(1) as usize;
+    let passes = bits.div_ceil(RADIX_BITS).max(1);
+    // One for each pass, as long each, so that they can be bound one by one.
+    let table_length = blocks << RADIX_BITS;
+    let tables = gpu.allocate("digits of a sort", passes as usize * table_length)?;
+    Launch::new(&gpu.client, counting(passes))
+        .reads(keys)
+        .writes(&tables)
+        .uniform(&[count as u32, blocks as u32])
+        .groups(blocks)?;
     // The passes alternate between two buffers.
     let buffers = (0..passes.min(2))
         .map(|_| Ok(Sorted { keys: gpu.allocate("sorted keys", count)?, order: gpu.allocate("sorted order", count)? }))
         .collect::<Result<Vec<_>, GpuError>>()?;
     // The first pass reads no order: the index of a key is its place.
     let no_order = gpu.allocate("no order", 0)?;
-    for pass in 0..passes {
-        let parameters = [count as u32, pass as u32 * RADIX_BITS, blocks as u32];
+    let summed = blocks > BLOCKS_ALONE;
+    for pass in 0..passes as usize {
         let (from_keys, from_order) = match pass {
             0 => (keys, &no_order),
             _ => (&buffers[(pass - 1) % 2].keys, &buffers[(pass - 1) % 2].order),
         };
         let to = &buffers[pass % 2];
-        Launch::new(&gpu.client, by_digit(RADIX_COUNT))
-            .reads(from_keys)
-            .writes(&table)
-            .uniform(&parameters)
-            .groups(blocks)?;
-        prefix_sum(gpu, &table, digits * blocks)?;
-        Launch::new(&gpu.client, scattering(pass == 0))
+        if summed {
+            prefix_sum(gpu, &words(&tables, pass * table_length, table_length), table_length)?;
+        }
+        let scattering = Scattering { summed, first: pass == 0, last: pass + 1 == passes as usize };
+        Launch::new(&gpu.client, scattering.kernel())
             .reads(from_keys)
             .reads(from_order)
-            .reads(&table)
+            .updates(&tables)
             .writes(&to.keys)
             .writes(&to.order)
-            .uniform(&parameters)
+            .uniform(&[count as u32, blocks as u32, pass as u32])
             .groups(blocks)?;
     }
-    Ok(buffers[(passes - 1) % 2].clone())
+    Ok(buffers[(passes as usize - 1) % 2].clone())
 }
 
 /// `[groups + 1]`: where each group's keys begin among sorted ones. The last entry is where keys of `groups` and above
@@ -117,4 +145,44 @@ pub(super) fn ranges(gpu: &Gpu, keys: &Handle, count: usize, groups: usize) -> R
 /// The number of bits that can hold every number up to `largest`.
 pub(super) fn bits_for(largest: usize) -> u32 {
     usize::BITS - largest.leading_zeros()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::context::tests::gpu;
+    use super::*;
+
+    fn upload(gpu: &Gpu, words: &[u32]) -> Handle {
+        let mut words = words.to_vec();
+        words.resize(words.len().max(1), 0);
+        gpu.client.create_from_slice(&words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<_>>())
+    }
+
+    fn read(gpu: &Gpu, handle: &Handle, count: usize) -> Vec<u32> {
+        let bytes = gpu.client.read_one(handle.clone()).unwrap();
+        bytes.as_chunks::<4>().0.iter().map(|bytes| u32::from_le_bytes(*bytes)).take(count).collect()
+    }
+
+    /// Few blocks and many, one pass and several, keys that are equal.
+    #[test]
+    fn keys_are_sorted_and_equal_ones_keep_their_order() {
+        let gpu = gpu();
+        let mut state = 1u32;
+        for (count, bits) in [(0, 7), (1, 28), (1000, 7), (5000, 10), (70_001, 28), (150_000, 10)] {
+            let keys: Vec<u32> = (0..count)
+                .map(|_| {
+                    state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                    // Only some of the keys' values occur, so that many are equal.
+                    (state >> 8) * 37 % 3001 % (1 << bits)
+                })
+                .collect();
+            let mut order: Vec<u32> = (0..count as u32).collect();
+            order.sort_by_key(|&index| keys[index as usize]);
+            let sorted = sort(&gpu, &upload(&gpu, &keys), count, bits).unwrap();
+            let case = format!("{count} keys of {bits} bits");
+            assert!(read(&gpu, &sorted.order, count) == order, "order of {case}");
+            let expected: Vec<u32> = order.iter().map(|&index| keys[index as usize]).collect();
+            assert!(read(&gpu, &sorted.keys, count) == expected, "{case}");
+        }
+    }
 }

@@ -7,11 +7,9 @@ use burn_wgpu::CubeTensor;
 use cubecl::server::Handle;
 use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
 use light4gs_render::{CHANNELS, View};
-use light4gs_shaders::{
-    CELL_COUNTS, COLOR, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader,
-};
+use light4gs_shaders::{CELL_COUNTS, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader};
 
-use super::context::{Gpu, Places, buffer_of, first_words};
+use super::context::{Gpu, PLACE_ALIGNMENT, Places, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
@@ -122,7 +120,7 @@ pub(super) fn kernels() -> Vec<Kernel> {
     let cells = Team::cells().into_iter().flat_map(|cell| [projecting(cell), by_cells(INTERSECT, cell)]);
     let teams =
         Team::all().flat_map(|team| [RASTERIZE, RASTERIZE_BACKWARD].map(|shader| Kernel::new(shader).blending(team)));
-    cells.chain(teams).chain([COLOR, CELL_COUNTS, PROJECT_BACKWARD].map(Kernel::new)).collect()
+    cells.chain(teams).chain([CELL_COUNTS, PROJECT_BACKWARD].map(Kernel::new)).collect()
 }
 
 /// A kernel of Gaussians that counts or lists cells.
@@ -131,34 +129,26 @@ fn by_cells(shader: Shader, cell: u32) -> Kernel {
 }
 
 fn projecting(cell: u32) -> Kernel {
-    by_cells(PROJECT, cell).constant("DEPTH_BITS", DEPTH_BITS)
+    by_cells(PROJECT, cell).constant("DEPTH_BITS", DEPTH_BITS).constant("ALIGNMENT", PLACE_ALIGNMENT as u32)
 }
 
 fn project(gpu: &Gpu, frame: &Frame, inputs: &InputBuffers) -> Result<[Handle; 3], GpuError> {
     let count = frame.gaussians;
-    let splats = gpu.allocate("splats", 16 * count)?;
-    let depth_keys = gpu.allocate("depths", count)?;
-    let radii = gpu.allocate("radii", count)?;
-    let uniform = frame.uniform(0, 1);
-    Launch::new(&gpu.client, COLOR)
-        .reads(&inputs.means)
-        .reads(&inputs.sh_dc)
-        .reads(&inputs.sh_rest)
-        .writes(&splats)
-        .uniform(&uniform)
-        .invocations(count)?;
+    // Splats, keys in the order of depths, radii.
+    let layout = Places::new(&[16 * count, count, count]);
+    let projected = gpu.allocate("splats", layout.total)?;
     Launch::new(&gpu.client, projecting(frame.team.cell))
         .reads(&inputs.means)
         .reads(&inputs.quats)
         .reads(&inputs.scales)
         .reads(&inputs.opacities)
         .reads(&inputs.screen_offsets)
-        .updates(&splats)
-        .writes(&depth_keys)
-        .writes(&radii)
-        .uniform(&uniform)
+        .reads(&inputs.sh_dc)
+        .reads(&inputs.sh_rest)
+        .writes(&projected)
+        .uniform(&frame.uniform(0, 1))
         .invocations(count)?;
-    Ok([splats, depth_keys, radii])
+    Ok(std::array::from_fn(|k| layout.of(&projected, k)))
 }
 
 fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> Result<Intersections, GpuError> {

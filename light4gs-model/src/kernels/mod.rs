@@ -1,8 +1,10 @@
 //! Inputs and outputs of the kernels of every back end: the seam between the operations of [`ops`](crate::ops) and
 //! `cpu/`, `gpu/`.
 
+pub(crate) mod activation;
 pub(crate) mod adam;
 pub(crate) mod gather_rows;
+pub(crate) mod image_difference;
 pub(crate) mod mixture_bits;
 pub(crate) mod node_poses;
 pub(crate) mod node_regularizer;

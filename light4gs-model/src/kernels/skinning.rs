@@ -11,10 +11,10 @@ pub(crate) const POSE: usize = 16;
 pub(crate) const PLACE: usize = 4;
 /// Numbers of a posed node before its affinities.
 pub(crate) const POSED: usize = PLACE + POSE;
-/// Numbers of a Gaussian's orientation: quaternion (4), and a vector that turns along (3).
-pub(crate) const ORIENTATION: usize = 7;
-/// Numbers of a moved Gaussian: position (3), quaternion (4), turned vector (3).
-pub(crate) const MOVED: usize = 10;
+/// Numbers of a moved Gaussian: position (3), quaternion (4); turned vectors (3) stand behind them.
+pub(crate) const MOVED: usize = 7;
+/// Numbers of a vector that turns along.
+pub(crate) const VECTOR: usize = 3;
 
 /// Most affinities of a Gaussian and of a node.
 pub const MOST_AFFINITIES: usize = 4;
@@ -24,25 +24,30 @@ pub const MOST_AFFINITIES: usize = 4;
 pub struct SkinningTensors<B: Backend> {
     /// `[N, 3]`, world units.
     pub means: FloatTensor<B>,
-    /// `[N, 7]`: quaternions (w, x, y, z) of any length, then vectors that turn along.
-    pub orientations: FloatTensor<B>,
-    /// `[N, 1 + H]`, logits of the node that stands still, then affinities.
+    /// `[N, 4]`: quaternions (w, x, y, z) of any length.
+    pub quats: FloatTensor<B>,
+    /// `[N, V]`, V 0 or 3: vectors that turn along.
+    pub vectors: FloatTensor<B>,
+    /// `[N, 1]`, logits of the node that stands still.
     pub stillness: FloatTensor<B>,
+    /// `[N, H]`.
+    pub affinities: FloatTensor<B>,
     /// `[B, 20 + H]`: anchor (3), precision (1), pose (16): rotation matrix row by row (9), offset (3), quaternion (4); then
     /// affinities.
     pub nodes: FloatTensor<B>,
 }
 
 /// Tensors of [`SkinningTensors`].
-pub(crate) const INPUTS: usize = 4;
+pub(crate) const INPUTS: usize = 6;
 
 impl<B: Backend> SkinningTensors<B> {
     pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.means, self.orientations, self.stillness, self.nodes]
+        [self.means, self.quats, self.vectors, self.stillness, self.affinities, self.nodes]
     }
 
-    pub(crate) fn from_array([means, orientations, stillness, nodes]: [FloatTensor<B>; INPUTS]) -> Self {
-        Self { means, orientations, stillness, nodes }
+    pub(crate) fn from_array(tensors: [FloatTensor<B>; INPUTS]) -> Self {
+        let [means, quats, vectors, stillness, affinities, nodes] = tensors;
+        Self { means, quats, vectors, stillness, affinities, nodes }
     }
 }
 
@@ -51,9 +56,9 @@ pub trait SkinningKernels: Backend {
     /// What the backward pass wants to see again.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// Positions, quaternions and vectors `[N, 10]`.
+    /// Positions, quaternions and vectors `[N, 7 + V]`.
     fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the output `[N, 10]`.
+    /// Gradients of all inputs from that of the output `[N, 7 + V]`.
     fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
 }

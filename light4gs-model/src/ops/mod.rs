@@ -8,10 +8,13 @@
 // Burn 0.22 deprecates its `ndarray` back end in favor of `flex`; we serve both.
 #![allow(deprecated)]
 
+pub mod activation;
 pub mod adam;
+pub mod columns;
 #[cfg(feature = "wgpu")]
 mod fusion;
 mod host;
+pub mod image_difference;
 pub mod linear;
 pub mod lower_bound;
 pub mod node_poses;
@@ -19,7 +22,6 @@ pub mod node_regularizer;
 pub mod normal_cdf;
 pub mod plane_query;
 pub mod rate;
-pub mod sigmoid;
 pub mod significance;
 pub mod skinning;
 pub mod splat;

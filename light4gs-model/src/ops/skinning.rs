@@ -1,6 +1,7 @@
 //! Linear blend skinning of Gaussians by control nodes (Lewis et al. 2000; for Gaussians SC-GS, Huang et al. 2024), as a Burn
 //! operation.
 
+use std::ops::Range;
 use std::sync::Arc;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
@@ -17,9 +18,9 @@ use burn_fusion::{Fusion, FusionBackend};
 use super::fusion::{leaf, resolve};
 use super::host::{HostBackend, HostTensor};
 use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::skinning::{BlendedGroup, SkinningSlices, skin as skin_slices};
+use crate::cpu::skinning::{BlendedGroup, MOVED as ALL_MOVED, ORIENTATION, SkinningSlices, skin as skin_slices};
 use crate::cpu::skinning_backward::skin_backward;
-use crate::kernels::skinning::{INPUTS, MOVED, ORIENTATION, POSED};
+use crate::kernels::skinning::{INPUTS, MOVED, POSED, VECTOR};
 pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTensors};
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
@@ -27,7 +28,7 @@ pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTen
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait SkinningOps: Backend {
-    /// Positions, quaternions and vectors `[N, 10]`; see [`skin`].
+    /// Positions, quaternions and vectors `[N, 7 + V]`; see [`skin`].
     fn skinning(#[extension_type] tensors: SkinningTensors<Self>) -> FloatTensor<Self>;
 }
 
@@ -68,37 +69,86 @@ impl<B: SkinningOps + SkinningKernels, C: CheckpointStrategy> SkinningOps for Au
 /// State of the CPU back ends between forward and backward.
 #[derive(Clone, Debug)]
 pub struct CpuSaved {
-    inputs: [HostTensor; INPUTS],
+    means: HostTensor,
+    orientations: Arc<Vec<f32>>,
+    stillness: Arc<Vec<f32>>,
+    nodes: HostTensor,
     affinities: usize,
+    /// Numbers of a vector: none or three.
+    vector: usize,
     blended: Arc<Vec<BlendedGroup>>,
 }
 
-fn slices(inputs: &[HostTensor; INPUTS], affinities: usize) -> SkinningSlices<'_> {
-    let [means, orientations, stillness, nodes] = inputs.each_ref().map(HostTensor::as_slice);
-    SkinningSlices { means, orientations, stillness, nodes, affinities }
+impl CpuSaved {
+    fn slices(&self) -> SkinningSlices<'_> {
+        SkinningSlices {
+            means: self.means.as_slice(),
+            orientations: &self.orientations,
+            stillness: &self.stillness,
+            nodes: self.nodes.as_slice(),
+            affinities: self.affinities,
+        }
+    }
+}
+
+/// Rows of two matrices as rows of one, `columns` wide; what both leave of it is 0.
+fn side_by_side([(first, width), (second, other)]: [(&[f32], usize); 2], columns: usize) -> Vec<f32> {
+    let mut rows = vec![0.0; first.len() / width * columns];
+    for (row, own) in rows.chunks_exact_mut(columns).zip(first.chunks_exact(width)) {
+        row[..width].copy_from_slice(own);
+    }
+    if other > 0 {
+        for (row, own) in rows.chunks_exact_mut(columns).zip(second.chunks_exact(other)) {
+            row[width..width + other].copy_from_slice(own);
+        }
+    }
+    rows
+}
+
+/// Some columns of a matrix that is `width` wide.
+fn columns_of(matrix: &[f32], width: usize, columns: Range<usize>) -> Vec<f32> {
+    matrix.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect()
 }
 
 fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
-    let affinities = tensors.nodes.shape()[1] - POSED;
-    let inputs = tensors.into_array().map(B::to_host);
-    let (moved, blended) = skin_slices(&slices(&inputs, affinities));
-    let count = moved.len() / MOVED;
-    (B::from_values(moved, [count, MOVED]), CpuSaved { inputs, affinities, blended: Arc::new(blended) })
+    let (vector, affinities) = (tensors.vectors.shape()[1], tensors.affinities.shape()[1]);
+    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
+    let orientations = side_by_side([(quats.as_slice(), 4), (vectors.as_slice(), vector)], ORIENTATION);
+    let stillness = side_by_side([(stillness.as_slice(), 1), (of_gaussians.as_slice(), affinities)], 1 + affinities);
+    let mut saved = CpuSaved {
+        means,
+        orientations: Arc::new(orientations),
+        stillness: Arc::new(stillness),
+        nodes,
+        affinities,
+        vector,
+        blended: Arc::default(),
+    };
+    let (moved, blended) = skin_slices(&saved.slices());
+    saved.blended = Arc::new(blended);
+    let count = moved.len() / ALL_MOVED;
+    let moved = if vector == 0 { columns_of(&moved, ALL_MOVED, 0..MOVED) } else { moved };
+    (B::from_values(moved, [count, MOVED + vector]), saved)
 }
 
 fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
     let upstream = B::to_host(gradient);
-    let affinities = saved.affinities;
-    let gradients = skin_backward(&slices(&saved.inputs, affinities), &saved.blended, upstream.as_slice());
-    let matrix = |values: Vec<f32>, columns: usize| {
-        let rows = values.len() / columns;
-        B::from_values(values, [rows, columns])
+    let CpuSaved { affinities, vector, .. } = saved;
+    let widened = (vector == 0).then(|| side_by_side([(upstream.as_slice(), MOVED), (&[], 0)], ALL_MOVED));
+    let gradients = skin_backward(&saved.slices(), &saved.blended, widened.as_deref().unwrap_or(upstream.as_slice()));
+    let count = gradients.means.len() / 3;
+    let part = |matrix: &[f32], width: usize, columns: Range<usize>| {
+        let shape = [count, columns.len()];
+        B::from_values(columns_of(matrix, width, columns), shape)
     };
+    let columns = POSED + affinities;
     SkinningTensors {
-        means: matrix(gradients.means, 3),
-        orientations: matrix(gradients.orientations, ORIENTATION),
-        stillness: matrix(gradients.stillness, 1 + affinities),
-        nodes: matrix(gradients.nodes, POSED + affinities),
+        quats: part(&gradients.orientations, ORIENTATION, 0..4),
+        vectors: part(&gradients.orientations, ORIENTATION, 4..4 + vector),
+        stillness: part(&gradients.stillness, 1 + affinities, 0..1),
+        affinities: part(&gradients.stillness, 1 + affinities, 1..1 + affinities),
+        means: B::from_values(gradients.means, [count, 3]),
+        nodes: B::from_values(gradients.nodes, [saved.nodes.as_slice().len() / columns, columns]),
     }
 }
 
@@ -137,11 +187,14 @@ impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
 pub struct SkinningInputs {
     /// `[N, 3]`: where the Gaussians are at rest, world units.
     pub means: Tensor<2>,
-    /// `[N, 7]`: their orientations at rest as quaternions (w, x, y, z), of any length, then a vector for each that turns along.
-    pub orientations: Tensor<2>,
-    /// `[N, 1 + H]`: logit of the node that stands still, for each Gaussian, then its H affinities, 0 to
-    /// [`MOST_AFFINITIES`].
+    /// `[N, 4]`: their orientations at rest as quaternions (w, x, y, z), of any length.
+    pub quats: Tensor<2>,
+    /// `[N, 3]`: a vector for each that turns along.
+    pub vectors: Option<Tensor<2>>,
+    /// `[N, 1]`: logit of the node that stands still.
     pub stillness: Tensor<2>,
+    /// `[N, H]`: each Gaussian's affinities, H up to [`MOST_AFFINITIES`].
+    pub affinities: Option<Tensor<2>>,
     /// `[B, 20 + H]`, the nodes, such as [`pose`](super::node_poses::pose) gives them: where each is at rest (3), world units;
     /// `1 / (2 r²)` of its radius r; what it does to the space around it: a matrix R row by row (9) and an offset t (3), so that x
     /// goes to `R x + t`, and R's quaternion (w, x, y, z); its own affinities.
@@ -149,7 +202,7 @@ pub struct SkinningInputs {
 }
 
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
-/// 2024). Returns `[N, 10]`: positions (3), quaternions (4), which are not normalized, and turned vectors (3).
+/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized; or `[N, 10]`, with turned vectors (3).
 ///
 /// ```text
 /// w   = softmax over b of (affinities · affinities_b - precision_b |mean - anchor_b|², and stillness for the node that stands still)
@@ -173,10 +226,12 @@ pub struct SkinningInputs {
 /// let half = 0.5_f32.sqrt();
 /// let moved = skin(SkinningInputs {
 ///     means: rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3),
+///     quats: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 4),
 ///     // Each with a vector along x.
-///     orientations: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0], 7),
+///     vectors: Some(rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3)),
 ///     // The first Gaussian goes with the node, the second stands still.
 ///     stillness: rows(&[-60.0, 60.0], 1),
+///     affinities: None,
 ///     nodes: rows(&[
 ///         0.0, 0.0, 0.0, 1.0,
 ///         0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half,
@@ -190,19 +245,31 @@ pub struct SkinningInputs {
 /// # Panics
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, orientations, stillness, nodes } = inputs;
+    let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
     let count = means.dims()[0];
     assert!(nodes.dims()[0] > 0, "nodes must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
-    assert_eq!(orientations.dims(), [count, ORIENTATION], "orientations must be [N, 7]");
-    let affinities = stillness.dims()[1].saturating_sub(1);
-    assert!(affinities <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
-    assert_eq!(stillness.dims(), [count, 1 + affinities], "stillness must be [N, 1 + H]");
-    assert_eq!(nodes.dims()[1], POSED + affinities, "nodes must be [B, 20 + H]");
+    assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");
+    assert_eq!(stillness.dims(), [count, 1], "stillness must be [N, 1]");
+    let nothing = || Tensor::empty([count, 0], &means.device());
+    let vectors = match vectors {
+        Some(vectors) => {
+            assert_eq!(vectors.dims(), [count, VECTOR], "vectors must be [N, 3]");
+            vectors
+        }
+        None => nothing(),
+    };
+    let affinities = affinities.unwrap_or_else(nothing);
+    let [rows, columns] = affinities.dims();
+    assert!(columns <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
+    assert_eq!(rows, count, "affinities must be [N, H]");
+    assert_eq!(nodes.dims()[1], POSED + columns, "nodes must be [B, 20 + H]");
     Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {
         means: means.into_dispatch(),
-        orientations: orientations.into_dispatch(),
+        quats: quats.into_dispatch(),
+        vectors: vectors.into_dispatch(),
         stillness: stillness.into_dispatch(),
+        affinities: affinities.into_dispatch(),
         nodes: nodes.into_dispatch(),
     }))
 }

@@ -20,11 +20,10 @@ use std::borrow::Cow;
 
 use burn::tensor::Tensor;
 use light4gs_codec::legal_attribute_name;
-use light4gs_codec::rendering::MAX_LOGARITHM;
 use light4gs_data::PointCloud;
 
 use super::gaussians::GaussiansConfig;
-use crate::ops::sigmoid::sigmoid;
+use crate::ops::activation::{bounded_exponential, sigmoid};
 
 /// One attribute of every Gaussian.
 #[derive(Clone, Debug)]
@@ -101,12 +100,11 @@ pub enum Coding {
 }
 
 impl Activation {
-    /// Applies it. Logarithms are clamped before the exponential, which then stays finite, so that the backward pass
-    /// has no 0 · infinity.
+    /// Applies it.
     pub fn apply<const D: usize>(self, values: Tensor<D>) -> Tensor<D> {
         match self {
             Self::Identity => values,
-            Self::Exponential => values.clamp_max(MAX_LOGARITHM).exp(),
+            Self::Exponential => bounded_exponential(values),
             Self::Sigmoid => sigmoid(values),
         }
     }

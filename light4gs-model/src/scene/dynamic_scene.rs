@@ -5,7 +5,7 @@ use burn::tensor::Device;
 use light4gs_data::PointCloud;
 
 use super::coordinates::{CoordinatesConfig, SceneCoordinates};
-use super::field::{BuiltInField, DeformationField};
+use super::field::{BuiltInField, DeformationField, ScenePoints};
 use super::gaussians::{GaussianTensors, Gaussians, GaussiansConfig};
 use crate::planes::FeaturePlanes;
 
@@ -89,7 +89,7 @@ impl<F: DeformationField> DynamicScene<F> {
         let means = canonical.means.clone();
         let means = if self.differentiate_points { means } else { means.detach() };
         let constants = canonical.further.clone();
-        let (points, time) = (self.coordinates.normalize(means), self.coordinates.field_time(time));
+        let (points, time) = (ScenePoints::new(means, &self.coordinates), self.coordinates.field_time(time));
         self.field.deform(canonical, points, time).with_constants_of(&constants)
     }
 

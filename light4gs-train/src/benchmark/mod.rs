@@ -258,8 +258,10 @@ pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningI
     let precisions = Tensor::full([nodes, 1], 0.5 / (radius * radius), device);
     SkinningInputs {
         means: leaf(random(count, 3)),
-        orientations: leaf(random(count, 7)),
+        quats: leaf(random(count, 4)),
+        vectors: None,
         stillness: leaf(random(count, 1)),
+        affinities: None,
         nodes: leaf(Tensor::cat(vec![random(nodes, 3), precisions, random(nodes, 16)], 1)),
     }
 }
@@ -332,7 +334,7 @@ fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device, presets: &[(Con
     add("hexplane forward + backward", both);
 
     let inputs = skinning_inputs(count, SKINNING_NODES, autodiff);
-    let upstream = Tensor::<2>::random([count, 10], Distribution::Default, autodiff);
+    let upstream = Tensor::<2>::random([count, 7], Distribution::Default, autodiff);
     add("skinning forward", meter.measure(|| inputs.clone(), skin));
     let skinned = |inputs: SkinningInputs| (skin(inputs) * upstream.clone()).sum();
     add("skinning backward", meter.measure(|| skinned(inputs.clone()), |loss| loss.backward()));

@@ -3,7 +3,7 @@
 
 use burn::tensor::{Tensor, TensorData, s};
 use light4gs_model::attributes::OPACITY_LOGITS;
-use light4gs_model::ops::sigmoid::sigmoid;
+use light4gs_model::ops::activation::sigmoid;
 use light4gs_model::{GaussianTensors, Gaussians};
 
 use super::GaussianEditor;

@@ -15,19 +15,20 @@ mod ssim;
 
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_data::{PixelMask, RgbImage8};
+use light4gs_model::ops::image_difference::{Difference, mean_difference};
 
 pub use metric::{Metric, RegionMetric};
 pub use pixel_map::PixelMap;
 pub use ssim::{MS_SSIM_LEAST_SIDE, WINDOW, d_ssim, ms_ssim, ssim, ssim_map, ssim_valid};
 
-/// Mean absolute difference over pixels and channels, `[1]`.
+/// Mean absolute difference over pixels and channels, `[1]`. The truth gets no gradient.
 pub fn l1(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
-    (image - truth).abs().mean()
+    mean_difference(Difference::Absolute, image, truth)
 }
 
-/// Mean squared difference over pixels and channels, `[1]`.
+/// Mean squared difference over pixels and channels, `[1]`. The truth gets no gradient.
 pub fn l2(image: Tensor<3>, truth: Tensor<3>) -> Tensor<1> {
-    squared_differences(image, truth).mean()
+    mean_difference(Difference::Squared, image, truth)
 }
 
 /// Squared difference at every pixel and channel, `[H, W, 3]`.

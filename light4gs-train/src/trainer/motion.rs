@@ -150,7 +150,7 @@ mod tests {
     use burn::module::Module;
     use burn::tensor::{Device, TensorData, s};
     use light4gs_data::{Camera, Frame, PointCloud, RgbImage8, Scene, SplitFrames};
-    use light4gs_model::{GaussianTensors, LearningRate, ModelError, Renewed};
+    use light4gs_model::{GaussianTensors, LearningRate, ModelError, Renewed, ScenePoints};
     use rand::SeedableRng;
 
     use super::*;
@@ -187,8 +187,8 @@ mod tests {
             }
         }
 
-        fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
-            assert_eq!(points.dims(), canonical.means.dims());
+        fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {
+            assert_eq!(points.normalized().dims(), canonical.means.dims());
             let shift = self.shifts.val().mean_dim(0) + (self.fast.val() + self.slow.val()).unsqueeze::<2>();
             GaussianTensors { means: canonical.means.clone() + shift * time, ..canonical }
         }

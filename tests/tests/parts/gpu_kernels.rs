@@ -2,10 +2,10 @@
 //! and lists that are longer than one launch can process.
 
 use burn::tensor::{Device, Tensor};
+use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
-use light4gs_model::ops::sigmoid::sigmoid;
 use light4gs_model::{HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
 
@@ -27,10 +27,11 @@ fn run(function: fn(Tensor<1>) -> Tensor<1>, device: Device, count: usize) -> [V
 fn values_and_gradients_are_those_of_the_cpu() {
     type Function = fn(Tensor<1>) -> Tensor<1>;
     // Of values and slopes. That of the logistic function has a difference from 1, whose rounding counts.
-    let functions: [(&str, Function, [f32; 2]); 3] = [
+    let functions: [(&str, Function, [f32; 2]); 4] = [
         ("normal cdf", normal_cdf, [f32::MIN_POSITIVE; 2]),
         ("lower bound", |x| lower_bound(x, 0.11), [0.0; 2]),
         ("sigmoid", sigmoid, [0.0, f32::EPSILON]),
+        ("bounded exponential", |x| bounded_exponential(x * 10.0), [0.0; 2]),
     ];
     for (what, function, rounding) in functions {
         for count in [0, 1, 2600] {

@@ -3,6 +3,7 @@
 
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor, TensorData};
+use light4gs_model::ops::columns::columns;
 use light4gs_model::ops::skinning::{SkinningInputs, skin};
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::random::Random;
@@ -63,7 +64,14 @@ impl Case {
         if self.affinities > 0 {
             nodes.push(anchors.narrow(1, 3, self.affinities));
         }
-        let moved = operation(SkinningInputs { means, orientations, stillness, nodes: Tensor::cat(nodes, 1) });
+        let moved = operation(SkinningInputs {
+            means,
+            quats: columns(orientations.clone(), 0..4),
+            vectors: Some(columns(orientations, 4..7)),
+            affinities: (self.affinities > 0).then(|| columns(stillness.clone(), 1..1 + self.affinities)),
+            stillness: columns(stillness, 0..1),
+            nodes: Tensor::cat(nodes, 1),
+        });
         let weights: Vec<f32> = weights.iter().map(|weight| *weight as f32).collect();
         let weights = Tensor::<2>::from_data(TensorData::new(weights, moved.dims()), &moved.device());
         let gradients = (moved.clone() * weights).sum().backward();
@@ -121,19 +129,19 @@ fn loss_weights(count: usize, random: &mut Random) -> Vec<f64> {
 
 /// The operation in plain ones.
 fn plain(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, orientations, stillness, nodes } = inputs;
+    let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
+    let orientations = Tensor::cat(vec![quats, vectors.expect("all cases have vectors")], 1);
     let device = means.device();
-    let affinities = stillness.dims()[1] - 1;
     let [places, precisions, poses] =
         [(0, 3), (3, 1), (4, 16)].map(|(first, count)| nodes.clone().narrow(1, first, count));
     let offsets = means.clone().detach().unsqueeze_dim::<3>(1) - places.unsqueeze_dim::<3>(0);
     let squared = offsets.powi_scalar(2).sum_dim(2).squeeze_dim::<2>(2);
     let mut logits = -squared * precisions.transpose();
-    if affinities > 0 {
-        let liked = stillness.clone().narrow(1, 1, affinities).matmul(nodes.narrow(1, 20, affinities).transpose());
-        logits = logits + liked;
+    if let Some(affinities) = affinities {
+        let columns = affinities.dims()[1];
+        logits = logits + affinities.matmul(nodes.narrow(1, 20, columns).transpose());
     }
-    let weights = softmax(Tensor::cat(vec![logits, stillness.narrow(1, 0, 1)], 1), 1);
+    let weights = softmax(Tensor::cat(vec![logits, stillness], 1), 1);
     let still = Tensor::<1>::from_floats(STILL.map(|value| value as f32), &device).unsqueeze::<2>();
     let pose = weights.matmul(Tensor::cat(vec![poses, still], 0));
     let [p, m, q] = [pose.split(1, 1), means.split(1, 1), orientations.split(1, 1)];
@@ -315,17 +323,37 @@ fn tensors_may_lie_in_memory_as_they_like() {
     for (name, device) in devices() {
         let expected = case.run(&device, &weights, skin);
         let found = case.run(&device, &weights, |inputs| {
-            let SkinningInputs { means, orientations, stillness, nodes } = inputs;
-            let gaussians = Tensor::cat(vec![stillness, means, orientations], 1);
+            let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
+            let [vectors, affinities] = [vectors, affinities].map(|tensor| tensor.expect("this case has them"));
+            let gaussians = Tensor::cat(vec![stillness, affinities, means, quats, vectors], 1);
             let nodes = Tensor::cat(vec![nodes.clone().transpose(), nodes.transpose()], 0);
             skin(SkinningInputs {
                 means: gaussians.clone().narrow(1, 3, 3),
-                orientations: gaussians.clone().narrow(1, 6, 7),
-                stillness: gaussians.narrow(1, 0, 3),
+                quats: gaussians.clone().narrow(1, 6, 4),
+                vectors: Some(gaussians.clone().narrow(1, 10, 3)),
+                stillness: gaussians.clone().narrow(1, 0, 1),
+                affinities: Some(gaussians.narrow(1, 1, 2)),
                 nodes: nodes.narrow(0, 22, 22).transpose(),
             })
         });
         assert!(found == expected, "{name}");
+    }
+}
+
+/// Without vectors there is less to do, and all else is the same.
+#[test]
+fn vectors_may_be_left_out() {
+    let mut random = Random::new(360);
+    let case = Case::random(300, 9, 3, &mut random);
+    let weights = random.normals(7 * 300);
+    for (name, device) in devices() {
+        let with = case.run(&device, &weights, |inputs| skin(inputs).narrow(1, 0, 7));
+        let without = case.run(&device, &weights, |inputs| {
+            let vectors = inputs.vectors.clone().expect("all cases have vectors");
+            // They stay on the tape, with a gradient of zero.
+            skin(SkinningInputs { vectors: None, ..inputs }) + vectors.sum_dim(1) * 0.0
+        });
+        assert!(with == without, "{name}");
     }
 }
 
@@ -341,7 +369,7 @@ fn no_gaussian_is_no_error() {
 }
 
 #[test]
-#[should_panic(expected = "stillness must be [N, 1 + H]")]
+#[should_panic(expected = "stillness must be [N, 1]")]
 fn a_wrong_shape_is_named() {
     let mut case = Case::random(5, 3, 0, &mut Random::new(340));
     case.inputs[2].push(1.0);

@@ -28,6 +28,7 @@ impl Blend {
     ///
     /// Channels whose weight is 0 at all eight places are left out, where all numbers are finite: their products are
     /// then +0. No sum is ever -0, since neither 0 nor any product is, so that adding +0 changes no bit.
+    #[inline(always)]
     pub(crate) fn apply(&self, weights: &[Lanes], used: &mut Vec<(usize, Lanes)>, outputs: &mut [Lanes]) {
         used.clear();
         let all = weights.iter().enumerate().map(|(channel, lanes)| (channel, *lanes));
@@ -41,8 +42,7 @@ impl Blend {
     }
 }
 
-/// A separate and simple function, so that the compiler keeps the sums in vector registers.
-#[inline(never)]
+#[inline(always)]
 fn panel_sums(panel: &[Panel], weights: &[(usize, Lanes)]) -> [Lanes; PANEL] {
     let mut sums = [[0.0; LANES]; PANEL];
     for (channel, weights) in weights {

@@ -28,6 +28,7 @@ impl Convolution {
 
     /// The outputs around `columns` of row `y` of the input, which has a border of half the kernel. `window` is scratch
     /// memory.
+    #[inline(always)]
     pub(crate) fn apply(
         &self,
         map: &PaddedMap,
@@ -54,6 +55,7 @@ impl Convolution {
 
     /// The outputs of a kernel of side 1 from the inputs at eight positions. Without groups, inputs may be left out at
     /// the end; they are then not in the sums.
+    #[inline(always)]
     pub(crate) fn apply_pointwise(&self, inputs: &[Lanes], mut outputs: &mut [Lanes]) {
         if let [group] = &self.groups[..] {
             return group.apply(inputs, outputs);

@@ -19,11 +19,13 @@ const SERIES: [f32; 6] = [1.0 / 2.0, 1.0 / 6.0, 1.0 / 24.0, 1.0 / 120.0, 1.0 / 7
 const SQRT_2: f32 = std::f32::consts::SQRT_2;
 
 /// `2^k` for `k` in -126..=127.
+#[inline(always)]
 fn power_of_two(k: i32) -> f32 {
     f32::from_bits(((k + 127) as u32) << 23)
 }
 
 /// `exp(x)`: infinite above 88.72283, 0 below -40; NaN of NaN.
+#[inline(always)]
 pub(crate) fn exponential(x: f32) -> f32 {
     if x > LARGEST {
         return f32::INFINITY;
@@ -44,6 +46,7 @@ pub(crate) fn exponential(x: f32) -> f32 {
 }
 
 /// `ln(x)`: minus infinity at 0, NaN below.
+#[inline(always)]
 pub(crate) fn logarithm(x: f32) -> f32 {
     if x == 0.0 {
         return f32::NEG_INFINITY;

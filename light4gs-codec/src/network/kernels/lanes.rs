@@ -15,7 +15,7 @@ pub(super) type Panel = [f32; PANEL];
 pub(crate) const LEAST_MAGNITUDE: f32 = 1.0 / (1u64 << 50) as f32;
 
 /// A weight or a value, or 0 where its magnitude is too small.
-#[inline]
+#[inline(always)]
 pub(crate) fn kept(value: f32) -> f32 {
     // NaN is kept.
     if value.abs() < LEAST_MAGNITUDE { 0.0 } else { value }
@@ -78,6 +78,7 @@ impl Matrix {
 
     /// Each output is its bias plus the products with the inputs, in their order. If there are fewer `inputs` than
     /// columns, the missing ones are not in the sums.
+    #[inline(always)]
     pub(super) fn apply(&self, inputs: &[Lanes], outputs: &mut [Lanes]) {
         debug_assert!(inputs.len() <= self.columns && outputs.len() == self.outputs);
         let weights = self.weights.chunks_exact(self.columns);
@@ -90,9 +91,8 @@ impl Matrix {
     }
 }
 
-/// A separate and simple function, so that the compiler keeps the sums in vector registers.
 #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
-#[inline(never)]
+#[inline(always)]
 fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
     let mut sums = bias.map(|bias| [bias; LANES]);
     for (weights, input) in weights.iter().zip(inputs) {

@@ -73,6 +73,7 @@ impl MaskedConvolution {
     }
 
     /// The outputs at eight neighboring non-anchors of row `y`, the first of which is number `first` of its row.
+    #[inline(always)]
     pub(crate) fn apply(
         &self,
         anchors: &AnchorMap,

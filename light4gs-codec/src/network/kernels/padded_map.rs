@@ -64,12 +64,13 @@ impl PaddedMap {
     }
 
     /// Where a row begins; `bordered_y` counts from the top of the border.
+    #[inline(always)]
     fn start(&self, channel: usize, bordered_y: usize) -> usize {
         (channel * (self.height + 2 * self.border) + bordered_y) * self.stride
     }
 
     /// The values of one channel at `columns`, displaced by `(dy, dx)`, each at most the border.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn lanes(&self, channel: usize, y: usize, columns: Columns, dy: isize, dx: isize) -> Lanes {
         let row = self.start(channel, (y + self.border).wrapping_add_signed(dy));
         let start = row + (columns.first + self.border).wrapping_add_signed(dx);

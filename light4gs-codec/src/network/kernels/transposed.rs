@@ -39,6 +39,7 @@ impl TransposedConvolution {
     }
 
     /// The whole output with a border of its own. The input needs a border of 1.
+    #[inline(always)]
     pub(crate) fn apply(&self, map: &PaddedMap, border: usize, activation: impl Fn(&mut [Lanes])) -> PaddedMap {
         let outputs = self.phases[0][0].outputs();
         let mut doubled = PaddedMap::zeros(outputs, 2 * map.height, 2 * map.width, border);

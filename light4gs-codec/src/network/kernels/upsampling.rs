@@ -15,6 +15,7 @@ fn positions(from: usize, to: usize) -> impl Iterator<Item = (usize, usize, f32)
 /// A map at the size `[height, width]`.
 ///
 /// `a (1 - x) + b x` along each of the two rows, then likewise between the rows.
+#[inline(always)]
 pub(crate) fn resized(lower: &PaddedMap, to: [usize; 2], border: usize) -> PaddedMap {
     let mut map = PaddedMap::zeros(lower.channels, to[0], to[1], border);
     let columns: Vec<_> = positions(lower.width, to[1]).collect();

@@ -5,6 +5,7 @@ use crate::network::kernels::{
     AnchorMap, Columns, LANES, Lanes, PaddedMap, exponential, kept, logarithm, mean_over_height, mean_over_width,
     resized, transposed,
 };
+use crate::vectors::vectorized;
 
 impl Program {
     /// Computes the whole maps. `maps` has a map for each input that is one, with the border of [`Program::border`];
@@ -30,6 +31,22 @@ impl Program {
     }
 
     fn perform(
+        &self,
+        schedule: &[Action],
+        maps: &[Option<PaddedMap>],
+        anchors: Option<&AnchorMap>,
+        y: usize,
+        columns: Columns,
+        workspace: &mut Workspace,
+    ) {
+        vectorized(
+            #[inline(always)]
+            || self.perform_in_vectors(schedule, maps, anchors, y, columns, workspace),
+        );
+    }
+
+    #[inline(always)]
+    fn perform_in_vectors(
         &self,
         schedule: &[Action],
         maps: &[Option<PaddedMap>],
@@ -131,8 +148,14 @@ impl Program {
             let activate =
                 |values: &mut [Lanes]| step.activation.iter().for_each(|activation| activation.apply(values));
             return match &*step.kind {
-                StepKind::Doubling(convolution) => convolution.apply(input(0), border, activate),
-                StepKind::Resize => resized(input(0), target, border),
+                StepKind::Doubling(convolution) => vectorized(
+                    #[inline(always)]
+                    || convolution.apply(input(0), border, activate),
+                ),
+                StepKind::Resize => vectorized(
+                    #[inline(always)]
+                    || resized(input(0), target, border),
+                ),
                 StepKind::MeanOverHeight => mean_over_height(input(0), border),
                 StepKind::MeanOverWidth => mean_over_width(input(0), border),
                 _ => transposed(input(0), border),
@@ -171,6 +194,7 @@ impl Program {
 }
 
 impl Activation {
+    #[inline(always)]
     fn apply(self, values: &mut [Lanes]) {
         let slope = match self {
             Self::Relu => {
@@ -208,6 +232,7 @@ impl Maps<'_> {
 }
 
 /// A map whose height or width may be 1, at places of a larger map.
+#[inline(always)]
 fn spread(map: &PaddedMap, y: usize, columns: Columns, outputs: &mut [Lanes]) {
     let y = if map.height == 1 { 0 } else { y };
     for (channel, lanes) in outputs.iter_mut().enumerate() {
@@ -216,6 +241,7 @@ fn spread(map: &PaddedMap, y: usize, columns: Columns, outputs: &mut [Lanes]) {
 }
 
 /// Element by element; `b` may have fewer channels, which are repeated.
+#[inline(always)]
 fn combine(own: &mut [Lanes], a: &[Lanes], b: &[Lanes], operation: impl Fn(f32, f32) -> f32) {
     for (own, a) in own.chunks_exact_mut(b.len()).zip(a.chunks_exact(b.len())) {
         let pairs = a.as_flattened().iter().zip(b.as_flattened());
@@ -224,12 +250,14 @@ fn combine(own: &mut [Lanes], a: &[Lanes], b: &[Lanes], operation: impl Fn(f32, 
 }
 
 /// Number by number.
+#[inline(always)]
 fn change(own: &mut [Lanes], from: &[Lanes], operation: impl Fn(f32) -> f32) {
     let numbers = own.as_flattened_mut().iter_mut().zip(from.as_flattened());
     numbers.for_each(|(own, &x)| *own = kept(operation(x)));
 }
 
 /// Reduces each group of neighboring channels to one, from the first to the last.
+#[inline(always)]
 fn reduce(own: &mut [Lanes], from: &[Lanes], group: usize, operation: impl Fn(f32, f32) -> f32) {
     for (own, group) in own.iter_mut().zip(from.chunks_exact(group)) {
         *own = group[0];
@@ -241,6 +269,7 @@ fn reduce(own: &mut [Lanes], from: &[Lanes], group: usize, operation: impl Fn(f3
 }
 
 /// NaN stays NaN.
+#[inline(always)]
 fn clamped(x: f32, least: f32, most: f32) -> f32 {
     if x < least {
         least

@@ -9,7 +9,9 @@ use light4gs_codec::MotionArrays;
 use super::hexplane::HexPlaneField;
 use super::nodes::NodesField;
 use super::still::StillField;
-use super::{DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest};
+use super::{
+    DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest, ScenePoints,
+};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
@@ -72,7 +74,7 @@ macro_rules! built_in_fields {
                 Err(ModelError::kind(&arrays.kind, Self::KINDS))
             }
 
-            fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
+            fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {
                 each!(self, field => field.deform(canonical, points, time))
             }
 

@@ -6,7 +6,7 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
 
 use super::deformation::{Deformation, DeformationConfig};
-use super::{DeformationField, Offsets};
+use super::{DeformationField, Offsets, ScenePoints};
 use crate::planes::{FeaturePlanes, HexPlaneConfig};
 use crate::scene::{GaussianTensors, ModelError};
 
@@ -65,8 +65,8 @@ impl DeformationField for HexPlaneField {
         Self { hexplane, deformation: deformation.init(device) }
     }
 
-    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors {
-        canonical.offset_by(self.offsets(points, time))
+    fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {
+        canonical.offset_by(self.offsets(points.normalized(), time))
     }
 
     fn planes(&self) -> Option<&FeaturePlanes> {

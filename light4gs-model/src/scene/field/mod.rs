@@ -33,6 +33,25 @@ use super::coordinates::SceneCoordinates;
 use super::gaussians::{GaussianTensors, Gaussians};
 use crate::planes::FeaturePlanes;
 
+/// The positions of N Gaussians, for a field that works in the scene's coordinates. They are computed when it asks for them.
+#[derive(Clone, Debug)]
+pub struct ScenePoints<'a> {
+    means: Tensor<2>,
+    coordinates: &'a SceneCoordinates,
+}
+
+impl<'a> ScenePoints<'a> {
+    /// From positions `[N, 3]` in world units.
+    pub fn new(means: Tensor<2>, coordinates: &'a SceneCoordinates) -> Self {
+        Self { means, coordinates }
+    }
+
+    /// The positions `[N, 3]` in the scene's coordinates, each in [-1, 1].
+    pub fn normalized(self) -> Tensor<2> {
+        self.coordinates.normalize(self.means)
+    }
+}
+
 /// A deformation field over space and time (paper III-A).
 ///
 /// [`HexPlaneField`](crate::HexPlaneField) is the paper's. [`DynamicScene`](crate::DynamicScene) is generic over the
@@ -60,10 +79,9 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     fn init(config: &Self::Config, device: &Device) -> Self;
 
     /// The Gaussians at a time in [0, 1]. `canonical` are the N > 0 canonical Gaussians with all their attributes,
-    /// including positions in world units. `points [N, 3]` are their positions in the scene's coordinates, each in [-1,
-    /// 1]. Differentiable in all of them and in the parameters. A field that only adds to attributes can return
+    /// including positions in world units; `points` gives their positions in the scene's coordinates. Differentiable in all of them and in the parameters. A field that only adds to attributes can return
     /// [`GaussianTensors::offset_by`] of [`Offsets`].
-    fn deform(&self, canonical: GaussianTensors, points: Tensor<2>, time: f32) -> GaussianTensors;
+    fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors;
 
     /// Which of [`Self::KINDS`] this one is.
     fn kind(&self) -> &'static str {

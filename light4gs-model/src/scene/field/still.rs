@@ -1,10 +1,10 @@
 //! No motion: plain Gaussians, for static scenes.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor};
+use burn::tensor::Device;
 use light4gs_codec::MotionArrays;
 
-use super::DeformationField;
+use super::{DeformationField, ScenePoints};
 use crate::planes::FeaturePlanes;
 use crate::scene::{GaussianTensors, ModelError};
 
@@ -32,7 +32,7 @@ impl DeformationField for StillField {
         Self
     }
 
-    fn deform(&self, canonical: GaussianTensors, _: Tensor<2>, _: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, _: ScenePoints<'_>, _: f32) -> GaussianTensors {
         canonical
     }
 

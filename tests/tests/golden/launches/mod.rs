@@ -11,7 +11,10 @@ use std::path::Path;
 
 use burn::tensor::{Device, Tensor};
 use light4gs_model::gpu::{Communication, RecordedLaunch, Team, record, with_team};
+use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::adam::{AdamStep, adam_step};
+use light4gs_model::ops::columns::columns;
+use light4gs_model::ops::image_difference::{Difference, mean_difference};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::node_poses::{NodeParameters, pose};
 use light4gs_model::ops::node_regularizer::{Regularization, regularize};
@@ -19,7 +22,6 @@ use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::ops::rate::gather_rows::{ChosenRows, gather_rows};
 use light4gs_model::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
 use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
-use light4gs_model::ops::sigmoid::sigmoid;
 use light4gs_model::ops::skinning::{MOST_AFFINITIES, SkinningInputs, skin};
 use light4gs_model::{PlaneTensors, Significance, Splatter};
 use light4gs_tests::golden::{Golden, values_of};
@@ -215,8 +217,10 @@ fn skinning(transcript: &mut Transcript) {
             let (gaussians, nodes) = (777, 21);
             let moved = skin(SkinningInputs {
                 means: tensor(gaussians, 3, -1.0, 1.0),
-                orientations: tensor(gaussians, 7, -1.0, 1.0),
-                stillness: tensor(gaussians, 1 + affinities, -3.0, 1.0),
+                quats: tensor(gaussians, 4, -1.0, 1.0),
+                vectors: (affinities > 0).then(|| tensor(gaussians, 3, -1.0, 1.0)),
+                stillness: tensor(gaussians, 1, -3.0, 1.0),
+                affinities: (affinities > 0).then(|| tensor(gaussians, affinities, -3.0, 1.0)),
                 nodes: tensor(nodes, 20 + affinities, 0.0, 1.0),
             });
             (moved.clone() * moved).sum().backward();
@@ -282,12 +286,17 @@ fn rate(transcript: &mut Transcript) {
 fn elementwise(transcript: &mut Transcript) {
     let places: Vec<f32> = (0..2600).map(|i| i as f32 * 0.01 - 13.0).collect();
     let leaf = |device: &Device| Tensor::<1>::from_floats(places.as_slice(), device);
-    let functions = [normal_cdf as fn(Tensor<1>) -> Tensor<1>, |x| lower_bound(x, 0.11), sigmoid];
+    let functions = [normal_cdf as fn(Tensor<1>) -> Tensor<1>, |x| lower_bound(x, 0.11), sigmoid, bounded_exponential];
     let ((), launches): (_, Vec<RecordedLaunch>) = record(|| {
         for function in functions {
             let upstream = leaf(&device().autodiff()).sin();
             (function(leaf(&device().autodiff()).require_grad()) * upstream).sum().backward();
         }
+        for difference in [Difference::Absolute, Difference::Squared] {
+            let image = leaf(&device().autodiff()).require_grad();
+            mean_difference(difference, image, leaf(&device().autodiff()).cos()).backward();
+        }
+        columns(leaf(&device().autodiff()).reshape([1, -1]).require_grad(), 1..3).sum().backward();
         let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 3 };
         let moments = [leaf(&device()).cos(), leaf(&device()).sin() * 0.1, leaf(&device()).abs() * 0.01];
         adam_step(moments, leaf(&device()), step);

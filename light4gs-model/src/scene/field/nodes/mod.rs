@@ -34,14 +34,17 @@ use std::ops::Range;
 
 use burn::config::Config;
 use burn::module::{Module, Param};
-use burn::tensor::{Device, Tensor, TensorData, s};
+use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::MotionArrays;
 
 pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
 pub use shading::SHADING;
 
-use super::{DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest};
+use super::{
+    DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest, ScenePoints,
+};
+use crate::ops::columns::columns;
 use crate::ops::node_poses::{NodeParameters, pose};
 use crate::ops::node_regularizer::{Regularization, regularize};
 pub use crate::ops::skinning::MOST_AFFINITIES;
@@ -196,21 +199,17 @@ impl NodesField {
         }
     }
 
-    /// Moved positions, quaternions and shadings `[N, 10]`, from the nodes `[B, 20 + H]` at a time.
+    /// Moved positions and quaternions `[N, 7]`, with shadings `[N, 10]`, from the nodes `[B, 20 + H]` at a time.
     fn skinned(&self, canonical: &GaussianTensors, nodes: Tensor<2>) -> Tensor<2> {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
             .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
-        let stillness = match canonical.further(AFFINITY) {
-            Some(own) => Tensor::cat(vec![stillness, own.clone()], 1),
-            None => stillness,
-        };
-        let shading = canonical.further(SHADING).cloned();
-        let shading = shading.unwrap_or_else(|| canonical.means.zeros_like());
         skin(SkinningInputs {
             means: canonical.means.clone(),
-            orientations: Tensor::cat(vec![canonical.quats.clone(), shading], 1),
+            quats: canonical.quats.clone(),
+            vectors: canonical.further(SHADING).cloned(),
             stillness,
+            affinities: canonical.further(AFFINITY).cloned(),
             nodes,
         })
     }
@@ -244,9 +243,9 @@ impl DeformationField for NodesField {
     }
 
     /// Weights take positions as constants: a Gaussian does not move only to follow another node.
-    fn deform(&self, canonical: GaussianTensors, _points: Tensor<2>, time: f32) -> GaussianTensors {
+    fn deform(&self, canonical: GaussianTensors, _: ScenePoints<'_>, time: f32) -> GaussianTensors {
         let moved = self.skinned(&canonical, pose(self.parameters(), time));
-        let part = |columns: Range<usize>| moved.clone().slice(s![.., columns]);
+        let part = |range: Range<usize>| columns(moved.clone(), range);
         let opacity_logits = match canonical.further(LIFETIME) {
             Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),
             _ => canonical.opacity_logits.clone(),

@@ -5,14 +5,14 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use light4gs_shaders::ADAM;
 
-use super::context::{Gpu, buffer_of};
-use super::kernel::Kernel;
-use super::launch::Launch;
+use super::super::context::{Gpu, buffer_of};
+use super::super::kernel::Kernel;
+use super::super::launch::Launch;
 use crate::gpu_error::GpuError;
 use crate::kernels::adam::{AdamStep, AdamTensors};
 
 /// The kernels of this file.
-pub(super) fn kernels() -> Vec<Kernel> {
+pub(in crate::gpu) fn kernels() -> Vec<Kernel> {
     vec![ADAM.into()]
 }
 

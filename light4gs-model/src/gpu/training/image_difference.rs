@@ -1,0 +1,84 @@
+//! The mean difference of two images on a GPU.
+
+use burn::backend::TensorMetadata;
+use burn::tensor::Shape;
+use burn_wgpu::{CubeBackend, CubeTensor};
+use light4gs_shaders::{IMAGE_DIFFERENCE, IMAGE_DIFFERENCE_BACKWARD, MEAN_OF_SUMS, Shader};
+
+use super::context::{Gpu, buffer_of, first_words};
+use super::kernel::Kernel;
+use super::launch::Launch;
+use crate::gpu_error::GpuError;
+use crate::kernels::image_difference::{Difference, ImageDifferenceKernels};
+
+/// Numbers that a workgroup adds up.
+const BLOCK: usize = 4096;
+
+/// The kernels of this file.
+pub(super) fn kernels() -> Vec<Kernel> {
+    let of = |difference| [summing(difference), kernel(IMAGE_DIFFERENCE_BACKWARD, difference)];
+    [Difference::Absolute, Difference::Squared].into_iter().flat_map(of).chain([MEAN_OF_SUMS.into()]).collect()
+}
+
+fn kernel(shader: Shader, difference: Difference) -> Kernel {
+    Kernel::new(shader).constant("SQUARED", (difference == Difference::Squared).into())
+}
+
+fn summing(difference: Difference) -> Kernel {
+    kernel(IMAGE_DIFFERENCE, difference).constant("BLOCK", BLOCK as u32)
+}
+
+fn forward(difference: Difference, image: CubeTensor, truth: CubeTensor) -> Result<CubeTensor, GpuError> {
+    let gpu = Gpu::of(&image)?;
+    let count = image.shape().num_elements();
+    let blocks = count.div_ceil(BLOCK);
+    let sums = gpu.allocate("sums of differences", blocks)?;
+    let mean = gpu.allocate("mean difference", 1)?;
+    Launch::new(&gpu.client, summing(difference))
+        .reads(&buffer_of(image))
+        .reads(&buffer_of(truth))
+        .writes(&sums)
+        .uniform(&[count as u32])
+        .groups(blocks)?;
+    Launch::new(&gpu.client, MEAN_OF_SUMS)
+        .reads(&sums)
+        .writes(&mean)
+        .uniform(&[blocks as u32, (count as f32).to_bits()])
+        .groups(1)?;
+    Ok(gpu.tensor(first_words(&mean, 1), Shape::from([1])))
+}
+
+fn backward(
+    difference: Difference,
+    image: CubeTensor,
+    truth: CubeTensor,
+    upstream: CubeTensor,
+) -> Result<CubeTensor, GpuError> {
+    let gpu = Gpu::of(&image)?;
+    let shape = image.shape();
+    let count = shape.num_elements();
+    let gradient = gpu.allocate("gradient of an image", count)?;
+    Launch::new(&gpu.client, kernel(IMAGE_DIFFERENCE_BACKWARD, difference))
+        .reads(&buffer_of(image))
+        .reads(&buffer_of(truth))
+        .reads(&buffer_of(upstream))
+        .writes(&gradient)
+        .uniform(&[count as u32])
+        .invocations(count)?;
+    Ok(gpu.tensor(first_words(&gradient, count), shape))
+}
+
+impl ImageDifferenceKernels for CubeBackend {
+    fn image_difference_forward(difference: Difference, image: CubeTensor, truth: CubeTensor) -> CubeTensor {
+        forward(difference, image, truth).unwrap_or_else(|error| error.raise())
+    }
+
+    fn image_difference_backward(
+        difference: Difference,
+        image: CubeTensor,
+        truth: CubeTensor,
+        upstream: CubeTensor,
+    ) -> CubeTensor {
+        backward(difference, image, truth, upstream).unwrap_or_else(|error| error.raise())
+    }
+}

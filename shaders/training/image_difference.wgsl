@@ -1,0 +1,40 @@
+// Sums of the absolute differences of two images (SQUARED: of the squared ones).
+//
+// A workgroup owns a block of BLOCK numbers of `image` and `truth`, and writes its sum to `sums`.
+
+struct Parameters {
+    count: u32,
+}
+
+@group(0) @binding(0) var<storage, read_write> image: array<f32>;
+@group(0) @binding(1) var<storage, read_write> truth: array<f32>;
+@group(0) @binding(2) var<storage, read_write> sums: array<f32>;
+@group(0) @binding(3) var<uniform> parameters: Parameters;
+
+var<workgroup> totals: array<f32, WORKGROUP>;
+
+@compute @workgroup_size(WORKGROUP)
+fn main(
+    @builtin(workgroup_id) group: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) lane: u32,
+) {
+    let block = flat_group(group, groups);
+    let end = min((block + 1u) * BLOCK, parameters.count);
+    var sum = 0.0;
+    for (var i = block * BLOCK + lane; i < end; i += WORKGROUP) {
+        let difference = image[i] - truth[i];
+        sum += select(abs(difference), difference * difference, SQUARED == 1u);
+    }
+    totals[lane] = sum;
+    workgroupBarrier();
+    for (var step = WORKGROUP / 2u; step > 0u; step = step / 2u) {
+        if (lane < step) {
+            totals[lane] += totals[lane + step];
+        }
+        workgroupBarrier();
+    }
+    if (lane == 0u && block * BLOCK < parameters.count) {
+        sums[block] = totals[0];
+    }
+}
