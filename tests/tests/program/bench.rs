@@ -32,12 +32,12 @@ fn a_step_does_not_launch_more_kernels_than_before() {
     let adapter = json[0]["adapter"].as_str().unwrap();
     let more = if adapter.contains("llvmpipe") { 0 } else { 10 };
     for (part, bound) in [
-        ("splat forward + backward", 42),
+        ("splat forward + backward", 28),
         ("skinning forward + backward", 11),
         ("nodes, Adam step", 13),
-        ("nodes, training step", 102),
-        ("nodes, step with noise and rate", 232),
-        ("nodes, render", 50),
+        ("nodes, training step", 57),
+        ("nodes, step with noise and rate", 187),
+        ("nodes, render", 20),
         ("hexplane, training step", 613),
         ("hexplane, step with noise and rate", 1131),
     ] {
