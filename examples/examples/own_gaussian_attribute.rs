@@ -6,7 +6,7 @@
 //! in the file reads it by name, so any player shows its effect.
 
 use burn::module::Module;
-use burn::tensor::{Device, Tensor, s};
+use burn::tensor::{Device, s};
 use light4gs_codec::network::{Operation, Value};
 use light4gs_codec::{
     GaussianArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource, Network, decode,

@@ -42,7 +42,10 @@ impl Blend {
     }
 }
 
-#[inline(always)]
+/// Inlined into what runs in the vectors of the processor (see [`crate::vectors`]); elsewhere a separate and simple function, so that
+/// the compiler keeps the sums in vector registers.
+#[cfg_attr(target_arch = "x86_64", inline(always))]
+#[cfg_attr(not(target_arch = "x86_64"), inline(never))]
 fn panel_sums(panel: &[Panel], weights: &[(usize, Lanes)]) -> [Lanes; PANEL] {
     let mut sums = [[0.0; LANES]; PANEL];
     for (channel, weights) in weights {

@@ -91,8 +91,11 @@ impl Matrix {
     }
 }
 
+/// Inlined into what runs in the vectors of the processor (see [`crate::vectors`]); elsewhere a separate and simple function, so that
+/// the compiler keeps the sums in vector registers.
 #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
-#[inline(always)]
+#[cfg_attr(target_arch = "x86_64", inline(always))]
+#[cfg_attr(not(target_arch = "x86_64"), inline(never))]
 fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
     let mut sums = bias.map(|bias| [bias; LANES]);
     for (weights, input) in weights.iter().zip(inputs) {
