@@ -25,10 +25,8 @@ const DIGITS: u32 = 1u << RADIX_BITS;
 // Neighboring digits that an invocation looks after.
 const OWN: u32 = DIGITS / WORKGROUP;
 
-// For each digit and invocation the place of its next key.
+// For each digit and invocation the place of its next key. There is no room for more in 16 KiB.
 var<workgroup> places: array<u32, DIGITS * WORKGROUP>;
-// Keys whose digit an invocation looks after.
-var<workgroup> keys_of: array<u32, WORKGROUP>;
 
 fn digit_of(key: u32, pass_number: u32) -> u32 {
     return (key >> (pass_number * RADIX_BITS)) & (DIGITS - 1u);
@@ -46,14 +44,6 @@ fn main(
 ) {
     let block = flat_group(group, groups);
     let pass_number = parameters.pass_number;
-    for (var digit = 0u; digit < DIGITS; digit++) {
-        places[digit * WORKGROUP + lane] = 0u;
-    }
-    let first = block * BLOCK + lane * EACH;
-    let end = min(first + EACH, parameters.count);
-    for (var k = first; k < end; k++) {
-        places[digit_of(keys[k], pass_number) * WORKGROUP + lane] += 1u;
-    }
 
     // Where the block's keys of each own digit begin: behind those of smaller digits, and of earlier blocks.
     var starts: array<u32, OWN>;
@@ -63,7 +53,6 @@ fn main(
                 starts[own] = atomicLoad(&tables[table_at(pass_number, lane * OWN + own, block)]);
             }
         }
-        workgroupBarrier();
     } else {
         var sum = 0u;
         for (var own = 0u; own < OWN; own++) {
@@ -74,16 +63,27 @@ fn main(
                 starts[own] += select(0u, keys_there, other < block);
             }
         }
-        keys_of[lane] = sum;
+        places[lane] = sum;
         workgroupBarrier();
         var before = 0u;
         for (var other = 0u; other < lane; other++) {
-            before += keys_of[other];
+            before += places[other];
         }
         for (var own = 0u; own < OWN; own++) {
             starts[own] += before;
         }
+        workgroupBarrier();
     }
+
+    for (var digit = 0u; digit < DIGITS; digit++) {
+        places[digit * WORKGROUP + lane] = 0u;
+    }
+    let first = block * BLOCK + lane * EACH;
+    let end = min(first + EACH, parameters.count);
+    for (var k = first; k < end; k++) {
+        places[digit_of(keys[k], pass_number) * WORKGROUP + lane] += 1u;
+    }
+    workgroupBarrier();
     for (var own = 0u; own < OWN; own++) {
         let digit = lane * OWN + own;
         var place = starts[own];
