@@ -16,10 +16,9 @@ use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::skinning::{
-    BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, orientation, product, to_rows,
-    weight,
+    BlendedGroup, Block, CHUNK, MOVED, Node, ORIENTATION, STILL, SkinningSlices, as_exponents, columns, orientation,
+    product, to_rows, weight,
 };
-use crate::cpu::skinning::{MOVED, ORIENTATION};
 use crate::kernels::skinning::{PLACE, POSE, POSED};
 
 /// Tasks at most, so that their sums take no more memory than some thousand Gaussians.

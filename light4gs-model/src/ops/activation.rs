@@ -142,7 +142,7 @@ pub fn sigmoid<const D: usize>(tensor: Tensor<D>) -> Tensor<D> {
 }
 
 /// `exp(min(x, MAX_LOGARITHM))`, elementwise: finite for every number, so that a backward pass has no 0 · infinity. The slope is 0
-/// where `x` is beyond [`MAX_LOGARITHM`].
+/// where `x` is beyond [`MAX_LOGARITHM`], or less than 0.001 below it.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};

@@ -79,7 +79,8 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     fn init(config: &Self::Config, device: &Device) -> Self;
 
     /// The Gaussians at a time in [0, 1]. `canonical` are the N > 0 canonical Gaussians with all their attributes,
-    /// including positions in world units; `points` gives their positions in the scene's coordinates. Differentiable in all of them and in the parameters. A field that only adds to attributes can return
+    /// including positions in world units; `points` gives their positions `[N, 3]` in the scene's coordinates.
+    /// Differentiable in all of them and in the parameters. A field that only adds to attributes can return
     /// [`GaussianTensors::offset_by`] of [`Offsets`].
     fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors;
 
