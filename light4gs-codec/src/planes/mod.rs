@@ -32,3 +32,4 @@ pub(crate) use coder::parameters;
 pub use coding::PlaneCoding;
 pub use context_model::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource};
 pub(crate) use plane_parameters::bounded_mean;
+pub(crate) use walk::nearest;

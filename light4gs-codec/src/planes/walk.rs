@@ -20,13 +20,20 @@ pub(super) struct Grid {
 
 impl Grid {
     fn symbol(self, value: f32, mean: f32) -> i32 {
-        // Values out of range saturate, and are refused later.
-        ((value - self.center) / self.step - mean).round_ties_even() as i32
+        nearest((value - self.center) / self.step, mean)
     }
 
     fn value(self, symbol: i32, mean: f32) -> f32 {
         (symbol as f32 + mean) * self.step + self.center
     }
+}
+
+/// The integer that with `mean` is nearest to `value`, both in units of the step. Values out of range saturate, and are
+/// refused later.
+pub(crate) fn nearest(value: f32, mean: f32) -> i32 {
+    // In float32 the difference from a large mean would be rounded, to 1/8 at 2^20, and the value be further than half
+    // a step from its symbol's.
+    (f64::from(value) - f64::from(mean)).round_ties_even() as i32
 }
 
 /// Codes the values `[M, height, width]` of a plane, with one coder for each part. An encoder's values are replaced by

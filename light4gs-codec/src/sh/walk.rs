@@ -9,7 +9,7 @@ use crate::{
     adaptive::Damaged,
     entropy::{Distribution, SymbolCoder, gaussian_table},
     network::kernels::LANES,
-    planes::bounded_mean,
+    planes::{bounded_mean, nearest},
     sh_rest_coefficients,
 };
 
@@ -70,7 +70,7 @@ pub(super) fn walk<C: SymbolCoder>(
                 let (offset, count) = group(degree);
                 for row in values.chunks_exact_mut(channels) {
                     for (table, value) in (offset..).zip(&mut row[offset..offset + count]) {
-                        let symbol = coder.code(distributions, table as u16, || nearest(*value / step))?;
+                        let symbol = coder.code(distributions, table as u16, || nearest(*value / step, 0.0))?;
                         *value = symbol as f32 * step;
                     }
                 }
@@ -90,7 +90,7 @@ pub(super) fn walk<C: SymbolCoder>(
                         for (channel, (scale, mean)) in (start..).zip(scales.iter().zip(means)) {
                             let (mean, level) = (bounded_mean(mean[lane]), table.level(scale[lane]));
                             let (coder, value) = (&mut coders[coder_of[channel]], &mut row[channel]);
-                            let symbol = coder.code(&table.levels, level, || nearest(*value / step - mean))?;
+                            let symbol = coder.code(&table.levels, level, || nearest(*value / step, mean))?;
                             *value = (symbol as f32 + mean) * step;
                         }
                     }
@@ -99,9 +99,4 @@ pub(super) fn walk<C: SymbolCoder>(
         }
     }
     Ok(())
-}
-
-/// The nearest integer. Values out of range saturate, and are refused later.
-fn nearest(value: f32) -> i32 {
-    value.round_ties_even() as i32
 }
