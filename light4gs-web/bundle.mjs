@@ -1,4 +1,5 @@
 // Puts the player into one ES module: the decoder as compressed WebAssembly, the worker as text.
+// The script of the page that trains is a module of its own.
 // usage: node bundle.mjs DECODER.wasm FOLDER
 
 import { build } from "esbuild";
@@ -33,7 +34,13 @@ const code = main.outputFiles[0].text;
 if (/<\/script|<!--/i.test(code)) throw new Error("the bundle would end the script element that holds it");
 writeFileSync(`${folder}/light4gs-player.js`, code);
 
+const trainerWorker = await build({ ...common, entryPoints: ["trainer/page/worker.js"], format: "iife" });
+const trainerPlugins = [virtual({ "virtual:trainer-worker": trainerWorker.outputFiles[0].text })];
+const trainer = await build({ ...common, entryPoints: ["trainer/page/page.js"], format: "esm", plugins: trainerPlugins, charset: "utf8" });
+writeFileSync(`${folder}/light4gs-trainer.js`, trainer.outputFiles[0].text);
+
 const size = (text) => `${Buffer.byteLength(text)} bytes, ${gzipSync(text, { level: 9 }).length} compressed`;
 console.log(`light4gs-player.js: ${size(code)}`);
 console.log(`  of which the decoder: ${readFileSync(wasm).length} bytes, ${packed.length} compressed`);
 console.log(`  worker: ${size(parts["virtual:worker"])}; style: ${size(parts["virtual:style"])}`);
+console.log(`light4gs-trainer.js: ${size(trainer.outputFiles[0].text)}`);

@@ -75,7 +75,7 @@ pub mod checks;
 mod entropy;
 mod error;
 mod fields;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(not(target_os = "unknown"))]
 mod file;
 mod format;
 mod limits;
@@ -98,7 +98,7 @@ pub use bytes::{
 };
 pub use entropy::{Distributions, FrequencyTable};
 pub use error::CodecError;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(not(target_os = "unknown"))]
 pub use file::{read_file, read_file_and, read_file_with_limits, read_info, read_info_with_limits};
 pub use format::{MAGIC, VERSION};
 pub use limits::Limits;

@@ -28,13 +28,18 @@ fn refuse_special_file(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
+/// The number of this process; 1 in WebAssembly, which has none.
+pub fn process_id() -> u32 {
+    if cfg!(target_family = "wasm") { 1 } else { std::process::id() }
+}
+
 /// A name in the folder of `path` that no other call in this process uses.
 ///
 /// The name of `path` is not a part of it, so that even a name of the longest legal length can be written.
 fn sibling(path: &Path) -> PathBuf {
     static COUNTER: AtomicU64 = AtomicU64::new(0);
     let count = COUNTER.fetch_add(1, Ordering::Relaxed);
-    path.with_file_name(format!("{PREFIX}{}-{count}.part", std::process::id()))
+    path.with_file_name(format!("{PREFIX}{}-{count}.part", process_id()))
 }
 
 /// The folder of `path`.

@@ -31,7 +31,7 @@ mod regular_file;
 mod scene;
 mod synthetic;
 
-pub use atomic::{is_temporary_name, sweep_leftovers, write_atomically};
+pub use atomic::{is_temporary_name, process_id, sweep_leftovers, write_atomically};
 pub use camera::{Camera, Intrinsics, PoseError};
 pub use digest::DatasetDigest;
 pub use error::DataError;

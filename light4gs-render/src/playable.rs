@@ -62,7 +62,7 @@ impl PlayableScene {
     ///
     /// # Errors
     /// As [`PlayableScene::decode`], and what the system refuses to read; the message names the file.
-    #[cfg(not(target_arch = "wasm32"))]
+    #[cfg(not(target_os = "unknown"))]
     pub fn open(path: &std::path::Path, limits: &Limits) -> Result<Self, CodecError> {
         light4gs_codec::read_file_and(path, limits, |bytes| Self::decode(bytes, limits))
     }

@@ -36,7 +36,7 @@ fn state() -> MutexGuard<'static, State> {
 }
 
 /// Allocates memory for the bytes of a file, and returns its address.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn reserve_input(bytes: usize) -> *mut u8 {
     let mut state = state();
     state.input = vec![0; bytes];
@@ -44,7 +44,7 @@ pub extern "C" fn reserve_input(bytes: usize) -> *mut u8 {
 }
 
 /// Decodes the input, and frees it. Returns 1 if it is a scene, else 0. [`text`] has the description or the error.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn open() -> u32 {
     let state = &mut *state();
     state.scene = None;
@@ -54,7 +54,7 @@ pub extern "C" fn open() -> u32 {
 }
 
 /// Begins with a file that comes in pieces. The scene that is open stays until something of the file can be seen.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn begin() {
     state().arrival = Some(Arrival::default());
 }
@@ -62,7 +62,7 @@ pub extern "C" fn begin() {
 /// Takes the input as the next piece of the file, which may be empty, and frees it. Decodes at most one layer. Returns 1 if the
 /// scene is another one now, since there is more to be seen; 2 if it is not; 0 if the file is damaged. [`text`] has the
 /// description or the error.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn push() -> u32 {
     let state = &mut *state();
     let input = std::mem::take(&mut state.input);
@@ -71,7 +71,7 @@ pub extern "C" fn push() -> u32 {
 }
 
 /// Ends the file. Returns 2 if it is complete, else 0; [`text`] has the error.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn finish() -> u32 {
     let state = &mut *state();
     let finished = state.arrival.take().unwrap_or_default().finish();
@@ -97,19 +97,19 @@ impl State {
 }
 
 /// The description or the error from [`open`], [`push`] and [`finish`], as JSON.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn text() -> *const u8 {
     state().text.as_ptr()
 }
 
 /// Number of bytes of [`text`].
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn text_length() -> usize {
     state().text.len()
 }
 
 /// The digest of the scene that the input decodes to; 0 where it does not decode. The scene that is open stays.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn digest() -> u64 {
     let input = std::mem::take(&mut state().input);
     light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
@@ -117,19 +117,19 @@ pub extern "C" fn digest() -> u64 {
 
 /// Chooses the level of detail that [`evaluate`] and [`draw_list`] are about: 0 is the scene itself. Returns 1 if nothing of it
 /// is evaluated yet, else 0.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn show_level(level: u32) -> u32 {
     state().scene.as_mut().map_or(0, |scene| u32::from(scene.show_level(level)))
 }
 
 /// How many Gaussians the level of [`show_level`] has.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn count() -> usize {
     state().scene.as_ref().map_or(0, OpenScene::count)
 }
 
 /// Computes the Gaussians `first` to `last` at a time in [0, 1].
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
     if let Some(scene) = &mut state().scene {
         scene.evaluate(time, first, last);
@@ -139,7 +139,7 @@ pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
 /// What is drawn, back to front: 16 numbers each, center, opacity, covariance xx, xy, xz, yy, yz, zz, color, and three zeros;
 /// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera
 /// stands at the eye and sees the cone with this tangent, or all in front of it. [`list_length`] says how many numbers.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn draw_list(
     row_x: f32,
     row_y: f32,
@@ -158,13 +158,13 @@ pub extern "C" fn draw_list(
 }
 
 /// How many numbers [`draw_list`] returned.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn list_length() -> usize {
     state().list_length
 }
 
 /// All attributes at a time. [`numbers_length`] says how many numbers.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn attributes_at(time: f32) -> *const f32 {
     let state = &mut *state();
     state.numbers = state.scene.as_ref().map(|scene| scene.attributes_at(time)).unwrap_or_default();
@@ -172,13 +172,13 @@ pub extern "C" fn attributes_at(time: f32) -> *const f32 {
 }
 
 /// How many numbers [`attributes_at`] returned.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn numbers_length() -> usize {
     state().numbers.len()
 }
 
 /// Frees the memory that [`attributes_at`] returned.
-#[cfg_attr(target_arch = "wasm32", unsafe(no_mangle))]
+#[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn forget_numbers() {
     state().numbers = Vec::new();
 }

@@ -23,7 +23,7 @@ mod digest;
 mod draw_list;
 mod gaussians;
 mod levels;
-#[cfg(not(target_arch = "wasm32"))]
+#[cfg(not(target_os = "unknown"))]
 pub mod page;
 mod scene;
 

@@ -6,8 +6,8 @@ use std::process::{Command, Stdio};
 use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
-use light4gs_data::Scene;
-use light4gs_web::page::{Content, PLAYER, page};
+use light4gs_data::{DataError, Scene, read_regular_file};
+use light4gs_web::page::{Content, PLAYER, TRAINER, TRAINER_PAGE, page};
 use serde_json::json;
 
 use super::output::{say, tell};
@@ -16,17 +16,31 @@ use crate::dataset::load_options;
 use crate::error::TrainError;
 use crate::view::{Answer, Server, ViewSource, cameras_json, run_around};
 
+/// The player's script.
+const PLAYER_ADDRESS: &str = "light4gs-player.js";
+
+/// More bytes than the program that trains in a browser has.
+const LARGEST_PROGRAM: u64 = 256 << 20;
+
+// Types of content.
+const HTML: &str = "text/html; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const JSON: &str = "application/json";
+
 /// Most cameras of each split that the player lists.
 const MOST_CAMERAS: usize = 500;
 
 #[derive(Debug, Args)]
 pub(super) struct View {
     /// A .l4gs file, or the folder of a run: while it trains, the page follows its newest checkpoint.
-    #[arg(value_name = "FILE|RUN")]
-    what: PathBuf,
+    #[arg(value_name = "FILE|RUN", required_unless_present = "trainer")]
+    what: Option<PathBuf>,
     /// Dataset whose cameras the player offers; by default the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
+    /// In place of a scene, a page that trains one in the browser: the program that light4gs-web/build-trainer makes.
+    #[arg(long, value_name = "FILE.wasm", conflicts_with_all = ["what", "scene", "device"])]
+    trainer: Option<PathBuf>,
     /// Port on this machine; 0 is any free one.
     #[arg(long, default_value_t = 0)]
     port: u16,
@@ -40,14 +54,60 @@ pub(super) struct View {
 
 impl View {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let source =
-            if self.what.is_dir() { ViewSource::run(&self.what, self.device)? } else { ViewSource::file(&self.what)? };
+        match (&self.what, &self.trainer) {
+            (_, Some(program)) => self.train(program),
+            (Some(what), None) => self.play(what),
+            (None, None) => Err(TrainError::Input("name a .l4gs file or the folder of a run".into())),
+        }
+    }
+
+    /// A page that plays a scene.
+    fn play(&self, what: &Path) -> Result<(), TrainError> {
+        let source = if what.is_dir() { ViewSource::run(what, self.device)? } else { ViewSource::file(what)? };
         let cameras = match (&self.scene, source.dataset()) {
             (None, Some(dataset)) => cameras_json(dataset, MOST_CAMERAS),
-            _ => dataset_cameras(&self.what, self.scene.as_deref(), MOST_CAMERAS)?,
+            _ => dataset_cameras(what, self.scene.as_deref(), MOST_CAMERAS)?,
         };
         let content = Content::Served { scene: "scene.l4gs", cameras: "cameras.json", watch: "state.json" };
-        let html = page(&source.title(), content, Some("light4gs-player.js"));
+        let html = page(&source.title(), content, Some(PLAYER_ADDRESS));
+        let source = Mutex::new(source);
+        self.serve(move |path| match path {
+            "/" => Some(answer(HTML, html.clone().into_bytes())),
+            "/cameras.json" => Some(answer(JSON, cameras.clone().into_bytes())),
+            "/scene.l4gs" => {
+                let source = source.lock().unwrap_or_else(PoisonError::into_inner);
+                (source.version() > 0).then(|| answer("application/octet-stream", source.bytes().to_vec()))
+            }
+            "/state.json" => {
+                let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+                let problem = source.refresh().err().map(|error| error.to_string());
+                let status = problem.as_deref().unwrap_or(source.status());
+                let state = json!({ "scene": source.version(), "status": status });
+                Some(answer(JSON, state.to_string().into_bytes()))
+            }
+            _ => None,
+        })
+    }
+
+    /// A page that trains a scene.
+    fn train(&self, program: &Path) -> Result<(), TrainError> {
+        let module = read_regular_file(program, LARGEST_PROGRAM).map_err(DataError::io("read", program))?;
+        if !module.starts_with(b"\0asm") {
+            let program = program.display();
+            return Err(TrainError::Input(format!(
+                "{program} is no WebAssembly module; light4gs-web/build-trainer makes one"
+            )));
+        }
+        self.serve(move |path| match path {
+            "/" => Some(answer(HTML, TRAINER_PAGE.as_bytes())),
+            "/light4gs-trainer.js" => Some(answer(SCRIPT, TRAINER.as_bytes())),
+            "/light4gs-web-trainer.wasm" => Some(answer("application/wasm", module.clone())),
+            _ => None,
+        })
+    }
+
+    /// Serves a page with the player's script until the program is ended.
+    fn serve(&self, respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static) -> Result<(), TrainError> {
         let port = self.port;
         let server = Server::bind(port).map_err(|error| {
             TrainError::Input(format!(
@@ -60,33 +120,16 @@ impl View {
         if self.open {
             open_browser(&address);
         }
-        let source = Mutex::new(source);
-        server.run(move |path| {
-            let answer = |content_type, body: Cow<'static, [u8]>| Some(Answer { content_type, body });
-            match path {
-                "/" => answer("text/html; charset=utf-8", Cow::Owned(html.clone().into_bytes())),
-                "/light4gs-player.js" => answer("text/javascript; charset=utf-8", Cow::Borrowed(PLAYER.as_bytes())),
-                "/cameras.json" => answer("application/json", Cow::Owned(cameras.clone().into_bytes())),
-                "/scene.l4gs" => {
-                    let source = source.lock().unwrap_or_else(PoisonError::into_inner);
-                    let found = source.version() > 0;
-                    found.then(|| Answer {
-                        content_type: "application/octet-stream",
-                        body: Cow::Owned(source.bytes().to_vec()),
-                    })
-                }
-                "/state.json" => {
-                    let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
-                    let problem = source.refresh().err().map(|error| error.to_string());
-                    let status = problem.as_deref().unwrap_or(source.status());
-                    let state = json!({ "scene": source.version(), "status": status });
-                    answer("application/json", Cow::Owned(state.to_string().into_bytes()))
-                }
-                _ => None,
-            }
+        server.run(move |path| match path.strip_prefix('/') {
+            Some(PLAYER_ADDRESS) => Some(answer(SCRIPT, PLAYER.as_bytes())),
+            _ => respond(path),
         });
         Ok(())
     }
+}
+
+fn answer(content_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Answer {
+    Answer { content_type, body: body.into() }
 }
 
 /// The cameras for a file as JSON: those of a named dataset, else those of the run whose folder holds the file, else

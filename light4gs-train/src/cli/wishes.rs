@@ -106,7 +106,7 @@ impl Wishes {
                 "{}×{} pixels, at most {} Gaussians, {} + {} iterations: about {:.1} minutes of training on this machine",
                 camera.width,
                 camera.height,
-                pace.full_count(),
+                pace.most_gaussians(&config),
                 train.coarse_iterations,
                 train.fine_iterations,
                 pace.training_seconds(&config) / 60.0

@@ -7,6 +7,7 @@
 
 mod typical_gaussians;
 
+use std::collections::BTreeSet;
 use std::time::Instant;
 
 use light4gs_data::Scene;
@@ -49,6 +50,8 @@ pub struct Pace {
     pub full: Vec<Iteration>,
     /// What a rate adds to an iteration after densification, in the mean, where every few of them have one.
     pub rate: f64,
+    /// The most Gaussians that guided sampling adds at a time.
+    pub guided: usize,
 }
 
 /// An iteration.
@@ -61,9 +64,14 @@ pub struct Iteration {
 }
 
 impl Pace {
-    /// The most Gaussians of the run.
-    pub fn full_count(&self) -> usize {
+    /// The most Gaussians that densification leaves.
+    fn full_count(&self) -> usize {
         self.full.last().map_or(self.first.gaussians, |iteration| iteration.gaussians)
+    }
+
+    /// The most Gaussians of a run of this configuration.
+    pub fn most_gaussians(&self, config: &Config) -> usize {
+        self.full_count() + self.guided * config.train.guided_sampling.iterations.len()
     }
 
     /// Trains the scene of a run for a moment.
@@ -71,6 +79,8 @@ impl Pace {
     /// # Errors
     /// As [`Trainer`]'s builder, and its steps.
     pub fn measure(config: &Config, mut data: Scene) -> Result<Self, TrainError> {
+        let times: BTreeSet<u32> = data.train.iter().map(|frame| frame.time.to_bits()).collect();
+        let guided = config.train.guided_sampling.count * times.len();
         let apart = data.train.len().div_ceil(VIEWS).max(1);
         data.train = data.train.into_iter().step_by(apart).collect();
         let density = TypicalGaussians::new(config, &data, PLAIN, plain_iterations(config))?;
@@ -85,10 +95,10 @@ impl Pace {
                 Stage::Fine => fine.push(Iteration { gaussians: report.gaussians, seconds }),
             }
         }
-        Ok(Self::of(config, coarse, &fine))
+        Ok(Self { guided, ..Self::of(config, coarse, &fine) })
     }
 
-    /// From the seconds of a moment's coarse iterations, and its fine ones.
+    /// From the seconds of a moment's coarse iterations, and its fine ones, without guided sampling.
     fn of(config: &Config, coarse: Vec<f64>, fine: &[Iteration]) -> Self {
         let (first, rest) = fine.split_at(PLAIN);
         let (sizes, rate) = rest.split_at(PLAIN * sizes(config).len());
@@ -104,7 +114,7 @@ impl Pace {
         let whole = full.last().expect("whole images are one of the sizes").seconds;
         let noisy = seconds(without);
         let rate = (seconds(with) - noisy) / config.compression.rate.interval as f64 + noisy - whole;
-        Self { coarse: median(coarse), first: typical(first), full, rate: rate.max(0.0) }
+        Self { coarse: median(coarse), first: typical(first), full, rate: rate.max(0.0), guided: 0 }
     }
 
     /// Seconds that the training of a configuration takes, without coding and measuring. It has the image sizes of that
@@ -138,6 +148,7 @@ impl Pace {
             true => train.prune.iterations.iter().map(|&iteration| iteration as f64).collect(),
             false => Vec::new(),
         };
+        let guided = &train.guided_sampling.iterations;
         let sizes = sizes(config);
         let seconds_at = |progress: f64| {
             let iteration = progress * end as f64;
@@ -145,7 +156,9 @@ impl Pace {
             let size = sizes.iter().take_while(|until| progress >= **until).count();
             let full = self.full[size];
             let grown = first.gaussians as f64 + (full_count as f64 - first.gaussians as f64) * reached(iteration);
-            let count = grown.min(full.gaussians as f64) * (1.0 - train.prune.fraction).powi(passes as i32);
+            let sampled = self.guided * guided.iter().filter(|&&time| (time as f64) < iteration).count();
+            let added = grown.min(full.gaussians as f64) + sampled as f64;
+            let count = added * (1.0 - train.prune.fraction).powi(passes as i32);
             let plain = (full.seconds + growth * (count - full.gaussians as f64)).max(0.0);
             if iteration >= rate_from as f64 { plain + rate * count / full_count.max(1) as f64 } else { plain }
         };
@@ -245,7 +258,7 @@ mod tests {
             let adaptive = &config.train.densify.strategies.adaptive;
             let AdaptiveDensityConfig { from, until, interval, .. } = *adaptive;
             assert_eq!((from, until, interval, config.train.fine_iterations), (200, 5000, 100, 12_000));
-            let pace = Pace { coarse: 0.0, first, full: vec![full; sizes(&config).len()], rate: 0.0 };
+            let pace = Pace { coarse: 0.0, first, full: vec![full; sizes(&config).len()], rate: 0.0, guided: 0 };
             pace.training_seconds(&config)
         };
         // A second for a thousand Gaussians: 1000 of them, then as many as there are in the mean while they are added, then all.
@@ -255,5 +268,23 @@ mod tests {
             let found = seconds(&[&format!("train.photometric.l2_until={until}")]);
             assert!((found / expected - 1.0).abs() < 1e-3, "until {until}: {found}, expected {expected}");
         }
+    }
+    #[test]
+    fn guided_sampling_adds_gaussians_beyond_those_of_densification() {
+        let full = Iteration { gaussians: 10_000, seconds: 10.0 };
+        let first = Iteration { gaussians: 1000, seconds: 1.0 };
+        let keys = [
+            "train.prune.fraction=0",
+            "compression.rate.lambda=0",
+            "train.coarse_iterations=0",
+            "train.guided_sampling.iterations=[6000, 9000]",
+            "train.photometric.l2_until=0",
+        ];
+        let config = Config::load("dnerf-cpu+nodes", &keys.map(str::to_owned)).unwrap();
+        let of = |guided| Pace { coarse: 0.0, first, full: vec![full; sizes(&config).len()], rate: 0.0, guided };
+        assert_eq!((of(0).most_gaussians(&config), of(500).most_gaussians(&config)), (10_000, 11_000));
+        // Half a second for 500 Gaussians: in 6000 iterations, and once more in 3000.
+        let more = of(500).training_seconds(&config) - of(0).training_seconds(&config);
+        assert!((more / (0.5 * 9000.0) - 1.0).abs() < 1e-3, "{more}");
     }
 }

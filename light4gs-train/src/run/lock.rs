@@ -5,7 +5,7 @@ use std::io::{Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use light4gs_data::DataError;
+use light4gs_data::{DataError, process_id};
 
 use crate::error::TrainError;
 use crate::utc;
@@ -39,7 +39,7 @@ impl RunLock {
             Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => {}
             Err(TryLockError::Error(error)) => return Err(failed("lock")(error).into()),
         }
-        let holder = format!("process {} since {}\n", std::process::id(), utc::now());
+        let holder = format!("process {} since {}\n", process_id(), utc::now());
         let written = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(holder.as_bytes()));
         written.map_err(failed("write"))?;
         Ok(Self(Arc::new(file)))

@@ -30,7 +30,7 @@ pub fn write_mp4<E: From<DataError>>(
     }
     // Beside the file, so that renaming it stays on one file system. ffmpeg is told the format, since it cannot tell
     // from the name.
-    let partial = path.with_extension(format!("mp4.{}.part", std::process::id()));
+    let partial = path.with_extension(format!("mp4.{}.part", light4gs_data::process_id()));
     let written = encode(path, &partial, frames, fps);
     if written.is_ok() {
         std::fs::rename(&partial, path).map_err(DataError::io("write", path))?;

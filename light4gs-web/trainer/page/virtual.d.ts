@@ -1,0 +1,5 @@
+declare module "virtual:trainer-worker" {
+  /** The worker's source. */
+  const source: string;
+  export default source;
+}
