@@ -279,6 +279,7 @@ mod tests {
             "train.coarse_iterations=0",
             "train.guided_sampling.iterations=[6000, 9000]",
             "train.photometric.l2_until=0",
+            "model.nodes.lifetime=true",
         ];
         let config = Config::load("dnerf-cpu+nodes", &keys.map(str::to_owned)).unwrap();
         let of = |guided| Pace { coarse: 0.0, first, full: vec![full; sizes(&config).len()], rate: 0.0, guided };
