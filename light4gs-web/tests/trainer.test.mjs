@@ -1,6 +1,8 @@
-// The page that trains. LIGHT4GS_TRAINER names the program that ./build-trainer makes.
+// The page that trains. LIGHT4GS_TRAINER names the program that ./build-trainer makes, LIGHT4GS the one whose `view --trainer`
+// serves the page; without it, the test does.
 
 import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
 import { mkdirSync, mkdtempSync, readFileSync, rmSync, writeFileSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { after, before, test } from "node:test";
@@ -12,13 +14,25 @@ const SHORT = ["train.coarse_iterations=5", "train.fine_iterations=40", "train.c
 let browser;
 let server;
 
+/** The page as the program serves it. */
+async function view(program, trainer) {
+  const child = spawn(program, ["view", "--trainer", trainer]);
+  const url = await new Promise((resolve, reject) => {
+    child.stdout.on("data", (text) => resolve(/http:\S+/.exec(text)[0]));
+    child.on("exit", (code) => reject(new Error(`${program} view --trainer: exit code ${code}`)));
+  });
+  return { url, close: () => child.kill() };
+}
+
 before(async () => {
   browser = await launch();
-  server = await serve({
+  const trainer = process.env.LIGHT4GS_TRAINER ?? `${root}/target/wasm-trainer/wasm32-wasip1/quick/light4gs-web-trainer.wasm`;
+  const program = process.env.LIGHT4GS;
+  server = program ? await view(program, trainer) : await serve({
     "": readFileSync(`${dist}/trainer.html`),
     "light4gs-player.js": bundle(),
     "light4gs-trainer.js": readFileSync(`${dist}/light4gs-trainer.js`),
-    "light4gs-web-trainer.wasm": readFileSync(process.env.LIGHT4GS_TRAINER ?? `${root}/target/wasm-trainer/wasm32-wasip1/dist/light4gs-web-trainer.wasm`),
+    "light4gs-web-trainer.wasm": readFileSync(trainer),
   });
 });
 after(async () => {

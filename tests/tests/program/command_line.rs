@@ -448,6 +448,10 @@ fn wrong_arguments() {
     assert_refused(&w.run(["bench", "--device", "abacus"]), &["abacus", "ndarray"]);
     assert_refused(&w.run(["bench", "--gaussians", "0"]), &["--gaussians", "between 1"]);
     assert_refused(&w.run(["synth", "scene"]), &["scene"]);
+    assert_refused(&w.run(["view"]), &["FILE|RUN"]);
+    assert_refused(&w.run(["view", "scene", "--trainer", "x.wasm"]), &["--trainer"]);
+    assert_refused(&w.run(["view", "--trainer", "x.wasm"]), &["x.wasm"]);
+    assert_refused(&w.run(["view", "--trainer", "scene/transforms_train.json"]), &["no WebAssembly", "build-trainer"]);
     for command in [
         "quickstart",
         "prepare",
