@@ -18,7 +18,8 @@ let server;
 async function view(program, trainer) {
   const child = spawn(program, ["view", "--trainer", trainer]);
   const url = await new Promise((resolve, reject) => {
-    child.stdout.on("data", (text) => resolve(/http:\S+/.exec(text)[0]));
+    // The address is the first line.
+    child.stdout.once("data", (text) => resolve(/http:\S+/.exec(text)[0]));
     child.on("exit", (code) => reject(new Error(`${program} view --trainer: exit code ${code}`)));
   });
   return { url, close: () => child.kill() };
