@@ -269,6 +269,7 @@ mod tests {
             assert!((found / expected - 1.0).abs() < 1e-3, "until {until}: {found}, expected {expected}");
         }
     }
+
     #[test]
     fn guided_sampling_adds_gaussians_beyond_those_of_densification() {
         let full = Iteration { gaussians: 10_000, seconds: 10.0 };
