@@ -10,14 +10,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates that have rooms.
-const CRATES: [&str; 8] = [
+const CRATES: [&str; 7] = [
     "light4gs-codec",
     "light4gs-data",
     "light4gs-render",
     "light4gs-model",
     "light4gs-train",
     "light4gs-web",
-    "light4gs-web/trainer",
     "light4gs-c",
 ];
 
