@@ -43,10 +43,9 @@ after(async () => {
 });
 
 /** Trains to the end, and returns the page. */
-async function train(settings, dataset) {
+async function train(settings) {
   const page = await open(browser, server.url);
   await page.fill("#settings", settings.join("\n"));
-  if (dataset) await page.setInputFiles("#folder", dataset);
   await page.click("#train");
   await page.waitForFunction(() => /^(Done|Failed)/.test(document.getElementById("status").textContent), null, { timeout: 600_000 });
   return page;
@@ -91,6 +90,9 @@ test("a training can be stopped, and begun again", { timeout: 300_000 }, async (
   await page.waitForFunction(() => /iteration/.test(document.getElementById("status").textContent), null, { timeout: 240_000 });
   await page.click("#stop");
   assert.equal(await status(page), "Stopped");
-  assert.ok(await page.isVisible("#train"));
+  await page.fill("#settings", SHORT.join("\n"));
+  await page.click("#train");
+  await page.waitForFunction(() => /^fine stage/.test(document.getElementById("status").textContent), null, { timeout: 120_000 });
+  assert.deepEqual(page.problems, []);
   await page.context().close();
 });

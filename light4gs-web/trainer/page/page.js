@@ -13,8 +13,6 @@ const curve = new Curve(find("curve"));
 let worker = null;
 /** Compiled once. @type {Promise<WebAssembly.Module> | null} */
 let compiled = null;
-/** Of the stages: their iterations, and those that are done. */
-let progress = { stage: "", iterations: 0, before: 0 };
 
 /** @param {string} text */
 const say = (text) => (find("status").textContent = text);
@@ -42,12 +40,14 @@ async function start() {
   const folder = find("folder").files;
   const settings = find("settings").value.split("\n").map((/** @type {string} */ line) => line.trim()).filter(Boolean);
   curve.clear();
-  progress = { stage: "", iterations: 0, before: 0 };
+  find("warnings").replaceChildren();
   find("results").hidden = true;
   find("train").hidden = true;
   find("stop").hidden = false;
   say("Loading the trainer …");
-  const mine = new Worker(URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" })));
+  const source = URL.createObjectURL(new Blob([workerSource], { type: "text/javascript" }));
+  const mine = new Worker(source);
+  URL.revokeObjectURL(source);
   worker = mine;
   mine.onmessage = ({ data }) => mine === worker && take(data);
   mine.onerror = (event) => mine === worker && take({ kind: "error", text: event.message });
@@ -93,7 +93,6 @@ function show(bytes) {
 function take(message) {
   const { kind, contents = {} } = message;
   if (kind === "stage") {
-    progress = { stage: message.stage, iterations: message.iterations, before: 0 };
     find("bar").max = message.iterations;
     find("bar").value = 0;
     say(`${message.stage} stage`);
@@ -101,7 +100,7 @@ function take(message) {
     find("bar").value = message.iteration;
     if (message.psnr !== undefined && message.stage === "fine") curve.add(message.iteration, message.psnr);
     const psnr = message.psnr === undefined ? "" : `, ${message.psnr.toFixed(2)} dB`;
-    say(`${message.stage} stage, iteration ${message.iteration} of ${progress.iterations}, ${message.gaussians} Gaussians${psnr}, ${Math.round(message.seconds)} s`);
+    say(`${message.stage} stage, iteration ${message.iteration} of ${find("bar").max}, ${message.gaussians} Gaussians${psnr}, ${Math.round(message.seconds)} s`);
   } else if (kind === "picture") {
     if (contents.file) replace(find("picture"), "src", address(contents.file, "image/png"));
   } else if (kind === "scene") {
