@@ -3,6 +3,9 @@
 /** Differences that a launch may have, as a share of the largest magnitude in the buffer; integers must be the same. */
 const ALLOWED = 1e-6;
 
+/** Keys of a buffer of mixed words are smaller, and the bits of a depth: one more is this share of it. */
+const [KEYS, SHARE_OF_KEY] = [2 ** 28, 2 ** -23];
+
 let device, kernels, scenes, pieces, contents;
 
 /** What browsers want before a text. The variant for Mesa's software driver says so itself that it proves less. */
@@ -21,7 +24,7 @@ export async function begin() {
   contents = await (await fetch("/blobs.bin")).arrayBuffer();
   for (const kernel of kernels) {
     kernel.buffers = [...kernel.text.matchAll(/@binding\((\d+)\) var<storage, read_write> (\w+): array<(.+?)>;/g)]
-      .map(([, , name, type]) => ({ name, integer: /[iu]32/.test(type) }));
+      .map(([, , name, type]) => ({ name, difference: type === "vec4<u32>" ? ofWords : /[iu]32/.test(type) ? ofIntegers : ofFloats }));
   }
   const { vendor, architecture, subgroupMinSize, subgroupMaxSize } = adapter.info;
   return { vendor, architecture, subgroups: [subgroupMinSize, subgroupMaxSize] };
@@ -94,13 +97,33 @@ async function read(source) {
 }
 
 /** The largest difference, and where it is. Equal bits are equal, NaN as well. */
-function difference(found, expected) {
+function difference(found, expected, off = (f, e) => Math.abs(f - e)) {
   let [error, at] = [0, 0];
   for (let i = 0; i < expected.length; i++) {
-    const off = Object.is(found[i], expected[i]) ? 0 : Math.abs(found[i] - expected[i]);
-    if (!(off <= error)) [error, at] = [Number.isNaN(off) ? Infinity : off, i];
+    const here = Object.is(found[i], expected[i]) ? 0 : off(found[i], expected[i], i);
+    if (!(here <= error)) [error, at] = [Number.isNaN(here) ? Infinity : here, i];
   }
   return { error, at: `[${at}]: ${found[at]} for ${expected[at]}` };
+}
+
+const ofIntegers = (found, expected) => ({ ...difference(new Uint32Array(found), new Uint32Array(expected)), allowed: 0 });
+
+function largest(floats) {
+  return floats.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 1e-30);
+}
+
+function ofFloats(found, expected) {
+  const floats = new Float32Array(expected);
+  const { error, at } = difference(new Float32Array(found), floats);
+  return { error: error / largest(floats), at, allowed: ALLOWED };
+}
+
+/** Words that are bits of floats, and keys made of them. */
+function ofWords(found, expected) {
+  const [left, right] = [new Float32Array(found), new Float32Array(expected)];
+  const scale = largest(right);
+  const off = (f, e, i) => (Math.max(f, e) < KEYS ? SHARE_OF_KEY * Math.abs(f - e) : Math.abs(left[i] - right[i]) / scale);
+  return { ...difference(new Uint32Array(found), new Uint32Array(expected), off), allowed: ALLOWED };
 }
 
 /** One scene: every launch by itself, then all of them one after the other. */
@@ -115,12 +138,8 @@ export async function run(index) {
     const found = await Promise.all(results.map((buffer, place) => launch.buffers[place][1] !== null && read(buffer)));
     for (const [place, [, after]] of launch.buffers.entries()) {
       if (after === null) continue;
-      const { name, integer } = kernels[kernel].buffers[place];
-      const Values = integer ? Uint32Array : Float32Array;
-      const expected = new Values(piece(after).slice().buffer);
-      const { error, at } = difference(new Values(found[place]), expected);
-      const largest = expected.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
-      buffers.push({ buffer: name, at, error: integer ? error : error / Math.max(largest, 1e-30), allowed: integer ? 0 : ALLOWED });
+      const { name, difference } = kernels[kernel].buffers[place];
+      buffers.push({ buffer: name, ...difference(found[place], piece(after).slice().buffer) });
     }
     results.forEach((buffer) => buffer.destroy());
     compared.push({ kernel, buffers, problem: (await device.popErrorScope())?.message });
