@@ -23,6 +23,7 @@ studies![
     "sizes",
     "motion",
     "attribute-rate",
+    "minutes",
 ];
 
 /// The text of a study.

@@ -1,4 +1,4 @@
-//! Rate-distortion curves: the convex hull of measured points, and Bjøntegaard's difference between two curves.
+//! Curves of quality over what it costs, such as rate-distortion curves: the convex hull of measured points, and Bjøntegaard's difference between two curves.
 //!
 //! Sources: G. Bjøntegaard, *Calculation of average PSNR differences between RD-curves*, VCEG-M33, 2001. Between the
 //! points, the curve is the piecewise cubic Hermite interpolation (Fritsch and Carlson 1980) of the JCT-VC's sheets,
@@ -6,11 +6,11 @@
 
 use serde::{Deserialize, Serialize};
 
-/// A measured file: its size, and its quality.
+/// A measured run: what it costs, and its quality.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RatePoint {
-    /// Size of the file in bytes, above 0.
-    pub bytes: f64,
+pub struct CurvePoint {
+    /// Bytes of the file or minutes of training, above 0.
+    pub cost: f64,
     /// Quality in dB; more is better.
     pub psnr: f64,
 }
@@ -18,22 +18,22 @@ pub struct RatePoint {
 /// The difference between two curves, over the range that both cover.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BjontegaardDelta {
-    /// Mean difference in size at equal quality, percent; negative is smaller. `None` if the curves share no range of
-    /// quality.
-    pub rate_percent: Option<f64>,
-    /// Mean difference in quality at equal size, dB; positive is better. `None` if the curves share no range of size.
+    /// Mean difference in cost at equal quality, percent; negative is cheaper: of bytes, the BD-rate. `None` if the
+    /// curves share no range of quality.
+    pub cost_percent: Option<f64>,
+    /// Mean difference in quality at equal cost, dB; positive is better. `None` if the curves share no range of cost.
     pub psnr: Option<f64>,
 }
 
-/// The points that no mixture of two others surpasses, by ascending size: the upper left of the convex hull, over the
-/// logarithm of the size. Along it, sizes and qualities are strictly ascending. Points that are not finite, or without
-/// size, are left out.
-pub fn convex_hull(points: &[RatePoint]) -> Vec<RatePoint> {
-    let mut sorted: Vec<RatePoint> =
-        points.iter().copied().filter(|p| p.bytes > 0.0 && p.bytes.is_finite() && p.psnr.is_finite()).collect();
-    // Of points with equal size, the best comes first.
-    sorted.sort_by(|a, b| a.bytes.total_cmp(&b.bytes).then(b.psnr.total_cmp(&a.psnr)));
-    let mut hull: Vec<RatePoint> = Vec::new();
+/// The points that no mixture of two others surpasses, by ascending cost: the upper left of the convex hull, over the
+/// logarithm of the cost. Along it, costs and qualities are strictly ascending. Points that are not finite, or without
+/// cost, are left out.
+pub fn convex_hull(points: &[CurvePoint]) -> Vec<CurvePoint> {
+    let mut sorted: Vec<CurvePoint> =
+        points.iter().copied().filter(|p| p.cost > 0.0 && p.cost.is_finite() && p.psnr.is_finite()).collect();
+    // Of points with equal cost, the best comes first.
+    sorted.sort_by(|a, b| a.cost.total_cmp(&b.cost).then(b.psnr.total_cmp(&a.psnr)));
+    let mut hull: Vec<CurvePoint> = Vec::new();
     for point in sorted {
         if hull.last().is_some_and(|last| point.psnr <= last.psnr) {
             continue;
@@ -48,31 +48,31 @@ pub fn convex_hull(points: &[RatePoint]) -> Vec<RatePoint> {
     hull
 }
 
-/// dB for each factor e in size.
-fn slope(a: RatePoint, b: RatePoint) -> f64 {
-    (b.psnr - a.psnr) / (b.bytes.ln() - a.bytes.ln())
+/// dB for each factor e in cost.
+fn slope(a: CurvePoint, b: CurvePoint) -> f64 {
+    (b.psnr - a.psnr) / (b.cost.ln() - a.cost.ln())
 }
 
-/// The difference of `curve` from `anchor`. Each needs at least two points, with sizes and qualities that ascend
+/// The difference of `curve` from `anchor`. Each needs at least two points, with costs and qualities that ascend
 /// together, as on a [`convex_hull`]; `None` if one has fewer.
-pub fn bjontegaard(anchor: &[RatePoint], curve: &[RatePoint]) -> Option<BjontegaardDelta> {
+pub fn bjontegaard(anchor: &[CurvePoint], curve: &[CurvePoint]) -> Option<BjontegaardDelta> {
     let [anchor, curve] = [anchor, curve].map(rising);
     let (anchor, curve) = (anchor?, curve?);
-    let by_quality = |points: &[RatePoint]| Hermite::new(points.iter().map(|p| (p.psnr, p.bytes.ln())).collect());
-    let by_size = |points: &[RatePoint]| Hermite::new(points.iter().map(|p| (p.bytes.ln(), p.psnr)).collect());
+    let by_quality = |points: &[CurvePoint]| Hermite::new(points.iter().map(|p| (p.psnr, p.cost.ln())).collect());
+    let by_cost = |points: &[CurvePoint]| Hermite::new(points.iter().map(|p| (p.cost.ln(), p.psnr)).collect());
     let log_rate = mean_difference(&by_quality(&anchor), &by_quality(&curve));
     Some(BjontegaardDelta {
-        rate_percent: log_rate.map(|difference| 100.0 * difference.exp_m1()),
-        psnr: mean_difference(&by_size(&anchor), &by_size(&curve)),
+        cost_percent: log_rate.map(|difference| 100.0 * difference.exp_m1()),
+        psnr: mean_difference(&by_cost(&anchor), &by_cost(&curve)),
     })
 }
 
 /// The points by ascending size; `None` if there are fewer than two, or if quality does not ascend with size.
-fn rising(points: &[RatePoint]) -> Option<Vec<RatePoint>> {
+fn rising(points: &[CurvePoint]) -> Option<Vec<CurvePoint>> {
     let mut points = points.to_vec();
-    points.sort_by(|a, b| a.bytes.total_cmp(&b.bytes));
-    let rises = points.iter().all(|p| p.bytes > 0.0 && p.bytes.is_finite() && p.psnr.is_finite())
-        && points.windows(2).all(|pair| pair[0].bytes < pair[1].bytes && pair[0].psnr < pair[1].psnr);
+    points.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let rises = points.iter().all(|p| p.cost > 0.0 && p.cost.is_finite() && p.psnr.is_finite())
+        && points.windows(2).all(|pair| pair[0].cost < pair[1].cost && pair[0].psnr < pair[1].psnr);
     (points.len() >= 2 && rises).then_some(points)
 }
 
@@ -161,8 +161,8 @@ fn end_slope(near_width: f64, far_width: f64, near: f64, far: f64) -> f64 {
 mod tests {
     use super::*;
 
-    fn points(rows: &[(f64, f64)]) -> Vec<RatePoint> {
-        rows.iter().map(|&(bytes, psnr)| RatePoint { bytes, psnr }).collect()
+    fn points(rows: &[(f64, f64)]) -> Vec<CurvePoint> {
+        rows.iter().map(|&(cost, psnr)| CurvePoint { cost, psnr }).collect()
     }
 
     /// The example that comes with most implementations of VCEG-M33. The values are those of the Python package
@@ -172,20 +172,20 @@ mod tests {
         let anchor = points(&[(686.76, 40.28), (309.58, 37.18), (157.11, 34.24), (85.95, 31.42)]);
         let curve = points(&[(893.34, 40.39), (407.8, 37.21), (204.93, 34.17), (112.75, 31.24)]);
         let delta = bjontegaard(&anchor, &curve).unwrap();
-        assert!((delta.rate_percent.unwrap() - 31.379_878_202_397_627).abs() < 1e-6, "{delta:?}");
+        assert!((delta.cost_percent.unwrap() - 31.379_878_202_397_627).abs() < 1e-6, "{delta:?}");
         assert!((delta.psnr.unwrap() + 1.183_472_404_622_459_2).abs() < 1e-6, "{delta:?}");
     }
 
     #[test]
     fn half_the_bytes_at_equal_quality() {
         let anchor = points(&[(100.0, 20.0), (200.0, 25.0), (400.0, 28.0), (900.0, 30.0), (1000.0, 30.1)]);
-        let half: Vec<_> = anchor.iter().map(|p| RatePoint { bytes: p.bytes / 2.0, ..*p }).collect();
+        let half: Vec<_> = anchor.iter().map(|p| CurvePoint { cost: p.cost / 2.0, ..*p }).collect();
         let delta = bjontegaard(&anchor, &half).unwrap();
-        assert!((delta.rate_percent.unwrap() + 50.0).abs() < 1e-9);
+        assert!((delta.cost_percent.unwrap() + 50.0).abs() < 1e-9);
         let back = bjontegaard(&half, &anchor).unwrap();
-        assert!((back.rate_percent.unwrap() - 100.0).abs() < 1e-9);
+        assert!((back.cost_percent.unwrap() - 100.0).abs() < 1e-9);
         let same = bjontegaard(&anchor, &anchor).unwrap();
-        assert_eq!((same.rate_percent, same.psnr), (Some(0.0), Some(0.0)));
+        assert_eq!((same.cost_percent, same.psnr), (Some(0.0), Some(0.0)));
     }
 
     #[test]
@@ -193,7 +193,7 @@ mod tests {
         let low = points(&[(100.0, 20.0), (200.0, 21.0)]);
         let high = points(&[(100.0, 25.0), (200.0, 26.0)]);
         let delta = bjontegaard(&low, &high).unwrap();
-        assert_eq!(delta.rate_percent, None);
+        assert_eq!(delta.cost_percent, None);
         assert!((delta.psnr.unwrap() - 5.0).abs() < 1e-12);
     }
 
@@ -220,7 +220,7 @@ mod tests {
         let one = points(&[(5.0, 20.0)]);
         assert_eq!(convex_hull(&one), one);
         assert_eq!(convex_hull(&points(&[(5.0, 20.0), (5.0, 20.0), (5.0, 19.0)])), one);
-        // A point with more bytes and no better quality is not on the hull.
+        // A point of higher cost and no better quality is not on the hull.
         assert_eq!(convex_hull(&points(&[(5.0, 20.0), (6.0, 20.0), (9.0, 3.0)])), one);
         // Of points on a line, only the ends are needed.
         let e = std::f64::consts::E;
@@ -238,12 +238,12 @@ mod tests {
         };
         for _ in 0..200 {
             let all: Vec<_> =
-                (0..12).map(|_| RatePoint { bytes: 1.0 + 9.0 * random(), psnr: 20.0 + 10.0 * random() }).collect();
+                (0..12).map(|_| CurvePoint { cost: 1.0 + 9.0 * random(), psnr: 20.0 + 10.0 * random() }).collect();
             let hull = convex_hull(&all);
-            assert!(hull.windows(2).all(|pair| pair[0].bytes < pair[1].bytes && pair[0].psnr < pair[1].psnr));
+            assert!(hull.windows(2).all(|pair| pair[0].cost < pair[1].cost && pair[0].psnr < pair[1].psnr));
             for pair in hull.windows(2) {
-                for p in all.iter().filter(|p| p.bytes >= pair[0].bytes && p.bytes <= pair[1].bytes) {
-                    let on_it = pair[0].psnr + slope(pair[0], pair[1]) * (p.bytes.ln() - pair[0].bytes.ln());
+                for p in all.iter().filter(|p| p.cost >= pair[0].cost && p.cost <= pair[1].cost) {
+                    let on_it = pair[0].psnr + slope(pair[0], pair[1]) * (p.cost.ln() - pair[0].cost.ln());
                     assert!(p.psnr <= on_it + 1e-9);
                 }
             }

@@ -20,19 +20,23 @@
 //! ```
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use light4gs_data::read_regular_text;
 use serde::{Deserialize, Serialize};
 
 use super::catalog;
-use super::measure::{Column, default_columns};
+use super::measure::{Column, Measure, default_columns};
 use crate::config::{MAX_CONFIG_BYTES, UnknownChoice};
 use crate::error::TrainError;
 use crate::keys::choice;
 
 /// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;
+
+/// How many times as long a schedule may be.
+pub const SCHEDULES: RangeInclusive<f64> = 0.001..=1000.0;
 
 /// What varies, and what is shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -108,6 +112,9 @@ pub struct AxisValue {
     /// Presets or files, which are laid on top in this order.
     #[serde(default)]
     pub presets: Vec<String>,
+    /// How many times as long the schedule is as that of the presets, see [`SCHEDULES`].
+    #[serde(default)]
+    pub schedule: Option<f64>,
     /// Overrides, as for `--set`.
     #[serde(default)]
     pub set: Vec<String>,
@@ -136,6 +143,39 @@ choice! {
 pub struct Curves {
     /// Name of the axis whose values are the points of a curve. Each combination of the other axes' values is a curve.
     pub along: String,
+    /// What a point costs.
+    #[serde(default)]
+    pub over: Cost,
+}
+
+choice! {
+    /// What a point of a curve costs.
+    #[derive(Default)]
+    pub enum Cost: "cost" {
+        /// Bytes of the file.
+        #[default]
+        Bytes = "bytes",
+        /// Minutes of training: those of this machine and its load.
+        Minutes = "minutes",
+    }
+}
+
+impl Cost {
+    /// How it is measured.
+    pub fn measure(self) -> Measure {
+        match self {
+            Self::Bytes => Measure::Bytes,
+            Self::Minutes => Measure::Minutes,
+        }
+    }
+
+    /// Name of the difference at equal quality.
+    pub fn difference(self) -> &'static str {
+        match self {
+            Self::Bytes => "BD-rate",
+            Self::Minutes => "BD-minutes",
+        }
+    }
 }
 
 /// Published results on known data. They are shown only if the study has the same scenes and image sizes.
@@ -258,6 +298,14 @@ impl Study {
                         axis.name, value.name
                     ));
                 }
+                if let Some(factor) = value.schedule.filter(|factor| !SCHEDULES.contains(factor)) {
+                    let (least, most) = SCHEDULES.into_inner();
+                    return Some(format!(
+                        "axis \"{}\": `schedule` of \"{}\" is {factor}; it is how many times as long the schedule is, \
+                         {least} to {most}",
+                        axis.name, value.name
+                    ));
+                }
                 if !values.insert(&value.name) {
                     return Some(format!(
                         "axis \"{}\" has two values called \"{}\"; rename one",
@@ -315,6 +363,8 @@ value = [{ name = "x" }, { name = "y", set = ["seed=1"] }]
         refused(&GOOD.replace("\"y\"", "\"x\""), &["axis \"a\"", "two values called \"x\""]);
         refused(&GOOD.replace("\"y\"", "\"../y\""), &["../y", "folder"]);
         refused(&GOOD.replace("\"y\"", "\"\""), &["folder"]);
+        refused(&GOOD.replace("\"y\"", "\"y\", schedule = 0"), &["`schedule` of \"y\" is 0", "0.001 to 1000"]);
+        refused(&GOOD.replace("\"y\"", "\"y\", schedule = nan"), &["is NaN"]);
         refused(&GOOD.replace("\"y\"", "\"..\""), &["folder"]);
         refused(
             &GOOD.replace("value = [{ name = \"x\" }, { name = \"y\", set = [\"seed=1\"] }]", "value = []"),

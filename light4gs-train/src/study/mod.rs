@@ -7,7 +7,7 @@
 //! - [`results`]: the results of the runs so far, `results.json` and the CSV files; [`reuse`]: trainings of other
 //!   studies
 //! - [`table`]: means, spreads and differences to the reference
-//! - [`rate_curves`]: runs as curves of quality over size
+//! - [`quality_curves`]: runs as curves of quality over size
 //! - `plots`, `figures`: plots and images, and the study's `report.html` (feature `cli`)
 //! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
 
@@ -21,7 +21,7 @@ pub mod measure;
 pub mod plan;
 #[cfg(feature = "cli")]
 pub mod plots;
-pub mod rate_curves;
+pub mod quality_curves;
 pub mod results;
 pub mod reuse;
 pub mod spread;

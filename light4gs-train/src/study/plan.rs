@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use light4gs_data::DataError;
 
-use super::definition::{Axis, Study};
+use super::definition::{Axis, SCHEDULES, Study};
 use crate::config::Config;
 use crate::error::TrainError;
 
@@ -19,6 +19,8 @@ pub struct PlanOptions {
     pub config: String,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
+    /// How many times as long the schedule of every run is as the configuration's, see [`SCHEDULES`].
+    pub schedule: Option<f64>,
     /// Overrides of every run.
     pub overrides: Vec<String>,
     /// Runs of each variant on each scene, with different seeds. At least 1.
@@ -90,6 +92,12 @@ impl Plan {
     pub fn new(study: Study, options: &PlanOptions) -> Result<Self, TrainError> {
         if options.seeds == 0 {
             return Err(TrainError::Input("--seeds is 0; at least one run of each variant is needed".into()));
+        }
+        if let Some(factor) = options.schedule.filter(|factor| !SCHEDULES.contains(factor)) {
+            let (least, most) = SCHEDULES.into_inner();
+            return Err(TrainError::Input(format!(
+                "--schedule is {factor}; it is how many times as long the schedule is, {least} to {most}"
+            )));
         }
         let variants = variants(&study.axis);
         check_reference(&study, &variants)?;
@@ -164,9 +172,16 @@ fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOption
     let mut names = vec![options.config.replace(SCENE_PLACE, scene)];
     names.extend(study.presets.iter().cloned());
     names.extend(chosen().flat_map(|value| value.presets.iter().cloned()));
-    let mut overrides: Vec<String> = chosen().flat_map(|value| value.set.iter().cloned()).collect();
-    overrides.extend(options.overrides.iter().cloned());
-    Config::load(&names.join("+"), &overrides)
+    let names = names.join("+");
+    let factor: Option<f64> = chosen().filter_map(|value| value.schedule).chain(options.schedule).reduce(|a, b| a * b);
+    let scaled = factor.map(|factor| Ok(Config::load(&names, &[])?.for_schedule(factor)));
+    let load = |scaled: Option<Vec<String>>| {
+        let own = chosen().flat_map(|value| &value.set).chain(&options.overrides).cloned();
+        Config::load(&names, &scaled.into_iter().flatten().chain(own).collect::<Vec<_>>())
+    };
+    scaled
+        .transpose()
+        .and_then(load)
         .map_err(|error| TrainError::Input(format!("variant \"{}\" of \"{}\": {error}", variant.name, study.title)))
 }
 
@@ -241,6 +256,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         PlanOptions {
             config: "dnerf-cpu".into(),
             scenes: vec![scene.into()],
+            schedule: None,
             overrides: Vec::new(),
             seeds: 1,
             reuse: Vec::new(),
@@ -266,6 +282,24 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         assert_eq!(plan.runs[6].config.seed, 1);
         let digests: BTreeSet<_> = plan.runs[..18].iter().map(|run| run.config.digest()).collect();
         assert_eq!(digests.len(), 18);
+    }
+
+    /// The factors of the command and of a value are multiplied, and what is set by hand wins.
+    #[test]
+    fn a_schedule_can_be_longer_or_shorter() {
+        let folder = tempfile::tempdir().unwrap();
+        let axes = LAMBDAS.replace("name = \"strong\"", "name = \"strong\", schedule = 0.5");
+        let scene = folder.path().join("scene");
+        std::fs::create_dir(&scene).unwrap();
+        let overrides = vec!["train.coarse_iterations=7".to_owned()];
+        let options = PlanOptions { schedule: Some(0.1), overrides, ..options(&scene) };
+        let plan = Plan::new(study(&axes), &options).unwrap();
+        let usual = Config::load("dnerf-cpu", &[]).unwrap().train.fine_iterations;
+        let fine = |run: usize| plan.runs[run].config.train.fine_iterations;
+        assert_eq!([fine(0), fine(2)], [usual / 10, usual / 20]);
+        assert!(plan.runs.iter().all(|run| run.config.train.coarse_iterations == 7));
+        let error = Plan::new(study(&axes), &PlanOptions { schedule: Some(-1.0), ..options }).unwrap_err().to_string();
+        assert!(error.contains("--schedule is -1"), "{error}");
     }
 
     #[test]

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::manifest::Manifest;
 use super::measure::{Column, Form, Measure};
-use super::rate_curves::RateCurves;
+use super::quality_curves::QualityCurves;
 use super::results::Results;
 use super::spread::Spread;
 use crate::report::table::{Align, Table};
@@ -240,7 +240,7 @@ impl StudyTable {
 }
 
 /// `table.md`: all tables, the meaning of the marks, and the missing runs.
-pub fn to_markdown(manifest: &Manifest, results: &Results, tables: &[StudyTable], curves: &[RateCurves]) -> String {
+pub fn to_markdown(manifest: &Manifest, results: &Results, tables: &[StudyTable], curves: &[QualityCurves]) -> String {
     let study = &manifest.study;
     let mut text = format!("# {}\n\nReproduces: {}.\n", study.title, study.reproduces);
     if !study.notes.is_empty() {
@@ -249,7 +249,7 @@ pub fn to_markdown(manifest: &Manifest, results: &Results, tables: &[StudyTable]
     for table in tables {
         text += &format!("\n{}", table.to_markdown());
     }
-    for curves in curves.iter().map(RateCurves::to_markdown).filter(|text| !text.is_empty()) {
+    for curves in curves.iter().map(QualityCurves::to_markdown).filter(|text| !text.is_empty()) {
         text += &format!("\n{curves}");
     }
     text += &format!("\n{}\n", legend(manifest));
@@ -285,7 +285,7 @@ pub fn legend(manifest: &Manifest) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::manifest::{ManifestRun, ManifestScene};
-    use super::super::rate_curves::rate_curves;
+    use super::super::quality_curves::quality_curves;
     use super::super::results::{MissingRun, Quality, RunResult};
     use super::super::{Manifest, Study};
     use super::*;
@@ -370,7 +370,7 @@ bytes = 2.2e6
         assert_eq!(texts(&tables[0], 1), ["two", "21.00", "+1.00", "+5.00", "2000"]);
         // Published figures of the same scene, of the same size.
         assert_eq!(texts(&tables[0], 2), ["published: theirs (a paper)", "33.00", "–", "–", "2200000"]);
-        let curves = rate_curves(&manifest, &results);
+        let curves = quality_curves(&manifest, &results);
         assert_eq!(curves[0].series.len(), 1);
         assert_eq!(curves[0].hull.len(), 2);
         let text = to_markdown(&manifest, &results, &tables, &curves);
@@ -434,7 +434,7 @@ bytes = 2.2e6
         assert!(text.contains("Missing: 5 of 8 runs.") && text.contains("- y/one/seed-0: not begun"), "{text}");
         let (manifest, results) = example(&["x"], 1, |_, _, _| None);
         assert_eq!(texts(&super::tables(&manifest, &results)[0], 0)[1], "–");
-        assert!(rate_curves(&manifest, &results)[0].hull.is_empty());
+        assert!(quality_curves(&manifest, &results)[0].hull.is_empty());
         assert_eq!(results.to_csv(&manifest, false).lines().count(), 1);
     }
 }

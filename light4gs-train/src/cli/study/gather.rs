@@ -9,7 +9,7 @@ use super::super::output::{say, say_json, tell};
 use crate::error::TrainError;
 use crate::study::figures::{figures, write_report};
 use crate::study::manifest::{Manifest, StudyFolder};
-use crate::study::rate_curves::{RateCurves, rate_curves};
+use crate::study::quality_curves::{QualityCurves, quality_curves};
 use crate::study::results::Results;
 use crate::study::table::{StudyTable, legend, tables, to_markdown};
 
@@ -35,7 +35,7 @@ struct ResultsFile<'a> {
     #[serde(flatten)]
     results: &'a Results,
     tables: &'a [StudyTable],
-    curves: &'a [RateCurves],
+    curves: &'a [QualityCurves],
 }
 
 /// Writes tables and report from the finished runs, and prints the tables.
@@ -45,7 +45,7 @@ struct ResultsFile<'a> {
 pub(super) fn gather(folder: &StudyFolder, manifest: &Manifest, json: bool) -> Result<(), TrainError> {
     let results = Results::read(folder, manifest)?;
     let tables = tables(manifest, &results);
-    let curves = rate_curves(manifest, &results);
+    let curves = quality_curves(manifest, &results);
     let file = ResultsFile { results: &results, tables: &tables, curves: &curves };
     folder.write_json("results.json", &file)?;
     folder.write("results.csv", results.to_csv(manifest, false).as_bytes())?;

@@ -46,6 +46,9 @@ pub(super) struct Study {
     /// The preset or TOML file that every variant starts from; {scene} in it stands for the scene's name.
     #[arg(long, default_value = "dnerf-cpu", value_name = "PRESET|FILE")]
     config: String,
+    /// The schedule of every variant this many times as long: 0.25 for a first look.
+    #[arg(long, value_name = "FACTOR")]
+    schedule: Option<f64>,
     /// Changes one key of every variant's configuration; may be given more than once.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
@@ -85,8 +88,10 @@ impl Study {
         }
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
-        let (config, scenes, seeds, reuse) = (self.config, self.scenes, self.seeds, self.reuse);
-        let plan = Plan::new(Definition::load(&self.name)?, &PlanOptions { config, scenes, overrides, seeds, reuse })?;
+        let (config, scenes, schedule) = (self.config, self.scenes, self.schedule);
+        let (seeds, reuse) = (self.seeds, self.reuse);
+        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse };
+        let plan = Plan::new(Definition::load(&self.name)?, &options)?;
         for study in &plan.reuse {
             StudyFolder::open(study)?;
         }

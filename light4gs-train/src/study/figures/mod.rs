@@ -11,11 +11,11 @@ use light4gs_data::RgbImage8;
 
 pub use report::write_report;
 
-use super::definition::Output;
+use super::definition::{Cost, Output};
 use super::manifest::{Manifest, StudyFolder};
 use super::measure::Measure;
 use super::plots::{Bar, BarPlot, Drawing, Mark, ScatterPlot, Series, draw};
-use super::rate_curves::RateCurves;
+use super::quality_curves::QualityCurves;
 use super::results::{Results, RunResult};
 use super::spread::Spread;
 use crate::error::TrainError;
@@ -49,7 +49,7 @@ pub fn figures(
     folder: &StudyFolder,
     manifest: &Manifest,
     results: &Results,
-    curves: &[RateCurves],
+    curves: &[QualityCurves],
 ) -> Result<Vec<Figure>, TrainError> {
     let study = &manifest.study;
     let mut figures = Vec::new();
@@ -106,8 +106,12 @@ fn file_name(heading: &str) -> String {
     heading.replace(|c: char| c.is_whitespace() || c == '/' || c == '\\', "-")
 }
 
-fn curves_plot(title: &str, curves: &RateCurves) -> ScatterPlot {
-    let place = |point: &super::curve::RatePoint| (point.bytes / 1e6, point.psnr);
+fn curves_plot(title: &str, curves: &QualityCurves) -> ScatterPlot {
+    let (unit, x_label) = match curves.over {
+        Cost::Bytes => (1e6, "file, MB (10^6 bytes)"),
+        Cost::Minutes => (1.0, "training, minutes"),
+    };
+    let place = |point: &super::curve::CurvePoint| (point.cost / unit, point.psnr);
     let mut series: Vec<Series> = curves
         .series
         .iter()
@@ -123,7 +127,7 @@ fn curves_plot(title: &str, curves: &RateCurves) -> ScatterPlot {
     }
     ScatterPlot {
         title: format!("{title}: {}", curves.heading),
-        x_label: "file, MB (10^6 bytes)".to_owned(),
+        x_label: x_label.to_owned(),
         y_label: "test PSNR, dB".to_owned(),
         logarithmic: true,
         series,

@@ -6,7 +6,7 @@ use super::Figure;
 use crate::error::TrainError;
 use crate::report::{escape, page_of};
 use crate::study::manifest::{Manifest, StudyFolder};
-use crate::study::rate_curves::RateCurves;
+use crate::study::quality_curves::QualityCurves;
 use crate::study::results::Results;
 use crate::study::table::{StudyTable, legend};
 
@@ -19,7 +19,7 @@ pub fn write_report(
     manifest: &Manifest,
     results: &Results,
     tables: &[StudyTable],
-    curves: &[RateCurves],
+    curves: &[QualityCurves],
     figures: &[Figure],
 ) -> Result<(), TrainError> {
     let path = folder.path("figures");
@@ -66,19 +66,8 @@ fn missing_section(results: &Results) -> String {
     format!("<ul>\n{}</ul>\n", items.collect::<String>())
 }
 
-fn differences(curves: &RateCurves) -> String {
-    let [first, others @ ..] = &curves.series[..] else { return String::new() };
-    if others.is_empty() {
-        return String::new();
-    }
-    let cell = |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |value| format!("{value:+.2}"));
-    let row = |other: &super::super::rate_curves::RateSeries| {
-        let delta =
-            |pick: fn(super::super::curve::BjontegaardDelta) -> Option<f64>| cell(other.to_first.and_then(pick));
-        vec![other.label.clone(), delta(|delta| delta.rate_percent), delta(|delta| delta.psnr)]
-    };
-    let heading = format!("{}: hull of the curve, to \"{}\"", curves.heading, first.label);
-    html_table(vec![heading, "BD-rate %".to_owned(), "BD-PSNR dB".to_owned()], others.iter().map(row).collect())
+fn differences(curves: &QualityCurves) -> String {
+    curves.differences().map(|(headings, rows)| html_table(headings, rows)).unwrap_or_default()
 }
 
 fn html_table(heading: Vec<String>, lines: Vec<Vec<String>>) -> String {
