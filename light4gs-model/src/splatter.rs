@@ -22,6 +22,9 @@ pub struct Rendering {
     /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the image; -1 for Gaussians that are not
     /// finite or have no orientation, which are not drawn.
     pub radii: Tensor<1, Int>,
+    /// `[1]`: pairs of a Gaussian and a cell of the image that it touches; how large cells are, a back end chooses. If there was
+    /// room for fewer ([`Splatter::with_room_for`]), the image is incomplete.
+    pub intersections: Tensor<1, Int>,
 }
 
 impl Rendering {
@@ -55,13 +58,21 @@ impl Rendering {
 pub struct Splatter {
     background: [f32; 3],
     sh_degree: usize,
+    room: Option<usize>,
 }
 
 impl Splatter {
     /// `sh_degree` is the active degree: coefficients above it are ignored. A degree above that of the Gaussians means
     /// theirs.
     pub fn new(background: [f32; 3], sh_degree: usize) -> Self {
-        Self { background, sh_degree }
+        Self { background, sh_degree, room: None }
+    }
+
+    /// Reserves room for so many [`Rendering::intersections`]. A GPU then need not tell the host how many there are before the
+    /// host goes on, but an image with more is incomplete, with its gradients: whoever sets this looks at that number, and
+    /// draws such an image again. Other back ends have room for all.
+    pub fn with_room_for(self, intersections: usize) -> Self {
+        Self { room: Some(intersections), ..self }
     }
 
     /// Renders raw attributes (the activations happen here) through a camera.
@@ -88,7 +99,7 @@ impl Splatter {
         let (inputs, view) = self.inputs(gaussians, camera, screen_offsets);
         let outputs = Dispatch::splat(inputs, view);
         let rendering = Tensor::<1>::from_dispatch(outputs.rendering);
-        let radii = Tensor::<1, Int>::from_dispatch(outputs.radii);
+        let [radii, intersections] = [outputs.radii, outputs.intersections].map(Tensor::<1, Int>::from_dispatch);
         let (width, height) = (camera.width as usize, camera.height as usize);
         let pixels = width * height;
         // Channel by channel: those of all pixels are columns of a matrix with one row.
@@ -99,6 +110,7 @@ impl Splatter {
             alpha: part(3..4).reshape([height, width]),
             depth: part(4..5).reshape([height, width]),
             radii,
+            intersections,
         }
     }
 
@@ -126,7 +138,7 @@ impl Splatter {
         assert_eq!(screen_offsets.dims(), [count, 2], "screen_offsets must be [N, 2]");
 
         let sh_degree = self.sh_degree.min((rest + 1).isqrt() - 1);
-        let view = SplatView::new(*camera, self.background, sh_degree);
+        let view = SplatView { room: self.room, ..SplatView::new(*camera, self.background, sh_degree) };
         let inputs = SplatInputs {
             means: means.into_dispatch(),
             quats: quats.into_dispatch(),

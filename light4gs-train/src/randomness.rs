@@ -24,6 +24,8 @@ pub(crate) enum Purpose {
     GuidedSampling,
     /// Quantization noise of the attributes of Gaussians.
     Noise,
+    /// Quantization noise of the hyperprior's latents.
+    Latents,
 }
 
 /// A generator for one purpose at one position, which is an iteration or a pass over the data.
@@ -36,9 +38,9 @@ pub(crate) fn generator(seed: u64, purpose: Purpose, stage: Stage, position: usi
     generator
 }
 
-/// Seeds the device's own generator, which fills random tensors, for one iteration.
-pub(crate) fn seed_device(device: &Device, seed: u64, stage: Stage, iteration: usize) {
-    device.seed(generator(seed, Purpose::Rate, stage, iteration).random());
+/// Seeds the device's own generator, which fills random tensors, for one purpose in one iteration.
+pub(crate) fn seed_device(device: &Device, seed: u64, purpose: Purpose, stage: Stage, iteration: usize) {
+    device.seed(generator(seed, purpose, stage, iteration).random());
 }
 
 /// Box-Muller; one number of the pair.

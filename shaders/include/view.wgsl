@@ -16,6 +16,6 @@ struct View {
     size: vec4<u32>,
     // Columns and rows of cells, then: which chunk of the lists is blended, and whether it is the last one.
     cells: vec4<u32>,
-    // Gaussians, active SH degree, coefficients of `sh_rest` for each Gaussian.
+    // Gaussians, active SH degree, coefficients of `sh_rest` for each Gaussian, intersections that there is room for.
     counts: vec4<u32>,
 }

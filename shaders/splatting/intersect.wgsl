@@ -2,7 +2,8 @@
 //
 // Each invocation computes one Gaussian, at a position in the order of depths. It writes the cell and the Gaussian of
 // each of its intersections, one after the other from the position's entry of `first_places`. The number of its first
-// intersection is kept in `first_of_gaussian`, so that the backward pass finds all of them.
+// intersection is kept in `first_of_gaussian`, so that the backward pass finds all of them. Intersections for which there is
+// no room are left out. Room that is left gets the cell behind the last one, which sorts to the end of all lists.
 
 @group(0) @binding(0) var<storage, read_write> by_depth: array<u32>;
 @group(0) @binding(1) var<storage, read_write> first_places: array<u32>;
@@ -10,7 +11,15 @@
 @group(0) @binding(3) var<storage, read_write> first_of_gaussian: array<u32>;
 @group(0) @binding(4) var<storage, read_write> cells: array<u32>;
 @group(0) @binding(5) var<storage, read_write> gaussians: array<u32>;
-@group(0) @binding(6) var<uniform> view: View;
+@group(0) @binding(6) var<storage, read_write> total: array<u32>;
+@group(0) @binding(7) var<uniform> view: View;
+
+fn write_intersection(place: u32, cell: u32, gaussian: u32) {
+    if (place < view.counts.w) {
+        cells[place] = cell;
+        gaussians[place] = gaussian;
+    }
+}
 
 @compute @workgroup_size(WORKGROUP)
 fn main(
@@ -21,6 +30,10 @@ fn main(
     let place = flat_group(group, groups) * WORKGROUP + lane;
     if (place >= view.counts.x) {
         return;
+    }
+    let no_cell = view.cells.x * view.cells.y;
+    for (var free = total[0] + place; free < view.counts.w; free += view.counts.x) {
+        write_intersection(free, no_cell, 0u);
     }
     let i = by_depth[place];
     var next = first_places[place];
@@ -43,8 +56,7 @@ fn main(
     var row = rectangle.low.y;
     while (row < rectangle.high.y && next < end) {
         if (reaches(splat, column, row)) {
-            cells[next] = row * view.cells.x + column;
-            gaussians[next] = i;
+            write_intersection(next, row * view.cells.x + column, i);
             next += 1u;
         }
         column += 1u;
@@ -60,8 +72,7 @@ fn main(
     // no sums are written for it. So the splat gets the real number of its cells.
     splats[4u * i + 3u].w = f32(next - first_places[place]);
     while (next < end) {
-        cells[next] = view.cells.x * view.cells.y;
-        gaussians[next] = i;
+        write_intersection(next, no_cell, i);
         next += 1u;
     }
 }

@@ -12,7 +12,7 @@ use super::launch::Launch;
 use super::splat::{Begun, begin};
 use super::team::Team;
 use crate::gpu_error::GpuError;
-use crate::kernels::splat::SplatInputs;
+use crate::kernels::splat::{SplatInputs, SplatView};
 
 /// Values of an intersection's sums.
 const SUMS: usize = 3;
@@ -25,7 +25,7 @@ pub(super) fn kernels() -> Vec<Kernel> {
 
 fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs.means)?;
-    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, view)?;
+    let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { view, room: None })?;
     let sums = gpu.allocate("sums of intersections", SUMS * lists.count)?;
     let chunks = frame.chunks(lists.count);
     let carried = gpu.allocate("pixels between chunks", if chunks > 1 { frame.pixels() } else { 0 })?;

@@ -31,6 +31,8 @@ pub(super) struct Frame {
     pub(super) gaussians: usize,
     /// Coefficients of `sh_rest` for each Gaussian.
     rest: usize,
+    /// Intersections that there is room for; `None`: for all, as soon as they are counted.
+    room: Option<usize>,
 }
 
 impl Frame {
@@ -66,7 +68,7 @@ impl Frame {
         let words = [
             [width, height, width.div_ceil(TILE as u32), height.div_ceil(TILE as u32)],
             [width.div_ceil(side), height.div_ceil(side), chunk as u32, u32::from(chunk + 1 == chunks)],
-            [self.gaussians as u32, self.view.sh_degree as u32, self.rest as u32, 0],
+            [self.gaussians as u32, self.view.sh_degree as u32, self.rest as u32, self.room.unwrap_or(0) as u32],
         ];
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
@@ -93,7 +95,9 @@ struct InputBuffers {
 #[derive(Clone, Debug)]
 pub(super) struct Intersections {
     pub(super) splats: Handle,
-    /// Number of all intersections.
+    /// `[1]`: number of all intersections.
+    total: Handle,
+    /// Intersections that the lists have room for: the number of all, or what the caller has chosen.
     pub(super) count: usize,
     /// `[N]`: the first intersection of each Gaussian; the others follow it.
     pub(super) first_of_gaussian: Handle,
@@ -162,11 +166,14 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
         .uniform(&[gaussian_count as u32])
         .invocations(gaussian_count)?;
     let total = prefix_sum(gpu, &first_places, gaussian_count)?;
-    // The only read-back of an image: all further buffers have the size that it gives.
-    let count = match gaussian_count {
-        0 => 0,
-        _ => gpu.read_word("the number of intersections", &total)? as usize,
+    let count = match frame.room {
+        _ if gaussian_count == 0 => 0,
+        // No Gaussian is in a cell's list twice.
+        Some(room) => room.min(gaussian_count.saturating_mul(frame.cells())),
+        // The only read-back of an image: all further buffers have the size that it gives.
+        None => gpu.read_word("the number of intersections", &total)? as usize,
     };
+    let frame = &Frame { room: Some(count), ..*frame };
 
     let first_of_gaussian = gpu.allocate("intersections of Gaussians", gaussian_count)?;
     let cells = gpu.allocate("cells of intersections", count)?;
@@ -178,11 +185,12 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
         .writes(&first_of_gaussian)
         .writes(&cells)
         .writes(&gaussians)
+        .reads(&total)
         .uniform(&frame.uniform(0, 1))
         .invocations(gaussian_count)?;
     let Sorted { keys, order } = sort(gpu, &cells, count, bits_for(frame.cells()))?;
     let starts = ranges(gpu, &keys, count, frame.cells())?;
-    Ok(Intersections { splats, count, first_of_gaussian, gaussians, order, starts })
+    Ok(Intersections { splats, total, count, first_of_gaussian, gaussians, order, starts })
 }
 
 fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, GpuError> {
@@ -212,11 +220,13 @@ pub(super) struct Begun {
 }
 
 /// Projects, intersects and sorts.
-pub(super) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: View) -> Result<Begun, GpuError> {
+pub(super) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: SplatView) -> Result<Begun, GpuError> {
     let inputs = inputs.into_array();
     let shapes = inputs.each_ref().map(|tensor| tensor.shape());
+    let SplatView { view, room } = view;
     let frame = Frame {
         view,
+        room,
         team: choose_team(gpu, view.camera.width, view.camera.height)?,
         gaussians: shapes[0][0],
         rest: shapes[5][1],
@@ -240,6 +250,7 @@ fn forward(gpu: &Gpu, begun: Begun) -> Result<(SplatOutputs<CubeBackend>, GpuSpl
     let outputs = SplatOutputs {
         rendering: gpu.tensor(first_words(&rendering, values), Shape::from([values])),
         radii: gpu.int_tensor(first_words(&radii, frame.gaussians), Shape::from([frame.gaussians])),
+        intersections: gpu.int_tensor(first_words(&intersections.total, 1), Shape::from([1])),
     };
     Ok((outputs, GpuSplatSaved { frame, shapes, inputs, intersections, rendering }))
 }
@@ -291,7 +302,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
 impl SplatKernels for CubeBackend {
     type Saved = GpuSplatSaved;
 
-    fn splat_forward(inputs: SplatInputs<Self>, SplatView(view): SplatView) -> (SplatOutputs<Self>, GpuSplatSaved) {
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, GpuSplatSaved) {
         let drawn = Gpu::of(&inputs.means).and_then(|gpu| forward(&gpu, begin(&gpu, inputs, view)?));
         drawn.unwrap_or_else(|error| error.raise())
     }
@@ -313,8 +324,8 @@ mod tests {
     const COUNT: usize = 300;
     const SIZE: [u32; 2] = [50, 37];
 
-    /// Image and gradients of a scene, blended by a team.
-    fn run(gpu: &Gpu, team: Team) -> Vec<Vec<f32>> {
+    /// Image and gradients of a scene, blended by a team, and the number of its intersections.
+    fn run(gpu: &Gpu, team: Team, room: Option<usize>) -> (Vec<Vec<f32>>, usize) {
         // Any numbers that look random will do.
         let mut state = 1u32;
         let mut uniform = move |low: f32, high: f32| {
@@ -334,24 +345,24 @@ mod tests {
         let camera = Camera::look_at(Vec3::new(0.0, -4.0, 0.5), Vec3::ZERO, Vec3::Z, 0.7, SIZE[0], SIZE[1]);
         let view = View { camera, background: [0.1, 0.5, 0.9], sh_degree: 3 };
         let shapes = widths.map(|width| Shape::from([COUNT, width]));
-        let frame = Frame { view, team, gaussians: COUNT, rest: 15 };
+        let frame = Frame { view, team, gaussians: COUNT, rest: 15, room };
         let (outputs, saved) = forward(gpu, begin_with(gpu, frame, inputs, shapes).unwrap()).unwrap();
         let values = outputs.rendering.shape().num_elements();
+        let count = gpu.read_word("intersections", &outputs.intersections.handle).unwrap();
         let gradients = backward(saved, gpu.tensor(upstream, Shape::from([values]))).unwrap().into_array();
-        std::iter::once(outputs.rendering)
-            .chain(gradients)
-            .map(|tensor| {
-                let bytes = gpu.client.read_one(tensor.handle).unwrap();
-                bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
-            })
-            .collect()
+        let read = |tensor: CubeTensor| {
+            let bytes = gpu.client.read_one(tensor.handle).unwrap();
+            bytes.as_chunks::<4>().0.iter().map(|bytes| f32::from_le_bytes(*bytes)).collect()
+        };
+        let values = std::iter::once(outputs.rendering).chain(gradients).map(read).collect();
+        (values, count as usize)
     }
 
     #[test]
     fn every_team_draws_the_same() {
         let gpu = gpu();
         let chosen = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
-        let expected = run(&gpu, chosen);
+        let (expected, _) = run(&gpu, chosen, None);
         assert!(expected[0].iter().any(|value| *value > 1.0), "the scene is empty");
         let mut teams = vec![(32, WorkgroupMemory, 16), (32, WorkgroupMemory, 8), (8, WorkgroupMemory, 8)];
         if chosen.communication != WorkgroupMemory {
@@ -366,12 +377,26 @@ mod tests {
                 continue;
             }
             let team = Team { members, communication, cell };
-            for (k, (found, expected)) in run(&gpu, team).iter().zip(&expected).enumerate() {
+            for (k, (found, expected)) in run(&gpu, team, None).0.iter().zip(&expected).enumerate() {
                 let largest = expected.iter().fold(0.0f32, |m, v| m.max(v.abs()));
                 let pairs = found.iter().zip(expected);
                 let error = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max) / largest;
                 assert!(error < 1e-5, "{members} members, cell {cell}: output {k} is off by {error}");
             }
+        }
+    }
+
+    /// The same to the bit, whatever the room, and a number that says where there is too little.
+    #[test]
+    fn room_for_the_lists_changes_nothing_but_the_waiting() {
+        let gpu = gpu();
+        let team = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
+        let (expected, count) = run(&gpu, team, None);
+        for room in [count, count + 1, 2 * count, 100 * count] {
+            assert_eq!(run(&gpu, team, Some(room)), (expected.clone(), count), "room for {room} of {count}");
+        }
+        for room in [0, 1, count - 1] {
+            assert_eq!(run(&gpu, team, Some(room)).1, count, "room for {room} of {count}");
         }
     }
 }

@@ -48,6 +48,8 @@ pub struct SplatOutputs<B: Backend> {
     pub rendering: FloatTensor<B>,
     /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
     pub radii: IntTensor<B>,
+    /// `[1]`: pairs of a Gaussian and a cell of the image that it touches. If there was room for fewer, the image is incomplete.
+    pub intersections: IntTensor<B>,
 }
 
 /// A back end's kernels. [`SplatOps`](crate::ops::splat::SplatOps) adds the dispatch and the tape.
@@ -64,12 +66,16 @@ pub trait SplatKernels: Backend {
 
 /// Camera, background and active SH degree of one image.
 #[derive(Clone, Copy, Debug)]
-pub struct SplatView(pub(crate) View);
+pub struct SplatView {
+    pub(crate) view: View,
+    /// Intersections that there is room for; `None`: for all.
+    pub(crate) room: Option<usize>,
+}
 
 impl SplatView {
     /// The image of `camera` over `background` (red, green, blue). `sh_degree` (0 to 3) is the highest degree of the spherical
     /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
     pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
-        Self(View { camera, background, sh_degree })
+        Self { view: View { camera, background, sh_degree }, room: None }
     }
 }

@@ -26,7 +26,7 @@ pub trait SignificanceOps: Backend {
     fn significance(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self>;
 }
 
-fn significance_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): SplatView) -> FloatTensor<B> {
+fn significance_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView { view, .. }: SplatView) -> FloatTensor<B> {
     let inputs = inputs.into_array();
     let count = inputs[0].shape()[0];
     let inputs = inputs.map(B::to_host);
@@ -44,7 +44,7 @@ for_cpu_back_ends! {
 
 #[cfg(feature = "wgpu")]
 impl SignificanceOps for CubeBackend {
-    fn significance(inputs: SplatInputs<Self>, SplatView(view): SplatView) -> FloatTensor<Self> {
+    fn significance(inputs: SplatInputs<Self>, SplatView { view, .. }: SplatView) -> FloatTensor<Self> {
         significance_on_gpu(inputs, view)
     }
 }

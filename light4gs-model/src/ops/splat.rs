@@ -58,7 +58,7 @@ impl<B: SplatOps + SplatKernels, C: CheckpointStrategy> SplatOps for Autodiff<B,
             OpsKind::Tracked(prep) => prep.finish(saved, outputs.rendering),
             OpsKind::UnTracked(prep) => prep.finish(outputs.rendering),
         };
-        SplatOutputs { rendering, radii: outputs.radii }
+        SplatOutputs { rendering, radii: outputs.radii, intersections: outputs.intersections }
     }
 }
 
@@ -77,7 +77,10 @@ pub(super) fn slices(inputs: &[HostTensor; INPUTS]) -> GaussianSlices<'_> {
     GaussianSlices { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
 }
 
-fn forward_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): SplatView) -> (SplatOutputs<B>, CpuSaved) {
+fn forward_on_cpu<B: HostBackend>(
+    inputs: SplatInputs<B>,
+    SplatView { view, .. }: SplatView,
+) -> (SplatOutputs<B>, CpuSaved) {
     let inputs = inputs.into_array();
     let device = inputs[0].device();
     let shapes = inputs.each_ref().map(|input| input.shape().iter().copied().collect());
@@ -90,6 +93,7 @@ fn forward_on_cpu<B: HostBackend>(inputs: SplatInputs<B>, SplatView(view): Splat
     let outputs = SplatOutputs {
         rendering: B::from_values(rendering, [view.camera.height as usize * view.camera.width as usize * CHANNELS]),
         radii: B::int_from_data(TensorData::new(radii, [count]), &device),
+        intersections: B::int_from_data(TensorData::from([lists.intersections() as i32]), &device),
     };
     (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })
 }
@@ -123,8 +127,10 @@ impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
     type Saved = B::Saved;
 
     fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, B::Saved) {
-        let (SplatOutputs { rendering, radii }, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
-        (SplatOutputs { rendering: leaf::<B>(rendering), radii: int_leaf::<B>(radii) }, saved)
+        let (outputs, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
+        let SplatOutputs { rendering, radii, intersections } = outputs;
+        let [radii, intersections] = [radii, intersections].map(int_leaf::<B>);
+        (SplatOutputs { rendering: leaf::<B>(rendering), radii, intersections }, saved)
     }
 
     fn splat_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {

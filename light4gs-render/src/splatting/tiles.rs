@@ -131,6 +131,11 @@ impl TileLists {
         self.splats.iter().map(|splat| splat.radius).collect()
     }
 
+    /// Number of all intersections.
+    pub fn intersections(&self) -> usize {
+        self.gaussians.len()
+    }
+
     /// Range of a tile's intersections, numbered by tile.
     pub(crate) fn tile_range(&self, tile: usize) -> std::ops::Range<usize> {
         self.tile_starts[tile] as usize..self.tile_starts[tile + 1] as usize

@@ -72,8 +72,11 @@ pub(super) fn timings(
     };
     let mut dynamic = dynamic(scene, config, &position, autodiff);
     let regularizer = config.train.regularizer.build();
+    // As a trainer, which knows from the step before.
+    let seen = splatter.render(dynamic.at(TIME), &scene.camera, None).intersections.into_scalar::<i64>();
+    let trained = splatter.with_room_for(2 * seen as usize);
     let loss_of = |model: &DynamicScene, frame: usize| {
-        let image = splatter.render(model.at(TIME), &scene.camera_at(frame), None).image;
+        let image = trained.render(model.at(TIME), &scene.camera_at(frame), None).image;
         let loss = l1(image, truth.clone());
         let loss = match model.planes() {
             Some(planes) => loss + regularizer.loss(planes),
@@ -127,7 +130,7 @@ pub(super) fn timings(
             |()| {
                 let noisy = compression.noisy(&dynamic, true, true, 0);
                 let mut sums = GradientSums::default();
-                let image = splatter.render(noisy.scene.at(TIME), &scene.camera, None).image;
+                let image = trained.render(noisy.scene.at(TIME), &scene.camera, None).image;
                 sums.add_module(&noisy.scene, &mut l1(image, truth.clone()).backward());
                 if with_rate {
                     let rate = compression.rate(&noisy, config.compression.rate.fraction, true, &mut random);

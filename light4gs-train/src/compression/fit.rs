@@ -29,7 +29,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
     device: &Device,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
 ) -> Result<CompressionOf<E>, TrainError> {
-    seed_device(device, config.seed, Stage::Fine, 0);
+    seed_device(device, config.seed, Purpose::Rate, Stage::Fine, 0);
     let mut compression = Compression::new(models, config, scene.planes(), device)?;
     let settings = &config.compression;
     let iterations = settings.context.fit_iterations;
@@ -44,7 +44,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
     }
     let mut adam = Adam::default();
     for iteration in 1..=iterations {
-        seed_device(device, config.seed, Stage::Fine, iteration);
+        seed_device(device, config.seed, Purpose::Rate, Stage::Fine, iteration);
         let mut random = generator(config.seed, Purpose::Rate, Stage::Fine, iteration);
         let noisy = compression.noisy(
             scene,

@@ -12,6 +12,7 @@ use light4gs_model::attributes::check_further;
 use light4gs_model::{Attribute, BuiltInField, DeformationField, DynamicSceneConfig, ModelError};
 
 use super::Trainer;
+use super::list_room::ListRoom;
 use super::profile::Profile;
 use super::views::ViewPools;
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
@@ -373,6 +374,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             regularizers,
             profile: Profile::off(),
             view_pools,
+            list_room: ListRoom::new(!side_by_side),
             lap: None,
             empty_images: EmptyImageWatch::default(),
         })

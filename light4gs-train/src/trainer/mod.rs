@@ -5,6 +5,7 @@
 //! - `step`: one iteration
 //! - `motion`: calls to the deformation field other than moving the Gaussians
 //! - `views`: the views of an iteration, each with its own tape
+//! - `list_room`: room for the splats of an image, so that a GPU is not waited for
 //! - `learning_rates`: the rate of each parameter group
 //! - `rate`: quantization noise, and the rate in the loss
 //! - `rate_correction`: the expected bits of attributes follow those that the coder writes
@@ -17,6 +18,7 @@
 mod builder;
 mod guided_sampling;
 mod learning_rates;
+mod list_room;
 mod motion;
 pub mod profile;
 mod pruning;
@@ -52,6 +54,7 @@ use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder, SaveError, checkpoint_name, list_checkpoints};
 use crate::sampling::{FrameSampler, StageFrames};
 use crate::stage::Stage;
+use list_room::ListRoom;
 use profile::Profile;
 use views::ViewPools;
 
@@ -122,6 +125,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     regularizers: Vec<Box<dyn Regularizer<F>>>,
     profile: Profile,
     view_pools: ViewPools,
+    list_room: ListRoom,
     lap: Option<Lap>,
     empty_images: EmptyImageWatch,
 }

@@ -46,7 +46,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
                 *planes = frozen;
             }
         }
-        seed_device(&self.device, *seed, stage, iteration);
+        seed_device(&self.device, *seed, Purpose::Rate, stage, iteration);
         let noise_seed = generator(*seed, Purpose::Noise, stage, iteration).random();
         let learn_steps = config.steps.adaptive && iteration >= config.steps.adaptive_from;
         Ok(Some(match frozen {
@@ -86,6 +86,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let anything = noisy.steps.is_some() || (with_gaussians && models_gaussians);
         if anything && iteration.is_multiple_of(config.interval) {
             let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
+            // Not what was drawn before: a step may be computed again.
+            seed_device(&self.device, self.config.seed, Purpose::Latents, Stage::Fine, iteration);
             let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
             let rate =
                 compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);

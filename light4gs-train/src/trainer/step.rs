@@ -1,12 +1,13 @@
 //! One iteration: forward, backward, the optimizer's step.
 
-use burn::tensor::Tensor;
+use burn::tensor::{Tensor, Transaction};
 use light4gs_data::Frame;
 use light4gs_model::DeformationField;
 
 use super::Trainer;
 use super::learning_rates::GroupRates;
-use crate::compression::EntropyModels;
+use super::views::{View, ViewPass};
+use crate::compression::{EntropyModels, NoisyScene};
 use crate::density::{GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
@@ -16,6 +17,27 @@ use crate::optimization::parameters::COMPRESSION;
 use crate::regularizer::RegularizerInput;
 use crate::sampling::BatchRequest;
 use crate::stage::Stage;
+
+/// What a step has computed before anything changes.
+struct Differentiated {
+    views: Vec<View>,
+    /// Of the loss with respect to all parameters.
+    gradients: GradientSums,
+    /// `[1]`
+    loss: Tensor<1>,
+}
+
+impl Differentiated {
+    /// The loss, and the intersections of each view. Together, since a GPU waits for each: this is all that a plain iteration
+    /// reads back from the device.
+    fn read(&self) -> (f32, Vec<usize>) {
+        let read = Transaction::default().register(self.loss.clone());
+        let read = self.views.iter().fold(read, |read, view| read.register(view.intersections.clone())).execute();
+        let (loss, intersections) = read.split_first().expect("the loss was registered");
+        let loss = loss.iter::<f32>().next().expect("a loss is one number");
+        (loss, intersections.iter().filter_map(|data| data.iter::<i64>().next()).map(|count| count as usize).collect())
+    }
+}
 
 /// Iterations ahead for which images are decoded.
 const PREFETCHED_ITERATIONS: usize = 8;
@@ -33,23 +55,13 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.prefetch(stage, iteration)?;
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
-        let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
-        let pass = self.view_pass(stage, iteration, batch);
-        let seen = noisy.as_ref().map_or(&self.state.scene, |noisy| &noisy.scene);
-        let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
-        let mut gradients = GradientSums::default();
-        for view in &mut views {
-            gradients.add(std::mem::take(&mut view.gradients));
-        }
-        let rate = noisy.as_ref().and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
-        let regularizer = self.add_plane_regularizer(stage, iteration, &mut gradients);
-        let own = self.add_field_regularizer(stage, iteration, &mut gradients);
-        let others = self.add_regularizers(stage, iteration, &mut gradients);
-        let regularizers = regularizer.into_iter().chain(own).chain(others);
-        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
-        let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
-        // This number is all that an iteration reads back from the device.
-        let loss: f32 = loss.into_scalar();
+        let (Differentiated { views, mut gradients, .. }, loss) = loop {
+            let step = self.differentiate(stage, iteration, &indices, noisy.as_ref())?;
+            let (loss, intersections) = step.read();
+            if self.list_room.learn(&intersections) {
+                break (step, loss);
+            }
+        };
         if !loss.is_finite() {
             let parameter = not_finite_in(&self.state.scene, self.state.compression.as_ref());
             return Err(self.diverged(stage, iteration, parameter.unwrap_or(NotFinite::Loss(loss))));
@@ -74,6 +86,33 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         }
         self.profile.lap("Adam");
         Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
+    }
+
+    /// The loss of a step with its gradients. The same again gives the same.
+    fn differentiate(
+        &mut self,
+        stage: Stage,
+        iteration: usize,
+        indices: &[usize],
+        noisy: Option<&NoisyScene<F>>,
+    ) -> Result<Differentiated, TrainError> {
+        let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
+        let pass = self.view_pass(stage, iteration, indices.len());
+        let pass = ViewPass { splatter: self.list_room.reserve(pass.splatter), ..pass };
+        let seen = noisy.map_or(&self.state.scene, |noisy| &noisy.scene);
+        let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
+        let mut gradients = GradientSums::default();
+        for view in &mut views {
+            gradients.add(std::mem::take(&mut view.gradients));
+        }
+        let rate = noisy.and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
+        let regularizer = self.add_plane_regularizer(stage, iteration, &mut gradients);
+        let own = self.add_field_regularizer(stage, iteration, &mut gradients);
+        let others = self.add_regularizers(stage, iteration, &mut gradients);
+        let regularizers = regularizer.into_iter().chain(own).chain(others);
+        let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
+        let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
+        Ok(Differentiated { views, gradients, loss })
     }
 
     /// Starts to decode the images of later iterations in the background. Each call is for as many images as one
@@ -170,5 +209,74 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             self.prune_insignificant(iteration);
         }
         self.profile.lap("density control");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use light4gs_data::{Camera, PointCloud, RgbImage8, Scene, SplitFrames};
+
+    use super::super::list_room::ListRoom;
+    use super::*;
+    use crate::config::{Config, DeviceName};
+    use crate::dataset::MemoryImages;
+
+    /// Two views of a gray image, a few Gaussians, and the rate in every step.
+    fn trainer(preset: &str, device: DeviceName) -> Trainer {
+        let keys = [
+            "train.batch_size=2",
+            "train.coarse_iterations=2",
+            "train.fine_iterations=6",
+            "train.densify.strategy=none",
+            "train.prune.fraction=0",
+            "compression.rate.lambda=0.1",
+            "compression.rate.from=1",
+            "compression.rate.interval=1",
+            "eval.interval=0",
+        ];
+        let mut config = Config::load(preset, &keys.map(str::to_owned)).unwrap();
+        config.device = device;
+        let camera = Camera::look_at([4.0, 0.0, 0.5].into(), [0.0; 3].into(), [0.0, 0.0, 1.0].into(), 0.7, 40, 40);
+        let frames: Vec<Frame> =
+            [0.2, 0.8].map(|time| Frame::without_image(format!("view-{time}"), camera, time)).into();
+        let image = RgbImage8 { width: 40, height: 40, pixels: vec![100; 40 * 40 * 3] };
+        let images: MemoryImages = frames.iter().map(|frame| (frame.name.clone(), image.clone())).collect();
+        let frames = SplitFrames { test: frames.clone(), train: frames, ..SplitFrames::default() };
+        let data = Scene::new("memory", Path::new("gray"), frames, PointCloud::random(60, 0.8, 0), [1.0; 3]).unwrap();
+        Trainer::builder(config, data).images(images).build().unwrap()
+    }
+
+    /// Also with planes, whose latents have noise from the device's generator.
+    #[test]
+    fn what_is_computed_again_is_the_same() {
+        let mut trainer = trainer("dnerf-cpu", DeviceName::Flex);
+        (0..4).for_each(|_| drop(trainer.step().unwrap()));
+        let noisy = trainer.quantization_noise(Stage::Fine, 3).unwrap().unwrap();
+        let [first, second] = [(), ()].map(|()| trainer.differentiate(Stage::Fine, 3, &[0, 1], Some(&noisy)).unwrap());
+        assert_eq!(first.read(), second.read());
+        let id = noisy.scene.planes().unwrap().planes[0].id;
+        let gradient = |step: &Differentiated| step.gradients.get(id).unwrap().into_data();
+        assert_eq!(gradient(&first), gradient(&second));
+    }
+
+    #[cfg(feature = "wgpu")]
+    #[test]
+    fn a_step_whose_lists_had_no_room_is_computed_again() {
+        let losses = |squeezed: bool| {
+            let mut trainer = trainer("dnerf-cpu+nodes", DeviceName::Wgpu(crate::config::Adapter::Software));
+            let mut losses = Vec::new();
+            loop {
+                if squeezed {
+                    trainer.list_room = ListRoom::with(7);
+                }
+                let Some(step) = trainer.step().unwrap() else { break losses };
+                losses.push(step.loss);
+            }
+        };
+        let expected = losses(false);
+        assert_eq!(expected.len(), 8);
+        assert_eq!(losses(true), expected);
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Int, Tensor};
 use light4gs_data::{Frame, PixelMask, RgbImage8};
 use light4gs_model::parameters::on_a_new_tape;
 use light4gs_model::{DeformationField, DynamicScene, Splatter};
@@ -47,6 +47,8 @@ pub(super) struct View {
     pub(super) image: Tensor<3>,
     /// `[H, W, 3]`
     pub(super) truth: Tensor<3>,
+    /// `[1]`: see [`Rendering::intersections`](light4gs_model::Rendering::intersections).
+    pub(super) intersections: Tensor<1, Int>,
 }
 
 /// The processor's threads, divided among the views of a step: a pool for each view that runs beside others.
@@ -180,6 +182,7 @@ impl ViewPass<'_> {
             },
             image: image.inner(),
             truth: truth.inner(),
+            intersections: rendering.intersections,
         })
     }
 }

@@ -1,0 +1,77 @@
+//! Room for the lists of splats in the cells of an image: what a GPU would have to tell before the host can go on.
+//!
+//! A step tells how many there were when it reads its loss, so the next step reserves somewhat more and waits for nothing. The
+//! rare step whose lists did not fit is computed again.
+
+use light4gs_model::Splatter;
+
+/// Of what a step needed, the next has so much room: views differ, and Gaussians become more.
+const MARGIN: f64 = 1.5;
+/// Room falls by this factor a step, at most, where less is needed.
+const SHRINKING: f64 = 0.99;
+
+/// How many intersections the images of a step have room for.
+#[derive(Debug)]
+pub(super) struct ListRoom {
+    /// Whether the device is one for whose answers the host waits. Others have room for all.
+    waits: bool,
+    /// `None` before the first step: its images read how many there are.
+    room: Option<usize>,
+}
+
+impl ListRoom {
+    pub(super) fn new(waits: bool) -> Self {
+        Self { waits, room: None }
+    }
+
+    #[cfg(test)]
+    pub(super) fn with(room: usize) -> Self {
+        Self { waits: true, room: Some(room) }
+    }
+
+    /// The splatter of the next step.
+    pub(super) fn reserve(&self, splatter: Splatter) -> Splatter {
+        self.room.map_or(splatter, |room| splatter.with_room_for(room))
+    }
+
+    /// Learns how many intersections the views of a step had. Returns whether all had room; if not, the step must be computed
+    /// again.
+    pub(super) fn learn(&mut self, intersections: &[usize]) -> bool {
+        let most = intersections.iter().copied().max().unwrap_or(0);
+        let fitted = self.room.is_none_or(|room| most <= room);
+        if self.waits {
+            let wanted = most as f64 * MARGIN;
+            let kept = self.room.unwrap_or(0) as f64 * SHRINKING;
+            self.room = Some(wanted.max(kept) as usize);
+        }
+        fitted
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn room_follows_what_was_needed() {
+        let plain = Splatter::new([0.0; 3], 0);
+        let mut room = ListRoom::new(true);
+        assert_eq!(room.reserve(plain), plain);
+        assert!(room.learn(&[600, 1000]));
+        assert_eq!(room.reserve(plain), plain.with_room_for(1500));
+        assert!(room.learn(&[1500, 7]));
+        assert_eq!(room.reserve(plain), plain.with_room_for(2250));
+        assert!(!room.learn(&[2251]));
+        assert!(room.learn(&[2251]));
+        (0..1000).for_each(|_| assert!(room.learn(&[100])));
+        assert_eq!(room.reserve(plain), plain.with_room_for(150));
+    }
+
+    #[test]
+    fn what_has_room_for_all_reserves_nothing() {
+        let plain = Splatter::new([0.0; 3], 0);
+        let mut room = ListRoom::new(false);
+        assert!([10, 1000, 10].iter().all(|most| room.learn(&[*most])));
+        assert_eq!(room.reserve(plain), plain);
+    }
+}
