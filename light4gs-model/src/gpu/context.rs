@@ -42,11 +42,20 @@ impl Gpu {
     /// A buffer for `count` values of four bytes, at least one.
     pub(super) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
         let bytes = 4 * count.max(PLACE_ALIGNMENT) as u64;
-        let limit = self.client.properties().memory.max_page_size;
-        if bytes > limit {
-            return Err(GpuError::TooLarge { buffer, bytes, limit });
+        if !self.holds(count) {
+            return Err(GpuError::TooLarge { buffer, bytes, limit: self.largest_buffer() });
         }
         Ok(self.client.empty(bytes as usize))
+    }
+
+    /// Whether a buffer may have `count` values of four bytes.
+    pub(super) fn holds(&self, count: usize) -> bool {
+        count as u64 <= self.largest_buffer() / 4
+    }
+
+    /// Bytes.
+    fn largest_buffer(&self) -> u64 {
+        self.client.properties().memory.max_page_size
     }
 
     /// A float32 tensor over a buffer or a piece of it.

@@ -168,10 +168,10 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
     let total = prefix_sum(gpu, &first_places, gaussian_count)?;
     let count = match frame.room {
         _ if gaussian_count == 0 => 0,
-        // No Gaussian is in a cell's list twice.
-        Some(room) => room.min(gaussian_count.saturating_mul(frame.cells())),
+        // No Gaussian is in a cell's list twice. Room that the adapter does not have may not be needed either.
+        Some(room) if gpu.holds(room.saturating_mul(SUMS)) => room.min(gaussian_count.saturating_mul(frame.cells())),
         // The only read-back of an image: all further buffers have the size that it gives.
-        None => gpu.read_word("the number of intersections", &total)? as usize,
+        _ => gpu.read_word("the number of intersections", &total)? as usize,
     };
     let frame = &Frame { room: Some(count), ..*frame };
 

@@ -1,4 +1,5 @@
-//! Curves of quality over what it costs, such as rate-distortion curves: the convex hull of measured points, and Bjøntegaard's difference between two curves.
+//! Curves of quality over cost, such as rate-distortion curves: the convex hull of measured points, and Bjøntegaard's
+//! difference between two curves.
 //!
 //! Sources: G. Bjøntegaard, *Calculation of average PSNR differences between RD-curves*, VCEG-M33, 2001. Between the
 //! points, the curve is the piecewise cubic Hermite interpolation (Fritsch and Carlson 1980) of the JCT-VC's sheets,

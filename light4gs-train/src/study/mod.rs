@@ -7,7 +7,7 @@
 //! - [`results`]: the results of the runs so far, `results.json` and the CSV files; [`reuse`]: trainings of other
 //!   studies
 //! - [`table`]: means, spreads and differences to the reference
-//! - [`quality_curves`]: runs as curves of quality over size
+//! - [`quality_curves`]: runs as curves of quality over bytes or minutes
 //! - `plots`, `figures`: plots and images, and the study's `report.html` (feature `cli`)
 //! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
 
