@@ -68,7 +68,8 @@ pub trait SplatKernels: Backend {
 #[derive(Clone, Copy, Debug)]
 pub struct SplatView {
     pub(crate) view: View,
-    /// Intersections that there is room for; `None`: for all.
+    /// Intersections that there is room for; `None`: for all. Only a GPU has to know.
+    #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
     pub(crate) room: Option<usize>,
 }
 
