@@ -68,7 +68,7 @@ pub fn bjontegaard(anchor: &[CurvePoint], curve: &[CurvePoint]) -> Option<Bjonte
     })
 }
 
-/// The points by ascending size; `None` if there are fewer than two, or if quality does not ascend with size.
+/// The points by ascending cost; `None` if there are fewer than two, or if quality does not ascend with cost.
 fn rising(points: &[CurvePoint]) -> Option<Vec<CurvePoint>> {
     let mut points = points.to_vec();
     points.sort_by(|a, b| a.cost.total_cmp(&b.cost));

@@ -38,6 +38,13 @@ const MOST_VARIANTS: usize = 10_000;
 /// How many times as long a schedule may be.
 pub const SCHEDULES: RangeInclusive<f64> = 0.001..=1000.0;
 
+/// Says that a factor is not in [`SCHEDULES`], if so; to be put behind its name.
+pub(super) fn schedule_problem(factor: f64) -> Option<String> {
+    let (least, most) = SCHEDULES.into_inner();
+    let problem = || format!("is {factor}; it is how many times as long the schedule is, {least} to {most}");
+    (!SCHEDULES.contains(&factor)).then(problem)
+}
+
 /// What varies, and what is shown.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -298,13 +305,8 @@ impl Study {
                         axis.name, value.name
                     ));
                 }
-                if let Some(factor) = value.schedule.filter(|factor| !SCHEDULES.contains(factor)) {
-                    let (least, most) = SCHEDULES.into_inner();
-                    return Some(format!(
-                        "axis \"{}\": `schedule` of \"{}\" is {factor}; it is how many times as long the schedule is, \
-                         {least} to {most}",
-                        axis.name, value.name
-                    ));
+                if let Some(problem) = value.schedule.and_then(schedule_problem) {
+                    return Some(format!("axis \"{}\": `schedule` of \"{}\" {problem}", axis.name, value.name));
                 }
                 if !values.insert(&value.name) {
                     return Some(format!(

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use light4gs_data::DataError;
 
-use super::definition::{Axis, SCHEDULES, Study};
+use super::definition::{Axis, Study, schedule_problem};
 use crate::config::Config;
 use crate::error::TrainError;
 
@@ -19,7 +19,7 @@ pub struct PlanOptions {
     pub config: String,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
-    /// How many times as long the schedule of every run is as the configuration's, see [`SCHEDULES`].
+    /// How many times as long the schedule of every run is as the configuration's, see [`SCHEDULES`](super::definition::SCHEDULES).
     pub schedule: Option<f64>,
     /// Overrides of every run.
     pub overrides: Vec<String>,
@@ -93,11 +93,8 @@ impl Plan {
         if options.seeds == 0 {
             return Err(TrainError::Input("--seeds is 0; at least one run of each variant is needed".into()));
         }
-        if let Some(factor) = options.schedule.filter(|factor| !SCHEDULES.contains(factor)) {
-            let (least, most) = SCHEDULES.into_inner();
-            return Err(TrainError::Input(format!(
-                "--schedule is {factor}; it is how many times as long the schedule is, {least} to {most}"
-            )));
+        if let Some(problem) = options.schedule.and_then(schedule_problem) {
+            return Err(TrainError::Input(format!("--schedule {problem}")));
         }
         let variants = variants(&study.axis);
         check_reference(&study, &variants)?;
