@@ -163,7 +163,7 @@ keys! {
         /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";
         /// Learned steps may become finer than they are at the start. Finer steps improve training frames only:
-        /// [results](results.md#learned-quantization-steps).
+        /// [results](results/hexplane.md#learned-quantization-steps).
         refine: bool = false; Flag, "ours; paper: yes", "finer steps help training frames only";
         /// Every scale has a pair of steps of its own.
         per_scale: bool = quantization().per_scale; Flag, "ours";
