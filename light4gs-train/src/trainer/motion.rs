@@ -68,7 +68,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let mut views = Vec::with_capacity(frames.len());
         // As many at a time as in a step, for their memory.
         for frames in frames.chunks(self.config.train.batch_size.max(1)) {
-            let seen = pass.run(&self.state.scene, frames, &self.view_pools, &self.profile)?;
+            let (seen, ()) = pass.run(&self.state.scene, frames, &self.view_pools, &self.profile, || ())?;
             for (mut view, frame) in seen.into_iter().zip(frames) {
                 if let Some(gradients) = view.gradients.remove(means.id) {
                     views.push(PositionGradients { time: frame.time, gradients: gradients.reshape(means.dims()) });
@@ -85,7 +85,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// Adds the gradients of the field's own regularizer, and returns its value, `[1]`.
     pub(super) fn add_field_regularizer(
-        &mut self,
+        &self,
         stage: Stage,
         iteration: usize,
         gradients: &mut GradientSums,

@@ -17,6 +17,16 @@ use crate::optimization::gradients::GradientSums;
 use crate::randomness::{Purpose, generator, seed_device};
 use crate::stage::Stage;
 
+/// The rate of a step, differentiated.
+pub(super) struct RateTerm {
+    /// `[1]`, weighted.
+    value: Tensor<1>,
+    /// With respect to the noisy scene's parameters and those of the entropy models.
+    gradients: GradientSums,
+    /// With respect to the planes' steps, by plane, but for what comes through the noise.
+    steps: Vec<Option<Tensor<1>>>,
+}
+
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// The scene roughly as it will be decoded, from the iteration on at which the rate counts.
     pub(super) fn quantization_noise(
@@ -68,47 +78,62 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         iteration >= from && self.density.is_over(Stage::Fine, iteration - 1)
     }
 
-    /// Adds the gradients of the rate, in the iterations in which it is due, and the gradients of the steps through the
-    /// noise. Returns the weighted rate, `[1]`. `gradients` are those of the views.
-    pub(super) fn add_rate(
-        &mut self,
-        noisy: &NoisyScene<F>,
-        iteration: usize,
-        gradients: &mut GradientSums,
-    ) -> Option<Tensor<1>> {
+    /// The rate with its gradients, in the iterations in which it is due. It needs no view.
+    pub(super) fn rate(&self, noisy: &NoisyScene<F>, iteration: usize) -> Option<RateTerm> {
         let config = &self.config.compression.rate;
         let with_gaussians = self.gaussian_rate_is_active(iteration);
-        let compression = self.state.compression.as_mut()?;
-        let mut value = None;
-        let mut steps = vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())];
+        let compression = self.state.compression.as_ref()?;
         // With frozen planes, or none, and without the Gaussians there is no rate: constants have no gradient.
         let models_gaussians = compression.sh.is_some() || compression.attributes.is_some();
         let anything = noisy.steps.is_some() || (with_gaussians && models_gaussians);
-        if anything && iteration.is_multiple_of(config.interval) {
-            let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
-            // Not what was drawn before: a step may be computed again.
-            seed_device(&self.device, self.config.seed, Purpose::Latents, Stage::Fine, iteration);
-            let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
-            let rate =
-                compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);
-            let interval = config.interval as f64;
-            let attributes = rate.attribute_megabytes().map(|rate| rate * (config.attribute_lambda * interval));
-            let term = match config.weighting {
-                RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
-                // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
-                // on the interval.
-                RateWeighting::Megabytes => rate.megabytes() * (config.lambda * interval),
-            };
-            let term = attributes.into_iter().fold(term, |sum, part| sum + part);
-            let term = term * self.state.rate_weight;
-            value = Some(term.clone().inner());
-            let mut tape = term.backward();
-            steps = noisy.step_gradients(&tape);
-            gradients.add_module(&noisy.scene, &mut tape);
-            gradients.add_module(&*compression, &mut tape);
+        if !anything || !iteration.is_multiple_of(config.interval) {
+            return None;
         }
+        let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
+        // Not what was drawn before: a step may be computed again.
+        seed_device(&self.device, self.config.seed, Purpose::Latents, Stage::Fine, iteration);
+        let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
+        let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);
+        let interval = config.interval as f64;
+        let attributes = rate.attribute_megabytes().map(|rate| rate * (config.attribute_lambda * interval));
+        let term = match config.weighting {
+            RateWeighting::PerSymbol => rate.bits_per_symbol() * config.lambda,
+            // Computed once in `interval` iterations and multiplied by that number, so that lambda does not depend
+            // on the interval.
+            RateWeighting::Megabytes => rate.megabytes() * (config.lambda * interval),
+        };
+        let term = attributes.into_iter().fold(term, |sum, part| sum + part);
+        let term = term * self.state.rate_weight;
+        let value = term.clone().inner();
+        let mut tape = term.backward();
+        let steps = noisy.step_gradients(&tape);
+        let mut gradients = GradientSums::default();
+        gradients.add_module(&noisy.scene, &mut tape);
+        gradients.add_module(compression, &mut tape);
+        self.profile.lap("rate");
+        Some(RateTerm { value, gradients, steps })
+    }
+
+    /// Adds the gradients of the rate, where it is due, and the gradients of the steps through the noise. Returns the
+    /// weighted rate, `[1]`. `gradients` are those of the views.
+    pub(super) fn add_rate(
+        &self,
+        noisy: &NoisyScene<F>,
+        iteration: usize,
+        rate: Option<RateTerm>,
+        gradients: &mut GradientSums,
+    ) -> Option<Tensor<1>> {
+        let with_gaussians = self.gaussian_rate_is_active(iteration);
+        let compression = self.state.compression.as_ref()?;
+        let (value, steps) = match rate {
+            Some(rate) => {
+                gradients.add(rate.gradients);
+                (Some(rate.value), rate.steps)
+            }
+            None => (None, vec![None; noisy.scene.planes().map_or(0, |hexplane| hexplane.planes.len())]),
+        };
         if let Some(term) = steps_term(noisy, &self.state.scene, compression, steps, gradients) {
-            gradients.add_module(&*compression, &mut term.backward());
+            gradients.add_module(compression, &mut term.backward());
         }
         if let Some(attributes) = compression.attributes.as_ref().filter(|_| with_gaussians) {
             let gradient = gradient_through_noise(noisy, &self.state.scene, attributes, gradients);

@@ -90,7 +90,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// The loss of a step with its gradients. The same again gives the same.
     fn differentiate(
-        &mut self,
+        &self,
         stage: Stage,
         iteration: usize,
         indices: &[usize],
@@ -100,12 +100,14 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let pass = self.view_pass(stage, iteration, indices.len());
         let pass = ViewPass { splatter: self.list_room.reserve(pass.splatter), ..pass };
         let seen = noisy.map_or(&self.state.scene, |noisy| &noisy.scene);
-        let mut views = pass.run(seen, &frames, &self.view_pools, &self.profile)?;
+        // On a processor the rate, which hardly occupies more than one thread, is differentiated beside the views.
+        let rate = || noisy.and_then(|noisy| self.rate(noisy, iteration));
+        let (mut views, rate) = pass.run(seen, &frames, &self.view_pools, &self.profile, rate)?;
         let mut gradients = GradientSums::default();
         for view in &mut views {
             gradients.add(std::mem::take(&mut view.gradients));
         }
-        let rate = noisy.and_then(|noisy| self.add_rate(noisy, iteration, &mut gradients));
+        let rate = noisy.and_then(|noisy| self.add_rate(noisy, iteration, rate, &mut gradients));
         let regularizer = self.add_plane_regularizer(stage, iteration, &mut gradients);
         let own = self.add_field_regularizer(stage, iteration, &mut gradients);
         let others = self.add_regularizers(stage, iteration, &mut gradients);
@@ -160,12 +162,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 
     /// Adds the gradients of the planes' regularizers, and returns their value, `[1]`.
-    fn add_plane_regularizer(
-        &mut self,
-        stage: Stage,
-        iteration: usize,
-        gradients: &mut GradientSums,
-    ) -> Option<Tensor<1>> {
+    fn add_plane_regularizer(&self, stage: Stage, iteration: usize, gradients: &mut GradientSums) -> Option<Tensor<1>> {
         if stage == Stage::Coarse || self.planes_are_frozen(stage, iteration) {
             return None;
         }

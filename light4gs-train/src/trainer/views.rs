@@ -93,21 +93,23 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 }
 
 impl ViewPass<'_> {
-    /// Renders and differentiates every frame. The results, in the order of the frames, do not depend on the pools.
-    pub(super) fn run<'f, F: DeformationField>(
+    /// Renders and differentiates every frame, and meanwhile does what needs no view. The results, in the order of the
+    /// frames, do not depend on the pools.
+    pub(super) fn run<'f, F: DeformationField, R>(
         &self,
         scene: &DynamicScene<F>,
         frames: &[&'f Frame],
         pools: &ViewPools,
         profile: &Profile,
-    ) -> Result<Vec<View>, TrainError> {
+        meanwhile: impl FnOnce() -> R,
+    ) -> Result<(Vec<View>, R), TrainError> {
         // Copies share the scene's memory; each begins its own tape.
         let with_copies = |frames: &[&'f Frame]| -> Vec<_> {
             frames.iter().map(|frame| (on_a_new_tape(scene.clone()), *frame)).collect()
         };
         let ViewPools(pools) = pools;
         if pools.is_empty() {
-            return self.views(with_copies(frames), profile);
+            return Ok((self.views(with_copies(frames), profile)?, meanwhile()));
         }
         std::thread::scope(|scope| {
             let shares = frames.chunks(frames.len().div_ceil(pools.len())).map(with_copies);
@@ -115,11 +117,12 @@ impl ViewPass<'_> {
                 .zip(pools)
                 .map(|(share, pool)| scope.spawn(move || pool.install(|| self.views(share, &Profile::off()))))
                 .collect();
+            let other = meanwhile();
             let mut views = Vec::with_capacity(frames.len());
             for worker in workers {
                 views.extend(worker.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))?);
             }
-            Ok(views)
+            Ok((views, other))
         })
     }
 
