@@ -16,6 +16,7 @@ use crate::config::{Config, FieldKind};
 use crate::error::TrainError;
 use crate::stage::Stage;
 use crate::trainer::Trainer;
+use crate::trainer::rate_correction::CORRECTIONS;
 use typical_gaussians::TypicalGaussians;
 
 /// Iterations of the coarse stage that are measured.
@@ -86,7 +87,7 @@ impl Pace {
         let density = TypicalGaussians::new(config, &data, PLAIN, plain_iterations(config))?;
         let mut trainer = Trainer::builder(moment_of(config), data).density(density).build()?;
         let (mut coarse, mut fine) = (Vec::new(), Vec::new());
-        loop {
+        while fine.len() < fine_iterations(config) {
             let begin = Instant::now();
             let Some(report) = trainer.step()? else { break };
             let seconds = begin.elapsed().as_secs_f64();
@@ -106,7 +107,6 @@ impl Pace {
         let full: Vec<_> = sizes.chunks_exact(PLAIN).map(|size| typical(&size[1..])).collect();
         let (with, without): (Vec<_>, Vec<_>) =
             rate.iter().enumerate().partition(|(k, _)| (k + 1) % RATE_INTERVAL == 0);
-        // Medians, since some iterations also correct the expected bits, which a run does a dozen times only.
         let seconds = |iterations: Vec<(usize, &Iteration)>| {
             median(iterations.into_iter().map(|(_, iteration)| iteration.seconds).collect())
         };
@@ -183,13 +183,19 @@ fn plain_iterations(config: &Config) -> usize {
     PLAIN * (1 + sizes(config).len())
 }
 
-/// The configuration of the moment that is measured.
+/// Iterations of the fine stage that are measured.
+fn fine_iterations(config: &Config) -> usize {
+    plain_iterations(config) + RATE_ROUNDS * RATE_INTERVAL
+}
+
+/// The configuration of the moment that is measured: the beginning of a training in which the expected bits are not
+/// corrected so early. That takes longer than an iteration, and a run does it a dozen times only.
 fn moment_of(config: &Config) -> Config {
     let mut moment = config.clone();
     let train = &mut moment.train;
     train.coarse_iterations = COARSE;
     let plain = plain_iterations(config);
-    train.fine_iterations = plain + RATE_ROUNDS * RATE_INTERVAL;
+    train.fine_iterations = CORRECTIONS * (fine_iterations(config) + 1);
     let coarse_to_fine = &mut train.coarse_to_fine;
     let mut until = PLAIN;
     for share in [&mut coarse_to_fine.quarter_until, &mut coarse_to_fine.half_until] {
@@ -225,9 +231,10 @@ fn median(mut times: Vec<f64>) -> f64 {
 mod tests {
     use super::*;
     use crate::density::AdaptiveDensityConfig;
+    use crate::trainer::rate_correction::is_due;
 
     #[test]
-    fn corrections_of_expected_bits_are_not_in_the_rate() {
+    fn the_rate_is_what_it_adds_to_an_iteration() {
         let config = Config::load("dnerf-cpu+nodes", &["compression.rate.interval=5".to_owned()]).unwrap();
         let iteration = |gaussians: usize, seconds: f64| Iteration { gaussians, seconds };
         let mut fine = vec![iteration(1000, 1.0); PLAIN];
@@ -237,14 +244,22 @@ mod tests {
             fine.extend(vec![iteration(9000, 2.0); PLAIN - 1]);
         }
         for k in 0..RATE_ROUNDS * RATE_INTERVAL {
-            let correction = if k % 4 == 3 { 100.0 } else { 0.0 };
-            fine.push(iteration(9000, correction + if (k + 1) % RATE_INTERVAL == 0 { 7.0 } else { 4.0 }));
+            fine.push(iteration(9000, if (k + 1) % RATE_INTERVAL == 0 { 7.0 } else { 4.0 }));
         }
         let pace = Pace::of(&config, vec![0.5; COARSE], &fine);
         assert_eq!((pace.coarse, pace.first, pace.full_count()), (0.5, iteration(1000, 1.0), 9000));
         assert!(pace.full.iter().all(|full| full.seconds == 2.0));
         // Three more than noise alone, once in five iterations, and two that the noise takes.
         assert!((pace.rate - 2.6).abs() < 1e-9, "{}", pace.rate);
+    }
+
+    #[test]
+    fn expected_bits_are_not_corrected_while_it_is_measured() {
+        for preset in ["dnerf-cpu+nodes", "neu3d-cpu", "hypernerf-cpu+medium"] {
+            let config = Config::from_preset(preset).unwrap();
+            let moment = moment_of(&config).train.fine_iterations;
+            assert!(!(1..=fine_iterations(&config)).any(|iteration| is_due(iteration, moment)), "{preset}");
+        }
     }
 
     #[test]

@@ -23,7 +23,7 @@ mod motion;
 pub mod profile;
 mod pruning;
 mod rate;
-mod rate_correction;
+pub(crate) mod rate_correction;
 mod rate_steering;
 mod step;
 mod views;

@@ -8,13 +8,13 @@ use crate::dataset::scene_meta;
 
 /// The fine stage has so many iterations between two corrections that there would be this many of them in all of it. The
 /// last iteration has none: nothing is trained after it.
-const CORRECTIONS: usize = 12;
+pub(crate) const CORRECTIONS: usize = 12;
 /// Further ones in the last of these periods, each after half of what is left. The bits of few symbols, as those of opacity,
 /// drift by up to 4 % in a whole period, and a file has to be as large as training expects.
 const LAST_CORRECTIONS: u32 = 3;
 
 /// Whether a correction is due after an iteration of a fine stage with so many.
-fn is_due(iteration: usize, iterations: usize) -> bool {
+pub(crate) fn is_due(iteration: usize, iterations: usize) -> bool {
     let period = (iterations / CORRECTIONS).max(1);
     let left = iterations.saturating_sub(iteration);
     let is_last = |halvings: u32| left == period >> halvings;
