@@ -256,7 +256,7 @@ mod tests {
     #[test]
     fn expected_bits_are_not_corrected_while_it_is_measured() {
         for preset in ["dnerf-cpu+nodes", "neu3d-cpu", "hypernerf-cpu+medium"] {
-            let config = Config::from_preset(preset).unwrap();
+            let config = Config::load(preset, &[]).unwrap();
             let moment = moment_of(&config).train.fine_iterations;
             assert!(!(1..=fine_iterations(&config)).any(|iteration| is_due(iteration, moment)), "{preset}");
         }
