@@ -210,7 +210,7 @@ fn moment_of(config: &Config) -> Config {
     moment.compression.rate.from = plain;
     moment.compression.rate.interval = RATE_INTERVAL;
     moment.compression.rate.planes_until = 0;
-    // In a moment this short every iteration would be followed by a coding.
+    // To steer the rate, the scene would be coded every few iterations.
     (moment.compression.target_bytes, moment.compression.target_db) = (0, 0.0);
     moment.eval.interval = 0;
     moment
