@@ -2,6 +2,8 @@
 
 use std::any::Any;
 
+use burn::tensor::{TensorData, Transaction};
+
 /// An error of a GPU operation.
 ///
 /// Burn's operations return tensors, not results, so these errors are panics with a `GpuError` as their payload.
@@ -66,9 +68,25 @@ pub enum GpuError {
 impl GpuError {
     /// Panics with the error as the payload. A program that prints the error itself should install a silent panic hook,
     /// see [`GpuError::catch`].
-    #[cfg_attr(not(feature = "wgpu"), expect(dead_code, reason = "only the wgpu back end raises"))]
     pub(crate) fn raise(self) -> ! {
         std::panic::panic_any(self)
+    }
+
+    /// Reads tensors back, waiting for everything that they depend on. Where an earlier operation has failed, so does this.
+    ///
+    /// ```
+    /// use burn::tensor::{Device, Tensor, Transaction};
+    /// use light4gs_model::GpuError;
+    ///
+    /// let two = Tensor::<1>::from_floats([2.0], &Device::flex());
+    /// let read = GpuError::read("an example", Transaction::default().register(two)).unwrap();
+    /// assert_eq!(read[0].iter::<f32>().next(), Some(2.0));
+    /// ```
+    ///
+    /// # Errors
+    /// What the device says.
+    pub fn read(operation: &'static str, tensors: Transaction) -> Result<Vec<TensorData>, Self> {
+        tensors.try_execute().map_err(|error| Self::Device { operation, reason: first_lines(&error.to_string()) })
     }
 
     /// The error that is the payload of a panic; any other payload is returned unchanged.
@@ -96,6 +114,12 @@ impl GpuError {
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
             .map_err(|payload| Self::from_panic(payload).unwrap_or_else(|other| std::panic::resume_unwind(other)))
     }
+}
+
+/// The part of a driver's message that is useful to a reader, without the backtrace.
+pub(crate) fn first_lines(message: &str) -> String {
+    let end = message.find("Backtrace").or_else(|| message.find("BACKTRACE")).unwrap_or(message.len());
+    message[..end].split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

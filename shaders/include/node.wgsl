@@ -41,7 +41,9 @@ fn squared_length(v: vec3<f32>) -> f32 {
 
 // The logit by which Gaussian `i` follows a node that is so far away, in squares. Forward and backward have to find the same number
 // to the last bit, since a logit may be so large that its rounding is a noticeable weight. So every product that can be is in an `fma`:
-// compilers fuse others or not as they like, one way in one kernel and another way in the next.
+// compilers fuse others or not as they like, one way in one kernel and another way in the next. And so something is added that a compiler
+// cannot know to be 0, as no precision is negative: an `fma` with 0 is a product, which it may fuse with what the caller subtracts.
 fn exponent_between(i: u32, node: u32, squared: f32) -> f32 {
-    return fma(-precision_of(node), squared, affinity_between(i, node));
+    let sharpness = precision_of(node);
+    return fma(-sharpness, squared, affinity_between(i, node) + min(sharpness, 0.0));
 }

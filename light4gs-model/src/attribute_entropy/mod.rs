@@ -16,6 +16,7 @@ use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 
 use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
+use crate::gpu_error::GpuError;
 use crate::ops::rate::gather_rows::{ChosenRows, gather_rows};
 use crate::ops::rate::uniform_noise::add_uniform_noise;
 use crate::scene::attributes::{Attribute, MEANS};
@@ -188,11 +189,11 @@ impl AttributeEntropy {
     /// Looks at the positions, on the host.
     fn placed(&self, gaussians: &GaussianTensors) -> Placed {
         // Together, since a GPU waits for each.
-        let read = Transaction::default()
+        let values = Transaction::default()
             .register(off_tape(gaussians.means.clone()))
             .register(off_tape(self.log_steps.val()))
-            .register(off_tape(self.size.val()))
-            .execute();
+            .register(off_tape(self.size.val()));
+        let read = GpuError::read("the positions for the rate", values).unwrap_or_else(|error| error.raise());
         let numbers = |data: &TensorData| data.iter::<f32>().collect::<Vec<_>>();
         let [means, log_steps, size] = [&read[0], &read[1], &read[2]].map(numbers);
         let (means, size) = (means.as_chunks().0, size[0]);

@@ -7,8 +7,7 @@ use cubecl::Device as CubeDevice;
 use cubecl::client::Client;
 use cubecl::server::Handle;
 
-use super::launch::first_lines;
-use crate::gpu_error::GpuError;
+use crate::gpu_error::{GpuError, first_lines};
 
 /// Tensors within a buffer begin at multiples of this many values, where every adapter can bind them.
 pub(super) const PLACE_ALIGNMENT: usize = 64;

@@ -12,7 +12,7 @@ use cubecl::server::{Handle, KernelArguments, MetadataBindingInfo};
 
 use super::kernel::{Constants, Kernel};
 use super::recording::{self, RecordedBuffer, RecordedLaunch};
-use crate::gpu_error::GpuError;
+use crate::gpu_error::{GpuError, first_lines};
 
 /// Workgroups along one dimension of a dispatch: below WebGPU's limit of 65535.
 const MAX_GROUPS: u32 = 32768;
@@ -153,12 +153,6 @@ fn overlap(a: &Handle, b: &Handle) -> bool {
     };
     let (of_a, of_b) = (range(a), range(b));
     std::ptr::eq(a.memory.descriptor(), b.memory.descriptor()) && of_a.start < of_b.end && of_b.start < of_a.end
-}
-
-/// The part of a driver's message that is useful to a reader, without the backtrace.
-pub(super) fn first_lines(message: &str) -> String {
-    let end = message.find("Backtrace").or_else(|| message.find("BACKTRACE")).unwrap_or(message.len());
-    message[..end].split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]

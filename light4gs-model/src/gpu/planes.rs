@@ -165,7 +165,6 @@ fn backward(
             .uniform(&uniform)
             .invocations(layout.cells() * layout.quads())?;
     }
-    gpu.check("the gradients of the planes", &[&gradients])?;
 
     let points = with_points.then(|| gpu.tensor(of_points.of(&point_gradients, 0), Shape::from([layout.points, 4])));
     let mut planes = [const { None }; MOST_PLANES];

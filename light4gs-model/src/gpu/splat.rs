@@ -73,6 +73,12 @@ impl Frame {
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
 
+    /// An error if what this buffer depends on has failed. A caller that has reserved room does not want to wait: it hears of
+    /// it when it reads something.
+    fn check(&self, gpu: &Gpu, operation: &'static str, buffer: &Handle) -> Result<(), GpuError> {
+        if self.room.is_some() { Ok(()) } else { gpu.check(operation, &[buffer]) }
+    }
+
     /// The number of launches for the longest possible list: no Gaussian is in a cell's list twice.
     pub(super) fn chunks(&self, intersections: usize) -> usize {
         intersections.min(self.gaussians).div_ceil(CHUNK).max(1)
@@ -245,7 +251,7 @@ fn begin_with(gpu: &Gpu, frame: Frame, inputs: InputBuffers, shapes: [Shape; 7])
 fn forward(gpu: &Gpu, begun: Begun) -> Result<(SplatOutputs<CubeBackend>, GpuSplatSaved), GpuError> {
     let Begun { frame, shapes, inputs, intersections, radii } = begun;
     let rendering = rasterize(gpu, &frame, &intersections)?;
-    gpu.check("the image", &[&rendering])?;
+    frame.check(gpu, "the image", &rendering)?;
     let values = CHANNELS * frame.pixels();
     let outputs = SplatOutputs {
         rendering: gpu.tensor(first_words(&rendering, values), Shape::from([values])),
@@ -291,7 +297,7 @@ fn backward(saved: GpuSplatSaved, upstream: CubeTensor) -> Result<SplatInputs<Cu
         .writes(&gradients)
         .uniform(&uniform)
         .invocations(frame.gaussians)?;
-    gpu.check("the gradients of an image", &[&gradients])?;
+    frame.check(&gpu, "the gradients of an image", &gradients)?;
     let mut k = 0;
     Ok(SplatInputs::from_array(shapes.map(|shape| {
         k += 1;

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Tensor, Transaction};
 use light4gs_data::Frame;
-use light4gs_model::DeformationField;
+use light4gs_model::{DeformationField, GpuError};
 
 use super::Trainer;
 use super::learning_rates::GroupRates;
@@ -29,13 +29,15 @@ struct Differentiated {
 
 impl Differentiated {
     /// The loss, and the intersections of each view. Together, since a GPU waits for each: this is all that a plain iteration
-    /// reads back from the device.
-    fn read(&self) -> (f32, Vec<usize>) {
+    /// reads back from the device, and where it hears of an operation that failed.
+    fn read(&self) -> Result<(f32, Vec<usize>), GpuError> {
         let read = Transaction::default().register(self.loss.clone());
-        let read = self.views.iter().fold(read, |read, view| read.register(view.intersections.clone())).execute();
+        let read = self.views.iter().fold(read, |read, view| read.register(view.intersections.clone()));
+        let read = GpuError::read("a training step", read)?;
         let (loss, intersections) = read.split_first().expect("the loss was registered");
         let loss = loss.iter::<f32>().next().expect("a loss is one number");
-        (loss, intersections.iter().flat_map(|data| data.iter::<i64>()).map(|count| count as usize).collect())
+        let intersections = intersections.iter().flat_map(|data| data.iter::<i64>()).map(|count| count as usize);
+        Ok((loss, intersections.collect()))
     }
 }
 
@@ -57,7 +59,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.profile.lap("quantization noise");
         let (Differentiated { views, mut gradients, .. }, loss) = loop {
             let step = self.differentiate(stage, iteration, &indices, noisy.as_ref())?;
-            let (loss, intersections) = step.read();
+            let (loss, intersections) = step.read()?;
             if self.list_room.learn(&intersections) {
                 break (step, loss);
             }
@@ -100,7 +102,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let pass = self.view_pass(stage, iteration, indices.len());
         let pass = ViewPass { splatter: self.list_room.reserve(pass.splatter), ..pass };
         let seen = noisy.map_or(&self.state.scene, |noisy| &noisy.scene);
-        // On a processor the rate, which hardly occupies more than one thread, is differentiated beside the views.
+        // On a processor the rate, which hardly occupies more than one thread, is differentiated beside the views; on a GPU, before.
         let rate = || noisy.and_then(|noisy| self.rate(noisy, iteration));
         let (mut views, rate) = pass.run(seen, &frames, &self.view_pools, &self.profile, rate)?;
         let mut gradients = GradientSums::default();

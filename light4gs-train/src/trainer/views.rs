@@ -109,7 +109,9 @@ impl ViewPass<'_> {
         };
         let ViewPools(pools) = pools;
         if pools.is_empty() {
-            return Ok((self.views(with_copies(frames), profile)?, meanwhile()));
+            // First, since a rate reads positions: a GPU would otherwise finish the views before the host goes on.
+            let other = meanwhile();
+            return Ok((self.views(with_copies(frames), profile)?, other));
         }
         std::thread::scope(|scope| {
             let shares = frames.chunks(frames.len().div_ceil(pools.len())).map(with_copies);
