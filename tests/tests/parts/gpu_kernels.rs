@@ -1,12 +1,12 @@
 //! Kernels of the wgpu back end in cases that the other tests of back ends leave out: functions far into their tails,
 //! and lists that are longer than one launch can process.
 
-use burn::tensor::{Device, Tensor};
+use burn::tensor::{Device, Tensor, Transaction};
 use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
-use light4gs_model::{HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
+use light4gs_model::{GpuError, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
 
 /// Values and gradient of a function, at places far into the tails and on both sides of the bound.
@@ -116,4 +116,16 @@ fn noise_is_that_of_the_cpu() {
         noisy.into_data().iter().collect()
     };
     assert_eq!(run(Device::wgpu(Default::default())), run(Device::flex()));
+}
+
+/// A tensor that no adapter can hold. Burn returns tensors, not results, so it is the reading that fails.
+#[test]
+fn a_reading_that_fails_is_an_error() {
+    let device = Device::wgpu(Default::default());
+    let read =
+        |count: usize| GpuError::read("a test", Transaction::default().register(Tensor::<1>::ones([count], &device)));
+    let error = read(1 << 40).unwrap_err();
+    assert!(matches!(error, GpuError::Device { operation: "a test", .. }), "{error}");
+    let after = read(2).expect("the device works on");
+    assert_eq!(after[0].iter::<f32>().collect::<Vec<_>>(), [1.0; 2]);
 }
