@@ -1,5 +1,5 @@
 //! Kernels of the wgpu back end in cases that the other tests of back ends leave out: functions far into their tails,
-//! and lists that are longer than one launch can process.
+//! lists that are longer than one launch can process, and a reading that fails.
 
 use burn::tensor::{Device, Tensor, Transaction};
 use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
