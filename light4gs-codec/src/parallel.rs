@@ -13,6 +13,19 @@ pub(crate) fn map<T>(count: usize, work: impl Fn(usize) -> T) -> Vec<T> {
     (0..count).map(work).collect()
 }
 
+/// Sorts numbers of which no two are equal.
+#[cfg(not(target_arch = "wasm32"))]
+pub(crate) fn sort<T: Ord + Send>(numbers: &mut [T]) {
+    use rayon::prelude::*;
+    numbers.par_sort_unstable();
+}
+
+/// Sorts numbers of which no two are equal.
+#[cfg(target_arch = "wasm32")]
+pub(crate) fn sort<T: Ord>(numbers: &mut [T]) {
+    numbers.sort_unstable();
+}
+
 /// Both results.
 #[cfg(not(target_arch = "wasm32"))]
 pub(crate) fn join<A: Send, B: Send>(a: impl FnOnce() -> A + Send, b: impl FnOnce() -> B + Send) -> (A, B) {

@@ -43,7 +43,7 @@ pub mod sh;
 mod significance;
 mod splatter;
 
-pub use attribute_entropy::{AttributeEntropy, ChannelPrediction, CodedAttribute};
+pub use attribute_entropy::{AttributeEntropy, ChannelPrediction, CodedAttribute, GaussianPlaces};
 pub use context::*;
 pub use entropy::*;
 pub use gpu_error::GpuError;

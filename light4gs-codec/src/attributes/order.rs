@@ -5,7 +5,7 @@ use super::{
     position_grid::{PositionGrid, cell_point, morton_cell},
     positions,
 };
-use crate::{CodecError, adaptive::BitEncoder};
+use crate::{CodecError, adaptive::BitEncoder, parallel};
 
 /// Which Gaussians each one is predicted from, for a training whose rate shall know it.
 ///
@@ -14,8 +14,7 @@ use crate::{CodecError, adaptive::BitEncoder};
 ///
 /// let order = CodingOrder::new(&[[1.0, 0.0, 0.0], [0.0; 3], [0.9, 0.0, 0.0]], 0.1)?;
 /// // Coded are the second, the third, the first.
-/// assert_eq!(order.neighbors(0), [2, 1, 2, 2]);
-/// assert_eq!(order.neighbors(1), [1; 4]);
+/// assert_eq!(order.neighbors(&[0, 1]), [[2, 1, 2, 2], [1; 4]]);
 /// # Ok::<(), light4gs_codec::CodecError>(())
 /// ```
 #[derive(Clone, Debug)]
@@ -43,7 +42,7 @@ impl CodingOrder {
         for (place, &row) in rows.iter().enumerate() {
             places[row as usize] = place as u32;
         }
-        let points = codes.iter().map(|&code| cell_point(morton_cell(code))).collect();
+        let points = parallel::map(codes.len(), |place| cell_point(morton_cell(codes[place])));
         Ok(Self { rows, places, codes, code_bits: grid.code_bits(), points })
     }
 
@@ -59,11 +58,15 @@ impl CodingOrder {
         &self.rows
     }
 
-    /// The rows of the nearest Gaussians that are coded before one, nearest first. The first one has its own row.
+    /// For each of some rows, those of the nearest Gaussians that are coded before it, nearest first. The first Gaussian has
+    /// its own row.
     ///
     /// # Panics
     /// If there is no such row.
-    pub fn neighbors(&self, row: usize) -> [u32; NEIGHBORS] {
-        nearest_before(&self.points, self.places[row] as usize).map(|place| self.rows[place as usize])
+    pub fn neighbors(&self, rows: &[u32]) -> Vec<[u32; NEIGHBORS]> {
+        parallel::map(rows.len(), |index| {
+            let place = self.places[rows[index] as usize];
+            nearest_before(&self.points, place as usize).map(|place| self.rows[place as usize])
+        })
     }
 }

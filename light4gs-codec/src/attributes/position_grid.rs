@@ -7,6 +7,7 @@ use crate::{
     CodecError,
     adaptive::{LARGEST_STEP, index, reconstruct},
     bytes::{Reader, Writer},
+    parallel,
 };
 
 /// Most bits of a coordinate, so that three fit into a Morton code.
@@ -59,11 +60,10 @@ impl PositionGrid {
 
     /// The rows of positions in the order of their Morton codes, and these codes, ascending.
     pub(super) fn sorted(&self, means: &[[f32; 3]]) -> (Vec<u32>, Vec<u64>) {
-        let codes: Vec<u64> = means.iter().map(|&mean| morton_code(self.cell(mean))).collect();
-        let mut order: Vec<u32> = (0..means.len() as u32).collect();
-        order.sort_by_key(|&index| codes[index as usize]);
-        let codes = order.iter().map(|&index| codes[index as usize]).collect();
-        (order, codes)
+        // Rows in one cell stay in their order.
+        let mut sorted = parallel::map(means.len(), |row| (morton_code(self.cell(means[row])), row as u32));
+        parallel::sort(&mut sorted);
+        sorted.into_iter().map(|(code, row)| (row, code)).unzip()
     }
 
     /// The position of a cell.

@@ -86,7 +86,7 @@ impl AttributeEntropy {
         replace(&mut self.size, size);
         let gaussians = gaussians.clone().inner();
         let rows: Vec<u32> = (0..gaussians.means.dims()[0] as u32).collect();
-        let order = self.placed(&gaussians).order;
+        let order = self.places(gaussians.means.clone()).order;
         let [own, near] = self.own_and_near(gaussians, order.as_ref(), &rows);
         let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
         let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
@@ -133,17 +133,19 @@ impl AttributeEntropy {
         gaussians.map(&mut Noise { model: self, steps, seed })
     }
 
-    /// Bits of all attributes of Gaussians, `[1]`: of noisy ones in training, of quantized ones in an evaluation.
-    /// Differentiable in the Gaussians, the steps, the predictions and the densities. With `rows`, the densities see only
-    /// these rows and their neighbors, positions count as uniform in their box, and the result is an estimate for all.
-    pub fn bits(&self, gaussians: GaussianTensors, rows: Option<&[u32]>) -> Tensor<1> {
-        let (positions, channels) = self.bits_of_parts(gaussians, rows);
+    /// An estimate of the bits of all attributes of all Gaussians, `[1]`, from some rows: the densities see only these and their
+    /// neighbors, and positions count as uniform in their box. `places` are those of the same Gaussians. Differentiable in
+    /// the Gaussians, the steps, the predictions and the densities.
+    pub fn bits(&self, gaussians: GaussianTensors, places: &GaussianPlaces, rows: &[u32]) -> Tensor<1> {
+        let (positions, channels) = self.bits_of_parts(gaussians, places, Some(rows));
         positions + channels.sum()
     }
 
-    /// The same for each attribute, `[A]`, from all rows.
+    /// Bits of each attribute, `[A]`, from all rows: of noisy Gaussians in training, of quantized ones in an evaluation.
+    /// Differentiable in the same.
     pub fn bits_of_each(&self, gaussians: GaussianTensors) -> Tensor<1> {
-        let (positions, channels) = self.bits_of_parts(gaussians, None);
+        let places = self.places(gaussians.means.clone());
+        let (positions, channels) = self.bits_of_parts(gaussians, &places, None);
         let mut first = 0;
         let each = self.attributes.iter().map(|attribute| match has_density(&attribute.name) {
             true => {
@@ -156,11 +158,16 @@ impl AttributeEntropy {
     }
 
     /// Bits of the positions, `[1]`, and of each number with a density, `[C]`.
-    fn bits_of_parts(&self, gaussians: GaussianTensors, rows: Option<&[u32]>) -> (Tensor<1>, Tensor<1>) {
+    fn bits_of_parts(
+        &self,
+        gaussians: GaussianTensors,
+        places: &GaussianPlaces,
+        rows: Option<&[u32]>,
+    ) -> (Tensor<1>, Tensor<1>) {
         let count = gaussians.means.dims()[0];
-        let Placed { order, extent } = self.placed(&gaussians);
+        let GaussianPlaces { order, extent } = places;
         let coded = order.as_ref().filter(|_| rows.is_none()).map(CodingOrder::position_bits);
-        let positions = self.position_bits(extent, count, coded);
+        let positions = self.position_bits(*extent, count, coded);
         let all: Vec<u32>;
         let rows = match rows {
             Some(rows) => rows,
@@ -186,16 +193,20 @@ impl AttributeEntropy {
         [(0, rows.len()), (rows.len(), near.len())].map(|(first, count)| channels.clone().narrow(1, first, count))
     }
 
-    /// Looks at the positions, on the host.
-    fn placed(&self, gaussians: &GaussianTensors) -> Placed {
+    /// Looks at positions `[N, 3]`, on the host. On a GPU this waits for them.
+    ///
+    /// # Panics
+    /// With a [`GpuError`] if they cannot be read.
+    pub fn places(&self, means: Tensor<2>) -> GaussianPlaces {
         // Together, since a GPU waits for each.
         let values = Transaction::default()
-            .register(off_tape(gaussians.means.clone()))
+            .register(off_tape(means))
             .register(off_tape(self.log_steps.val()))
             .register(off_tape(self.size.val()));
         let read = GpuError::read("the positions for the rate", values).unwrap_or_else(|error| error.raise());
-        let numbers = |data: &TensorData| data.iter::<f32>().collect::<Vec<_>>();
-        let [means, log_steps, size] = [&read[0], &read[1], &read[2]].map(numbers);
+        let read: Vec<Vec<f32>> =
+            read.into_iter().map(|data| data.try_into_vec().expect("parameters are float32")).collect();
+        let [means, log_steps, size] = <[_; 3]>::try_from(read).expect("three tensors were registered");
         let (means, size) = (means.as_chunks().0, size[0]);
         let step = self.place(&MEANS.name).map_or(0.0, |place| log_steps[place].exp() * size);
         let extent = [0, 1, 2].map(|axis| {
@@ -203,7 +214,7 @@ impl AttributeEntropy {
             let [least, most] = [along.clone().fold(f32::INFINITY, f32::min), along.fold(f32::NEG_INFINITY, f32::max)];
             (most - least).max(0.0) / size
         });
-        Placed { order: CodingOrder::new(means, step).ok(), extent }
+        GaussianPlaces { order: CodingOrder::new(means, step).ok(), extent }
     }
 
     /// What the codec writes for the positions of `count` Gaussians, if that is given; else what a set of points takes that
@@ -299,8 +310,9 @@ impl AttributeEntropy {
     }
 }
 
-/// What the positions of Gaussians say.
-struct Placed {
+/// What the positions of Gaussians say about their bits: which ones are neighbors, and how large their box is.
+#[derive(Clone, Debug)]
+pub struct GaussianPlaces {
     /// The order in which the codec would code them; `None` where positions are not finite: the trainer stops for them,
     /// after this.
     order: Option<CodingOrder>,

@@ -104,7 +104,7 @@ impl ChannelPrediction {
 /// The rows of the neighbors of each of some Gaussians, [`NEIGHBORS`] each. Without an order each is its own neighbor.
 pub(super) fn neighbor_rows(order: Option<&CodingOrder>, rows: &[u32]) -> Vec<u32> {
     match order {
-        Some(order) => rows.iter().flat_map(|&row| order.neighbors(row as usize)).collect(),
+        Some(order) => order.neighbors(rows).into_flattened(),
         None => rows.iter().flat_map(|&row| [row; NEIGHBORS]).collect(),
     }
 }

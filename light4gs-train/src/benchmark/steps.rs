@@ -133,7 +133,7 @@ pub(super) fn timings(
                 let image = trained.render(noisy.scene.at(TIME), &scene.camera, None).image;
                 sums.add_module(&noisy.scene, &mut l1(image, truth.clone()).backward());
                 if with_rate {
-                    let rate = compression.rate(&noisy, config.compression.rate.fraction, true, &mut random);
+                    let rate = compression.rate(&noisy, config.compression.rate.fraction, true, None, &mut random);
                     let attributes = rate.attribute_megabytes();
                     let term = attributes.into_iter().fold(rate.megabytes(), |sum, part| sum + part) * LAMBDA;
                     sums.add_module(&noisy.scene, &mut term.backward());

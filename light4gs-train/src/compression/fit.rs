@@ -52,7 +52,7 @@ pub fn fit<F: DeformationField, E: EntropyModels>(
             true,
             generator(config.seed, Purpose::Noise, Stage::Fine, iteration).random(),
         );
-        let rate = compression.rate(&noisy, settings.rate.fraction, true, &mut random);
+        let rate = compression.rate(&noisy, settings.rate.fraction, true, None, &mut random);
         let mut gradients = GradientSums::default();
         gradients.add_module(&compression, &mut rate.megabytes().backward());
         // The steps do not change: there is no distortion here against which their rate could be weighed.

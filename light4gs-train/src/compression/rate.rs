@@ -4,8 +4,8 @@ use burn::module::Param;
 use burn::tensor::{Gradients, Int, Tensor, TensorData};
 use light4gs_model::parameters::on_a_new_tape;
 use light4gs_model::{
-    Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy,
-    PlaneSteps, PlaneTensors, ShKnown,
+    Attribute, AttributeMapper, BuiltInField, DeformationField, DynamicScene, FeaturePlanes, GaussianPlaces, Latent,
+    PlaneEntropy, PlaneSteps, PlaneTensors, ShKnown,
 };
 use rand::Rng;
 use rand::seq::index;
@@ -122,12 +122,14 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 
     /// Estimates the rate on a random share of the planes and of the Gaussians. It is unbiased: over many draws, the
-    /// mean is the rate of everything.
+    /// mean is the rate of everything. `places` are what the noisy positions say
+    /// ([`light4gs_model::AttributeEntropy::places`]); without them it looks itself, for which a GPU waits.
     pub fn rate<F: DeformationField>(
         &self,
         noisy: &NoisyScene<F>,
         fraction: f64,
         with_gaussians: bool,
+        places: Option<GaussianPlaces>,
         generator: &mut impl Rng,
     ) -> Rate {
         let scene = &noisy.scene;
@@ -161,7 +163,11 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         });
         let plane_symbols = planes.iter().map(|plane| plane.dims().iter().product::<usize>()).sum();
         let attributes = self.attributes.as_ref().filter(|_| with_gaussians && count > 0);
-        let attributes = attributes.map(|model| model.bits(scene.gaussians.tensors(), Some(&rows(count))));
+        let attributes = attributes.map(|model| {
+            let gaussians = scene.gaussians.tensors();
+            let places = places.unwrap_or_else(|| model.places(gaussians.means.clone()));
+            model.bits(gaussians, &places, &rows(count))
+        });
         Rate { planes: plane_bits, plane_symbols, sh, sh_symbols: count * coefficients * colors, attributes }
     }
 }

@@ -12,6 +12,7 @@ use light4gs_model::attributes::check_further;
 use light4gs_model::{Attribute, BuiltInField, DeformationField, DynamicSceneConfig, ModelError};
 
 use super::Trainer;
+use super::background::Background;
 use super::list_room::ListRoom;
 use super::profile::Profile;
 use super::views::ViewPools;
@@ -375,6 +376,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             profile: Profile::off(),
             view_pools,
             list_room: ListRoom::new(!side_by_side),
+            background: Background::new(!side_by_side),
             lap: None,
             empty_images: EmptyImageWatch::default(),
         })

@@ -15,6 +15,7 @@
 //! The parts that a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`],
 //! [`DensityStrategy`], [`SignificanceScore`], [`Observer`] and [`ImageSource`].
 
+mod background;
 mod builder;
 mod guided_sampling;
 mod learning_rates;
@@ -54,6 +55,7 @@ use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder, SaveError, checkpoint_name, list_checkpoints};
 use crate::sampling::{FrameSampler, StageFrames};
 use crate::stage::Stage;
+use background::Background;
 use list_room::ListRoom;
 use profile::Profile;
 use views::ViewPools;
@@ -126,6 +128,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     profile: Profile,
     view_pools: ViewPools,
     list_room: ListRoom,
+    background: Background,
     lap: Option<Lap>,
     empty_images: EmptyImageWatch,
 }

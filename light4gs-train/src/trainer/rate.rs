@@ -6,10 +6,11 @@ use burn::module::{Module, Param, ParamId};
 use burn::tensor::Tensor;
 use light4gs_model::attributes::attribute_of_path;
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
-use light4gs_model::{AttributeEntropy, CodedAttribute, DeformationField, DynamicScene};
+use light4gs_model::{AttributeEntropy, CodedAttribute, DeformationField, DynamicScene, GaussianPlaces};
 use rand::Rng;
 
 use super::Trainer;
+use super::background::Pending;
 use crate::compression::{Compression, EntropyModels, NoisyScene, freeze_planes};
 use crate::config::{Config, RateWeighting};
 use crate::error::TrainError;
@@ -78,8 +79,24 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         iteration >= from && self.density.is_over(Stage::Fine, iteration - 1)
     }
 
+    /// Begins to look at the noisy positions, where the rate is due and has one of theirs.
+    pub(super) fn begin_places(&self, noisy: &NoisyScene<F>, iteration: usize) -> Option<Pending<GaussianPlaces>> {
+        let due = iteration.is_multiple_of(self.config.compression.rate.interval);
+        let attributes = self.state.compression.as_ref()?.attributes.as_ref()?;
+        let gaussians = &noisy.scene.gaussians;
+        (due && self.gaussian_rate_is_active(iteration) && gaussians.len() > 0).then(|| {
+            let (attributes, means) = (attributes.clone(), gaussians.means.val());
+            self.background.begin(move || attributes.places(means))
+        })
+    }
+
     /// The rate with its gradients, in the iterations in which it is due. It needs no view.
-    pub(super) fn rate(&self, noisy: &NoisyScene<F>, iteration: usize) -> Option<RateTerm> {
+    pub(super) fn rate(
+        &self,
+        noisy: &NoisyScene<F>,
+        places: Option<Pending<GaussianPlaces>>,
+        iteration: usize,
+    ) -> Option<RateTerm> {
         let config = &self.config.compression.rate;
         let with_gaussians = self.gaussian_rate_is_active(iteration);
         let compression = self.state.compression.as_ref()?;
@@ -93,7 +110,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         // Not what was drawn before: a step may be computed again.
         seed_device(&self.device, self.config.seed, Purpose::Latents, Stage::Fine, iteration);
         let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
-        let rate = compression.rate(apart.as_ref().unwrap_or(noisy), config.fraction, with_gaussians, &mut generator);
+        let (noisy_or_apart, places) = (apart.as_ref().unwrap_or(noisy), places.map(Pending::wait));
+        let rate = compression.rate(noisy_or_apart, config.fraction, with_gaussians, places, &mut generator);
         let interval = config.interval as f64;
         let attributes = rate.attribute_megabytes().map(|rate| rate * (config.attribute_lambda * interval));
         let term = match config.weighting {

@@ -102,8 +102,10 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let pass = self.view_pass(stage, iteration, indices.len());
         let pass = ViewPass { splatter: self.list_room.reserve(pass.splatter), ..pass };
         let seen = noisy.map_or(&self.state.scene, |noisy| &noisy.scene);
-        // On a processor the rate, which hardly occupies more than one thread, is differentiated beside the views; on a GPU, before.
-        let rate = || noisy.and_then(|noisy| self.rate(noisy, iteration));
+        // On a processor the rate, which hardly occupies more than one thread, is differentiated beside the views. On a GPU
+        // only what it waits for is: the positions.
+        let places = noisy.and_then(|noisy| self.begin_places(noisy, iteration));
+        let rate = || noisy.and_then(|noisy| self.rate(noisy, places, iteration));
         let (mut views, rate) = pass.run(seen, &frames, &self.view_pools, &self.profile, rate)?;
         let mut gradients = GradientSums::default();
         for view in &mut views {

@@ -109,9 +109,9 @@ impl ViewPass<'_> {
         };
         let ViewPools(pools) = pools;
         if pools.is_empty() {
-            // First, since a rate reads positions: a GPU would otherwise finish the views before the host goes on.
-            let other = meanwhile();
-            return Ok((self.views(with_copies(frames), profile)?, other));
+            // First the views: on a GPU these are launched while a thread reads what the rate needs.
+            let views = self.views(with_copies(frames), profile)?;
+            return Ok((views, meanwhile()));
         }
         std::thread::scope(|scope| {
             let shares = frames.chunks(frames.len().div_ceil(pools.len())).map(with_copies);

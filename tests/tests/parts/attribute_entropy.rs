@@ -49,7 +49,7 @@ fn the_estimate_is_near_the_bytes_of_the_codec() {
     for (name, device) in devices() {
         let gaussians = gaussians(&device);
         let model = model(&device, &gaussians.tensors());
-        let bits: f64 = model.bits(gaussians.tensors(), None).into_scalar();
+        let bits: f64 = model.bits_of_each(gaussians.tensors()).sum().into_scalar();
 
         let rows = |values: Vec<f32>| values.as_chunks().0.to_vec();
         let arrays = GaussianArrays {
@@ -96,7 +96,7 @@ fn the_estimate_is_near_the_bytes_of_the_codec() {
 fn the_estimate_knows_neighbors_and_channels_before() {
     let device = Device::flex();
     let mut gaussians = gaussians(&device);
-    let independent: f64 = model(&device, &gaussians.tensors()).bits(gaussians.tensors(), None).into_scalar();
+    let independent: f64 = model(&device, &gaussians.tensors()).bits_of_each(gaussians.tensors()).sum().into_scalar();
     let mut tensors = gaussians.tensors();
     let [x, y, z] = [0, 1, 2].map(|axis| tensors.means.clone().narrow(1, axis, 1));
     // Scales change slowly from place to place; the second and third color follow from the first.
@@ -105,13 +105,13 @@ fn the_estimate_knows_neighbors_and_channels_before() {
     tensors.sh_dc = Tensor::cat(vec![first.clone(), first.clone() * 0.5, first * -0.8 + 0.3], 2);
     gaussians.set_tensors(tensors);
     let model = model(&device, &gaussians.tensors());
-    let bits: f64 = model.bits(gaussians.tensors(), None).into_scalar();
+    let bits: f64 = model.bits_of_each(gaussians.tensors()).sum().into_scalar();
     // Two of three colors are known but for rounding, and half of the bits of the scales.
     let colors = 2.0 * 5.0 * COUNT as f64;
     assert!(bits < independent - colors, "{bits} of {independent}");
     let mut untold = model.clone();
     untold.prediction.weights = Param::from_tensor(model.prediction.weights.val().zeros_like());
-    let blind: f64 = untold.bits(gaussians.tensors(), None).into_scalar();
+    let blind: f64 = untold.bits_of_each(gaussians.tensors()).sum().into_scalar();
     assert!(bits < 0.9 * blind, "{bits}, without predictions {blind}");
 }
 
@@ -138,9 +138,9 @@ fn rows_stand_for_all() {
     let device = Device::flex();
     let gaussians = gaussians(&device);
     let model = model(&device, &gaussians.tensors());
-    let all: f64 = model.bits(gaussians.tensors(), None).into_scalar();
+    let all: f64 = model.bits_of_each(gaussians.tensors()).sum().into_scalar();
     let rows: Vec<u32> = (0..COUNT as u32).step_by(4).collect();
-    let some: f64 = model.bits(gaussians.tensors(), Some(&rows)).into_scalar();
+    let some: f64 = model.bits(gaussians.tensors(), &model.places(gaussians.means.val()), &rows).into_scalar();
     assert!((some / all - 1.0).abs() < 0.02, "{some} from a quarter, {all} from all");
 }
 
@@ -151,7 +151,7 @@ fn derivatives_of_the_steps_are_those_of_differences() {
     let device = Device::flex().autodiff();
     let gaussians = gaussians(&device);
     let model = model(&device, &gaussians.tensors());
-    let tape = model.bits(gaussians.tensors(), None).backward();
+    let tape = model.bits_of_each(gaussians.tensors()).sum().backward();
     let gradient = values_of(&model.log_steps.val().grad(&tape).unwrap());
     let steps = values_of(&model.log_steps.val());
     for (place, attribute) in model.attributes().iter().enumerate() {
@@ -160,7 +160,7 @@ fn derivatives_of_the_steps_are_those_of_differences() {
             moved[place] += change;
             let mut model = model.clone();
             model.log_steps = Param::from_tensor(Tensor::from_floats(moved.as_slice(), &device));
-            model.bits(gaussians.tensors(), None).into_scalar()
+            model.bits_of_each(gaussians.tensors()).sum().into_scalar()
         };
         let change = if attribute.name == "means" { std::f32::consts::LN_2 } else { 0.05 };
         let difference = (bits(change) - bits(-change)) / f64::from(2.0 * change);

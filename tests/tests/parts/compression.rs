@@ -115,7 +115,7 @@ fn the_rate_on_a_part_is_unbiased() {
     let estimate = |fraction: f64, seed: u64| {
         device.seed(1);
         let mut generator = ChaCha8Rng::seed_from_u64(seed);
-        let rate = compression.rate(&noisy, fraction, true, &mut generator);
+        let rate = compression.rate(&noisy, fraction, true, None, &mut generator);
         (rate.planes.into_scalar::<f64>(), rate.sh.unwrap().into_scalar::<f64>())
     };
     let (planes, sh) = estimate(1.0, 0);
