@@ -84,7 +84,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let due = iteration.is_multiple_of(self.config.compression.rate.interval);
         let attributes = self.state.compression.as_ref()?.attributes.as_ref()?;
         let gaussians = &noisy.scene.gaussians;
-        (due && self.gaussian_rate_is_active(iteration) && gaussians.len() > 0).then(|| {
+        (due && self.gaussian_rate_is_active(iteration) && !gaussians.is_empty()).then(|| {
             let (attributes, means) = (attributes.clone(), gaussians.means.val());
             self.background.begin(move || attributes.places(means))
         })
