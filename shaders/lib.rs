@@ -50,10 +50,10 @@ shaders! {
     /// First half of the query's derivative: the gradients from every point to each of its samples, and the
     /// points' own gradients.
     PLANE_QUERY_BACKWARD = "planes" / "plane_query_backward" [PLANES];
-    /// Rows of a table.
-    GATHER_ROWS = "rate" / "gather_rows" [];
-    /// Derivative of rows of a table: every number of the table adds up its gradients.
-    GATHER_ROWS_BACKWARD = "rate" / "gather_rows_backward" [];
+    /// Rows of a table, the means over their neighbors, and the nearest of these.
+    NEIGHBORHOODS = "rate" / "neighborhoods" [];
+    /// Derivative of rows of a table and their neighbors: every number of the table adds up its gradients.
+    NEIGHBORHOODS_BACKWARD = "rate" / "neighborhoods_backward" [];
     /// Sums of the differences of two images, block by block.
     IMAGE_DIFFERENCE = "training" / "image_difference" [];
     /// Derivative of the mean difference of two images by the first.

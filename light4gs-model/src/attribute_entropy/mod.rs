@@ -17,12 +17,12 @@ use light4gs_codec::attributes::{AttributeSteps, CodingOrder, typical_size};
 use crate::entropy::gaussian_conditional::LIKELIHOOD_BOUND;
 use crate::entropy::logistic_mixture::{LogisticMixture, LogisticMixtureConfig};
 use crate::gpu_error::GpuError;
-use crate::ops::rate::gather_rows::{ChosenRows, gather_rows};
+use crate::ops::rate::neighborhoods::{Neighborhoods, neighborhoods};
 use crate::ops::rate::uniform_noise::add_uniform_noise;
 use crate::scene::attributes::{Attribute, MEANS};
 use crate::scene::{AttributeMapper, GaussianTensors};
 pub use prediction::ChannelPrediction;
-use prediction::neighbor_rows;
+use prediction::neighbors_of;
 
 /// Logistics of a channel's density.
 const COMPONENTS: usize = 3;
@@ -86,13 +86,13 @@ impl AttributeEntropy {
         replace(&mut self.size, size);
         let gaussians = gaussians.clone().inner();
         let rows: Vec<u32> = (0..gaussians.means.dims()[0] as u32).collect();
-        let order = self.places(gaussians.means.clone()).order;
-        let [own, near] = self.own_and_near(gaussians, order.as_ref(), &rows);
-        let numbers = |values: &Tensor<2>| values.clone().into_data().iter::<f32>().collect::<Vec<_>>();
-        let weights = self.prediction.fit(&numbers(&own), &numbers(&near));
+        let neighbors = neighbors_of(self.places(gaussians.means.clone()).order.as_ref(), &rows);
+        let table = self.table(gaussians);
+        let numbers: Vec<f32> = table.clone().into_data().iter().collect();
+        let weights = self.prediction.fit(&numbers, &neighbors);
         replace(&mut self.prediction.weights, off_tape(weights));
-        let values =
-            off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), own), on_tape_of(&self.size.val(), near)));
+        let inputs = neighborhoods(table, Neighborhoods::new(&rows, &neighbors, rows.len()));
+        let values = off_tape(self.prediction.residuals(on_tape_of(&self.size.val(), inputs)));
         let least = self.by_channel(off_tape(self.log_steps.val()).exp()) * LEAST_SPREAD;
         // [C, 1].
         let means = values.clone().mean_dim(1);
@@ -177,20 +177,12 @@ impl AttributeEntropy {
             }
         };
         let share = count as f64 / rows.len().max(1) as f64;
-        let [own, near] = self.own_and_near(gaussians, order.as_ref(), rows);
-        let residuals = self.prediction.residuals(own, near);
+        let chosen = Neighborhoods::new(rows, &neighbors_of(order.as_ref(), rows), count);
+        let residuals = self.prediction.residuals(neighborhoods(self.table(gaussians), chosen));
         let widths = self.by_channel(self.log_steps.val().exp());
         let bits = self.mixture.interval_bits(residuals, widths, LIKELIHOOD_BOUND);
         let corrections = self.by_channel(untracked(self.corrections.val())).squeeze_dim::<1>(1);
         (positions, bits * corrections * share)
-    }
-
-    /// All numbers with a density of some rows, `[C, M]`, and of their neighbors, `[C, M · NEIGHBORS]`.
-    fn own_and_near(&self, gaussians: GaussianTensors, order: Option<&CodingOrder>, rows: &[u32]) -> [Tensor<2>; 2] {
-        let count = gaussians.means.dims()[0];
-        let near = neighbor_rows(order, rows);
-        let channels = self.channels(gaussians, &ChosenRows::new([rows, &near].concat(), count));
-        [(0, rows.len()), (rows.len(), near.len())].map(|(first, count)| channels.clone().narrow(1, first, count))
     }
 
     /// Looks at positions `[N, 3]`, on the host. On a GPU this waits for them.
@@ -292,21 +284,21 @@ impl AttributeEntropy {
         numbers.select(0, places).unsqueeze_dim(1)
     }
 
-    /// All numbers with a density of these rows, `[C, M]`.
-    fn channels(&self, gaussians: GaussianTensors, rows: &ChosenRows) -> Tensor<2> {
-        struct Collect<'a>(&'a AttributeEntropy, &'a ChosenRows, Vec<Option<Tensor<2>>>);
+    /// All numbers with a density, `[N, C]`.
+    fn table(&self, gaussians: GaussianTensors) -> Tensor<2> {
+        struct Collect<'a>(&'a AttributeEntropy, Vec<Option<Tensor<2>>>);
         impl AttributeMapper for Collect<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
                 if let Some(place) = self.0.place(&attribute.name).filter(|_| has_density(&attribute.name)) {
                     let shape = [values.dims()[0], self.0.attributes[place].width];
-                    self.2[place] = Some(gather_rows(values.clone().reshape(shape), self.1.clone()));
+                    self.1[place] = Some(values.clone().reshape(shape));
                 }
                 values
             }
         }
-        let mut found = Collect(self, rows, vec![None; self.attributes.len()]);
+        let mut found = Collect(self, vec![None; self.attributes.len()]);
         let _ = gaussians.map(&mut found);
-        Tensor::cat(found.2.into_iter().flatten().collect(), 0)
+        Tensor::cat(found.1.into_iter().flatten().collect(), 1)
     }
 }
 

@@ -29,33 +29,30 @@ impl ChannelPrediction {
         Self { weights: Param::from_tensor(weights), before }
     }
 
-    /// What the prediction leaves of channels `[C, N]`; `near`, `[C, N · NEIGHBORS]`, are those of each one's neighbors,
-    /// the nearest first.
-    pub fn residuals(&self, own: Tensor<2>, near: Tensor<2>) -> Tensor<2> {
-        let [channels, count] = own.dims();
-        let near = near.reshape([channels, count, NEIGHBORS]);
-        let around = near.clone().mean_dim(2).squeeze_dim::<2>(2);
-        let nearest = near.narrow(2, 0, 1).squeeze_dim::<2>(2);
-        let inputs = Tensor::cat(vec![own.clone(), around, nearest], 0);
+    /// What the prediction leaves of channels, `[C, M]`. `inputs`, `[3 C, M]`, are the channels of each Gaussian, their means
+    /// over its neighbors, and those of the nearest one, as
+    /// [`neighborhoods`](crate::ops::rate::neighborhoods::neighborhoods) finds them.
+    pub fn residuals(&self, inputs: Tensor<2>) -> Tensor<2> {
+        let channels = self.before.len();
+        let own = inputs.clone().narrow(0, 0, channels);
         let weights = self.weights.val() * self.mask(&inputs.device());
         let nothing = Tensor::zeros([channels], &inputs.device());
         own - linear(inputs.transpose(), weights.transpose(), nothing).transpose()
     }
 
-    /// The weights of the least squared error for channels as [`ChannelPrediction::residuals`] takes them, row by row.
-    pub fn fit(&self, own: &[f32], near: &[f32]) -> Tensor<2> {
+    /// The weights of the least squared error for all Gaussians of a table `[N, C]`, row by row, with these neighbors.
+    pub fn fit(&self, table: &[f32], neighbors: &[[u32; NEIGHBORS]]) -> Tensor<2> {
         let channels = self.before.len();
-        let count = own.len() / channels.max(1);
-        let rows = |values: &[f32], length: usize| -> Vec<Vec<f64>> {
-            values.chunks_exact(length.max(1)).map(|row| row.iter().map(|&value| f64::from(value)).collect()).collect()
+        let count = neighbors.len();
+        let value = |row: u32, channel: usize| f64::from(table[row as usize * channels + channel]);
+        let by_channel = |number: &dyn Fn(usize, usize) -> f64| -> Vec<Vec<f64>> {
+            (0..channels).map(|channel| (0..count).map(|row| number(row, channel)).collect()).collect()
         };
-        let (mut own, near) = (rows(own, count), rows(near, count * NEIGHBORS));
-        let mut around: Vec<Vec<f64>> = near
-            .iter()
-            .map(|row| row.chunks_exact(NEIGHBORS).map(|near| near.iter().sum::<f64>() / NEIGHBORS as f64).collect())
-            .collect();
-        let mut nearest: Vec<Vec<f64>> =
-            near.iter().map(|row| row.iter().step_by(NEIGHBORS).copied().collect()).collect();
+        let mut own = by_channel(&|row, channel| value(row as u32, channel));
+        let mut around = by_channel(&|row, channel| {
+            neighbors[row].iter().map(|&near| value(near, channel)).sum::<f64>() / NEIGHBORS as f64
+        });
+        let mut nearest = by_channel(&|row, channel| value(neighbors[row][0], channel));
         let means: Vec<f64> = own.iter().map(|row| row.iter().sum::<f64>() / count.max(1) as f64).collect();
         for table in [&mut own, &mut around, &mut nearest] {
             for (row, mean) in table.iter_mut().zip(&means) {
@@ -101,10 +98,10 @@ impl ChannelPrediction {
     }
 }
 
-/// The rows of the neighbors of each of some Gaussians, [`NEIGHBORS`] each. Without an order each is its own neighbor.
-pub(super) fn neighbor_rows(order: Option<&CodingOrder>, rows: &[u32]) -> Vec<u32> {
+/// The neighbors of some Gaussians. Without an order each is its own neighbor.
+pub(super) fn neighbors_of(order: Option<&CodingOrder>, rows: &[u32]) -> Vec<[u32; NEIGHBORS]> {
     match order {
-        Some(order) => order.neighbors(rows).into_flattened(),
-        None => rows.iter().flat_map(|&row| [row; NEIGHBORS]).collect(),
+        Some(order) => order.neighbors(rows),
+        None => rows.iter().map(|&row| [row; NEIGHBORS]).collect(),
     }
 }

@@ -3,6 +3,7 @@
 pub(crate) mod adam;
 pub(crate) mod image_difference;
 pub(crate) mod mixture_bits;
+pub(crate) mod neighborhoods;
 pub(crate) mod node_motion;
 pub(crate) mod node_poses;
 pub(crate) mod node_regularizer;

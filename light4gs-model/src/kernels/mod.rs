@@ -3,9 +3,9 @@
 
 pub(crate) mod activation;
 pub(crate) mod adam;
-pub(crate) mod gather_rows;
 pub(crate) mod image_difference;
 pub(crate) mod mixture_bits;
+pub(crate) mod neighborhoods;
 pub(crate) mod node_poses;
 pub(crate) mod node_regularizer;
 pub(crate) mod plane_query;

@@ -1,5 +1,5 @@
-//! Operations of the attributes' rate: noise in place of rounding, rows of attributes and their neighbors, bits.
+//! Operations of the attributes' rate: noise in place of rounding, what attributes are predicted from, bits.
 
-pub mod gather_rows;
 pub mod mixture_bits;
+pub mod neighborhoods;
 pub mod uniform_noise;

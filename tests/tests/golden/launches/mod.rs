@@ -19,8 +19,8 @@ use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::node_poses::{NodeParameters, pose};
 use light4gs_model::ops::node_regularizer::{Regularization, regularize};
 use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::ops::rate::gather_rows::{ChosenRows, gather_rows};
 use light4gs_model::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
+use light4gs_model::ops::rate::neighborhoods::{Neighborhoods, neighborhoods};
 use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
 use light4gs_model::ops::skinning::{MOST_AFFINITIES, SkinningInputs, skin};
 use light4gs_model::{PlaneTensors, Significance, Splatter};
@@ -257,7 +257,7 @@ fn control_nodes(transcript: &mut Transcript) {
     }
 }
 
-/// Bits of rows of a table, some of which are chosen several times, and their derivative.
+/// Bits of rows of a table and of their neighbors, some of which are chosen several times, and their derivative.
 fn rate(transcript: &mut Transcript) {
     let mut random = Random::new(10);
     let ((), launches) = record(|| {
@@ -266,11 +266,13 @@ fn rate(transcript: &mut Transcript) {
             let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(low, high) as f32).collect();
             Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
         };
-        let (count, channels, components) = (321, 7, 3);
-        let rows = (0..500).map(|place| place * place % count as u32).collect();
-        let table = tensor(count, channels, -2.0, 2.0);
+        let (count, columns, components) = (321, 3, 3);
+        let channels = 3 * columns;
+        let rows: Vec<u32> = (0..500).map(|place| place * place % count as u32).collect();
+        let neighbors: Vec<_> = rows.iter().map(|row| [row / 2, row / 3, row / 3, row / 5]).collect();
+        let table = tensor(count, columns, -2.0, 2.0);
         let inputs = MixtureInputs {
-            values: gather_rows(table, ChosenRows::new(rows, count)),
+            values: neighborhoods(table, Neighborhoods::new(&rows, &neighbors, count)),
             widths: tensor(channels, 1, 0.01, 0.5),
             weight_logits: tensor(channels, components, -1.0, 1.0),
             means: tensor(channels, components, -0.5, 0.5),

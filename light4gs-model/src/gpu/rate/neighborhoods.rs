@@ -1,4 +1,4 @@
-//! Rows of a table on a GPU.
+//! What rows of a table and their neighbors say, on a GPU.
 
 use burn::backend::TensorMetadata;
 use burn::tensor::Shape;
@@ -6,17 +6,18 @@ use burn_wgpu::CubeBackend;
 use burn_wgpu::CubeTensor;
 use cubecl::device::DeviceId;
 use cubecl::server::Handle;
-use light4gs_shaders::{GATHER_ROWS, GATHER_ROWS_BACKWARD};
+use light4gs_codec::attributes::NEIGHBORS;
+use light4gs_shaders::{NEIGHBORHOODS, NEIGHBORHOODS_BACKWARD};
 
 use super::super::context::{Gpu, Places, buffer_of, first_words};
 use super::super::kernel::Kernel;
 use super::super::launch::Launch;
 use crate::gpu_error::GpuError;
-use crate::kernels::gather_rows::{Chosen, ChosenRows, GatherRowsKernels};
+use crate::kernels::neighborhoods::{Chosen, Neighborhoods, NeighborhoodsKernels};
 
 /// The kernels of this file.
 pub(super) fn kernels() -> Vec<Kernel> {
-    [GATHER_ROWS, GATHER_ROWS_BACKWARD].map(Kernel::new).into()
+    [NEIGHBORHOODS, NEIGHBORHOODS_BACKWARD].map(Kernel::new).into()
 }
 
 /// Chosen rows, and where each was chosen, on a GPU.
@@ -53,40 +54,41 @@ impl UploadedRows {
     }
 }
 
-fn forward(table: CubeTensor, rows: &ChosenRows) -> Result<CubeTensor, GpuError> {
+fn forward(table: CubeTensor, chosen: &Neighborhoods) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&table)?;
-    let (columns, chosen) = (table.shape()[1], rows.0.rows.len());
-    let gathered = gpu.allocate("rows of a table", chosen * columns)?;
-    Launch::new(&gpu.client, GATHER_ROWS)
-        .reads(&UploadedRows::of(&gpu, &rows.0).rows)
+    let (columns, count) = (table.shape()[1], chosen.len());
+    let numbers = 3 * columns * count;
+    let result = gpu.allocate("rows of a table and their neighbors", numbers)?;
+    Launch::new(&gpu.client, NEIGHBORHOODS)
+        .reads(&UploadedRows::of(&gpu, &chosen.0).rows)
         .reads(&buffer_of(table))
-        .writes(&gathered)
-        .uniform(&[chosen as u32, columns as u32])
-        .invocations(chosen * columns)?;
-    Ok(gpu.tensor(first_words(&gathered, chosen * columns), Shape::from([columns, chosen])))
+        .writes(&result)
+        .uniform(&[count as u32, columns as u32, NEIGHBORS as u32])
+        .invocations(numbers)?;
+    Ok(gpu.tensor(first_words(&result, numbers), Shape::from([3 * columns, count])))
 }
 
-fn backward(rows: &ChosenRows, upstream: CubeTensor) -> Result<CubeTensor, GpuError> {
+fn backward(chosen: &Neighborhoods, upstream: CubeTensor) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let (columns, chosen, count) = (upstream.shape()[0], rows.0.rows.len(), rows.0.count);
-    let uploaded = UploadedRows::of(&gpu, &rows.0);
-    let sums = gpu.allocate("gradients of a table", count * columns)?;
-    Launch::new(&gpu.client, GATHER_ROWS_BACKWARD)
+    let (columns, rows) = (upstream.shape()[0] / 3, chosen.0.count);
+    let uploaded = UploadedRows::of(&gpu, &chosen.0);
+    let sums = gpu.allocate("gradients of a table", rows * columns)?;
+    Launch::new(&gpu.client, NEIGHBORHOODS_BACKWARD)
         .reads(&uploaded.starts)
         .reads(&uploaded.places)
         .reads(&buffer_of(upstream))
         .writes(&sums)
-        .uniform(&[count as u32, columns as u32, chosen as u32])
-        .invocations(count * columns)?;
-    Ok(gpu.tensor(first_words(&sums, count * columns), Shape::from([count, columns])))
+        .uniform(&[rows as u32, columns as u32, chosen.len() as u32, NEIGHBORS as u32])
+        .invocations(rows * columns)?;
+    Ok(gpu.tensor(first_words(&sums, rows * columns), Shape::from([rows, columns])))
 }
 
-impl GatherRowsKernels for CubeBackend {
-    fn gather_rows_forward(table: CubeTensor, rows: &ChosenRows) -> CubeTensor {
-        forward(table, rows).unwrap_or_else(|error| error.raise())
+impl NeighborhoodsKernels for CubeBackend {
+    fn neighborhoods_forward(table: CubeTensor, chosen: &Neighborhoods) -> CubeTensor {
+        forward(table, chosen).unwrap_or_else(|error| error.raise())
     }
 
-    fn gather_rows_backward(rows: &ChosenRows, gradient: CubeTensor) -> CubeTensor {
-        backward(rows, gradient).unwrap_or_else(|error| error.raise())
+    fn neighborhoods_backward(chosen: &Neighborhoods, gradient: CubeTensor) -> CubeTensor {
+        backward(chosen, gradient).unwrap_or_else(|error| error.raise())
     }
 }
