@@ -36,10 +36,10 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("skinning forward + backward", 11),
         ("nodes, Adam step", 13),
         ("nodes, training step", 57),
-        ("nodes, step with noise and rate", 187),
+        ("nodes, step with noise and rate", 156),
         ("nodes, render", 20),
-        ("hexplane, training step", 613),
-        ("hexplane, step with noise and rate", 1131),
+        ("hexplane, training step", 586),
+        ("hexplane, step with noise and rate", 1104),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");

@@ -46,8 +46,7 @@ fn values_and_gradients_are_those_of_burn() {
         let mut row = || random.uniform(0.0, count as f64) as u32;
         let rows: Vec<u32> = (0..chosen).map(|_| row()).collect();
         let neighbors: Vec<_> = (0..chosen).map(|_| [(); NEIGHBORS].map(|()| row())).collect();
-        let expected =
-            run(&Device::flex(), &table, columns, &weights, |table| by_burn(table, &rows, &neighbors));
+        let expected = run(&Device::flex(), &table, columns, &weights, |table| by_burn(table, &rows, &neighbors));
         for (name, device) in devices() {
             let found = run(&device, &table, columns, &weights, |table| {
                 neighborhoods(table, Neighborhoods::new(&rows, &neighbors, count))
