@@ -40,7 +40,8 @@ impl ChannelPrediction {
         own - linear(inputs.transpose(), weights.transpose(), nothing).transpose()
     }
 
-    /// The weights of the least squared error for all Gaussians of a table `[N, C]`, row by row, with these neighbors.
+    /// The weights of the least squared error, `[C, 3 C]`, for all Gaussians of a table `[N, C]`, row by row, with their
+    /// neighbors, `N`.
     pub fn fit(&self, table: &[f32], neighbors: &[[u32; NEIGHBORS]]) -> Tensor<2> {
         let channels = self.before.len();
         let count = neighbors.len();
