@@ -1,15 +1,17 @@
-// Values with uniform noise, the same as `light4gs-model/src/ops/uniform_noise.rs` computes.
+// Values with uniform noise, the same as `light4gs-model/src/ops/rate/uniform_noise.rs` computes.
 //
 // Each invocation computes one value.
 
 struct Parameters {
     count: u32,
+    // The width of these values.
+    which: u32,
     seed_a: u32,
     seed_b: u32,
 }
 
 @group(0) @binding(0) var<storage, read_write> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> width: array<f32>;
+@group(0) @binding(1) var<storage, read_write> widths: array<f32>;
 @group(0) @binding(2) var<storage, read_write> noisy: array<f32>;
 @group(0) @binding(3) var<uniform> parameters: Parameters;
 
@@ -32,5 +34,5 @@ fn main(
     }
     let bits = mixed(mixed(i + parameters.seed_a) ^ parameters.seed_b);
     let noise = f32(bits >> 8u) * (1.0 / 16777216.0) - 0.5;
-    noisy[i] = values[i] + width[0] * noise;
+    noisy[i] = values[i] + widths[parameters.which] * noise;
 }

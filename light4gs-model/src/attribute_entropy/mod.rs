@@ -115,22 +115,24 @@ impl AttributeEntropy {
             model: &'a AttributeEntropy,
             /// `[A]`.
             steps: Tensor<1>,
+            /// `[A]`, times the size of Gaussians: positions have such a step.
+            sized: Tensor<1>,
             seed: u64,
         }
         impl AttributeMapper for Noise<'_> {
             fn map<const D: usize>(&mut self, attribute: &Attribute, values: Tensor<D>) -> Tensor<D> {
                 let Some(place) = self.model.place(&attribute.name) else { return untracked(values) };
-                let step = self.steps.clone().narrow(0, place, 1);
-                let step = if has_density(&attribute.name) { step } else { step * off_tape(self.model.size.val()) };
+                let steps = if has_density(&attribute.name) { &self.steps } else { &self.sized };
                 // Attributes are as far apart in the seeds as can be (the golden ratio in 64 bits).
                 let seed = self.seed.wrapping_add((place as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15));
                 let device = values.device();
-                let noisy = add_uniform_noise(off_tape(values), step, seed);
+                let noisy = add_uniform_noise(off_tape(values), steps.clone(), place, seed);
                 if device.is_autodiff() { Tensor::from_inner(noisy) } else { noisy }
             }
         }
         let steps = off_tape(self.log_steps.val()).exp();
-        gaussians.map(&mut Noise { model: self, steps, seed })
+        let sized = steps.clone() * off_tape(self.size.val());
+        gaussians.map(&mut Noise { model: self, steps, sized, seed })
     }
 
     /// An estimate of the bits of all attributes of all Gaussians, `[1]`, from some rows: the densities see only these and their

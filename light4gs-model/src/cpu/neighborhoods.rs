@@ -10,7 +10,7 @@ const CHUNK: usize = 256;
 
 /// `[3 C, M]` of a table `[N, C]`.
 pub(crate) fn forward(table: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
-    let count = chosen.rows.len() / (1 + NEIGHBORS);
+    let count = chosen.len();
     let (rows, neighbors) = chosen.rows.split_at(count);
     let (neighbors, _) = neighbors.as_chunks::<NEIGHBORS>();
     let mut result = vec![0.0; 3 * columns * count];
@@ -30,7 +30,7 @@ pub(crate) fn forward(table: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32
 
 /// The gradient of the table `[N, C]` from that of the result. Every number adds up those of its places in their order.
 pub(crate) fn backward(gradient: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
-    let count = chosen.rows.len() / (1 + NEIGHBORS);
+    let count = chosen.len();
     let places = chosen.places();
     let mut sums = vec![0.0; chosen.count * columns];
     sums.par_chunks_mut((CHUNK * columns).max(1)).enumerate().for_each(|(chunk, sums)| {

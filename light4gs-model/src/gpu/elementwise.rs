@@ -90,19 +90,19 @@ pub(crate) fn place_columns_on_gpu(columns: CubeTensor, first: usize, width: usi
     raised(Gpu::of(&columns).and_then(|gpu| placed(&gpu)))
 }
 
-/// Values with noise of a width `[1]`.
-pub(crate) fn uniform_noise_on_gpu(values: CubeTensor, width: CubeTensor, seed: [u32; 2]) -> CubeTensor {
+/// Values with noise of one of the widths `[W]`.
+pub(crate) fn uniform_noise_on_gpu(values: CubeTensor, widths: CubeTensor, which: usize, seed: [u32; 2]) -> CubeTensor {
     let noisy = |gpu: &Gpu| {
         let shape = values.shape();
         let count = shape.num_elements();
         let output = gpu.allocate("noisy values", count)?;
         Launch::new(&gpu.client, UNIFORM_NOISE)
             .reads(&buffer_of(values))
-            .reads(&buffer_of(width.clone()))
+            .reads(&buffer_of(widths.clone()))
             .writes(&output)
-            .uniform(&[count as u32, seed[0], seed[1]])
+            .uniform(&[count as u32, which as u32, seed[0], seed[1]])
             .invocations(count)?;
         Ok(gpu.tensor(first_words(&output, count), shape))
     };
-    raised(Gpu::of(&width).and_then(|gpu| noisy(&gpu)))
+    raised(Gpu::of(&widths).and_then(|gpu| noisy(&gpu)))
 }

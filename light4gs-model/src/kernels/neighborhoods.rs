@@ -46,19 +46,14 @@ impl Neighborhoods {
         assert_eq!(beyond, None, "a row beyond the {count} of the table");
         Self(Arc::new(Chosen { rows, count, made: OnceLock::new(), places: OnceLock::new() }))
     }
-
-    /// How many there are, `M`.
-    pub fn len(&self) -> usize {
-        self.0.rows.len() / (1 + NEIGHBORS)
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.0.rows.is_empty()
-    }
 }
 
 impl Chosen {
+    /// How many rows were chosen, `M`.
+    pub(crate) fn len(&self) -> usize {
+        self.rows.len() / (1 + NEIGHBORS)
+    }
+
     pub(crate) fn places(&self) -> &Places {
         self.places.get_or_init(|| {
             let mut starts = vec![0; self.count + 1];

@@ -109,8 +109,8 @@ fn a_crowded_cell() {
 #[test]
 fn noise_is_that_of_the_cpu() {
     let run = |device: Device| -> Vec<f32> {
-        let noisy =
-            add_uniform_noise(Tensor::<1>::zeros([70_000], &device), Tensor::from_floats([0.5], &device), 1 << 40 | 3);
+        let widths = Tensor::from_floats([0.25, 0.5], &device);
+        let noisy = add_uniform_noise(Tensor::<1>::zeros([70_000], &device), widths, 1, 1 << 40 | 3);
         noisy.into_data().iter().collect()
     };
     assert_eq!(run(Device::wgpu(Default::default())), run(Device::flex()));

@@ -56,7 +56,7 @@ impl UploadedRows {
 
 fn forward(table: CubeTensor, chosen: &Neighborhoods) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&table)?;
-    let (columns, count) = (table.shape()[1], chosen.len());
+    let (columns, count) = (table.shape()[1], chosen.0.len());
     let numbers = 3 * columns * count;
     let result = gpu.allocate("rows of a table and their neighbors", numbers)?;
     Launch::new(&gpu.client, NEIGHBORHOODS)
@@ -78,7 +78,7 @@ fn backward(chosen: &Neighborhoods, upstream: CubeTensor) -> Result<CubeTensor, 
         .reads(&uploaded.places)
         .reads(&buffer_of(upstream))
         .writes(&sums)
-        .uniform(&[rows as u32, columns as u32, chosen.len() as u32, NEIGHBORS as u32])
+        .uniform(&[rows as u32, columns as u32, chosen.0.len() as u32, NEIGHBORS as u32])
         .invocations(rows * columns)?;
     Ok(gpu.tensor(first_words(&sums, rows * columns), Shape::from([rows, columns])))
 }

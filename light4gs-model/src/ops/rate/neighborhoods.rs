@@ -64,7 +64,7 @@ impl<B: NeighborhoodsOps + NeighborhoodsKernels, C: CheckpointStrategy> Neighbor
 fn forward_on_cpu<B: HostBackend>(table: FloatTensor<B>, chosen: &Neighborhoods) -> FloatTensor<B> {
     let columns = table.shape()[1];
     let result = cpu::forward(B::to_host(table).as_slice(), columns, &chosen.0);
-    B::from_values(result, [3 * columns, chosen.len()])
+    B::from_values(result, [3 * columns, chosen.0.len()])
 }
 
 fn backward_on_cpu<B: HostBackend>(chosen: &Neighborhoods, gradient: FloatTensor<B>) -> FloatTensor<B> {

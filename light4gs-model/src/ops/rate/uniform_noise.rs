@@ -22,8 +22,13 @@ const CHUNK: usize = 1 << 14;
 /// The noise on every back end.
 #[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
 pub trait UniformNoiseOps: Backend {
-    /// Values of any shape with noise of a width `[1]`; see [`add_uniform_noise`].
-    fn uniform_noise(values: FloatTensor<Self>, width: FloatTensor<Self>, seed: [u32; 2]) -> FloatTensor<Self>;
+    /// Values of any shape with noise of one of the widths `[W]`; see [`add_uniform_noise`].
+    fn uniform_noise(
+        values: FloatTensor<Self>,
+        widths: FloatTensor<Self>,
+        which: usize,
+        seed: [u32; 2],
+    ) -> FloatTensor<Self>;
 }
 
 /// A hash of 32 bits with little bias ("lowbias32" of C. Wellons's Hash Prospector, 2018).
@@ -39,10 +44,15 @@ fn noise(place: u32, seed: [u32; 2]) -> f32 {
     (bits >> 8) as f32 * (1.0 / 16_777_216.0) - 0.5
 }
 
-fn noise_on_cpu<B: HostBackend>(values: FloatTensor<B>, width: FloatTensor<B>, seed: [u32; 2]) -> FloatTensor<B> {
+fn noise_on_cpu<B: HostBackend>(
+    values: FloatTensor<B>,
+    widths: FloatTensor<B>,
+    which: usize,
+    seed: [u32; 2],
+) -> FloatTensor<B> {
     let shape = values.shape();
-    let (values, width) = (B::to_host(values), B::to_host(width));
-    let (values, width) = (values.as_slice(), width.as_slice()[0]);
+    let (values, widths) = (B::to_host(values), B::to_host(widths));
+    let (values, width) = (values.as_slice(), widths.as_slice()[which]);
     let mut noisy = vec![0.0; values.len()];
     noisy.par_chunks_mut(CHUNK).zip(values.par_chunks(CHUNK)).enumerate().for_each(|(chunk, (noisy, values))| {
         for (i, (noisy, value)) in noisy.iter_mut().zip(values).enumerate() {
@@ -54,45 +64,61 @@ fn noise_on_cpu<B: HostBackend>(values: FloatTensor<B>, width: FloatTensor<B>, s
 
 for_cpu_back_ends! {
     UniformNoiseOps {
-        fn uniform_noise(values: FloatTensor<Self>, width: FloatTensor<Self>, seed: [u32; 2]) -> FloatTensor<Self> {
-            noise_on_cpu::<Self>(values, width, seed)
+        fn uniform_noise(
+            values: FloatTensor<Self>,
+            widths: FloatTensor<Self>,
+            which: usize,
+            seed: [u32; 2],
+        ) -> FloatTensor<Self> {
+            noise_on_cpu::<Self>(values, widths, which, seed)
         }
     }
 }
 
 #[cfg(feature = "wgpu")]
 impl UniformNoiseOps for CubeBackend {
-    fn uniform_noise(values: FloatTensor<Self>, width: FloatTensor<Self>, seed: [u32; 2]) -> FloatTensor<Self> {
-        uniform_noise_on_gpu(values, width, seed)
+    fn uniform_noise(
+        values: FloatTensor<Self>,
+        widths: FloatTensor<Self>,
+        which: usize,
+        seed: [u32; 2],
+    ) -> FloatTensor<Self> {
+        uniform_noise_on_gpu(values, widths, which, seed)
     }
 }
 
 #[cfg(feature = "wgpu")]
 impl<B: FusionBackend + UniformNoiseOps> UniformNoiseOps for Fusion<B> {
-    fn uniform_noise(values: FloatTensor<Self>, width: FloatTensor<Self>, seed: [u32; 2]) -> FloatTensor<Self> {
-        leaf::<B>(B::uniform_noise(resolve::<B>(values), resolve::<B>(width), seed))
+    fn uniform_noise(
+        values: FloatTensor<Self>,
+        widths: FloatTensor<Self>,
+        which: usize,
+        seed: [u32; 2],
+    ) -> FloatTensor<Self> {
+        leaf::<B>(B::uniform_noise(resolve::<B>(values), resolve::<B>(widths), which, seed))
     }
 }
 
-/// Values with independent noise, uniform in an interval of this width `[1]` around 0.
+/// Values with independent noise, uniform in an interval around 0 whose width is one of the widths `[W]`, the one at `which`.
+/// On a GPU, a slice of the widths would be one more launch for each tensor.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
 /// use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
 ///
 /// let device = Device::flex();
-/// let width = Tensor::from_floats([0.5], &device);
-/// let noisy = add_uniform_noise(Tensor::<1>::ones([100], &device), width, 7);
+/// let widths = Tensor::from_floats([0.1, 0.5], &device);
+/// let noisy = add_uniform_noise(Tensor::<1>::ones([100], &device), widths, 1, 7);
 /// assert!(noisy.into_data().iter::<f32>().all(|value| (0.75..=1.25).contains(&value)));
 /// ```
 ///
 /// # Panics
-/// If a tensor is on an autodiff device, or the width is not one number.
-pub fn add_uniform_noise<const D: usize>(values: Tensor<D>, width: Tensor<1>, seed: u64) -> Tensor<D> {
-    assert_eq!(width.dims(), [1], "width must be [1]");
+/// If a tensor is on an autodiff device, or there is no width at `which`.
+pub fn add_uniform_noise<const D: usize>(values: Tensor<D>, widths: Tensor<1>, which: usize, seed: u64) -> Tensor<D> {
+    assert!(which < widths.dims()[0], "no width at {which} of {}", widths.dims()[0]);
     assert!(!values.device().is_autodiff(), "noise has no derivative: give it inner tensors");
     let seed = [seed as u32, (seed >> 32) as u32];
-    Tensor::from_dispatch(Dispatch::uniform_noise(values.into_dispatch(), width.into_dispatch(), seed))
+    Tensor::from_dispatch(Dispatch::uniform_noise(values.into_dispatch(), widths.into_dispatch(), which, seed))
 }
 
 #[cfg(test)]

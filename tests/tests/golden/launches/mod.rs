@@ -302,7 +302,7 @@ fn elementwise(transcript: &mut Transcript) {
         let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 3 };
         let moments = [leaf(&device()).cos(), leaf(&device()).sin() * 0.1, leaf(&device()).abs() * 0.01];
         adam_step(moments, leaf(&device()), step);
-        add_uniform_noise(leaf(&device()), Tensor::from_floats([0.25], &device()), 1 << 40 | 5);
+        add_uniform_noise(leaf(&device()), Tensor::from_floats([0.5, 0.25], &device()), 1, 1 << 40 | 5);
     });
     transcript.add("elementwise", launches, Vec::new());
 }
