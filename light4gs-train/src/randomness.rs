@@ -14,7 +14,7 @@ pub(crate) enum Purpose {
     FrameOrder,
     /// The positions of the two halves of a split Gaussian.
     Split,
-    /// The views on which significance is measured.
+    /// The views on which significance is measured, and the signs of their colors.
     PruningViews,
     /// Quantization noise of planes and the choice of planes and Gaussians for the rate.
     Rate,

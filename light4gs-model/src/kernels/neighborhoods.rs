@@ -93,7 +93,7 @@ mod tests {
     #[test]
     fn places_of_rows() {
         let chosen = Neighborhoods::new(&[2], &[[0, 2, 3, 2]], 5);
-        assert_eq!(chosen.len(), 1);
+        assert_eq!(chosen.0.len(), 1);
         let Places { starts, places } = chosen.0.places();
         assert_eq!(starts, &[0, 1, 1, 4, 5, 5]);
         assert_eq!(places, &[1, 0, 2, 4, 3]);

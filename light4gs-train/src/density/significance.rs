@@ -1,6 +1,6 @@
 //! Scores by which Gaussians are pruned (paper III-B).
 
-use light4gs_model::{PixelContribution as Sum, Significance, VolumeWeight};
+use light4gs_model::{PixelContribution as Sum, Sensitivity, Significance, VolumeWeight};
 
 use crate::keys::Bounds::{Flag, List, Number, Word};
 use crate::keys::{INTERVAL, choice, keys};
@@ -19,9 +19,11 @@ keys! {
             List { element: &INTERVAL, length: None },
             "paper: mid-way and near the end", "of the fine stage, after densification";
         /// What a pixel adds to the score of a Gaussian that it blends: `"transmittance"` times opacity, the blending
-        /// `"weight"` (transmittance times alpha), its `"opacity"`, or one (`"count"`).
+        /// `"weight"` (transmittance times alpha), its `"opacity"`, one (`"count"`), or its
+        /// `"sensitivity"`, the squared change of the color without the Gaussian.
         score: PruneScore = PruneScore::Transmittance;
-            Word(PruneScore::NAMES), "paper; the reference sums the opacity", "or \"weight\", \"opacity\", \"count\"";
+            Word(PruneScore::NAMES), "paper; the reference sums the opacity",
+            "or \"weight\", \"opacity\", \"count\", \"sensitivity\"";
         /// Factor of the volume V: `"clamped"` is clamp(V / V_90, 0, 1)^exponent, `"unclamped"` (V / V_10)^exponent,
         /// or `"none"`.
         volume: PruneVolume = PruneVolume::Clamped;
@@ -45,6 +47,8 @@ choice! {
         Opacity = "opacity",
         /// One a pixel.
         Count = "count",
+        /// The squared change of the pixel's color without the Gaussian (after SpeeDe3DGS).
+        Sensitivity = "sensitivity",
     }
 }
 
@@ -78,18 +82,22 @@ pub struct GaussianContributions {
     pub transmittance_opacity: Vec<f64>,
     /// `[N]`: sum over those pixels of the Gaussian's opacity.
     pub opacity: Vec<f64>,
+    /// `[N]`: sum over those pixels of the squared change of their color without the Gaussian. Empty unless the score
+    /// [reads it](SignificanceScore::reads_sensitivity).
+    pub sensitivity: Vec<f64>,
     /// `[N]`: products of the standard deviations, world units cubed.
     pub volumes: Vec<f64>,
 }
 
 impl GaussianContributions {
     /// From the sums over views, and the Gaussians' volumes.
-    pub fn new(significance: &Significance, volumes: Vec<f64>) -> Self {
+    pub fn new(significance: &Significance, sensitivity: Option<&Sensitivity>, volumes: Vec<f64>) -> Self {
         Self {
             pixels: significance.sums(Sum::PixelCount),
             blending_weight: significance.sums(Sum::BlendingWeight),
             transmittance_opacity: significance.sums(Sum::TransmittanceOpacity),
             opacity: significance.sums(Sum::Opacity),
+            sensitivity: sensitivity.map_or_else(Vec::new, |sensitivity| sensitivity.sums().to_vec()),
             volumes,
         }
     }
@@ -99,6 +107,11 @@ impl GaussianContributions {
 pub trait SignificanceScore: Send {
     /// `[N]`: the larger, the more it contributes. Must be finite.
     fn scores(&self, contributions: &GaussianContributions) -> Vec<f64>;
+
+    /// Whether it reads [`GaussianContributions::sensitivity`], which takes a backward pass for each view.
+    fn reads_sensitivity(&self) -> bool {
+        false
+    }
 }
 
 /// A sum over pixels times a factor of the Gaussian's volume: the paper's score, and its variants. The default.
@@ -130,7 +143,12 @@ impl SignificanceScore for VolumeWeightedScore {
             PruneScore::Weight => &contributions.blending_weight,
             PruneScore::Opacity => &contributions.opacity,
             PruneScore::Count => &contributions.pixels,
+            PruneScore::Sensitivity => &contributions.sensitivity,
         };
         sums.iter().zip(self.volume.of(&contributions.volumes)).map(|(sum, factor)| sum * factor).collect()
+    }
+
+    fn reads_sensitivity(&self) -> bool {
+        self.contribution == PruneScore::Sensitivity
     }
 }

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use burn::module::Module;
 use light4gs_data::Frame;
-use light4gs_model::{DeformationField, Significance, least_significant};
+use light4gs_model::{DeformationField, Sensitivity, Significance, least_significant};
 use rand::Rng;
 
 use super::Trainer;
@@ -19,12 +19,20 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         // Without a tape, which would keep every view's tensors until the next backward pass.
         let scene = self.state.scene.valid();
         let splatter = self.splatter(Stage::Fine, iteration);
-        let mut sums = Significance::new(scene.gaussians.len());
+        let count = scene.gaussians.len();
+        let mut sums = Significance::new(count);
+        let mut sensitivity = self.significance.reads_sensitivity().then(|| Sensitivity::new(count));
+        let mut seeds = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
         for frame in self.pruning_views(iteration) {
-            sums.add(&splatter, scene.at(frame.time), &frame.camera);
+            let gaussians = scene.at(frame.time);
+            if let Some(sensitivity) = &mut sensitivity {
+                sensitivity.add(&splatter, gaussians.clone(), &frame.camera, seeds.random());
+            }
+            sums.add(&splatter, gaussians, &frame.camera);
         }
         let volumes: Vec<f64> = scene.gaussians.log_scales.val().sum_dim(1).exp().into_data().iter::<f64>().collect();
-        let scores = self.significance.scores(&GaussianContributions::new(&sums, volumes));
+        let contributions = GaussianContributions::new(&sums, sensitivity.as_ref(), volumes);
+        let scores = self.significance.scores(&contributions);
         let drop = least_significant(&scores, self.config.train.prune.fraction);
         let keep: Vec<bool> = drop.iter().map(|drop| !drop).collect();
         // Never all Gaussians: an empty scene has no gradient and could not recover.

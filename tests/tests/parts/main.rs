@@ -16,5 +16,6 @@ mod plane_convolutions;
 mod plane_query;
 mod poisoned_scenes;
 mod rooms;
+mod sensitivity;
 mod sh_entropy;
 mod skinning;
