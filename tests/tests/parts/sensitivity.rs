@@ -60,3 +60,16 @@ fn back_ends_agree_on_it() {
         assert_close_relative(&format!("{name} and {first}"), &of(&device), &expected, 1e-4);
     }
 }
+
+#[test]
+fn what_no_camera_sees_has_none() {
+    for (name, device) in devices() {
+        let (gaussians, camera) = scene(&device);
+        let behind = Tensor::from_floats([[0.0, -9.0, 0.0]], &device);
+        let means = gaussians.means.clone().slice_assign([1..2, 0..3], behind);
+        let mut sensitivity = Sensitivity::new(4);
+        sensitivity.add(&Splatter::new(BACKGROUND, 0), GaussianTensors { means, ..gaussians }, &camera, 7);
+        let seen: Vec<bool> = sensitivity.sums().iter().map(|sum| *sum > 0.0).collect();
+        assert_eq!(seen, [true, false, true, true], "{name}");
+    }
+}
