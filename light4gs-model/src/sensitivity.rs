@@ -13,8 +13,8 @@ use crate::splatter::Splatter;
 /// the color changes by `o dC/do`, however far that is: what it hides comes to light. (It is exact but for alpha's largest value
 /// of 0.99.) SpeeDe3DGS (Tu et al. 2025) and Speedy-Splat (Hanson et al. 2024) sum squares of such a derivative in a backward pass
 /// of their own. Here the pass of training does it: with a random sign for each color, the square of the opacity's gradient has
-/// the sum of squares as its mean (Hutchinson 1990). Over a hundred views its standard
-/// deviation is a seventh of the sum.
+/// the sum of squares as its mean (Hutchinson 1990). Over a hundred views its standard deviation is a seventh of
+/// the sum.
 ///
 /// ```
 /// use burn::tensor::Device;
@@ -64,7 +64,8 @@ impl Sensitivity {
         let Some(gradient) = opacities.grad(&gradients) else { return };
         let changes: Vec<f32> = (gradient * gaussians.opacities).into_data().iter().collect();
         assert_eq!(changes.len(), self.sums.len(), "the number of Gaussians has changed");
-        for (sum, change) in self.sums.iter_mut().zip(changes) {
+        // A Gaussian that is not finite is not drawn, and changes nothing.
+        for (sum, change) in self.sums.iter_mut().zip(changes).filter(|(_, change)| change.is_finite()) {
             *sum += f64::from(change).powi(2);
         }
     }

@@ -13,7 +13,6 @@ mod gpu_kernels;
 mod import;
 mod operations;
 mod plane_convolutions;
-mod plane_query;
 mod poisoned_scenes;
 mod rooms;
 mod sensitivity;

@@ -5,3 +5,4 @@ mod image_difference;
 mod linear;
 mod mixture_bits;
 mod neighborhoods;
+mod plane_query;
