@@ -111,9 +111,10 @@ impl Config {
     /// `train.fine_iterations=200`, each one a line of TOML (a bare word is taken as a string).
     ///
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
-    /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order.
+    /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a
+    /// file that exists may itself have a `+` in it.
     pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
-        let mut names = name_or_path.split('+').map(|name| layers::named(name, None));
+        let mut names = layers::split(name_or_path).into_iter().map(|name| layers::named(name, None));
         let first = names.next().expect("splitting gives at least one part");
         layers::resolve(&first, &names.collect::<Vec<_>>(), overrides)
     }

@@ -1,6 +1,6 @@
 use std::fs;
 
-use super::layering::{presets, schema};
+use super::layering::{layers, presets, schema};
 use super::*;
 
 fn problem_text(result: Result<Config, ConfigError>) -> String {
@@ -211,6 +211,23 @@ fn tables_merge_deeply_and_the_top_wins() {
     assert_eq!(mine.model.hexplane.multipliers, [1]);
     assert_eq!(mine.model.hexplane.channels, small.model.hexplane.channels);
     assert_eq!(mine.train, small.train);
+}
+
+/// The folders of a study's runs are named after variants and schedules, such as `preset+quarter`.
+#[test]
+fn a_path_may_have_the_sign_that_joins_names() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let run = folder.path().join("preset+quarter");
+    fs::create_dir(&run).expect("making a folder");
+    fs::write(run.join("a+b.toml"), "extends = \"dnerf-cpu\"\nseed = 7\n").expect("writing a file");
+    fs::write(run.join("steps.toml"), "[train]\nfine_iterations = 200\n").expect("writing a file");
+    let [base, steps] = ["a+b.toml", "steps.toml"].map(|name| run.join(name).display().to_string());
+    let config = Config::load(&base, &[]).expect("a configuration");
+    assert_eq!(config.seed, 7);
+    let config = Config::load(&format!("{base}+medium+{steps}"), &[]).expect("a configuration");
+    let expected = Config::load("dnerf-cpu+medium", &["seed=7", "train.fine_iterations=200"].map(str::to_owned));
+    assert_eq!(config, expected.expect("a configuration"));
+    assert_eq!(layers::split("a++b+"), ["a", "", "b", ""]);
 }
 
 #[test]

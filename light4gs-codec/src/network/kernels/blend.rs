@@ -1,6 +1,11 @@
 //! Weighted sums of numbers that are the same at all places: poses of control nodes, blended by each Gaussian's weights.
 
-use super::lanes::{LANES, Lanes, PANEL, Panel, kept};
+use super::lanes::{LANES, Lanes, kept};
+
+/// Outputs that are computed together.
+const PANEL: usize = 4;
+/// One number for each output of a panel.
+type Panel = [f32; PANEL];
 
 /// Numbers `[outputs, channels]` that are the same at all places, for sums over the channels.
 #[derive(Debug, Default)]

@@ -4,11 +4,9 @@
 pub(crate) const LANES: usize = 8;
 /// One channel at [`LANES`] positions.
 pub(crate) type Lanes = [f32; LANES];
-/// Outputs that are computed together.
-pub(super) const PANEL: usize = 4;
-
-/// One number for each output of a panel.
-pub(super) type Panel = [f32; PANEL];
+/// Most outputs that are computed together: as many sums as the processor's registers hold. Additions wait for each other
+/// where there are fewer.
+const WIDEST: usize = if cfg!(target_arch = "wasm32") { 4 } else { 8 };
 
 /// Weights and values with a magnitude below this are replaced by 0. So no product and no sum is ever subnormal: many
 /// processors take a hundred times as long for subnormal numbers as for others.
@@ -21,38 +19,45 @@ pub(crate) fn kept(value: f32) -> f32 {
     if value.abs() < LEAST_MAGNITUDE { 0.0 } else { value }
 }
 
-/// Nanoseconds of a product of four outputs with one input at eight places.
+/// Outputs that are counted together in a cost, which must be the same on every machine.
+const COUNTED: usize = 4;
+/// Nanoseconds of a product of so many outputs with one input at eight places.
 const PRODUCT_NANOSECONDS: u64 = 4;
 /// Nanoseconds of a matrix without inputs.
 const MATRIX_NANOSECONDS: u64 = 10;
 /// Nanoseconds to gather one channel of a window at eight places.
 pub(super) const GATHER_NANOSECONDS: u64 = 8;
 
-/// `y = W x + b`, with `W` in the memory layout of [`Matrix::apply`].
+/// `y = W x + b`.
 #[derive(Clone, Debug)]
 pub(super) struct Matrix {
     columns: usize,
     outputs: usize,
-    /// For four outputs at a time, their weights column by column. Zeros fill up the last four.
-    weights: Vec<Panel>,
-    bias: Vec<Panel>,
+    /// Panel by panel, each as wide as [`panel_width`] says: the biases of its outputs, then their weights column by
+    /// column.
+    panels: Vec<f32>,
+}
+
+/// Outputs that are computed together, where so many are left.
+fn panel_width(left: usize) -> usize {
+    WIDEST.min(1 << left.ilog2())
 }
 
 impl Matrix {
     /// A matrix with `columns` inputs, and one output for each element of `bias`.
     pub(super) fn new(columns: usize, bias: &[f32], weight: impl Fn(usize, usize) -> f32) -> Self {
         let outputs = bias.len();
-        let panel = |first: usize, value: &dyn Fn(usize) -> f32| {
-            let mut panel = [0.0; PANEL];
-            (first..outputs).zip(&mut panel).for_each(|(row, slot)| *slot = kept(value(row)));
-            panel
-        };
-        let panels = || (0..outputs).step_by(PANEL);
-        let mut weights = Vec::with_capacity(outputs.div_ceil(PANEL) * columns);
-        for first in panels() {
-            weights.extend((0..columns).map(|column| panel(first, &|row| weight(row, column))));
+        let mut panels = Vec::with_capacity((columns + 1) * outputs);
+        let mut first = 0;
+        while first < outputs {
+            let rows = first..first + panel_width(outputs - first);
+            first = rows.end;
+            panels.extend(bias[rows.clone()].iter().map(|&bias| kept(bias)));
+            for column in 0..columns {
+                panels.extend(rows.clone().map(|row| kept(weight(row, column))));
+            }
         }
-        Self { columns, outputs, weights, bias: panels().map(|first| panel(first, &|row| bias[row])).collect() }
+        Self { columns, outputs, panels }
     }
 
     /// From a weight `[outputs, inputs]` row-major.
@@ -67,13 +72,13 @@ impl Matrix {
 
     /// Nanoseconds at eight places.
     pub(super) fn nanoseconds(&self) -> u64 {
-        self.bias.len() as u64 * (MATRIX_NANOSECONDS + PRODUCT_NANOSECONDS * self.columns as u64)
+        self.outputs.div_ceil(COUNTED) as u64 * (MATRIX_NANOSECONDS + PRODUCT_NANOSECONDS * self.columns as u64)
     }
 
     /// Bytes of a matrix of so many columns and outputs, with the overhead of vectors and allocator.
     pub(super) fn bytes(columns: u64, outputs: u64) -> u64 {
-        let panels = outputs.div_ceil(PANEL as u64);
-        panels.saturating_mul(columns.saturating_add(1)).saturating_mul(size_of::<Panel>() as u64).saturating_add(128)
+        let counted = outputs.div_ceil(COUNTED as u64) * (COUNTED * size_of::<f32>()) as u64;
+        counted.saturating_mul(columns.saturating_add(1)).saturating_add(128)
     }
 
     /// Each output is its bias plus the products with the inputs, in their order. If there are fewer `inputs` than
@@ -81,13 +86,34 @@ impl Matrix {
     #[inline(always)]
     pub(super) fn apply(&self, inputs: &[Lanes], outputs: &mut [Lanes]) {
         debug_assert!(inputs.len() <= self.columns && outputs.len() == self.outputs);
-        let weights = self.weights.chunks_exact(self.columns);
-        for ((weights, bias), outputs) in weights.zip(&self.bias).zip(outputs.chunks_mut(PANEL)) {
-            let sums = panel_sums(weights, inputs, bias);
-            for (output, sum) in outputs.iter_mut().zip(&sums) {
-                *output = sum.map(kept);
-            }
+        let mut rest = (&self.panels[..], outputs);
+        while rest.1.len() >= WIDEST {
+            rest = self.apply_panel::<WIDEST>(rest, inputs);
         }
+        // Never where four are the most.
+        if rest.1.len() >= 4 {
+            rest = self.apply_panel::<4>(rest, inputs);
+        }
+        if rest.1.len() >= 2 {
+            rest = self.apply_panel::<2>(rest, inputs);
+        }
+        if !rest.1.is_empty() {
+            self.apply_panel::<1>(rest, inputs);
+        }
+    }
+
+    /// Computes the outputs of the first panel; returns what is left of panels and outputs.
+    #[inline(always)]
+    fn apply_panel<'a, const WIDTH: usize>(
+        &self,
+        (panels, outputs): (&'a [f32], &'a mut [Lanes]),
+        inputs: &[Lanes],
+    ) -> (&'a [f32], &'a mut [Lanes]) {
+        let (panel, panels) = panels.split_at((self.columns + 1) * WIDTH);
+        let (bias, weights) = panel.as_chunks::<WIDTH>().0.split_first().expect("a panel begins with biases");
+        let (own, outputs) = outputs.split_first_chunk_mut::<WIDTH>().expect("an output for each bias");
+        *own = panel_sums(weights, inputs, bias).map(|sums| sums.map(kept));
+        (panels, outputs)
     }
 }
 
@@ -96,14 +122,12 @@ impl Matrix {
 #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
 #[cfg_attr(target_arch = "x86_64", inline(always))]
 #[cfg_attr(not(target_arch = "x86_64"), inline(never))]
-fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
+fn panel_sums<const WIDTH: usize>(weights: &[[f32; WIDTH]], inputs: &[Lanes], bias: &[f32; WIDTH]) -> [Lanes; WIDTH] {
+    let product = |sum: Lanes, weight: f32, input: &Lanes| std::array::from_fn(|lane| sum[lane] + weight * input[lane]);
     let mut sums = bias.map(|bias| [bias; LANES]);
+    // With loops over the sums in place of new arrays, the compiler does not keep eight of them in registers.
     for (weights, input) in weights.iter().zip(inputs) {
-        for (sum, weight) in sums.iter_mut().zip(weights) {
-            for (sum, input) in sum.iter_mut().zip(input) {
-                *sum += weight * input;
-            }
-        }
+        sums = std::array::from_fn(|output| product(sums[output], weights[output], input));
     }
     sums
 }
@@ -112,7 +136,7 @@ fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANE
 /// times as long. The same products and sums, to the last bit.
 #[cfg(all(target_arch = "wasm32", target_feature = "simd128"))]
 #[inline(never)]
-fn panel_sums(weights: &[Panel], inputs: &[Lanes], bias: &Panel) -> [Lanes; PANEL] {
+fn panel_sums<const WIDTH: usize>(weights: &[[f32; WIDTH]], inputs: &[Lanes], bias: &[f32; WIDTH]) -> [Lanes; WIDTH] {
     use core::arch::wasm32::{f32x4, f32x4_add, f32x4_extract_lane as lane, f32x4_mul, f32x4_splat};
     let mut sums = bias.map(|bias| [f32x4_splat(bias); 2]);
     for (weights, &[a, b, c, d, e, f, g, h]) in weights.iter().zip(inputs) {

@@ -70,7 +70,17 @@ fn near(found: f32, expected: f64) {
 #[test]
 fn convolutions() {
     let mut random = Random(1);
-    for (inputs, outputs, kernel, groups) in [(3, 5, 3, 1), (4, 8, 5, 4), (4, 6, 1, 2), (6, 9, 3, 3), (2, 4, 7, 1)] {
+    let shapes = [
+        (3, 5, 3, 1),
+        (4, 8, 5, 4),
+        (4, 6, 1, 2),
+        (6, 9, 3, 3),
+        (2, 4, 7, 1),
+        (3, 19, 3, 1),
+        (2, 13, 1, 1),
+        (2, 24, 1, 1),
+    ];
+    for (inputs, outputs, kernel, groups) in shapes {
         let layer = random.layer(LayerKind::Convolution, inputs, outputs, kernel, groups);
         let map = Plain::random(&mut random, inputs as usize, [5, 11]);
         let convolution = Convolution::new(&layer);

@@ -55,6 +55,23 @@ pub(in crate::config) fn resolve_text(
     build(layers)
 }
 
+/// The names and paths that are joined by `+`, at least one. A folder such as those of a study's runs may have a `+` in its
+/// name, so the longest path of a file that exists comes before shorter names.
+pub(in crate::config) fn split(joined: &str) -> Vec<&str> {
+    let mut parts = Vec::new();
+    let mut rest = joined;
+    loop {
+        let ends = rest.match_indices('+').map(|(at, _)| at).chain([rest.len()]);
+        let file = ends.clone().rev().find(|&end| Path::new(&rest[..end]).is_file());
+        let end = file.or_else(|| ends.clone().next()).unwrap_or(rest.len());
+        parts.push(&rest[..end]);
+        match rest.get(end + 1..) {
+            Some(after) => rest = after,
+            None => return parts,
+        }
+    }
+}
+
 /// What `name` means: a preset, or a path relative to `folder`.
 pub(in crate::config) fn named(name: &str, folder: Option<&Path>) -> Origin {
     let path = folder.unwrap_or(Path::new("")).join(name);
