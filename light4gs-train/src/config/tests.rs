@@ -220,12 +220,12 @@ fn a_path_may_have_the_sign_that_joins_names() {
     let run = folder.path().join("preset+quarter");
     fs::create_dir(&run).expect("making a folder");
     fs::write(run.join("a+b.toml"), "extends = \"dnerf-cpu\"\nseed = 7\n").expect("writing a file");
-    fs::write(run.join("steps.toml"), "[train]\nfine_iterations = 200\n").expect("writing a file");
-    let [base, steps] = ["a+b.toml", "steps.toml"].map(|name| run.join(name).display().to_string());
+    fs::write(run.join("pixels.toml"), "[data]\nresolution = 64\n").expect("writing a file");
+    let [base, pixels] = ["a+b.toml", "pixels.toml"].map(|name| run.join(name).display().to_string());
     let config = Config::load(&base, &[]).expect("a configuration");
     assert_eq!(config.seed, 7);
-    let config = Config::load(&format!("{base}+medium+{steps}"), &[]).expect("a configuration");
-    let expected = Config::load("dnerf-cpu+medium", &["seed=7", "train.fine_iterations=200"].map(str::to_owned));
+    let config = Config::load(&format!("{base}+medium+{pixels}"), &[]).expect("a configuration");
+    let expected = Config::load("dnerf-cpu+medium", &["seed=7", "data.resolution=64"].map(str::to_owned));
     assert_eq!(config, expected.expect("a configuration"));
     assert_eq!(layers::split("a++b+"), ["a", "", "b", ""]);
 }
