@@ -73,7 +73,6 @@ struct Step {
 }
 
 #[derive(Debug)]
-#[expect(clippy::large_enum_variant, reason = "a program has few steps, each allocated once")]
 enum StepKind {
     Pointwise(Convolution),
     Convolution {
