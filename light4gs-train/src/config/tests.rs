@@ -228,6 +228,9 @@ fn a_path_may_have_the_sign_that_joins_names() {
     let expected = Config::load("dnerf-cpu+medium", &["seed=7", "data.resolution=64"].map(str::to_owned));
     assert_eq!(config, expected.expect("a configuration"));
     assert_eq!(layers::split("a++b+"), ["a", "", "b", ""]);
+    let missing = run.join("missing.toml").display().to_string();
+    let text = problem_text(Config::load(&missing, &[]));
+    assert!(text.starts_with(&missing), "{text}");
 }
 
 #[test]

@@ -4,8 +4,8 @@
 pub(crate) const LANES: usize = 8;
 /// One channel at [`LANES`] positions.
 pub(crate) type Lanes = [f32; LANES];
-/// Most outputs that are computed together: as many sums as the processor's registers hold. Additions wait for each other
-/// where there are fewer.
+/// Most outputs that are computed together: as many sums as the registers hold, since additions wait for each other where
+/// there are fewer. Vectors of WebAssembly have four numbers, so that a sum takes two.
 const WIDEST: usize = if cfg!(target_arch = "wasm32") { 4 } else { 8 };
 
 /// Weights and values with a magnitude below this are replaced by 0. So no product and no sum is ever subnormal: many
@@ -86,19 +86,18 @@ impl Matrix {
     #[inline(always)]
     pub(super) fn apply(&self, inputs: &[Lanes], outputs: &mut [Lanes]) {
         debug_assert!(inputs.len() <= self.columns && outputs.len() == self.outputs);
-        let mut rest = (&self.panels[..], outputs);
-        while rest.1.len() >= WIDEST {
-            rest = self.apply_panel::<WIDEST>(rest, inputs);
+        let (mut panels, mut rest) = (&self.panels[..], outputs);
+        while rest.len() >= WIDEST {
+            (panels, rest) = self.apply_panel::<WIDEST>(panels, inputs, rest);
         }
-        // Never where four are the most.
-        if rest.1.len() >= 4 {
-            rest = self.apply_panel::<4>(rest, inputs);
+        if rest.len() >= 4 {
+            (panels, rest) = self.apply_panel::<4>(panels, inputs, rest);
         }
-        if rest.1.len() >= 2 {
-            rest = self.apply_panel::<2>(rest, inputs);
+        if rest.len() >= 2 {
+            (panels, rest) = self.apply_panel::<2>(panels, inputs, rest);
         }
-        if !rest.1.is_empty() {
-            self.apply_panel::<1>(rest, inputs);
+        if !rest.is_empty() {
+            self.apply_panel::<1>(panels, inputs, rest);
         }
     }
 
@@ -106,8 +105,9 @@ impl Matrix {
     #[inline(always)]
     fn apply_panel<'a, const WIDTH: usize>(
         &self,
-        (panels, outputs): (&'a [f32], &'a mut [Lanes]),
+        panels: &'a [f32],
         inputs: &[Lanes],
+        outputs: &'a mut [Lanes],
     ) -> (&'a [f32], &'a mut [Lanes]) {
         let (panel, panels) = panels.split_at((self.columns + 1) * WIDTH);
         let (bias, weights) = panel.as_chunks::<WIDTH>().0.split_first().expect("a panel begins with biases");

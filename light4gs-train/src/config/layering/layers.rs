@@ -56,14 +56,17 @@ pub(in crate::config) fn resolve_text(
 }
 
 /// The names and paths that are joined by `+`, at least one. A folder such as those of a study's runs may have a `+` in its
-/// name, so the longest path of a file that exists comes before shorter names.
+/// name, so the longest path of a file that exists comes before shorter names. A path of which nothing exists stays
+/// whole, so that the error names it as it was given.
 pub(in crate::config) fn split(joined: &str) -> Vec<&str> {
     let mut parts = Vec::new();
     let mut rest = joined;
     loop {
-        let ends = rest.match_indices('+').map(|(at, _)| at).chain([rest.len()]);
-        let file = ends.clone().rev().find(|&end| Path::new(&rest[..end]).is_file());
-        let end = file.or_else(|| ends.clone().next()).unwrap_or(rest.len());
+        let first = rest.find('+').unwrap_or(rest.len());
+        let in_folder = rest[..first].contains(['/', '\\']);
+        let mut ends = rest.match_indices('+').map(|(at, _)| at).chain([rest.len()]).rev();
+        let file = ends.find(|&end| Path::new(&rest[..end]).is_file());
+        let end = file.unwrap_or(if in_folder { rest.len() } else { first });
         parts.push(&rest[..end]);
         match rest.get(end + 1..) {
             Some(after) => rest = after,
