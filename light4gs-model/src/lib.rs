@@ -12,7 +12,7 @@
 //! | [`entropy`] | the components of these models: densities, convolutions over planes, quantization steps ([`AdaptiveQuantization`]) | III-D |
 //! | [`parameters`] | every float parameter of a module with its path | |
 //! | [`ops`] | custom operations with hand-written derivatives | |
-//! | `gpu` | with the feature `wgpu`: its kernels as text and its launches as data, to try them elsewhere | |
+//! | `gpu` | with the feature `wgpu`: kernels as text and launches as data, to try them elsewhere | |
 //!
 //! Every part with parameters is a separate Burn module (`Config` and `init`), which can be used alone. The device of a
 //! tensor chooses the back end of the custom operations at run time.
@@ -21,7 +21,7 @@
 //! model ([`PriorPart`]), the entropy model of the spherical harmonics ([`ShEntropy`]), and the training loop around
 //! them. Each part also describes its networks for the codec, so that both compute the same.
 
-// Without a CPU back end the kernels of `cpu/` are unused; otherwise each of them would need a condition of its own.
+// Without a CPU back end the kernels for it are unused; otherwise each of them would need a condition of its own.
 #![cfg_attr(
     not(any(feature = "ndarray", feature = "flex")),
     allow(dead_code, unused_imports, unused_variables, unused_mut, unreachable_code, unreachable_pub)
@@ -29,12 +29,10 @@
 
 mod attribute_entropy;
 pub mod context;
-mod cpu;
 pub mod entropy;
 #[cfg(feature = "wgpu")]
 pub mod gpu;
 mod gpu_error;
-mod kernels;
 pub mod ops;
 pub mod parameters;
 pub mod planes;

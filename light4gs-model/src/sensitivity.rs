@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use light4gs_data::Camera;
 
-use crate::ops::rate::uniform_noise::add_uniform_noise;
+use crate::ops::uniform_noise::add_uniform_noise;
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 use crate::splatter::Splatter;
 

@@ -2,6 +2,8 @@
 //
 // Each invocation computes one value. It reads `places` and writes `values`.
 
+// #include exponential
+
 struct Parameters {
     count: u32,
 }

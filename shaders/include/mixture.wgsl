@@ -1,4 +1,4 @@
-// The mixture of logistics of a channel, and the mass of the interval around a value. `light4gs-model/src/cpu/mixture_bits.rs` has the
+// The mixture of logistics of a channel, and the mass of the interval around a value. `light4gs-model/src/ops/mixture_bits/cpu.rs` has the
 // formulas.
 
 struct Logistic {

@@ -2,6 +2,8 @@
 //
 // A workgroup owns a channel. Each of its invocations takes every WORKGROUP-th value; the first adds up their sums, in order.
 
+// #include exponential, mixture
+
 struct Parameters {
     channels: u32,
     // Values of a channel.

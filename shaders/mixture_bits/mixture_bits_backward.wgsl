@@ -5,6 +5,8 @@
 // logits of the weights, the means, the logarithms of the scales. In `of_mixture` stand the gradients of all widths, then all logits,
 // and so on, each array from its place in `starts`.
 
+// #include exponential, mixture
+
 struct Parameters {
     channels: u32,
     // Values of a channel.

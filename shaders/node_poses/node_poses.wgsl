@@ -3,6 +3,8 @@
 // One invocation owns one node. Reads its parameters; lengths are shares of `unit`. Writes `posed` [B, 20 + AFFINITIES]: anchor (3) and
 // precision (1), world units, pose (16): matrix row by row, offset, quaternion; affinities.
 
+// #include quaternion, node_spline, node_motion
+
 @group(0) @binding(0) var<storage, read_write> anchors: array<f32>;
 @group(0) @binding(1) var<storage, read_write> log_radii: array<f32>;
 @group(0) @binding(2) var<storage, read_write> translations: array<f32>;

@@ -4,6 +4,8 @@
 // gradients of anchors [B, 3], log_radii [B, 1], translations [K, 3 B], rotations [K, 4 B] and affinities [B, AFFINITIES] into one buffer,
 // each from its place on.
 
+// #include quaternion, node_spline, node_motion
+
 struct Parameters {
     spline: Spline,
     // Where the gradients begin; those of the anchors at 0.

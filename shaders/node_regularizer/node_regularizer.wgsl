@@ -3,6 +3,8 @@
 // One invocation owns one node, and all knots of its trajectory. Reads the sums of `node_strain.wgsl` and the knots. Writes the loss, and into
 // one buffer the gradients of anchors [B, 3], translations [K, 3 B] and rotations [K, 4 B], each from its place on.
 
+// #include node_spline
+
 struct Parameters {
     spline: Spline,
     rigidity: f32,

@@ -9,6 +9,8 @@
 //   2: derivative by the spline of the rotations
 //   3: sums of the squared second differences of the knots: translations, rotations
 
+// #include exponential, quaternion, node_spline, node_motion
+
 @group(0) @binding(0) var<storage, read_write> anchors: array<f32>;
 @group(0) @binding(1) var<storage, read_write> log_radii: array<f32>;
 @group(0) @binding(2) var<storage, read_write> translations: array<f32>;

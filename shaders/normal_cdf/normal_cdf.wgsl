@@ -1,7 +1,9 @@
 // The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error everywhere (Press et
-// al., Numerical Recipes, section 6.2): the coefficients and the order of operations of `light4gs-model/src/ops`.
+// al., Numerical Recipes, section 6.2): the coefficients and the order of operations of `light4gs-model/src/ops/normal_cdf/cpu.rs`.
 //
 // Each invocation computes one value. It reads `places` and writes `probabilities`.
+
+// #include exponential
 
 struct Parameters {
     count: u32,

@@ -2,6 +2,8 @@
 //
 // Each invocation computes one value. It reads `places` and `upstream`, and writes `gradients`.
 
+// #include exponential
+
 struct Parameters {
     count: u32,
 }

@@ -7,6 +7,8 @@
 // places in `places`. A launch takes only so many samples of a cell that no loop gets too long; later launches add the
 // rest.
 
+// #include planes
+
 struct Places {
     // Where the gradients of the first four planes begin.
     a: vec4<u32>,

@@ -3,6 +3,8 @@
 // Each invocation computes one vector of four channels for one point. It reads points [N, 4] in [-1, 1] and the packed
 // planes, and writes features [N, C].
 
+// #include planes
+
 @group(0) @binding(0) var<storage, read_write> points: array<f32>;
 @group(0) @binding(1) var<storage, read_write> packed: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> features: array<f32>;

@@ -6,6 +6,8 @@
 // sample begins (`cells`), and the fractions along width and height (`fractions`). It also writes the points' gradients
 // [N, 4].
 
+// #include planes
+
 @group(0) @binding(0) var<storage, read_write> points: array<f32>;
 @group(0) @binding(1) var<storage, read_write> packed: array<vec4<f32>>;
 @group(0) @binding(2) var<storage, read_write> upstream: array<f32>;

@@ -5,6 +5,8 @@
 // with T the transmittance before the splat. No other invocation writes there, so the sums do not depend on any order.
 // Between two chunks of a list, `carried` holds T of every pixel, negative where it has stopped.
 
+// #include arithmetic, view, pixels, footprint
+
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
 @group(0) @binding(2) var<storage, read_write> gaussians: array<u32>;

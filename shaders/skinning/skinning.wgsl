@@ -8,6 +8,8 @@
 //   3: the blended quaternion
 //   4: the largest exponent; the inverse of the sum of the weights; the weight of the node that stands still
 
+// #include exponential, quaternion, pose, node
+
 struct Parameters {
     count: u32,
     nodes: u32,

@@ -3,6 +3,8 @@
 // One invocation owns one Gaussian and meets all nodes. Reads what it has handed over (see `skinning_backward.wgsl`), its
 // affinities and the nodes. Writes `of_affinities` [N, AFFINITIES].
 
+// #include exponential, pose, node
+
 struct Parameters {
     count: u32,
     nodes: u32,

@@ -9,6 +9,8 @@
 //   3: upstream gradient of the turned vector; the inverse of the sum of the weights
 //   4: the vector at rest
 
+// #include quaternion, pose
+
 struct Parameters {
     count: u32,
     // Where gradients begin; those of means are first.

@@ -4,6 +4,8 @@
 // that they read the same Gaussian at the same time. Reads what Gaussians hand over (see `skinning_backward.wgsl`) and the nodes.
 // Writes `sums`, SUMS a node and slice: anchor (3), precision (1), pose (16), and affinities where there are any.
 
+// #include exponential, pose, node
+
 struct Parameters {
     count: u32,
     nodes: u32,

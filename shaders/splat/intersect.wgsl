@@ -5,6 +5,8 @@
 // intersection is kept in `first_of_gaussian`, so that the backward pass finds all of them. Intersections for which there is
 // no room are left out. Room that is left gets the cell behind the last one, which sorts to the end of all lists.
 
+// #include arithmetic, view, splat
+
 @group(0) @binding(0) var<storage, read_write> by_depth: array<u32>;
 @group(0) @binding(1) var<storage, read_write> first_places: array<u32>;
 @group(0) @binding(2) var<storage, read_write> splats: array<vec4<f32>>;

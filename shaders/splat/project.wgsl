@@ -5,6 +5,8 @@
 // same order, and less those of the nearest depth they fit into DEPTH_BITS, which is fewer digits to sort: all up to 4e9 times the
 // nearest, beyond which all count as equally far. A Gaussian without cells has the largest key.
 
+// #include arithmetic, view, splat, quaternion, covariance, spherical_harmonics
+
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> quats: array<f32>;
 @group(0) @binding(2) var<storage, read_write> scales: array<f32>;

@@ -6,6 +6,8 @@
 // Every gradient is written once: `gradients` holds those of means [N, 3], quats [N, 4], scales [N, 3], opacities [N],
 // sh_dc [N, 3], sh_rest [N, K, 3] and screen offsets [N, 2], at the places in `places`.
 
+// #include arithmetic, view, quaternion, covariance, spherical_harmonics
+
 struct Places {
     // means, quats, scales, opacities
     a: vec4<u32>,

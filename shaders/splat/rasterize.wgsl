@@ -12,6 +12,8 @@
 // (see CHUNK) the image holds the sums so far, and, in place of alpha, T, which is negative where the pixel has
 // stopped.
 
+// #include arithmetic, view, pixels, footprint
+
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
 @group(0) @binding(2) var<storage, read_write> gaussians: array<u32>;

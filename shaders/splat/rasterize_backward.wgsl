@@ -10,6 +10,8 @@
 // dy, p dx², p dx dy, p dy². No other invocation writes there, so the sums do not depend on any order. Between two
 // chunks of a list, `carried` holds T and the remainder of every pixel.
 
+// #include arithmetic, view, pixels, footprint
+
 @group(0) @binding(0) var<storage, read_write> starts: array<u32>;
 @group(0) @binding(1) var<storage, read_write> order: array<u32>;
 @group(0) @binding(2) var<storage, read_write> gaussians: array<u32>;

@@ -1,4 +1,4 @@
-// Values with uniform noise, the same as `light4gs-model/src/ops/rate/uniform_noise.rs` computes.
+// Values with uniform noise, the same as `light4gs-model/src/ops/uniform_noise/cpu.rs` computes.
 //
 // Each invocation computes one value.
 

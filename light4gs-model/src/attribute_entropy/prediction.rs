@@ -31,7 +31,7 @@ impl ChannelPrediction {
 
     /// What the prediction leaves of channels, `[C, M]`. `inputs`, `[3 C, M]`, are the channels of each Gaussian, their means
     /// over its neighbors, and those of the nearest one, as
-    /// [`neighborhoods`](crate::ops::rate::neighborhoods::neighborhoods) finds them.
+    /// [`neighborhoods`](crate::ops::neighborhoods::neighborhoods) finds them.
     pub fn residuals(&self, inputs: Tensor<2>) -> Tensor<2> {
         let channels = self.before.len();
         let own = inputs.clone().narrow(0, 0, channels);

@@ -7,7 +7,7 @@ use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Tensor};
 
 use super::factorized_density::{logistic_interval, plain_logistic_interval};
-use crate::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
+use crate::ops::mixture_bits::{MixtureInputs, mixture_bits};
 
 /// Configuration of a [`LogisticMixture`].
 #[derive(Config, Debug)]
@@ -74,7 +74,7 @@ impl LogisticMixture {
     /// raised to it, with the gradient of [`lower_bound`](crate::ops::lower_bound::lower_bound).
     ///
     /// # Panics
-    /// If there are more logistics than [`MOST_COMPONENTS`](crate::ops::rate::mixture_bits::MOST_COMPONENTS), or the shapes do
+    /// If there are more logistics than [`MOST_COMPONENTS`](crate::ops::mixture_bits::MOST_COMPONENTS), or the shapes do
     /// not belong together.
     pub fn interval_bits(&self, x: Tensor<2>, widths: Tensor<2>, bound: f32) -> Tensor<1> {
         let inputs = MixtureInputs {

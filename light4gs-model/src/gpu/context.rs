@@ -10,17 +10,17 @@ use cubecl::server::Handle;
 use crate::gpu_error::{GpuError, first_lines};
 
 /// Tensors within a buffer begin at multiples of this many values, where every adapter can bind them.
-pub(super) const PLACE_ALIGNMENT: usize = 64;
+pub(crate) const PLACE_ALIGNMENT: usize = 64;
 
 /// A wgpu device.
-pub(super) struct Gpu {
-    pub(super) client: Client,
+pub(crate) struct Gpu {
+    pub(crate) client: Client,
     device: CubeDevice,
 }
 
 impl Gpu {
     /// The device of a tensor.
-    pub(super) fn of(tensor: &CubeTensor) -> Result<Self, GpuError> {
+    pub(crate) fn of(tensor: &CubeTensor) -> Result<Self, GpuError> {
         let runtime = tensor.client.name();
         if runtime != "wgpu<wgsl>" {
             return Err(GpuError::Runtime(runtime.to_owned()));
@@ -29,17 +29,17 @@ impl Gpu {
     }
 
     /// Iterations that a loop may have. Mesa's software driver ends any loop after 65535, without an error.
-    pub(super) fn longest_loop(&self) -> usize {
+    pub(crate) fn longest_loop(&self) -> usize {
         if self.is_mesas_software() { 60_000 } else { u32::MAX as usize }
     }
 
     /// Whether this is Mesa's software driver.
-    pub(super) fn is_mesas_software(&self) -> bool {
+    pub(crate) fn is_mesas_software(&self) -> bool {
         self.client.properties().identity.physical.is_none()
     }
 
     /// A buffer for `count` values of four bytes, at least one.
-    pub(super) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
+    pub(crate) fn allocate(&self, buffer: &'static str, count: usize) -> Result<Handle, GpuError> {
         let bytes = 4 * count.max(PLACE_ALIGNMENT) as u64;
         if !self.holds(count) {
             return Err(GpuError::TooLarge { buffer, bytes, limit: self.largest_buffer() });
@@ -48,7 +48,7 @@ impl Gpu {
     }
 
     /// Whether a buffer may have `count` values of four bytes.
-    pub(super) fn holds(&self, count: usize) -> bool {
+    pub(crate) fn holds(&self, count: usize) -> bool {
         count as u64 <= self.largest_buffer() / 4
     }
 
@@ -58,23 +58,23 @@ impl Gpu {
     }
 
     /// A float32 tensor over a buffer or a piece of it.
-    pub(super) fn tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
+    pub(crate) fn tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
         CubeTensor::new_contiguous(self.client.clone(), self.device.clone(), shape, handle, DType::F32)
     }
 
     /// An int32 tensor over a buffer.
-    pub(super) fn int_tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
+    pub(crate) fn int_tensor(&self, handle: Handle, shape: Shape) -> CubeTensor {
         CubeTensor::new_contiguous(self.client.clone(), self.device.clone(), shape, handle, DType::I32)
     }
 
     /// Reads one word, waiting for everything that was launched before.
-    pub(super) fn read_word(&self, operation: &'static str, buffer: &Handle) -> Result<u32, GpuError> {
+    pub(crate) fn read_word(&self, operation: &'static str, buffer: &Handle) -> Result<u32, GpuError> {
         let bytes = self.client.read_one(first_words(buffer, 1)).map_err(|error| failed(operation, &error))?;
         Ok(u32::from_le_bytes(bytes[..4].try_into().expect("a word has four bytes")))
     }
 
     /// An error if anything that was launched so far, and that these buffers depend on, has failed.
-    pub(super) fn check(&self, operation: &'static str, buffers: &[&Handle]) -> Result<(), GpuError> {
+    pub(crate) fn check(&self, operation: &'static str, buffers: &[&Handle]) -> Result<(), GpuError> {
         self.client.check(buffers.iter().copied()).map_err(|error| failed(operation, &error))
     }
 }
@@ -84,7 +84,7 @@ fn failed(operation: &'static str, error: &impl std::fmt::Display) -> GpuError {
 }
 
 /// A tensor's values in row-major order. An empty tensor becomes a buffer that can be bound but holds nothing.
-pub(super) fn buffer_of(tensor: CubeTensor) -> Handle {
+pub(crate) fn buffer_of(tensor: CubeTensor) -> Handle {
     assert_eq!(tensor.dtype, DType::F32, "the custom operations take float32 tensors");
     if tensor.meta.shape().num_elements() == 0 {
         return tensor.client.empty(4 * PLACE_ALIGNMENT);
@@ -93,26 +93,26 @@ pub(super) fn buffer_of(tensor: CubeTensor) -> Handle {
 }
 
 /// The first `count` words of a buffer, which may be larger.
-pub(super) fn first_words(buffer: &Handle, count: usize) -> Handle {
+pub(crate) fn first_words(buffer: &Handle, count: usize) -> Handle {
     let unused = buffer.size_in_used() - 4 * count as u64;
     buffer.clone().offset_end(unused)
 }
 
 /// Some words of a buffer. Where they begin must be a multiple of [`PLACE_ALIGNMENT`].
-pub(super) fn words(buffer: &Handle, start: usize, count: usize) -> Handle {
+pub(crate) fn words(buffer: &Handle, start: usize, count: usize) -> Handle {
     let (start, end) = (4 * start as u64, 4 * (start + count) as u64);
     buffer.clone().offset_start(start).offset_end(buffer.size_in_used() - end)
 }
 
 /// Several arrays in one buffer, each beginning where it can be bound.
-pub(super) struct Places {
-    pub(super) starts: Vec<usize>,
+pub(crate) struct Places {
+    pub(crate) starts: Vec<usize>,
     lengths: Vec<usize>,
-    pub(super) total: usize,
+    pub(crate) total: usize,
 }
 
 impl Places {
-    pub(super) fn new(lengths: &[usize]) -> Self {
+    pub(crate) fn new(lengths: &[usize]) -> Self {
         let mut total = 0;
         let starts = lengths
             .iter()
@@ -126,14 +126,14 @@ impl Places {
     }
 
     /// Array `k` of the buffer that holds them all. An empty one is a place that can be bound.
-    pub(super) fn of(&self, buffer: &Handle, k: usize) -> Handle {
+    pub(crate) fn of(&self, buffer: &Handle, k: usize) -> Handle {
         let length = self.lengths[k];
         words(buffer, self.starts[k], if length == 0 { PLACE_ALIGNMENT } else { length })
     }
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use cubecl::client::Client;
 
     use cubecl::wgpu::WgpuDevice;
@@ -141,7 +141,7 @@ pub(super) mod tests {
     use super::*;
 
     /// The default adapter, without Burn.
-    pub(in crate::gpu) fn gpu() -> Gpu {
+    pub(crate) fn default_gpu() -> Gpu {
         let device = WgpuDevice::default();
         let client: Client = CubeDevice::Wgpu(device.clone()).client();
         Gpu { client, device: CubeDevice::Wgpu(device) }

@@ -25,7 +25,7 @@ pub struct Kernel {
 }
 
 impl Kernel {
-    pub(super) fn new(shader: Shader) -> Self {
+    pub(crate) fn new(shader: Shader) -> Self {
         Self { shader, team: None, workgroup: WORKGROUP, constants: vec![("WORKGROUP", WORKGROUP)] }
     }
 
@@ -36,13 +36,13 @@ impl Kernel {
         self
     }
 
-    pub(super) fn constant(mut self, name: &'static str, value: u32) -> Self {
+    pub(crate) fn constant(mut self, name: &'static str, value: u32) -> Self {
         self.constants.push((name, value));
         self
     }
 
     /// A kernel that blends: the workgroup is a team.
-    pub(super) fn blending(mut self, team: Team) -> Self {
+    pub(crate) fn blending(mut self, team: Team) -> Self {
         self.team = Some(team.communication);
         self.workgroup(team.members)
             .constant("TEAM", team.members)

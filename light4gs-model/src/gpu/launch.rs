@@ -20,7 +20,7 @@ const MAX_GROUPS: u32 = 32768;
 const MAX_BUFFERS: usize = 8;
 
 /// One launch, built step by step. Buffers are bound in the order given, the uniform after them.
-pub(super) struct Launch<'a> {
+pub(crate) struct Launch<'a> {
     client: &'a Client,
     kernel: Kernel,
     buffers: Vec<(Handle, BufferIOAttr)>,
@@ -34,24 +34,24 @@ type Launched = (DeviceId, &'static str, Constants);
 static LAUNCHED: LazyLock<Mutex<HashSet<Launched>>> = LazyLock::new(Mutex::default);
 
 impl<'a> Launch<'a> {
-    pub(super) fn new(client: &'a Client, kernel: impl Into<Kernel>) -> Self {
+    pub(crate) fn new(client: &'a Client, kernel: impl Into<Kernel>) -> Self {
         Self { client, kernel: kernel.into(), buffers: Vec::new(), uniform: Vec::new() }
     }
 
-    pub(super) fn reads(self, buffer: &Handle) -> Self {
+    pub(crate) fn reads(self, buffer: &Handle) -> Self {
         self.binds(buffer, BufferIOAttr::ReadOnly)
     }
 
-    pub(super) fn writes(self, buffer: &Handle) -> Self {
+    pub(crate) fn writes(self, buffer: &Handle) -> Self {
         self.binds(buffer, BufferIOAttr::WriteOnly)
     }
 
-    pub(super) fn updates(self, buffer: &Handle) -> Self {
+    pub(crate) fn updates(self, buffer: &Handle) -> Self {
         self.binds(buffer, BufferIOAttr::ReadWrite)
     }
 
     /// A buffer that is read only if `earlier` launches have filled it.
-    pub(super) fn updates_if(self, earlier: bool, buffer: &Handle) -> Self {
+    pub(crate) fn updates_if(self, earlier: bool, buffer: &Handle) -> Self {
         if earlier { self.updates(buffer) } else { self.writes(buffer) }
     }
 
@@ -61,23 +61,23 @@ impl<'a> Launch<'a> {
     }
 
     /// Words of the uniform that follows the buffers.
-    pub(super) fn uniform(mut self, words: &[u32]) -> Self {
+    pub(crate) fn uniform(mut self, words: &[u32]) -> Self {
         // A uniform's size is a multiple of 16 bytes.
         self.uniform = words.to_vec();
         self.uniform.resize(words.len().next_multiple_of(4), 0);
         self
     }
 
-    /// Enough workgroups for this many invocations.
-    pub(super) fn invocations(self, count: usize) -> Result<(), GpuError> {
+    /// Launches workgroups for `count` invocations.
+    pub(crate) fn invocations(self, count: usize) -> Result<(), GpuError> {
         let groups = count.div_ceil(self.kernel.workgroup as usize);
         self.groups(groups)
     }
 
-    /// Launches at least this many workgroups; kernels must ignore those that are too many.
+    /// Launches `groups` workgroups, or some more; a kernel must ignore those in excess.
     ///
     /// The first launch of a kernel on a device waits until it is compiled, and returns an error if that failed.
-    pub(super) fn groups(self, groups: usize) -> Result<(), GpuError> {
+    pub(crate) fn groups(self, groups: usize) -> Result<(), GpuError> {
         debug_assert!(self.buffers.len() <= MAX_BUFFERS, "{}: too many buffers", self.kernel);
         if groups == 0 {
             return Ok(());
@@ -159,7 +159,7 @@ fn overlap(a: &Handle, b: &Handle) -> bool {
 mod tests {
     use light4gs_shaders::Shader;
 
-    use super::super::context::tests::gpu;
+    use super::super::context::tests::default_gpu;
     use super::*;
 
     const BROKEN: Shader = Shader {
@@ -171,7 +171,7 @@ mod tests {
 
     #[test]
     fn a_kernel_that_does_not_compile_is_an_error_with_its_name() {
-        let client = gpu().client;
+        let client = default_gpu().client;
         for _ in 0..2 {
             let out = client.empty(256);
             let error = Launch::new(&client, BROKEN).writes(&out).groups(1).unwrap_err();
@@ -190,7 +190,7 @@ mod tests {
             source: "@group(0) @binding(0) var<storage, read_write> out: array<f32>;\n\
                      @compute @workgroup_size(WORKGROUP) fn main() { out[0] = 1.0; }",
         };
-        let client = gpu().client;
+        let client = default_gpu().client;
         let out = client.empty(256);
         let error = Launch::new(&client, Kernel::new(GREEDY).workgroup(1 << 20)).writes(&out).groups(1).unwrap_err();
         assert!(matches!(error, GpuError::Kernel { kernel: "greedy", .. }), "{error}");

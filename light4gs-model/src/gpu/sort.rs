@@ -10,14 +10,15 @@ use crate::gpu_error::GpuError;
 
 /// Values of one workgroup of the prefix sum.
 const SUM_BLOCK: usize = 2048;
-/// Up to this many values, one workgroup is as fast as three launches.
+/// Values up to which one workgroup is as fast as three launches.
 const SUM_ALONE: usize = 8 * SUM_BLOCK;
 /// Keys of one workgroup of the sort.
 const SORT_BLOCK: usize = 1024;
 /// Invocations of such a workgroup, each with a counter for every digit: 16 KiB of workgroup memory.
 const SORT_GROUP: u32 = 32;
 const RADIX_BITS: u32 = 7;
-/// Up to so many blocks, each adds up what it needs of a pass's table itself; more would read too much of it.
+/// Blocks up to which each one adds up the entries of a pass's table that it needs. With more of them, each would read too much of
+/// the table, and a prefix sum replaces it first.
 const BLOCKS_ALONE: usize = 128;
 /// Passes over the widest keys.
 const MOST_PASSES: u32 = u32::BITS.div_ceil(RADIX_BITS);
@@ -46,7 +47,7 @@ fn counting(passes: u32) -> Kernel {
     by_digit(RADIX_COUNT).constant("PASSES", passes)
 }
 
-/// What a pass of the sort finds and leaves.
+/// Variants of a pass of the sort.
 struct Scattering {
     /// Its table has been replaced by prefix sums.
     summed: bool,
@@ -64,7 +65,7 @@ impl Scattering {
 }
 
 /// Replaces `count` words by their exclusive prefix sums. Returns a buffer that holds the total.
-pub(super) fn prefix_sum(gpu: &Gpu, values: &Handle, count: usize) -> Result<Handle, GpuError> {
+pub(crate) fn prefix_sum(gpu: &Gpu, values: &Handle, count: usize) -> Result<Handle, GpuError> {
     let step = |step: u32, values: &Handle, sums: &Handle, count: usize| {
         let launch = Launch::new(&gpu.client, summing(step)).updates(values).updates(sums).uniform(&[count as u32]);
         launch.groups(if step == 1 { 1 } else { count.div_ceil(SUM_BLOCK) })
@@ -82,18 +83,18 @@ pub(super) fn prefix_sum(gpu: &Gpu, values: &Handle, count: usize) -> Result<Han
     Ok(total)
 }
 
-/// Keys in ascending order, and the index that each had before.
+/// Keys in ascending order, and the index of each before the sort.
 #[derive(Clone)]
-pub(super) struct Sorted {
-    pub(super) keys: Handle,
-    pub(super) order: Handle,
+pub(crate) struct Sorted {
+    pub(crate) keys: Handle,
+    pub(crate) order: Handle,
 }
 
 /// Sorts `count` keys of which only the lowest `bits` bits differ. Equal keys keep their order.
-pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<Sorted, GpuError> {
+pub(crate) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<Sorted, GpuError> {
     let blocks = count.div_ceil(SORT_BLOCK).max(1);
     let passes = bits.div_ceil(RADIX_BITS).max(1);
-    // One for each pass, as long each, so that they can be bound one by one.
+    // A table for each pass, all of the same length, so that they can be bound one by one.
     let table_length = blocks << RADIX_BITS;
     let tables = gpu.allocate("digits of a sort", passes as usize * table_length)?;
     Launch::new(&gpu.client, counting(passes))
@@ -132,7 +133,7 @@ pub(super) fn sort(gpu: &Gpu, keys: &Handle, count: usize, bits: u32) -> Result<
 
 /// `[groups + 1]`: where each group's keys begin among sorted ones. The last entry is where keys of `groups` and above
 /// begin.
-pub(super) fn ranges(gpu: &Gpu, keys: &Handle, count: usize, groups: usize) -> Result<Handle, GpuError> {
+pub(crate) fn ranges(gpu: &Gpu, keys: &Handle, count: usize, groups: usize) -> Result<Handle, GpuError> {
     let starts = gpu.allocate("starts of ranges", groups + 1)?;
     Launch::new(&gpu.client, RANGES)
         .reads(keys)
@@ -143,13 +144,13 @@ pub(super) fn ranges(gpu: &Gpu, keys: &Handle, count: usize, groups: usize) -> R
 }
 
 /// The number of bits that can hold every number up to `largest`.
-pub(super) fn bits_for(largest: usize) -> u32 {
+pub(crate) fn bits_for(largest: usize) -> u32 {
     usize::BITS - largest.leading_zeros()
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::context::tests::gpu;
+    use super::super::context::tests::default_gpu;
     use super::*;
 
     fn upload(gpu: &Gpu, words: &[u32]) -> Handle {
@@ -166,7 +167,7 @@ mod tests {
     /// Few blocks and many, one pass and several, keys that are equal.
     #[test]
     fn keys_are_sorted_and_equal_ones_keep_their_order() {
-        let gpu = gpu();
+        let gpu = default_gpu();
         let mut state = 1u32;
         for (count, bits) in [(0, 7), (1, 28), (1000, 7), (5000, 10), (70_001, 28), (150_000, 10)] {
             let keys: Vec<u32> = (0..count)

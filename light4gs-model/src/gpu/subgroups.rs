@@ -23,7 +23,7 @@ pub(super) fn kernels() -> Vec<Kernel> {
 }
 
 /// A team is a subgroup if the size of subgroups is known.
-pub(super) fn choose_team(gpu: &Gpu, width: u32, height: u32) -> Result<Team, GpuError> {
+pub(crate) fn choose_team(gpu: &Gpu, width: u32, height: u32) -> Result<Team, GpuError> {
     let cells = |team: Team| width.div_ceil(team.cell) * height.div_ceil(team.cell);
     // A Gaussian visits the cells that it touches in one loop.
     let limit = gpu.longest_loop() as u32;

@@ -2,13 +2,11 @@
 
 use std::cell::Cell;
 
-use light4gs_shaders::include::{
-    TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW, TEAM_SUM_OF_MANY, TEAM_TRUSTED, TEAM_WORKGROUP,
-};
+use light4gs_shaders::team::{AGREED, SUBGROUP, SUM_OF_FEW, SUM_OF_MANY, TRUSTED, WORKGROUP};
 
 /// Intersections of a cell that one launch blends. Mesa's software driver ends any loop after 65535 iterations, and a
 /// graphics driver may stop a launch that runs for seconds.
-pub(super) const CHUNK: usize = 32768;
+pub(crate) const CHUNK: usize = 32768;
 
 /// How the members of a team communicate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -29,10 +27,10 @@ impl Communication {
     /// Its files in `shaders/team`.
     pub(super) fn includes(self) -> &'static [&'static str] {
         match self {
-            Self::WorkgroupMemory => &[TEAM_AGREED, TEAM_WORKGROUP],
-            Self::SubgroupOfFew => &[TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW],
-            Self::SubgroupOfMesa => &[TEAM_TRUSTED, TEAM_SUBGROUP, TEAM_SUM_OF_FEW],
-            Self::SubgroupOfMany => &[TEAM_AGREED, TEAM_SUBGROUP, TEAM_SUM_OF_MANY],
+            Self::WorkgroupMemory => &[AGREED, WORKGROUP],
+            Self::SubgroupOfFew => &[AGREED, SUBGROUP, SUM_OF_FEW],
+            Self::SubgroupOfMesa => &[TRUSTED, SUBGROUP, SUM_OF_FEW],
+            Self::SubgroupOfMany => &[AGREED, SUBGROUP, SUM_OF_MANY],
         }
     }
 }
@@ -70,7 +68,7 @@ impl Team {
     }
 
     /// Sides of the cells of [`Team::all`], each once.
-    pub(super) fn cells() -> Vec<u32> {
+    pub(crate) fn cells() -> Vec<u32> {
         let mut cells: Vec<u32> = Self::all().map(|team| team.cell).collect();
         cells.sort_unstable();
         cells.dedup();

@@ -1,9 +1,16 @@
-//! Custom operations as Burn backend extensions.
+//! Custom operations as Burn backend extensions, each in a folder of its own:
 //!
-//! Each has a trait with the operation, which is dispatched at run time to the device's back end and recorded by
-//! autodiff. A differentiable one also has a trait with the forward and backward kernels that a back end implements:
-//! `NdArray` and `Flex` with the kernels of `cpu/`, `CubeBackend` with those of `gpu/`, and `Fusion<B>` with those of
-//! the back end that it wraps.
+//! | file | contents |
+//! |---|---|
+//! | `mod.rs` | the operation, its shapes, its place on autodiff's tape, and the trait that a back end implements |
+//! | `cpu.rs`, `cpu_backward.rs` | its kernels for `NdArray` and `Flex`, on plain slices; those of splatting are in `light4gs-render` |
+//! | `gpu.rs` | its launches for `CubeBackend`, what `Fusion` does around them, and the operation for checks (`OPERATION`): a list of its kernels, and calls that launch them |
+//! | `shaders/<operation>/` | its kernels in WGSL |
+//!
+//! The trait of the operation itself is dispatched at run time to the device's back end and recorded by autodiff. A differentiable
+//! operation also has a trait with the kernels that a back end implements for both directions. What is in this folder beside the
+//! operations is what they share: access to the memory of CPU tensors (`host.rs`), fusion streams (`fusion.rs`), checks (`sample.rs`);
+//! what they share on a GPU is in `gpu/`.
 
 // Burn 0.22 deprecates its `ndarray` back end in favor of `flex`; we serve both.
 #![allow(deprecated)]
@@ -17,34 +24,89 @@ mod host;
 pub mod image_difference;
 pub mod linear;
 pub mod lower_bound;
+pub mod mixture_bits;
+pub mod neighborhoods;
 pub mod node_poses;
 pub mod node_regularizer;
 pub mod normal_cdf;
 pub mod plane_query;
-pub mod rate;
+#[cfg(feature = "wgpu")]
+mod sample;
 pub mod significance;
 pub mod skinning;
 pub mod splat;
+pub mod uniform_noise;
 
 use std::fmt::Debug;
 
-use burn::backend::Backend;
+use burn::backend::autodiff::checkpoint::base::Checkpointer;
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::Ops;
+use burn::backend::autodiff::ops::{Backward, NodeGuard, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend};
 
-/// The backward pass of an operation whose parents on the tape all get a gradient: `derivative` makes these from its state and
-/// from the gradient of its output.
-fn differentiate<B: Backend, S: Clone + Debug + Send + 'static, const N: usize>(
-    ops: Ops<S, N>,
-    tape: &mut Gradients,
-    derivative: impl FnOnce(S, FloatTensor<B>) -> [FloatTensor<B>; N],
-) {
-    let gradient = tape.consume::<B>(&ops.node);
-    for (parent, gradient) in ops.parents.into_iter().zip(derivative(ops.state, gradient)) {
-        if let Some(parent) = parent {
-            tape.register::<B>(parent.id, gradient);
+#[cfg(feature = "wgpu")]
+pub use sample::GpuOperation;
+
+#[cfg(feature = "wgpu")]
+use crate::gpu::{self, Kernel};
+
+/// The operations that have kernels on a GPU.
+#[cfg(feature = "wgpu")]
+pub const ON_GPU: &[GpuOperation] = &[
+    activation::gpu::OPERATION,
+    adam::gpu::OPERATION,
+    columns::gpu::OPERATION,
+    image_difference::gpu::OPERATION,
+    lower_bound::gpu::OPERATION,
+    mixture_bits::gpu::OPERATION,
+    neighborhoods::gpu::OPERATION,
+    node_poses::gpu::OPERATION,
+    node_regularizer::gpu::OPERATION,
+    normal_cdf::gpu::OPERATION,
+    plane_query::gpu::OPERATION,
+    significance::gpu::OPERATION,
+    skinning::gpu::OPERATION,
+    splat::gpu::OPERATION,
+    uniform_noise::gpu::OPERATION,
+];
+
+/// Every kernel that the program can launch, on any adapter and with any configuration.
+#[cfg(feature = "wgpu")]
+pub fn kernels() -> Vec<Kernel> {
+    gpu::kernels().into_iter().chain(ON_GPU.iter().flat_map(|operation| (operation.kernels)())).collect()
+}
+
+/// Makes the gradients of an operation's parents from what it saved and from the gradient of its output.
+type Derivative<B, S, const N: usize> = fn(S, FloatTensor<B>) -> [FloatTensor<B>; N];
+
+/// An operation on the tape.
+#[derive(Debug)]
+struct Recorded<B: Backend, S, const N: usize>(Derivative<B, S, N>);
+
+impl<B: Backend, S: Clone + Debug + Send + 'static, const N: usize> Backward<B, N> for Recorded<B, S, N> {
+    type State = S;
+
+    fn backward(self, ops: Ops<S, N>, tape: &mut Gradients, _: &mut Checkpointer) {
+        let gradient = tape.consume::<B>(&ops.node);
+        for (parent, gradient) in ops.parents.into_iter().zip(self.0(ops.state, gradient)) {
+            if let Some(parent) = parent {
+                tape.register::<B>(parent.id, gradient);
+            }
         }
+    }
+}
+
+/// The output of an operation as a tensor on the tape, if one of its parents is on the tape. All parents get a gradient.
+fn recorded<B: Backend, C: CheckpointStrategy, S: Clone + Debug + Send + 'static, const N: usize>(
+    parents: [NodeGuard; N],
+    (output, saved): (FloatTensor<B>, S),
+    derivative: Derivative<B, S, N>,
+) -> FloatTensor<Autodiff<B, C>> {
+    match Recorded::<B, S, N>(derivative).prepare::<C>(parents).compute_bound().stateful() {
+        OpsKind::Tracked(prep) => prep.finish(saved, output),
+        OpsKind::UnTracked(prep) => prep.finish(output),
     }
 }
 
@@ -70,3 +132,43 @@ macro_rules! for_all_back_ends {
 }
 
 use {for_all_back_ends, for_cpu_back_ends};
+
+#[cfg(all(test, feature = "wgpu"))]
+mod tests {
+    use std::collections::HashSet;
+
+    use burn::tensor::Device;
+
+    use super::*;
+
+    #[test]
+    fn every_shader_is_in_the_list_of_kernels_and_no_kernel_twice() {
+        let all = kernels();
+        for shader in light4gs_shaders::ALL {
+            assert!(all.iter().any(|kernel| kernel.name() == shader.name), "{}", shader.name);
+        }
+        let names: HashSet<String> = all.iter().map(Kernel::to_string).collect();
+        assert_eq!(names.len(), all.len());
+    }
+
+    /// Within a share of the largest number: each operation has closer tests of its own.
+    #[test]
+    #[cfg(feature = "flex")]
+    fn a_gpu_computes_what_a_cpu_does() {
+        const SHARE: f32 = 1e-4;
+        let devices = [Device::flex(), Device::wgpu(Default::default())];
+        for operation in ON_GPU {
+            for (sample, call) in operation.samples.iter().enumerate() {
+                let [expected, found] = devices.each_ref().map(call);
+                assert_eq!(expected.len(), found.len(), "{}", operation.name);
+                for (k, (expected, found)) in expected.iter().zip(&found).enumerate() {
+                    let largest = expected.iter::<f32>().fold(0.0, |largest: f32, value| largest.max(value.abs()));
+                    let pairs = expected.iter::<f32>().zip(found.iter::<f32>());
+                    let error = pairs.map(|(expected, found)| (expected - found).abs()).fold(0.0, f32::max);
+                    let case = format!("{}, sample {sample}, tensor {k}", operation.name);
+                    assert!(largest > 0.0 && error <= SHARE * largest, "{case}: {error} of {largest}");
+                }
+            }
+        }
+    }
+}

@@ -5,7 +5,7 @@ use burn::tensor::{Device, Tensor, Transaction};
 use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
+use light4gs_model::ops::uniform_noise::add_uniform_noise;
 use light4gs_model::{GpuError, HexPlaneConfig, PixelContribution, PlaneTensors, Significance, Splatter};
 use light4gs_tests::odd_scenes::dots;
 

@@ -1,5 +1,5 @@
 //! The structure of the sources: a *room* is a folder or file directly under a crate's `src`. Imports between the rooms
-//! of a crate form no circle, and no folder holds more than `MOST_FILES` files.
+//! of a crate form no circle.
 //!
 //! The paths that begin with `crate`, `super` or `self` are read from the sources as text; names that the crate's root
 //! exports again count for the room that they come from. `$crate` in a macro counts for the room of the macro. Unit tests count
@@ -20,65 +20,10 @@ const CRATES: [&str; 7] = [
     "light4gs-c",
 ];
 
-/// How many files a folder may hold.
-const MOST_FILES: usize = 16;
-
-/// The repository's folders.
-const PARTS: [&str; 13] = [
-    ".ci",
-    "docs",
-    "examples",
-    "light4gs-c",
-    "light4gs-codec",
-    "light4gs-data",
-    "light4gs-model",
-    "light4gs-python",
-    "light4gs-render",
-    "light4gs-train",
-    "light4gs-web",
-    "shaders",
-    "tests",
-];
-
-/// Folders that tools create inside of them.
-const NOT_OURS: [&str; 5] = ["target", "node_modules", "corpus", "artifacts", "__pycache__"];
-
-/// A capture as HyperNeRF's program writes it: an image and a camera for each of its 18 frames.
-const LARGE_FOLDERS: [&str; 2] =
-    ["tests/golden/datasets/case12_data_a/hypernerf/camera", "tests/golden/datasets/case12_data_a/hypernerf/rgb/2x"];
-
 #[test]
 fn imports_between_rooms_form_no_circle() {
     let circles: Vec<String> = CRATES.iter().flat_map(|name| circles(&root().join(name).join("src"))).collect();
     assert!(circles.is_empty(), "{}", circles.join("\n"));
-}
-
-#[test]
-fn no_folder_holds_more_files_than_sixteen() {
-    let large: Vec<String> = PARTS.iter().flat_map(|part| large_folders(part)).collect();
-    assert!(large.is_empty(), "more than {MOST_FILES} files:\n{}", large.join("\n"));
-}
-
-/// The folders at and below `folder`, which is named from the repository's root, that hold too many files.
-fn large_folders(folder: &str) -> Vec<String> {
-    if LARGE_FOLDERS.contains(&folder) {
-        return Vec::new();
-    }
-    let mut files = 0;
-    let mut found = Vec::new();
-    for entry in fs::read_dir(root().join(folder)).expect("a folder of the repository") {
-        let entry = entry.expect("an entry");
-        let name = entry.file_name().into_string().expect("UTF-8");
-        if !entry.path().is_dir() {
-            files += 1;
-        } else if !NOT_OURS.contains(&name.as_str()) {
-            found.extend(large_folders(&format!("{folder}/{name}")));
-        }
-    }
-    if files > MOST_FILES {
-        found.push(format!("{folder}: {files} files"));
-    }
-    found
 }
 
 #[test]

@@ -1,27 +1,31 @@
-//! What attributes of Gaussians go through before they are drawn: one kernel on a GPU in each direction, where Burn's own operations,
-//! compositions, take three to ten.
+//! The activations of attributes of Gaussians, as Burn operations: one kernel on a GPU in each direction, where compositions of Burn's
+//! own operations take three to ten.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
+mod cpu;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
+
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension, get_or_init_device_settings};
+use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
 use burn::tensor::Tensor;
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-#[cfg(feature = "wgpu")]
-use burn_wgpu::CubeBackend;
 use light4gs_codec::rendering::MAX_LOGARITHM;
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::{differentiate, for_cpu_back_ends};
-#[cfg(feature = "wgpu")]
-use crate::gpu::{activation_backward_on_gpu, activation_on_gpu};
-pub use crate::kernels::activation::Curve;
-use crate::kernels::activation::bound_reached;
+use super::recorded;
+
+/// A function of one number.
+#[derive(Clone, Copy, Debug)]
+pub enum Curve {
+    /// `1 / (1 + exp(-x))`.
+    Sigmoid,
+    /// `exp(min(x, MAX_LOGARITHM))`.
+    BoundedExponential,
+}
+
+/// A bounded exponential from here on has reached its bound. A little below it, since no two compilers have the same last digit.
+fn bound_reached() -> f32 {
+    0.999 * MAX_LOGARITHM.exp()
+}
 
 /// A back end's gradient. [`ActivationOps`] adds the dispatch and the tape.
 pub trait ActivationKernels: Backend {
@@ -38,90 +42,13 @@ pub trait ActivationOps: Backend {
     fn activation(curve: Curve, tensor: FloatTensor<Self>) -> FloatTensor<Self>;
 }
 
-for_cpu_back_ends! {
-    ActivationOps {
-        fn activation(curve: Curve, tensor: FloatTensor<Self>) -> FloatTensor<Self> {
-            match curve {
-                Curve::Sigmoid => {
-                    Self::float_recip(Self::float_add_scalar(Self::float_exp(Self::float_neg(tensor)), 1.0.into()))
-                }
-                Curve::BoundedExponential => Self::float_exp(Self::float_clamp_max(tensor, MAX_LOGARITHM.into())),
-            }
-        }
-    }
-}
-
-for_cpu_back_ends! {
-    ActivationKernels {
-        fn activation_backward(
-            curve: Curve,
-            values: FloatTensor<Self>,
-            upstream: FloatTensor<Self>,
-        ) -> FloatTensor<Self> {
-            match curve {
-                Curve::Sigmoid => {
-                    let rest = Self::float_add_scalar(Self::float_neg(values.clone()), 1.0.into());
-                    Self::float_mul(upstream, Self::float_mul(values, rest))
-                }
-                Curve::BoundedExponential => {
-                    let bool_type = get_or_init_device_settings::<Self>(&values.device()).bool_dtype;
-                    let bounded = Self::float_greater_equal_elem(values.clone(), bound_reached().into(), bool_type);
-                    Self::float_mask_fill(Self::float_mul(upstream, values), bounded, 0.0.into())
-                }
-            }
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl ActivationOps for CubeBackend {
-    fn activation(curve: Curve, tensor: FloatTensor<Self>) -> FloatTensor<Self> {
-        activation_on_gpu(curve, tensor)
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl ActivationKernels for CubeBackend {
-    fn activation_backward(curve: Curve, values: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
-        activation_backward_on_gpu(curve, values, upstream)
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + ActivationOps> ActivationOps for Fusion<B> {
-    fn activation(curve: Curve, tensor: FloatTensor<Self>) -> FloatTensor<Self> {
-        leaf::<B>(B::activation(curve, resolve::<B>(tensor)))
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + ActivationKernels> ActivationKernels for Fusion<B> {
-    fn activation_backward(curve: Curve, values: FloatTensor<Self>, upstream: FloatTensor<Self>) -> FloatTensor<Self> {
-        leaf::<B>(B::activation_backward(curve, resolve::<B>(values), resolve::<B>(upstream)))
-    }
-}
-
 impl<B: ActivationOps + ActivationKernels, C: CheckpointStrategy> ActivationOps for Autodiff<B, C> {
     fn activation(curve: Curve, tensor: FloatTensor<Self>) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Activated;
-
-        impl<B: ActivationKernels> Backward<B, 1> for Activated {
-            type State = (Curve, FloatTensor<B>);
-
-            fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |(curve, values), gradient| {
-                    [B::activation_backward(curve, values, gradient)]
-                });
-            }
-        }
-
         let node = tensor.node();
         let values = B::activation(curve, tensor.into_primitive());
-        match Activated.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish((curve, values.clone()), values),
-            OpsKind::UnTracked(prep) => prep.finish(values),
-        }
+        recorded::<B, C, _, _>([node], (values.clone(), (curve, values)), |(curve, values), gradient| {
+            [B::activation_backward(curve, values, gradient)]
+        })
     }
 }
 

@@ -1,22 +1,27 @@
 //! The fused Adam step on a GPU.
 
 use burn::backend::TensorMetadata;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn::backend::tensor::FloatTensor;
+use burn::tensor::{Device, TensorData};
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use light4gs_shaders::ADAM;
 
-use super::super::context::{Gpu, buffer_of};
-use super::super::kernel::Kernel;
-use super::super::launch::Launch;
+use super::{AdamOps, AdamStep, AdamTensors, adam_step};
+use crate::gpu::{Gpu, Kernel, Launch, buffer_of};
 use crate::gpu_error::GpuError;
-use crate::kernels::adam::{AdamStep, AdamTensors};
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::{GpuOperation, Numbers};
+
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "adam", kernels, samples: &[sample] };
 
 /// The kernels of this file.
-pub(in crate::gpu) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     vec![ADAM.into()]
 }
 
-fn step_on_gpu(
+fn step_of(
     tensors: AdamTensors<CubeBackend>,
     gradient: CubeTensor,
     step: AdamStep,
@@ -57,11 +62,33 @@ fn step_on_gpu(
     })
 }
 
-/// One step on a wgpu device.
-pub(crate) fn adam_on_gpu(
-    tensors: AdamTensors<CubeBackend>,
-    gradient: CubeTensor,
-    step: AdamStep,
-) -> AdamTensors<CubeBackend> {
-    step_on_gpu(tensors, gradient, step).unwrap_or_else(|error| error.raise())
+impl AdamOps for CubeBackend {
+    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
+        step_of(tensors, gradient, step).unwrap_or_else(|error| error.raise())
+    }
+}
+
+impl<B: FusionBackend + AdamOps> AdamOps for Fusion<B> {
+    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
+        let AdamTensors { parameter, first_moment, second_moment } = tensors;
+        let tensors = AdamTensors {
+            parameter: resolve::<B>(parameter),
+            first_moment: resolve::<B>(first_moment),
+            second_moment: resolve::<B>(second_moment),
+        };
+        let AdamTensors { parameter, first_moment, second_moment } = B::adam(tensors, resolve::<B>(gradient), step);
+        AdamTensors {
+            parameter: leaf::<B>(parameter),
+            first_moment: leaf::<B>(first_moment),
+            second_moment: leaf::<B>(second_moment),
+        }
+    }
+}
+
+fn sample(device: &Device) -> Vec<TensorData> {
+    let mut numbers = Numbers::new(device);
+    let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 3 };
+    let parameter =
+        [numbers.matrix(1, 2600, -1.0, 1.0), numbers.matrix(1, 2600, -0.1, 0.1), numbers.matrix(1, 2600, 0.0, 0.1)];
+    adam_step(parameter, numbers.matrix(1, 2600, -13.0, 13.0), step).map(|tensor| tensor.into_data()).into()
 }

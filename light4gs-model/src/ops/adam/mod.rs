@@ -1,21 +1,50 @@
 //! One fused Adam step for each tensor (Kingma and Ba, 2015), in place where the tensor is not shared.
 
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch, TensorMetadata, backend_extension};
-use burn::tensor::Tensor;
+mod cpu;
 #[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-#[cfg(feature = "wgpu")]
-use burn_wgpu::CubeBackend;
+pub(super) mod gpu;
 
-use super::for_cpu_back_ends;
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::HostBackend;
-use crate::cpu::adam::adam_step as adam_step_on_slices;
-#[cfg(feature = "wgpu")]
-use crate::gpu::adam_on_gpu;
-pub use crate::kernels::adam::{AdamStep, AdamTensors};
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Backend, Dispatch, ExtensionType, backend_extension};
+use burn::tensor::Tensor;
+
+/// Numbers of one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AdamStep {
+    /// Learning rate of this step.
+    pub learning_rate: f32,
+    /// Decay of the first moment.
+    pub beta_1: f64,
+    /// Decay of the second moment.
+    pub beta_2: f64,
+    /// Added to the root of the second moment after bias correction.
+    pub epsilon: f32,
+    /// Steps that this parameter has taken, this one included (so at least 1).
+    pub time: u32,
+}
+
+impl AdamStep {
+    /// Learning rate over the first moment's bias correction.
+    pub(crate) fn corrected_learning_rate(&self) -> f32 {
+        (f64::from(self.learning_rate) / (1.0 - self.beta_1.powi(self.time as i32))) as f32
+    }
+
+    /// Root of the second moment's bias correction.
+    pub(crate) fn root_correction(&self) -> f32 {
+        (1.0 - self.beta_2.powi(self.time as i32)).sqrt() as f32
+    }
+}
+
+/// A parameter with its moments.
+#[derive(ExtensionType)]
+pub struct AdamTensors<B: Backend> {
+    /// The parameter, any shape.
+    pub parameter: FloatTensor<B>,
+    /// First moment, in the parameter's shape.
+    pub first_moment: FloatTensor<B>,
+    /// Second moment, in the parameter's shape.
+    pub second_moment: FloatTensor<B>,
+}
 
 /// The fused step on every back end.
 #[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
@@ -26,59 +55,6 @@ pub trait AdamOps: Backend {
         gradient: FloatTensor<Self>,
         step: AdamStep,
     ) -> AdamTensors<Self>;
-}
-
-fn adam_on_cpu<B: HostBackend>(tensors: AdamTensors<B>, gradient: FloatTensor<B>, step: AdamStep) -> AdamTensors<B> {
-    debug_assert_eq!(tensors.parameter.shape(), gradient.shape());
-    let mut parameter = B::to_host(tensors.parameter);
-    let mut first = B::to_host(tensors.first_moment);
-    let mut second = B::to_host(tensors.second_moment);
-    let gradient = B::to_host(gradient);
-    adam_step_on_slices(
-        parameter.as_mut_slice(),
-        gradient.as_slice(),
-        first.as_mut_slice(),
-        second.as_mut_slice(),
-        step,
-    );
-    AdamTensors {
-        parameter: B::from_host(parameter),
-        first_moment: B::from_host(first),
-        second_moment: B::from_host(second),
-    }
-}
-
-for_cpu_back_ends! {
-    AdamOps {
-        fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-            adam_on_cpu(tensors, gradient, step)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl AdamOps for CubeBackend {
-    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-        adam_on_gpu(tensors, gradient, step)
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + AdamOps> AdamOps for Fusion<B> {
-    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-        let AdamTensors { parameter, first_moment, second_moment } = tensors;
-        let tensors = AdamTensors {
-            parameter: resolve::<B>(parameter),
-            first_moment: resolve::<B>(first_moment),
-            second_moment: resolve::<B>(second_moment),
-        };
-        let AdamTensors { parameter, first_moment, second_moment } = B::adam(tensors, resolve::<B>(gradient), step);
-        AdamTensors {
-            parameter: leaf::<B>(parameter),
-            first_moment: leaf::<B>(first_moment),
-            second_moment: leaf::<B>(second_moment),
-        }
-    }
 }
 
 /// Takes one Adam step on tensors without autodiff; returns parameter, first and second moment.

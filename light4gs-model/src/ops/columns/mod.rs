@@ -1,27 +1,19 @@
 //! Some columns of a matrix, as a Burn operation: the backward pass puts them in their place among zeros in one kernel, where
 //! Burn's slices take two.
 
+mod cpu;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
+
 use std::ops::Range;
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
 use burn::tensor::{Slice, Tensor};
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-#[cfg(feature = "wgpu")]
-use burn_wgpu::CubeBackend;
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::HostBackend;
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-#[cfg(feature = "wgpu")]
-use crate::gpu::place_columns_on_gpu;
+use super::{for_all_back_ends, recorded};
 
 /// A back end's gradient. [`ColumnsOps`] adds the dispatch and the tape.
 pub trait ColumnsKernels: Backend {
@@ -47,64 +39,15 @@ for_all_back_ends! {
     }
 }
 
-fn placed_on_cpu<B: HostBackend>(columns: FloatTensor<B>, first: usize, width: usize) -> FloatTensor<B> {
-    let [rows, count] = columns.shape().dims();
-    let mut placed = vec![0.0; rows * width];
-    if count > 0 {
-        let columns = B::to_host(columns);
-        for (row, own) in placed.chunks_exact_mut(width).zip(columns.as_slice().chunks_exact(count)) {
-            row[first..first + count].copy_from_slice(own);
-        }
-    }
-    B::from_values(placed, [rows, width])
-}
-
-for_cpu_back_ends! {
-    ColumnsKernels {
-        fn place_columns(columns: FloatTensor<Self>, first: usize, width: usize) -> FloatTensor<Self> {
-            placed_on_cpu::<Self>(columns, first, width)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl ColumnsKernels for CubeBackend {
-    fn place_columns(columns: FloatTensor<Self>, first: usize, width: usize) -> FloatTensor<Self> {
-        place_columns_on_gpu(columns, first, width)
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + ColumnsKernels> ColumnsKernels for Fusion<B> {
-    fn place_columns(columns: FloatTensor<Self>, first: usize, width: usize) -> FloatTensor<Self> {
-        leaf::<B>(B::place_columns(resolve::<B>(columns), first, width))
-    }
-}
-
 impl<B: ColumnsOps + ColumnsKernels, C: CheckpointStrategy> ColumnsOps for Autodiff<B, C> {
     fn columns(matrix: FloatTensor<Self>, first: usize, end: usize) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Columns;
-
-        impl<B: ColumnsKernels> Backward<B, 1> for Columns {
-            /// The first column, and the width of the matrix.
-            type State = (usize, usize);
-
-            fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |(first, width), gradient| {
-                    [B::place_columns(gradient, first, width)]
-                });
-            }
-        }
-
         let node = matrix.node();
         let matrix = matrix.into_primitive();
         let width = matrix.shape()[1];
         let columns = B::columns(matrix, first, end);
-        match Columns.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish((first, width), columns),
-            OpsKind::UnTracked(prep) => prep.finish(columns),
-        }
+        recorded::<B, C, _, _>([node], (columns, (first, width)), |(first, width), gradient| {
+            [B::place_columns(gradient, first, width)]
+        })
     }
 }
 
@@ -123,7 +66,7 @@ impl<B: ColumnsOps + ColumnsKernels, C: CheckpointStrategy> ColumnsOps for Autod
 /// ```
 ///
 /// # Panics
-/// If there are not so many columns.
+/// If the matrix has fewer columns than the range asks for.
 pub fn columns(matrix: Tensor<2>, range: Range<usize>) -> Tensor<2> {
     let [_, width] = matrix.dims();
     assert!(range.start <= range.end && range.end <= width, "columns {range:?} of a matrix with {width}");

@@ -1,21 +1,28 @@
 //! The mean difference of two images on a GPU.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
+use burn::tensor::{Device, TensorData};
+use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
 use light4gs_shaders::{IMAGE_DIFFERENCE, IMAGE_DIFFERENCE_BACKWARD, MEAN_OF_SUMS, Shader};
 
-use super::context::{Gpu, buffer_of, first_words};
-use super::kernel::Kernel;
-use super::launch::Launch;
+use super::{Difference, ImageDifferenceKernels, mean_difference};
+use crate::gpu::{Gpu, Kernel, Launch, buffer_of, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::image_difference::{Difference, ImageDifferenceKernels};
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::{GpuOperation, Numbers};
 
 /// Numbers that a workgroup adds up.
 const BLOCK: usize = 4096;
 
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation =
+    GpuOperation { name: "image_difference", kernels, samples: &[sample] };
+
 /// The kernels of this file.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     let of = |difference| [summing(difference), kernel(IMAGE_DIFFERENCE_BACKWARD, difference)];
     [Difference::Absolute, Difference::Squared].into_iter().flat_map(of).chain([MEAN_OF_SUMS.into()]).collect()
 }
@@ -81,4 +88,34 @@ impl ImageDifferenceKernels for CubeBackend {
     ) -> CubeTensor {
         backward(difference, image, truth, upstream).unwrap_or_else(|error| error.raise())
     }
+}
+
+impl<B: FusionBackend + ImageDifferenceKernels> ImageDifferenceKernels for Fusion<B> {
+    fn image_difference_forward(
+        difference: Difference,
+        image: FloatTensor<Self>,
+        truth: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        leaf::<B>(B::image_difference_forward(difference, resolve::<B>(image), resolve::<B>(truth)))
+    }
+
+    fn image_difference_backward(
+        difference: Difference,
+        image: FloatTensor<Self>,
+        truth: FloatTensor<Self>,
+        upstream: FloatTensor<Self>,
+    ) -> FloatTensor<Self> {
+        let [image, truth, upstream] = [image, truth, upstream].map(resolve::<B>);
+        leaf::<B>(B::image_difference_backward(difference, image, truth, upstream))
+    }
+}
+
+fn sample(device: &Device) -> Vec<TensorData> {
+    let mut numbers = Numbers::new(&device.clone().autodiff());
+    let (image, truth) = (numbers.leaf(2, 4000, -1.0, 1.0), numbers.matrix(2, 4000, -1.0, 1.0));
+    let mut of = |difference| {
+        let mean = mean_difference(difference, image.clone(), truth.clone());
+        numbers.with_gradients(mean, std::slice::from_ref(&image))
+    };
+    [of(Difference::Absolute), of(Difference::Squared)].concat()
 }

@@ -1,22 +1,64 @@
 //! The mean difference of an image and the truth, as a Burn operation: one pass over the pixels in each direction, where a
 //! composition takes several.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
-use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
-use burn::tensor::Tensor;
+mod cpu;
 #[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
+pub(super) mod gpu;
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::HostBackend;
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::image_difference::{gradient, mean};
-pub use crate::kernels::image_difference::{Difference, ImageDifferenceKernels};
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
+use burn::tensor::Tensor;
+
+use super::{for_all_back_ends, recorded};
+
+/// A kind of difference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Difference {
+    /// Absolute differences (L1).
+    Absolute,
+    /// Squared differences (L2).
+    Squared,
+}
+
+impl Difference {
+    /// Of two numbers that differ by this.
+    fn of(self, difference: f32) -> f32 {
+        match self {
+            Self::Absolute => difference.abs(),
+            Self::Squared => difference * difference,
+        }
+    }
+
+    /// Its slope there; 0 where two numbers are the same.
+    fn slope(self, difference: f32) -> f32 {
+        match self {
+            Self::Absolute if difference == 0.0 => 0.0,
+            // NaN keeps its sign bit and stays NaN.
+            Self::Absolute if difference.is_nan() => difference,
+            Self::Absolute => difference.signum(),
+            Self::Squared => 2.0 * difference,
+        }
+    }
+}
+
+/// A back end's kernels. [`ImageDifferenceOps`] adds the dispatch and the tape.
+pub trait ImageDifferenceKernels: Backend {
+    /// The mean `[1]` over all numbers of two images of the same shape.
+    fn image_difference_forward(
+        difference: Difference,
+        image: FloatTensor<Self>,
+        truth: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+
+    /// The gradient of the image from that of the mean `[1]`.
+    fn image_difference_backward(
+        difference: Difference,
+        image: FloatTensor<Self>,
+        truth: FloatTensor<Self>,
+        upstream: FloatTensor<Self>,
+    ) -> FloatTensor<Self>;
+}
 
 /// The mean on every back end that has [`ImageDifferenceKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -49,88 +91,12 @@ impl<B: ImageDifferenceOps + ImageDifferenceKernels, C: CheckpointStrategy> Imag
         image: FloatTensor<Self>,
         truth: FloatTensor<Self>,
     ) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct ImageDifference;
-
-        impl<B: ImageDifferenceKernels> Backward<B, 1> for ImageDifference {
-            type State = (Difference, FloatTensor<B>, FloatTensor<B>);
-
-            fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |(difference, image, truth), upstream| {
-                    [B::image_difference_backward(difference, image, truth, upstream)]
-                });
-            }
-        }
-
         let node = image.node();
         let (image, truth) = (image.into_primitive(), truth.into_primitive());
         let mean = B::image_difference_forward(difference, image.clone(), truth.clone());
-        match ImageDifference.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish((difference, image, truth), mean),
-            OpsKind::UnTracked(prep) => prep.finish(mean),
-        }
-    }
-}
-
-fn forward_on_cpu<B: HostBackend>(
-    difference: Difference,
-    image: FloatTensor<B>,
-    truth: FloatTensor<B>,
-) -> FloatTensor<B> {
-    let (image, truth) = (B::to_host(image), B::to_host(truth));
-    B::from_values(vec![mean(difference, image.as_slice(), truth.as_slice())], [1])
-}
-
-fn backward_on_cpu<B: HostBackend>(
-    difference: Difference,
-    image: FloatTensor<B>,
-    truth: FloatTensor<B>,
-    upstream: FloatTensor<B>,
-) -> FloatTensor<B> {
-    let shape = image.shape();
-    let [image, truth, upstream] = [image, truth, upstream].map(B::to_host);
-    B::from_values(gradient(difference, image.as_slice(), truth.as_slice(), upstream.as_slice()[0]), shape)
-}
-
-for_cpu_back_ends! {
-    ImageDifferenceKernels {
-        fn image_difference_forward(
-            difference: Difference,
-            image: FloatTensor<Self>,
-            truth: FloatTensor<Self>,
-        ) -> FloatTensor<Self> {
-            forward_on_cpu::<Self>(difference, image, truth)
-        }
-
-        fn image_difference_backward(
-            difference: Difference,
-            image: FloatTensor<Self>,
-            truth: FloatTensor<Self>,
-            upstream: FloatTensor<Self>,
-        ) -> FloatTensor<Self> {
-            backward_on_cpu::<Self>(difference, image, truth, upstream)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + ImageDifferenceKernels> ImageDifferenceKernels for Fusion<B> {
-    fn image_difference_forward(
-        difference: Difference,
-        image: FloatTensor<Self>,
-        truth: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        leaf::<B>(B::image_difference_forward(difference, resolve::<B>(image), resolve::<B>(truth)))
-    }
-
-    fn image_difference_backward(
-        difference: Difference,
-        image: FloatTensor<Self>,
-        truth: FloatTensor<Self>,
-        upstream: FloatTensor<Self>,
-    ) -> FloatTensor<Self> {
-        let [image, truth, upstream] = [image, truth, upstream].map(resolve::<B>);
-        leaf::<B>(B::image_difference_backward(difference, image, truth, upstream))
+        recorded::<B, C, _, _>([node], (mean, (difference, image, truth)), |(difference, image, truth), upstream| {
+            [B::image_difference_backward(difference, image, truth, upstream)]
+        })
     }
 }
 

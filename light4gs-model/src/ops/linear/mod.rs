@@ -4,30 +4,19 @@
 //! few tiles of results, in each of which a GPU takes ten thousand steps one after the other (6 ms a layer on an H100, where forward
 //! takes 0.03). So on a GPU it is split into parts, which are added up; the gradient of the bias likewise.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
+mod cpu;
+#[cfg(feature = "wgpu")]
+mod gpu;
+
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, TensorMetadata, backend_extension};
 use burn::nn::Linear;
-#[cfg(feature = "wgpu")]
-use burn::tensor::Slice;
 use burn::tensor::{Shape, Tensor};
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-#[cfg(feature = "wgpu")]
-use burn_wgpu::CubeBackend;
 
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
+use super::{for_all_back_ends, recorded};
 
-/// Rows of a part, unless there are so many parts then that adding them up takes longer than they save.
-#[cfg(feature = "wgpu")]
-const PART: usize = 128;
-#[cfg(feature = "wgpu")]
-const MOST_PARTS: usize = 256;
-
-/// The differentiable inputs, or their gradients, in the order that gradients are registered in.
+/// The differentiable inputs, or their gradients, in the order in which gradients are registered.
 #[derive(ExtensionType)]
 pub struct LinearTensors<B: Backend> {
     /// `[N, I]`.
@@ -78,39 +67,6 @@ fn sums_over_rows<B: Backend>(a: FloatTensor<B>, b: FloatTensor<B>) -> [FloatTen
     [B::float_matmul(B::float_transpose(a), b), of_bias]
 }
 
-/// The same, part by part.
-#[cfg(feature = "wgpu")]
-fn sums_over_parts<B: Backend>(a: FloatTensor<B>, b: FloatTensor<B>) -> [FloatTensor<B>; 2] {
-    let (count, inputs, outputs) = (a.shape()[0], a.shape()[1], b.shape()[1]);
-    let part = count.div_ceil(MOST_PARTS).max(PART);
-    let parts = count / part;
-    if parts < 2 {
-        return sums_over_rows::<B>(a, b);
-    }
-    let rows = |tensor: &FloatTensor<B>, from: usize, to: usize| {
-        if to - from == count {
-            return tensor.clone();
-        }
-        B::float_slice(tensor.clone(), &[Slice::from(from..to), Slice::from(0..tensor.shape()[1])])
-    };
-    let whole = parts * part;
-    let in_parts = |tensor: &FloatTensor<B>, columns| {
-        B::float_reshape(rows(tensor, 0, whole), Shape::from([parts, part, columns]))
-    };
-    let (a_in_parts, b_in_parts) = (in_parts(&a, inputs), in_parts(&b, outputs));
-    let of_bias = B::float_sum_dim(B::float_sum_dim(b_in_parts.clone(), 1), 0);
-    let of_weight = B::float_sum_dim(B::float_matmul(B::float_transpose(a_in_parts), b_in_parts), 0);
-    let sums = [
-        B::float_reshape(of_weight, Shape::from([inputs, outputs])),
-        B::float_reshape(of_bias, Shape::from([outputs])),
-    ];
-    if whole == count {
-        return sums;
-    }
-    let mut rest = sums_over_rows::<B>(rows(&a, whole, count), rows(&b, whole, count)).into_iter();
-    sums.map(|sum| B::float_add(sum, rest.next().expect("two sums")))
-}
-
 fn backward<B: Backend>(
     input: FloatTensor<B>,
     weight: FloatTensor<B>,
@@ -135,65 +91,16 @@ for_all_back_ends! {
     }
 }
 
-for_cpu_back_ends! {
-    LinearKernels {
-        fn linear_backward(
-            input: FloatTensor<Self>,
-            weight: FloatTensor<Self>,
-            gradient: FloatTensor<Self>,
-        ) -> [FloatTensor<Self>; 3] {
-            backward::<Self>(input, weight, gradient, sums_over_rows::<Self>)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl LinearKernels for CubeBackend {
-    fn linear_backward(
-        input: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-    ) -> [FloatTensor<Self>; 3] {
-        backward::<Self>(input, weight, gradient, sums_over_parts::<Self>)
-    }
-}
-
-/// A fusion stream fuses these operations without our help.
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend> LinearKernels for Fusion<B> {
-    fn linear_backward(
-        input: FloatTensor<Self>,
-        weight: FloatTensor<Self>,
-        gradient: FloatTensor<Self>,
-    ) -> [FloatTensor<Self>; 3] {
-        backward::<Self>(input, weight, gradient, sums_over_parts::<Self>)
-    }
-}
-
 impl<B: LinearOps + LinearKernels, C: CheckpointStrategy> LinearOps for Autodiff<B, C> {
     fn linear_layer(tensors: LinearTensors<Self>) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Layer;
-
-        impl<B: LinearKernels> Backward<B, 3> for Layer {
-            type State = [FloatTensor<B>; 2];
-
-            fn backward(self, ops: Ops<Self::State, 3>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |[input, weight], gradient| {
-                    B::linear_backward(input, weight, gradient)
-                });
-            }
-        }
-
         let tensors = [tensors.input, tensors.weight, tensors.bias];
         let nodes = tensors.each_ref().map(|tensor| tensor.node());
         let [input, weight, bias] = tensors.map(|tensor| tensor.into_primitive());
         let saved = [input.clone(), weight.clone()];
         let output = B::linear_layer(LinearTensors { input, weight, bias });
-        match Layer.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(saved, output),
-            OpsKind::UnTracked(prep) => prep.finish(output),
-        }
+        recorded::<B, C, _, _>(nodes, (output, saved), |[input, weight], gradient| {
+            B::linear_backward(input, weight, gradient)
+        })
     }
 }
 

@@ -4,22 +4,17 @@
 //! Here the gradient also passes below the bound if a descent step increases x. That depends on the sign of the
 //! incoming gradient, which no composition of ordinary operations can express; so it is a custom operation.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
+mod cpu;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
+
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::ops::FloatTensorOps;
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension, get_or_init_device_settings};
 use burn::tensor::Tensor;
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-#[cfg(feature = "wgpu")]
-use burn_wgpu::CubeBackend;
 
-use super::{for_all_back_ends, for_cpu_back_ends};
-#[cfg(feature = "wgpu")]
-use crate::gpu::lower_bound_backward_on_gpu;
+use super::{for_all_back_ends, recorded};
 
 /// A back end's gradient. [`LowerBoundOps`] adds the dispatch and the tape.
 pub trait LowerBoundKernels: Backend {
@@ -44,26 +39,6 @@ for_all_back_ends! {
     }
 }
 
-for_cpu_back_ends! {
-    LowerBoundKernels {
-        fn lower_bound_backward(
-            tensor: FloatTensor<Self>,
-            upstream: FloatTensor<Self>,
-            bound: f32,
-        ) -> FloatTensor<Self> {
-            masked_gradient::<Self>(tensor, upstream, bound)
-        }
-    }
-}
-
-/// A fusion stream fuses these operations without our help.
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend> LowerBoundKernels for Fusion<B> {
-    fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        masked_gradient::<Self>(tensor, upstream, bound)
-    }
-}
-
 fn masked_gradient<B: Backend>(tensor: FloatTensor<B>, upstream: FloatTensor<B>, bound: f32) -> FloatTensor<B> {
     let bool_type = get_or_init_device_settings::<B>(&tensor.device()).bool_dtype;
     let below = B::float_lower_elem(tensor, bound.into(), bool_type);
@@ -71,37 +46,14 @@ fn masked_gradient<B: Backend>(tensor: FloatTensor<B>, upstream: FloatTensor<B>,
     B::float_mask_fill(upstream, B::bool_and(below, decreasing), 0f32.into())
 }
 
-#[cfg(feature = "wgpu")]
-impl LowerBoundKernels for CubeBackend {
-    fn lower_bound_backward(tensor: FloatTensor<Self>, upstream: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        lower_bound_backward_on_gpu(tensor, upstream, bound)
-    }
-}
-
 impl<B: LowerBoundOps + LowerBoundKernels, C: CheckpointStrategy> LowerBoundOps for Autodiff<B, C> {
     fn lower_bound(tensor: FloatTensor<Self>, bound: f32) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct LowerBound;
-
-        impl<B: LowerBoundKernels> Backward<B, 1> for LowerBound {
-            type State = (FloatTensor<B>, f32);
-
-            fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-                let gradient = grads.consume::<B>(&ops.node);
-                let (tensor, bound) = ops.state;
-                if let [Some(node)] = ops.parents {
-                    grads.register::<B>(node.id, B::lower_bound_backward(tensor, gradient, bound));
-                }
-            }
-        }
-
         let node = tensor.node();
         let tensor = tensor.into_primitive();
         let bounded = B::lower_bound(tensor.clone(), bound);
-        match LowerBound.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish((tensor, bound), bounded),
-            OpsKind::UnTracked(prep) => prep.finish(bounded),
-        }
+        recorded::<B, C, _, _>([node], (bounded, (tensor, bound)), |(tensor, bound), gradient| {
+            [B::lower_bound_backward(tensor, gradient, bound)]
+        })
     }
 }
 

@@ -12,35 +12,38 @@
 
 use std::f64::consts::LOG2_E;
 
+use burn::backend::tensor::FloatTensor;
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use crate::kernels::mixture_bits::MOST_COMPONENTS;
+use super::{INPUTS, MOST_COMPONENTS, MixtureBitsKernels, MixtureTensors};
+use crate::ops::for_cpu_back_ends;
+use crate::ops::host::{HostBackend, HostTensor};
 
 type Block = [f32; LANES];
 
 /// The inputs, row by row.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct MixtureSlices<'a> {
+struct MixtureSlices<'a> {
     /// `[C, N]`
-    pub(crate) values: &'a [f32],
+    values: &'a [f32],
     /// `[C]`
-    pub(crate) widths: &'a [f32],
+    widths: &'a [f32],
     /// `[C, K]`
-    pub(crate) weight_logits: &'a [f32],
+    weight_logits: &'a [f32],
     /// `[C, K]`
-    pub(crate) means: &'a [f32],
+    means: &'a [f32],
     /// `[C, K]`
-    pub(crate) log_scales: &'a [f32],
+    log_scales: &'a [f32],
 }
 
 /// Gradients of [`MixtureSlices`].
-pub(crate) struct MixtureGradients {
-    pub(crate) values: Vec<f32>,
-    pub(crate) widths: Vec<f32>,
-    pub(crate) weight_logits: Vec<f32>,
-    pub(crate) means: Vec<f32>,
-    pub(crate) log_scales: Vec<f32>,
+struct MixtureGradients {
+    values: Vec<f32>,
+    widths: Vec<f32>,
+    weight_logits: Vec<f32>,
+    means: Vec<f32>,
+    log_scales: Vec<f32>,
 }
 
 /// A logistic, and the interval's width as it sees it.
@@ -186,7 +189,7 @@ impl LaneKernel for BitsOfChannel<'_> {
 }
 
 /// Bits of each channel.
-pub(crate) fn mixture_bits(inputs: &MixtureSlices, bound: f32) -> Vec<f32> {
+fn bits_of_slices(inputs: &MixtureSlices, bound: f32) -> Vec<f32> {
     let of_channel = |channel| {
         dispatch(BitsOfChannel { mixture: inputs.mixture(channel), values: inputs.values_of(channel), bound })
     };
@@ -254,7 +257,7 @@ impl LaneKernel for GradientsOfChannel<'_> {
 }
 
 /// Gradients from those of the channels' bits.
-pub(crate) fn mixture_bits_backward(inputs: &MixtureSlices, bound: f32, upstream: &[f32]) -> MixtureGradients {
+fn mixture_bits_backward(inputs: &MixtureSlices, bound: f32, upstream: &[f32]) -> MixtureGradients {
     let count = inputs.values.len() / inputs.channels().max(1);
     let mut of_values = vec![0.0; inputs.values.len()];
     let mut sums: Vec<Sums> = of_values
@@ -283,5 +286,57 @@ pub(crate) fn mixture_bits_backward(inputs: &MixtureSlices, bound: f32, upstream
         means: all(|sums| &sums.means),
         log_scales: all(|sums| &sums.log_scales),
         values: of_values,
+    }
+}
+
+/// Inputs of the CPU back ends.
+#[derive(Clone, Debug)]
+pub struct CpuInputs {
+    inputs: [HostTensor; INPUTS],
+    bound: f32,
+}
+
+impl CpuInputs {
+    fn slices(&self) -> MixtureSlices<'_> {
+        let [values, widths, weight_logits, means, log_scales] = self.inputs.each_ref().map(HostTensor::as_slice);
+        MixtureSlices { values, widths, weight_logits, means, log_scales }
+    }
+}
+
+fn forward_on_cpu<B: HostBackend>(tensors: MixtureTensors<B>, bound: f32) -> (FloatTensor<B>, CpuInputs) {
+    let inputs = CpuInputs { inputs: tensors.into_array().map(B::to_host), bound };
+    let bits = bits_of_slices(&inputs.slices(), bound);
+    let channels = bits.len();
+    (B::from_values(bits, [channels]), inputs)
+}
+
+fn backward_on_cpu<B: HostBackend>(inputs: &CpuInputs, gradient: FloatTensor<B>) -> MixtureTensors<B> {
+    let upstream = B::to_host(gradient);
+    let channels = upstream.as_slice().len();
+    let gradients = mixture_bits_backward(&inputs.slices(), inputs.bound, upstream.as_slice());
+    let matrix = |values: Vec<f32>| {
+        let columns = values.len() / channels.max(1);
+        B::from_values(values, [channels, columns])
+    };
+    MixtureTensors {
+        values: matrix(gradients.values),
+        widths: matrix(gradients.widths),
+        weight_logits: matrix(gradients.weight_logits),
+        means: matrix(gradients.means),
+        log_scales: matrix(gradients.log_scales),
+    }
+}
+
+for_cpu_back_ends! {
+    MixtureBitsKernels {
+        type Inputs = CpuInputs;
+
+        fn mixture_bits_forward(tensors: MixtureTensors<Self>, bound: f32) -> (FloatTensor<Self>, CpuInputs) {
+            forward_on_cpu(tensors, bound)
+        }
+
+        fn mixture_bits_backward(inputs: CpuInputs, gradient: FloatTensor<Self>) -> MixtureTensors<Self> {
+            backward_on_cpu(&inputs, gradient)
+        }
     }
 }

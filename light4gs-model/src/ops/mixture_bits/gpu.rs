@@ -1,20 +1,25 @@
 //! Bits under mixtures of logistics on a GPU.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn::tensor::{Device, TensorData};
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
 use light4gs_shaders::{MIXTURE_BITS, MIXTURE_BITS_BACKWARD, Shader};
 
-use super::super::context::{Gpu, Places, buffer_of, first_words};
-use super::super::kernel::Kernel;
-use super::super::launch::Launch;
+use super::{INPUTS, MOST_COMPONENTS, MixtureBitsKernels, MixtureInputs, MixtureTensors, mixture_bits};
+use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::mixture_bits::{INPUTS, MOST_COMPONENTS, MixtureBitsKernels, MixtureTensors};
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::{GpuOperation, Numbers};
+
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "mixture_bits", kernels, samples: &[sample] };
 
 /// The kernels of this file, for every number of logistics.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     let of_all = |components| [MIXTURE_BITS, MIXTURE_BITS_BACKWARD].map(|shader| kernel(shader, components));
     (1..=MOST_COMPONENTS).flat_map(of_all).collect()
 }
@@ -90,4 +95,33 @@ impl MixtureBitsKernels for CubeBackend {
     fn mixture_bits_backward(inputs: GpuInputs, gradient: CubeTensor) -> MixtureTensors<Self> {
         backward(&inputs, gradient).unwrap_or_else(|error| error.raise())
     }
+}
+
+impl<B: FusionBackend + MixtureBitsKernels> MixtureBitsKernels for Fusion<B> {
+    type Inputs = B::Inputs;
+
+    fn mixture_bits_forward(tensors: MixtureTensors<Self>, bound: f32) -> (FloatTensor<Self>, B::Inputs) {
+        let tensors = MixtureTensors::from_array(tensors.into_array().map(resolve::<B>));
+        let (bits, inputs) = B::mixture_bits_forward(tensors, bound);
+        (leaf::<B>(bits), inputs)
+    }
+
+    fn mixture_bits_backward(inputs: B::Inputs, gradient: FloatTensor<Self>) -> MixtureTensors<Self> {
+        let gradients = B::mixture_bits_backward(inputs, resolve::<B>(gradient));
+        MixtureTensors::from_array(gradients.into_array().map(leaf::<B>))
+    }
+}
+
+fn sample(device: &Device) -> Vec<TensorData> {
+    let mut numbers = Numbers::new(&device.clone().autodiff());
+    let (channels, components) = (9, 3);
+    let [values, widths] = [numbers.leaf(channels, 500, -2.0, 2.0), numbers.leaf(channels, 1, 0.01, 0.5)];
+    let [weight_logits, means, log_scales] = [
+        numbers.leaf(channels, components, -1.0, 1.0),
+        numbers.leaf(channels, components, -0.5, 0.5),
+        numbers.leaf(channels, components, -3.0, 0.0),
+    ];
+    let leaves = [&values, &widths, &weight_logits, &means, &log_scales].map(Clone::clone);
+    numbers
+        .with_gradients(mixture_bits(MixtureInputs { values, widths, weight_logits, means, log_scales }, 1e-9), &leaves)
 }

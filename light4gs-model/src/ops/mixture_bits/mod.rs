@@ -1,23 +1,62 @@
 //! Bits of values under mixtures of logistics, as a Burn operation: one pass over the values in place of some forty, each of which
 //! reads and writes `[C, K, N]` numbers.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
-use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
-use burn::tensor::Tensor;
+mod cpu;
 #[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
+pub(super) mod gpu;
 
-#[cfg(feature = "wgpu")]
-use super::super::fusion::{leaf, resolve};
-use super::super::host::{HostBackend, HostTensor};
-use super::super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::mixture_bits::{MixtureSlices, mixture_bits as bits_of_slices, mixture_bits_backward};
-use crate::kernels::mixture_bits::INPUTS;
-pub use crate::kernels::mixture_bits::{MOST_COMPONENTS, MixtureBitsKernels, MixtureTensors};
+use std::fmt::Debug;
+
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
+use burn::tensor::Tensor;
+
+use super::{for_all_back_ends, recorded};
+
+/// Most logistics of a mixture.
+pub const MOST_COMPONENTS: usize = 4;
+
+/// The differentiable inputs, or their gradients, in the order in which gradients are registered.
+#[derive(Clone, Debug, ExtensionType)]
+pub struct MixtureTensors<B: Backend> {
+    /// `[C, N]`.
+    pub values: FloatTensor<B>,
+    /// `[C, 1]`: widths of the intervals around the values of a channel.
+    pub widths: FloatTensor<B>,
+    /// `[C, K]`, through softmax.
+    pub weight_logits: FloatTensor<B>,
+    /// `[C, K]`, in the units of the values.
+    pub means: FloatTensor<B>,
+    /// `[C, K]`, natural logarithms.
+    pub log_scales: FloatTensor<B>,
+}
+
+/// Tensors of [`MixtureTensors`].
+const INPUTS: usize = 5;
+
+impl<B: Backend> MixtureTensors<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.values, self.widths, self.weight_logits, self.means, self.log_scales]
+    }
+
+    fn from_array([values, widths, weight_logits, means, log_scales]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { values, widths, weight_logits, means, log_scales }
+    }
+}
+
+/// A back end's kernels. [`MixtureBitsOps`] adds the dispatch and the tape.
+pub trait MixtureBitsKernels: Backend {
+    /// What the backward pass needs from the forward pass.
+    type Inputs: Clone + Debug + Send + 'static;
+
+    /// Bits of each channel `[C]`. Likelihoods below `bound` are raised to it.
+    fn mixture_bits_forward(tensors: MixtureTensors<Self>, bound: f32) -> (FloatTensor<Self>, Self::Inputs);
+
+    /// Gradients of all inputs from that of the bits `[C]`; below the bound, that of
+    /// [`lower_bound`](crate::ops::lower_bound::lower_bound).
+    fn mixture_bits_backward(inputs: Self::Inputs, gradient: FloatTensor<Self>) -> MixtureTensors<Self>;
+}
 
 /// The bits on every back end that has [`MixtureBitsKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -38,95 +77,12 @@ for_all_back_ends! {
 
 impl<B: MixtureBitsOps + MixtureBitsKernels, C: CheckpointStrategy> MixtureBitsOps for Autodiff<B, C> {
     fn mixture_bits(tensors: MixtureTensors<Self>, bound: f32) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct MixtureBits;
-
-        impl<B: MixtureBitsKernels> Backward<B, INPUTS> for MixtureBits {
-            type State = B::Inputs;
-
-            fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |inputs, gradient| {
-                    B::mixture_bits_backward(inputs, gradient).into_array()
-                });
-            }
-        }
-
         let tensors = tensors.into_array();
         let nodes = tensors.each_ref().map(|tensor| tensor.node());
         let inner = MixtureTensors::from_array(tensors.map(|tensor| tensor.into_primitive()));
-        let (bits, inputs) = B::mixture_bits_forward(inner, bound);
-        match MixtureBits.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(inputs, bits),
-            OpsKind::UnTracked(prep) => prep.finish(bits),
-        }
-    }
-}
-
-/// Inputs of the CPU back ends.
-#[derive(Clone, Debug)]
-pub struct CpuInputs {
-    inputs: [HostTensor; INPUTS],
-    bound: f32,
-}
-
-impl CpuInputs {
-    fn slices(&self) -> MixtureSlices<'_> {
-        let [values, widths, weight_logits, means, log_scales] = self.inputs.each_ref().map(HostTensor::as_slice);
-        MixtureSlices { values, widths, weight_logits, means, log_scales }
-    }
-}
-
-fn forward_on_cpu<B: HostBackend>(tensors: MixtureTensors<B>, bound: f32) -> (FloatTensor<B>, CpuInputs) {
-    let inputs = CpuInputs { inputs: tensors.into_array().map(B::to_host), bound };
-    let bits = bits_of_slices(&inputs.slices(), bound);
-    let channels = bits.len();
-    (B::from_values(bits, [channels]), inputs)
-}
-
-fn backward_on_cpu<B: HostBackend>(inputs: &CpuInputs, gradient: FloatTensor<B>) -> MixtureTensors<B> {
-    let upstream = B::to_host(gradient);
-    let channels = upstream.as_slice().len();
-    let gradients = mixture_bits_backward(&inputs.slices(), inputs.bound, upstream.as_slice());
-    let matrix = |values: Vec<f32>| {
-        let columns = values.len() / channels.max(1);
-        B::from_values(values, [channels, columns])
-    };
-    MixtureTensors {
-        values: matrix(gradients.values),
-        widths: matrix(gradients.widths),
-        weight_logits: matrix(gradients.weight_logits),
-        means: matrix(gradients.means),
-        log_scales: matrix(gradients.log_scales),
-    }
-}
-
-for_cpu_back_ends! {
-    MixtureBitsKernels {
-        type Inputs = CpuInputs;
-
-        fn mixture_bits_forward(tensors: MixtureTensors<Self>, bound: f32) -> (FloatTensor<Self>, CpuInputs) {
-            forward_on_cpu(tensors, bound)
-        }
-
-        fn mixture_bits_backward(inputs: CpuInputs, gradient: FloatTensor<Self>) -> MixtureTensors<Self> {
-            backward_on_cpu(&inputs, gradient)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + MixtureBitsKernels> MixtureBitsKernels for Fusion<B> {
-    type Inputs = B::Inputs;
-
-    fn mixture_bits_forward(tensors: MixtureTensors<Self>, bound: f32) -> (FloatTensor<Self>, B::Inputs) {
-        let tensors = MixtureTensors::from_array(tensors.into_array().map(resolve::<B>));
-        let (bits, inputs) = B::mixture_bits_forward(tensors, bound);
-        (leaf::<B>(bits), inputs)
-    }
-
-    fn mixture_bits_backward(inputs: B::Inputs, gradient: FloatTensor<Self>) -> MixtureTensors<Self> {
-        let gradients = B::mixture_bits_backward(inputs, resolve::<B>(gradient));
-        MixtureTensors::from_array(gradients.into_array().map(leaf::<B>))
+        recorded::<B, C, _, _>(nodes, B::mixture_bits_forward(inner, bound), |inputs, gradient| {
+            B::mixture_bits_backward(inputs, gradient).into_array()
+        })
     }
 }
 
@@ -150,7 +106,7 @@ pub struct MixtureInputs {
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
+/// use light4gs_model::ops::mixture_bits::{MixtureInputs, mixture_bits};
 ///
 /// let device = Device::flex();
 /// let zeros = Tensor::<2>::zeros([1, 1], &device);

@@ -1,15 +1,19 @@
-//! What rows of a table and their neighbors say, and the derivative.
+//! Rows of a table and their neighbors, and the derivative.
 
+use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use light4gs_codec::attributes::NEIGHBORS;
 use rayon::prelude::*;
 
-use crate::kernels::neighborhoods::Chosen;
+use super::{Chosen, Neighborhoods, NeighborhoodsKernels};
+use crate::ops::for_cpu_back_ends;
+use crate::ops::host::HostBackend;
 
 /// Rows of the table that a parallel task of the backward pass adds up.
 const CHUNK: usize = 256;
 
 /// `[3 C, M]` of a table `[N, C]`.
-pub(crate) fn forward(table: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
+fn forward(table: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
     let count = chosen.len();
     let (rows, neighbors) = chosen.rows.split_at(count);
     let (neighbors, _) = neighbors.as_chunks::<NEIGHBORS>();
@@ -29,7 +33,7 @@ pub(crate) fn forward(table: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32
 }
 
 /// The gradient of the table `[N, C]` from that of the result. Every number adds up those of its places in their order.
-pub(crate) fn backward(gradient: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
+fn backward(gradient: &[f32], columns: usize, chosen: &Chosen) -> Vec<f32> {
     let count = chosen.len();
     let places = chosen.places();
     let mut sums = vec![0.0; chosen.count * columns];
@@ -53,4 +57,28 @@ pub(crate) fn backward(gradient: &[f32], columns: usize, chosen: &Chosen) -> Vec
         }
     });
     sums
+}
+
+fn forward_on_cpu<B: HostBackend>(table: FloatTensor<B>, chosen: &Neighborhoods) -> FloatTensor<B> {
+    let columns = table.shape()[1];
+    let result = forward(B::to_host(table).as_slice(), columns, &chosen.0);
+    B::from_values(result, [3 * columns, chosen.0.len()])
+}
+
+fn backward_on_cpu<B: HostBackend>(chosen: &Neighborhoods, gradient: FloatTensor<B>) -> FloatTensor<B> {
+    let columns = gradient.shape()[0] / 3;
+    let sums = backward(B::to_host(gradient).as_slice(), columns, &chosen.0);
+    B::from_values(sums, [chosen.0.count, columns])
+}
+
+for_cpu_back_ends! {
+    NeighborhoodsKernels {
+        fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
+            forward_on_<Self>(table, chosen)
+        }
+
+        fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
+            backward_on_<Self>(chosen, gradient)
+        }
+    }
 }

@@ -1,22 +1,27 @@
-//! What rows of a table and their neighbors say, on a GPU.
+//! Rows of a table and their neighbors, on a GPU.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn::tensor::{Device, TensorData};
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::device::DeviceId;
 use cubecl::server::Handle;
 use light4gs_codec::attributes::NEIGHBORS;
 use light4gs_shaders::{NEIGHBORHOODS, NEIGHBORHOODS_BACKWARD};
 
-use super::super::context::{Gpu, Places, buffer_of, first_words};
-use super::super::kernel::Kernel;
-use super::super::launch::Launch;
+use super::{Chosen, Neighborhoods, NeighborhoodsKernels, neighborhoods};
+use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::neighborhoods::{Chosen, Neighborhoods, NeighborhoodsKernels};
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::{GpuOperation, Numbers};
+
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "neighborhoods", kernels, samples: &[sample] };
 
 /// The kernels of this file.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     [NEIGHBORHOODS, NEIGHBORHOODS_BACKWARD].map(Kernel::new).into()
 }
 
@@ -91,4 +96,23 @@ impl NeighborhoodsKernels for CubeBackend {
     fn neighborhoods_backward(chosen: &Neighborhoods, gradient: CubeTensor) -> CubeTensor {
         backward(chosen, gradient).unwrap_or_else(|error| error.raise())
     }
+}
+
+impl<B: FusionBackend + NeighborhoodsKernels> NeighborhoodsKernels for Fusion<B> {
+    fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
+        leaf::<B>(B::neighborhoods_forward(resolve::<B>(table), chosen))
+    }
+
+    fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
+        leaf::<B>(B::neighborhoods_backward(chosen, resolve::<B>(gradient)))
+    }
+}
+
+/// Some rows are chosen several times.
+fn sample(device: &Device) -> Vec<TensorData> {
+    let mut numbers = Numbers::new(&device.clone().autodiff());
+    let table = numbers.leaf(321, 3, -2.0, 2.0);
+    let rows: Vec<u32> = (0..500).map(|place| place * place % 321).collect();
+    let neighbors: Vec<_> = rows.iter().map(|row| [row / 2, row / 3, row / 3, row / 5]).collect();
+    numbers.with_gradients(neighborhoods(table.clone(), Neighborhoods::new(&rows, &neighbors, 321)), &[table])
 }

@@ -1,26 +1,103 @@
-//! What some rows of a table are predicted from, as a Burn operation: their own numbers and those of their neighbors.
+//! Rows of a table and their neighbors, as a Burn operation: attributes of Gaussians are predicted from these numbers.
 //!
 //! Burn has `select`, `mean_dim` and `cat`. On a GPU, the backward pass of `select` adds the chosen rows one after the other, one
 //! invocation a column: thousands of steps that wait for each other; and joining and narrowing tensors are launches of their
 //! own, two and more each. Here the host, which knows the rows, tells where each row was chosen, and every number of the table
 //! adds up its own few, in one launch.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
-use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
-use burn::tensor::Tensor;
+mod cpu;
 #[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
+pub(super) mod gpu;
 
-#[cfg(feature = "wgpu")]
-use super::super::fusion::{leaf, resolve};
-use super::super::host::HostBackend;
-use super::super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::neighborhoods as cpu;
-pub use crate::kernels::neighborhoods::{Neighborhoods, NeighborhoodsKernels};
+use std::any::Any;
+use std::fmt::Debug;
+use std::sync::{Arc, OnceLock};
+
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, backend_extension};
+use burn::tensor::Tensor;
+use light4gs_codec::attributes::NEIGHBORS;
+
+use super::{for_all_back_ends, recorded};
+
+/// Some rows of a table, in any order, and the [`NEIGHBORS`] neighbors of each, the nearest first. Cloning shares them.
+#[derive(Clone, Debug)]
+pub struct Neighborhoods(Arc<Chosen>);
+
+/// The rows, and where each was chosen, worked out once for the forward and the backward pass.
+#[derive(Debug)]
+struct Chosen {
+    /// The rows themselves, `M`, then `NEIGHBORS` neighbors for each.
+    rows: Vec<u32>,
+    /// Rows of the table.
+    count: usize,
+    /// What a GPU makes of the rows in the forward pass, for the backward pass.
+    #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
+    made: OnceLock<Box<dyn Any + Send + Sync>>,
+    places: OnceLock<Places>,
+}
+
+/// Where each row of the table was chosen: the places of row `i` in [`Chosen::rows`] are
+/// `places[starts[i]..starts[i + 1]]`, in ascending order.
+#[derive(Debug)]
+struct Places {
+    /// One number more than there are rows in a table.
+    starts: Vec<u32>,
+    places: Vec<u32>,
+}
+
+impl Neighborhoods {
+    /// These rows of a table with `count` rows, and the neighbors of each of them.
+    ///
+    /// # Panics
+    /// If the table has no such row; if there are not neighbors for each row.
+    pub fn new(rows: &[u32], neighbors: &[[u32; NEIGHBORS]], count: usize) -> Self {
+        assert_eq!(rows.len(), neighbors.len(), "every row has neighbors");
+        let rows = [rows, neighbors.as_flattened()].concat();
+        let beyond = rows.iter().find(|&&row| row as usize >= count);
+        assert_eq!(beyond, None, "a row beyond the {count} of the table");
+        Self(Arc::new(Chosen { rows, count, made: OnceLock::new(), places: OnceLock::new() }))
+    }
+}
+
+impl Chosen {
+    /// Number of chosen rows, `M`.
+    fn len(&self) -> usize {
+        self.rows.len() / (1 + NEIGHBORS)
+    }
+
+    fn places(&self) -> &Places {
+        self.places.get_or_init(|| {
+            let mut starts = vec![0; self.count + 1];
+            for &row in &self.rows {
+                starts[row as usize + 1] += 1;
+            }
+            for row in 0..self.count {
+                starts[row + 1] += starts[row];
+            }
+            let mut next = starts.clone();
+            let mut places = vec![0; self.rows.len()];
+            for (place, &row) in self.rows.iter().enumerate() {
+                let to = &mut next[row as usize];
+                places[*to as usize] = place as u32;
+                *to += 1;
+            }
+            Places { starts, places }
+        })
+    }
+}
+
+/// A back end's kernels. [`NeighborhoodsOps`] adds the dispatch and the
+/// tape.
+pub trait NeighborhoodsKernels: Backend {
+    /// `[3 C, M]` of `table [N, C]`: a column for each chosen row, with its own numbers, the means over its neighbors and
+    /// the numbers of the nearest one.
+    fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self>;
+
+    /// The gradient of the table `[N, C]` from that of the result `[3 C, M]`.
+    fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self>;
+}
 
 /// The operation on every back end that has [`NeighborhoodsKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -41,58 +118,11 @@ for_all_back_ends! {
 
 impl<B: NeighborhoodsOps + NeighborhoodsKernels, C: CheckpointStrategy> NeighborhoodsOps for Autodiff<B, C> {
     fn neighborhoods(table: FloatTensor<Self>, chosen: Neighborhoods) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct OfTable;
-
-        impl<B: NeighborhoodsKernels> Backward<B, 1> for OfTable {
-            type State = Neighborhoods;
-
-            fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |chosen, gradient| [B::neighborhoods_backward(&chosen, gradient)]);
-            }
-        }
-
         let node = table.node();
         let result = B::neighborhoods_forward(table.into_primitive(), &chosen);
-        match OfTable.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(chosen, result),
-            OpsKind::UnTracked(prep) => prep.finish(result),
-        }
-    }
-}
-
-fn forward_on_cpu<B: HostBackend>(table: FloatTensor<B>, chosen: &Neighborhoods) -> FloatTensor<B> {
-    let columns = table.shape()[1];
-    let result = cpu::forward(B::to_host(table).as_slice(), columns, &chosen.0);
-    B::from_values(result, [3 * columns, chosen.0.len()])
-}
-
-fn backward_on_cpu<B: HostBackend>(chosen: &Neighborhoods, gradient: FloatTensor<B>) -> FloatTensor<B> {
-    let columns = gradient.shape()[0] / 3;
-    let sums = cpu::backward(B::to_host(gradient).as_slice(), columns, &chosen.0);
-    B::from_values(sums, [chosen.0.count, columns])
-}
-
-for_cpu_back_ends! {
-    NeighborhoodsKernels {
-        fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
-            forward_on_cpu::<Self>(table, chosen)
-        }
-
-        fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-            backward_on_cpu::<Self>(chosen, gradient)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + NeighborhoodsKernels> NeighborhoodsKernels for Fusion<B> {
-    fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
-        leaf::<B>(B::neighborhoods_forward(resolve::<B>(table), chosen))
-    }
-
-    fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-        leaf::<B>(B::neighborhoods_backward(chosen, resolve::<B>(gradient)))
+        recorded::<B, C, _, _>([node], (result, chosen), |chosen, gradient| {
+            [B::neighborhoods_backward(&chosen, gradient)]
+        })
     }
 }
 
@@ -101,7 +131,7 @@ impl<B: FusionBackend + NeighborhoodsKernels> NeighborhoodsKernels for Fusion<B>
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::rate::neighborhoods::{Neighborhoods, neighborhoods};
+/// use light4gs_model::ops::neighborhoods::{Neighborhoods, neighborhoods};
 ///
 /// let device = Device::flex().autodiff();
 /// let table = Tensor::<2>::from_floats([[1.0], [2.0], [4.0]], &device).require_grad();
@@ -117,4 +147,30 @@ impl<B: FusionBackend + NeighborhoodsKernels> NeighborhoodsKernels for Fusion<B>
 pub fn neighborhoods(table: Tensor<2>, chosen: Neighborhoods) -> Tensor<2> {
     assert_eq!(table.dims()[0], chosen.0.count, "the rows were chosen for another table");
     Tensor::from_dispatch(Dispatch::neighborhoods(table.into_dispatch(), chosen))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn places_of_rows() {
+        let chosen = Neighborhoods::new(&[2], &[[0, 2, 3, 2]], 5);
+        assert_eq!(chosen.0.len(), 1);
+        let Places { starts, places } = chosen.0.places();
+        assert_eq!(starts, &[0, 1, 1, 4, 5, 5]);
+        assert_eq!(places, &[1, 0, 2, 4, 3]);
+    }
+
+    #[test]
+    #[should_panic(expected = "a row beyond the 3 of the table")]
+    fn no_row_beyond_the_table() {
+        Neighborhoods::new(&[0], &[[1, 2, 3, 0]], 3);
+    }
+
+    #[test]
+    #[should_panic(expected = "every row has neighbors")]
+    fn no_row_without_neighbors() {
+        Neighborhoods::new(&[0, 1], &[[0; NEIGHBORS]], 3);
+    }
 }

@@ -1,31 +1,36 @@
 //! Control nodes at a time, forward and backward. There are a few hundred at most, so one thread does it.
 
+use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use glam::{Mat3, Vec3};
 
-use super::node_motion::{Knots, add_to_knots};
-use crate::kernels::skinning::{PLACE, POSED};
-use crate::kernels::spline::Spline;
+use super::motion::{Knots, add_to_knots};
+use super::spline::Spline;
+use super::{INPUTS, LEARNED, NodePoseKernels, NodeTensors, Posing};
+use crate::ops::for_cpu_back_ends;
+use crate::ops::host::{HostBackend, HostTensor};
+use crate::ops::skinning::{PLACE, POSED};
 
 /// The parameters of the nodes; lengths are shares of `unit`.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct NodeSlices<'a> {
+struct NodeSlices<'a> {
     /// `[B, 3]`
-    pub(crate) anchors: &'a [f32],
+    anchors: &'a [f32],
     /// `[B, 1]`
-    pub(crate) log_radii: &'a [f32],
-    pub(crate) knots: Knots<'a>,
+    log_radii: &'a [f32],
+    knots: Knots<'a>,
     /// `[B, H]`
-    pub(crate) affinities: &'a [f32],
-    pub(crate) unit: f32,
+    affinities: &'a [f32],
+    unit: f32,
 }
 
-/// Gradients of [`pose`], row by row.
-pub(crate) struct NodeGradients {
-    pub(crate) anchors: Vec<f32>,
-    pub(crate) log_radii: Vec<f32>,
-    pub(crate) translations: Vec<f32>,
-    pub(crate) rotations: Vec<f32>,
-    pub(crate) affinities: Vec<f32>,
+/// Gradients of [`pose_slices`], row by row.
+struct NodeGradients {
+    anchors: Vec<f32>,
+    log_radii: Vec<f32>,
+    translations: Vec<f32>,
+    rotations: Vec<f32>,
+    affinities: Vec<f32>,
 }
 
 fn vector(rows: &[f32], row: usize) -> Vec3 {
@@ -48,7 +53,7 @@ impl NodeSlices<'_> {
 }
 
 /// Posed nodes `[B, 20 + H]`.
-pub(crate) fn pose(nodes: &NodeSlices, time: f32) -> Vec<f32> {
+fn pose_slices(nodes: &NodeSlices, time: f32) -> Vec<f32> {
     let spline = nodes.spline(time);
     let width = nodes.affinity_count();
     let mut posed = Vec::with_capacity(nodes.knots.nodes * (POSED + width));
@@ -67,7 +72,7 @@ pub(crate) fn pose(nodes: &NodeSlices, time: f32) -> Vec<f32> {
 }
 
 /// Gradients of all parameters but the unit, from `upstream [B, 20 + H]`.
-pub(crate) fn pose_backward(nodes: &NodeSlices, time: f32, upstream: &[f32]) -> NodeGradients {
+fn pose_backward(nodes: &NodeSlices, time: f32, upstream: &[f32]) -> NodeGradients {
     let spline = nodes.spline(time);
     let count = nodes.knots.nodes;
     let columns = POSED + nodes.affinity_count();
@@ -96,4 +101,57 @@ pub(crate) fn pose_backward(nodes: &NodeSlices, time: f32, upstream: &[f32]) -> 
         gradients.affinities.extend_from_slice(&row[POSED..]);
     }
     gradients
+}
+
+/// State of the CPU back ends between forward and backward.
+#[derive(Clone, Debug)]
+pub struct CpuSaved {
+    inputs: [HostTensor; INPUTS],
+    nodes: usize,
+    posing: Posing,
+}
+
+impl CpuSaved {
+    fn slices(&self) -> NodeSlices<'_> {
+        let [anchors, log_radii, translations, rotations, affinities, unit] =
+            self.inputs.each_ref().map(HostTensor::as_slice);
+        let affinities = if self.posing.affinities > 0 { affinities } else { &[] };
+        let knots = Knots { translations, rotations, nodes: self.nodes };
+        NodeSlices { anchors, log_radii, knots, affinities, unit: unit[0] }
+    }
+}
+
+fn forward_on_cpu<B: HostBackend>(nodes: NodeTensors<B>, posing: Posing) -> (FloatTensor<B>, CpuSaved) {
+    let count = nodes.anchors.shape()[0];
+    let saved = CpuSaved { inputs: nodes.into_array().map(B::to_host), nodes: count, posing };
+    let posed = pose_slices(&saved.slices(), posing.time);
+    (B::from_values(posed, [count, POSED + posing.affinities]), saved)
+}
+
+fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> [FloatTensor<B>; LEARNED] {
+    let upstream = B::to_host(gradient);
+    let slices = saved.slices();
+    let (nodes, knots) = (saved.nodes, slices.knots.count());
+    let gradients = pose_backward(&slices, saved.posing.time, upstream.as_slice());
+    [
+        B::from_values(gradients.anchors, [nodes, 3]),
+        B::from_values(gradients.log_radii, [nodes, 1]),
+        B::from_values(gradients.translations, [knots, 3 * nodes]),
+        B::from_values(gradients.rotations, [knots, 4 * nodes]),
+        B::from_values(gradients.affinities, [nodes, saved.posing.affinities]),
+    ]
+}
+
+for_cpu_back_ends! {
+    NodePoseKernels {
+        type Posed = CpuSaved;
+
+        fn node_poses_forward(nodes: NodeTensors<Self>, posing: Posing) -> (FloatTensor<Self>, CpuSaved) {
+            forward_on_cpu(nodes, posing)
+        }
+
+        fn node_poses_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> [FloatTensor<Self>; LEARNED] {
+            backward_on_cpu::<Self>(saved, gradient)
+        }
+    }
 }

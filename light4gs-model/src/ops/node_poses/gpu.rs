@@ -1,28 +1,33 @@
-//! Control nodes on a GPU: their poses, and their regularizer.
+//! Control nodes at a time, on a GPU.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
+use burn::tensor::{Device, TensorData};
+use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
-use light4gs_shaders::{NODE_POSES, NODE_POSES_BACKWARD, NODE_REGULARIZER, NODE_STRAIN, SCALE, Shader};
+use light4gs_shaders::{NODE_POSES, NODE_POSES_BACKWARD, Shader};
 
-use super::context::{Gpu, Places, buffer_of, first_words};
-use super::kernel::Kernel;
-use super::launch::Launch;
+use super::spline::Spline;
+use super::{INPUTS, LEARNED, NodeParameters, NodePoseKernels, NodeTensors, Posing, pose};
+use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::node_poses::{self, NodePoseKernels, NodeTensors, Posing};
-use crate::kernels::node_regularizer::{self, NodeRegularizerKernels, ROTATIONS, Regularization, RegularizedTensors};
-use crate::kernels::skinning::{MOST_AFFINITIES, POSED};
-use crate::kernels::spline::Spline;
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::{GpuOperation, Numbers};
+use crate::ops::skinning::{MOST_AFFINITIES, POSED};
 
-/// Values that a node sums up over its neighbors and knots: four vectors.
-const SUMS: usize = 16;
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation {
+    name: "node_poses",
+    kernels,
+    samples: &[|device| sample(device, 0), |device| sample(device, MOST_AFFINITIES)],
+};
 
 /// The kernels of this file, for every number of affinities.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     let posing = [NODE_POSES, NODE_POSES_BACKWARD];
-    let posing = (0..=MOST_AFFINITIES).flat_map(|count| posing.map(|shader| with_affinities(shader, count)));
-    posing.chain([NODE_STRAIN, NODE_REGULARIZER, SCALE].map(Kernel::new)).collect()
+    (0..=MOST_AFFINITIES).flat_map(|count| posing.map(|shader| with_affinities(shader, count))).collect()
 }
 
 fn with_affinities(shader: Shader, affinities: usize) -> Kernel {
@@ -30,22 +35,22 @@ fn with_affinities(shader: Shader, affinities: usize) -> Kernel {
 }
 
 /// The uniform of a time.
-fn words_of(spline: &Spline, nodes: usize, knots: usize) -> Vec<u32> {
+pub(in crate::ops) fn words_of(spline: &Spline, nodes: usize, knots: usize) -> Vec<u32> {
     let counts = [nodes, knots, spline.first].map(|count| count as u32);
     counts.into_iter().chain(spline.weights.map(f32::to_bits)).chain([0]).collect()
 }
 
-fn starts(places: &Places) -> impl Iterator<Item = u32> {
+pub(in crate::ops) fn starts(places: &Places) -> impl Iterator<Item = u32> {
     places.starts.iter().skip(1).map(|start| *start as u32)
 }
 
-/// Where they are among the inputs.
+/// Place of the affinities among the inputs.
 const AFFINITIES: usize = 4;
 
 /// State between forward and backward.
 #[derive(Clone, Debug)]
 pub struct PosedNodes {
-    inputs: [Handle; node_poses::INPUTS],
+    inputs: [Handle; INPUTS],
     nodes: usize,
     knots: usize,
     posing: Posing,
@@ -62,7 +67,7 @@ impl PosedNodes {
     }
 }
 
-fn pose(nodes: NodeTensors<CubeBackend>, posing: Posing) -> Result<(CubeTensor, PosedNodes), GpuError> {
+fn forward(nodes: NodeTensors<CubeBackend>, posing: Posing) -> Result<(CubeTensor, PosedNodes), GpuError> {
     let gpu = Gpu::of(&nodes.anchors)?;
     let (count, knots) = (nodes.anchors.shape()[0], nodes.translations.shape()[0]);
     let mut inputs = nodes.into_array().map(buffer_of);
@@ -79,7 +84,7 @@ fn pose(nodes: NodeTensors<CubeBackend>, posing: Posing) -> Result<(CubeTensor, 
     Ok((gpu.tensor(first_words(&posed, values), Shape::from([count, saved.columns()])), saved))
 }
 
-fn pose_backward(saved: PosedNodes, upstream: CubeTensor) -> Result<[CubeTensor; node_poses::LEARNED], GpuError> {
+fn backward(saved: PosedNodes, upstream: CubeTensor) -> Result<[CubeTensor; LEARNED], GpuError> {
     let gpu = Gpu::of(&upstream)?;
     let [anchors, log_radii, translations, rotations, _, unit] = &saved.inputs;
     let PosedNodes { nodes, knots, posing: Posing { affinities, .. }, .. } = saved;
@@ -104,94 +109,46 @@ impl NodePoseKernels for CubeBackend {
     type Posed = PosedNodes;
 
     fn node_poses_forward(nodes: NodeTensors<Self>, posing: Posing) -> (CubeTensor, PosedNodes) {
-        pose(nodes, posing).unwrap_or_else(|error| error.raise())
+        forward(nodes, posing).unwrap_or_else(|error| error.raise())
     }
 
-    fn node_poses_backward(saved: PosedNodes, gradient: CubeTensor) -> [CubeTensor; node_poses::LEARNED] {
-        pose_backward(saved, gradient).unwrap_or_else(|error| error.raise())
+    fn node_poses_backward(saved: PosedNodes, gradient: CubeTensor) -> [CubeTensor; LEARNED] {
+        backward(saved, gradient).unwrap_or_else(|error| error.raise())
     }
 }
 
-/// Gradients for a loss that counts once: of anchors, translations and rotations, in one buffer.
-#[derive(Clone, Debug)]
-pub struct RegularizedNodes {
-    gradients: Handle,
-    nodes: usize,
-    knots: usize,
-}
+impl<B: FusionBackend + NodePoseKernels> NodePoseKernels for Fusion<B> {
+    type Posed = B::Posed;
 
-/// Shapes of the gradients, and where they are in the buffer.
-fn places_of(nodes: usize, knots: usize) -> ([[usize; 2]; node_regularizer::LEARNED], Places) {
-    let shapes = [[nodes, 3], [knots, 3 * nodes], [knots, 4 * nodes]];
-    (shapes, Places::new(&shapes.map(|[rows, columns]| rows * columns)))
-}
-
-fn regularize(
-    nodes: RegularizedTensors<CubeBackend>,
-    regularization: Regularization,
-) -> Result<(CubeTensor, RegularizedNodes), GpuError> {
-    let gpu = Gpu::of(&nodes.anchors)?;
-    let Regularization { rigidity, smoothness, time } = regularization;
-    let (count, knots) = (nodes.anchors.shape()[0], nodes.translations.shape()[0]);
-    let [anchors, translations, rotations, log_radii] = nodes.into_array().map(buffer_of);
-    let spline = words_of(&Spline::at(time, knots), count, knots);
-    let sums = gpu.allocate("sums over neighbors", SUMS * count)?;
-    Launch::new(&gpu.client, NODE_STRAIN)
-        .reads(&anchors)
-        .reads(&log_radii)
-        .reads(&translations)
-        .reads(&rotations)
-        .writes(&sums)
-        .uniform(&spline)
-        .invocations(count)?;
-
-    let (_, places) = places_of(count, knots);
-    let loss = gpu.allocate("loss of nodes", 1)?;
-    let gradients = gpu.allocate("gradients of nodes", places.total)?;
-    let weights = [rigidity, smoothness, smoothness * ROTATIONS].map(f32::to_bits);
-    let uniform: Vec<u32> = spline.into_iter().chain(weights).chain(starts(&places)).collect();
-    Launch::new(&gpu.client, NODE_REGULARIZER)
-        .reads(&sums)
-        .reads(&translations)
-        .reads(&rotations)
-        .writes(&loss)
-        .writes(&gradients)
-        .uniform(&uniform)
-        .invocations(count)?;
-    let loss = gpu.tensor(first_words(&loss, 1), Shape::from([1]));
-    Ok((loss, RegularizedNodes { gradients, nodes: count, knots }))
-}
-
-fn regularize_backward(
-    derivatives: RegularizedNodes,
-    upstream: CubeTensor,
-) -> Result<[CubeTensor; node_regularizer::LEARNED], GpuError> {
-    let gpu = Gpu::of(&upstream)?;
-    let (shapes, places) = places_of(derivatives.nodes, derivatives.knots);
-    let scaled = gpu.allocate("gradients of nodes", places.total)?;
-    Launch::new(&gpu.client, SCALE)
-        .reads(&derivatives.gradients)
-        .reads(&buffer_of(upstream))
-        .writes(&scaled)
-        .uniform(&[places.total as u32])
-        .invocations(places.total)?;
-    Ok(std::array::from_fn(|k| gpu.tensor(places.of(&scaled, k), Shape::from(shapes[k]))))
-}
-
-impl NodeRegularizerKernels for CubeBackend {
-    type Derivatives = RegularizedNodes;
-
-    fn node_regularizer_forward(
-        nodes: RegularizedTensors<Self>,
-        regularization: Regularization,
-    ) -> (CubeTensor, RegularizedNodes) {
-        regularize(nodes, regularization).unwrap_or_else(|error| error.raise())
+    fn node_poses_forward(nodes: NodeTensors<Self>, posing: Posing) -> (FloatTensor<Self>, B::Posed) {
+        let nodes = NodeTensors::from_array(nodes.into_array().map(resolve::<B>));
+        let (posed, saved) = B::node_poses_forward(nodes, posing);
+        (leaf::<B>(posed), saved)
     }
 
-    fn node_regularizer_backward(
-        derivatives: RegularizedNodes,
-        gradient: CubeTensor,
-    ) -> [CubeTensor; node_regularizer::LEARNED] {
-        regularize_backward(derivatives, gradient).unwrap_or_else(|error| error.raise())
+    fn node_poses_backward(saved: B::Posed, gradient: FloatTensor<Self>) -> [FloatTensor<Self>; LEARNED] {
+        B::node_poses_backward(saved, resolve::<B>(gradient)).map(leaf::<B>)
+    }
+}
+
+fn sample(device: &Device, affinities: usize) -> Vec<TensorData> {
+    let mut numbers = Numbers::new(&device.clone().autodiff());
+    let nodes = NodeParameters::sample(&mut numbers, affinities);
+    let leaves = [&nodes.anchors, &nodes.log_radii, &nodes.translations, &nodes.rotations].map(Clone::clone);
+    let leaves: Vec<_> = leaves.into_iter().chain(nodes.affinities.clone()).collect();
+    numbers.with_gradients(pose(nodes, 0.3), &leaves)
+}
+
+impl NodeParameters {
+    pub(in crate::ops) fn sample(numbers: &mut Numbers, affinities: usize) -> Self {
+        let (nodes, knots) = (77, 9);
+        Self {
+            anchors: numbers.leaf(nodes, 3, -0.7, 0.7),
+            log_radii: numbers.leaf(nodes, 1, -0.7, 0.7),
+            translations: numbers.leaf(knots, 3 * nodes, -0.7, 0.7),
+            rotations: numbers.leaf(knots, 4 * nodes, -0.7, 0.7),
+            affinities: (affinities > 0).then(|| numbers.leaf(nodes, affinities, -0.7, 0.7)),
+            unit: numbers.matrix(1, 1, 2.5, 2.5).reshape([1]),
+        }
     }
 }

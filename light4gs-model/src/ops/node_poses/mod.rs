@@ -1,24 +1,71 @@
 //! Poses of control nodes on splines over time, as a Burn operation.
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
-use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
-use burn::tensor::Tensor;
+mod cpu;
 #[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
+pub(super) mod gpu;
+pub(super) mod motion;
+pub(super) mod spline;
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::{HostBackend, HostTensor};
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::node_motion::Knots;
-use crate::cpu::node_poses::{NodeSlices, pose as pose_slices, pose_backward};
-use crate::kernels::node_poses::{INPUTS, LEARNED};
-pub use crate::kernels::node_poses::{NodePoseKernels, NodeTensors, Posing};
-use crate::kernels::skinning::POSED;
+use std::fmt::Debug;
+
+use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
+use burn::backend::tensor::FloatTensor;
+use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
+use burn::tensor::Tensor;
+
+use super::{for_all_back_ends, recorded};
+
+/// The parameters of the nodes. Lengths are shares of the unit.
+#[derive(ExtensionType)]
+pub struct NodeTensors<B: Backend> {
+    /// `[B, 3]`.
+    pub anchors: FloatTensor<B>,
+    /// `[B, 1]`.
+    pub log_radii: FloatTensor<B>,
+    /// `[K, 3 B]`, the three of a node behind each other.
+    pub translations: FloatTensor<B>,
+    /// `[K, 4 B]`, the four of a node behind each other: a quaternion (w, x, y, z) less (1, 0, 0, 0).
+    pub rotations: FloatTensor<B>,
+    /// `[B, H]`; where there are none, a placeholder that is not read.
+    pub affinities: FloatTensor<B>,
+    /// `[1]`, a constant: world units.
+    pub unit: FloatTensor<B>,
+}
+
+/// Tensors of [`NodeTensors`], and those of them that are learned: all but the last.
+const INPUTS: usize = 6;
+const LEARNED: usize = 5;
+
+impl<B: Backend> NodeTensors<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.anchors, self.log_radii, self.translations, self.rotations, self.affinities, self.unit]
+    }
+
+    fn from_array([anchors, log_radii, translations, rotations, affinities, unit]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { anchors, log_radii, translations, rotations, affinities, unit }
+    }
+}
+
+/// Time and size of the poses.
+#[derive(Clone, Copy, Debug)]
+pub struct Posing {
+    /// In [0, 1].
+    pub time: f32,
+    /// A node's affinities, 0 to [`MOST_AFFINITIES`](super::skinning::MOST_AFFINITIES).
+    pub affinities: usize,
+}
+
+/// A back end's kernels. [`NodePoseOps`] adds the dispatch and the tape.
+pub trait NodePoseKernels: Backend {
+    /// What the backward pass needs from the forward pass.
+    type Posed: Clone + Debug + Send + 'static;
+
+    /// Posed nodes `[B, 20 + H]`.
+    fn node_poses_forward(nodes: NodeTensors<Self>, posing: Posing) -> (FloatTensor<Self>, Self::Posed);
+
+    /// From the gradient of the output to those of all parameters but the unit, in their order. That of a placeholder means nothing.
+    fn node_poses_backward(saved: Self::Posed, gradient: FloatTensor<Self>) -> [FloatTensor<Self>; LEARNED];
+}
 
 /// Poses on every back end that has [`NodePoseKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -39,93 +86,10 @@ for_all_back_ends! {
 
 impl<B: NodePoseOps + NodePoseKernels, C: CheckpointStrategy> NodePoseOps for Autodiff<B, C> {
     fn node_poses(nodes: NodeTensors<Self>, posing: Posing) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct NodePoses;
-
-        impl<B: NodePoseKernels> Backward<B, LEARNED> for NodePoses {
-            type State = B::Posed;
-
-            fn backward(self, ops: Ops<Self::State, LEARNED>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, B::node_poses_backward);
-            }
-        }
-
         let tensors = nodes.into_array();
         let parents = std::array::from_fn(|k| tensors[k].node());
         let inner = NodeTensors::from_array(tensors.map(|tensor| tensor.into_primitive()));
-        let (posed, saved) = B::node_poses_forward(inner, posing);
-        match NodePoses.prepare::<C>(parents).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(saved, posed),
-            OpsKind::UnTracked(prep) => prep.finish(posed),
-        }
-    }
-}
-
-/// State of the CPU back ends between forward and backward.
-#[derive(Clone, Debug)]
-pub struct CpuSaved {
-    inputs: [HostTensor; INPUTS],
-    nodes: usize,
-    posing: Posing,
-}
-
-impl CpuSaved {
-    fn slices(&self) -> NodeSlices<'_> {
-        let [anchors, log_radii, translations, rotations, affinities, unit] =
-            self.inputs.each_ref().map(HostTensor::as_slice);
-        let affinities = if self.posing.affinities > 0 { affinities } else { &[] };
-        let knots = Knots { translations, rotations, nodes: self.nodes };
-        NodeSlices { anchors, log_radii, knots, affinities, unit: unit[0] }
-    }
-}
-
-fn forward_on_cpu<B: HostBackend>(nodes: NodeTensors<B>, posing: Posing) -> (FloatTensor<B>, CpuSaved) {
-    let count = nodes.anchors.shape()[0];
-    let saved = CpuSaved { inputs: nodes.into_array().map(B::to_host), nodes: count, posing };
-    let posed = pose_slices(&saved.slices(), posing.time);
-    (B::from_values(posed, [count, POSED + posing.affinities]), saved)
-}
-
-fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> [FloatTensor<B>; LEARNED] {
-    let upstream = B::to_host(gradient);
-    let slices = saved.slices();
-    let (nodes, knots) = (saved.nodes, slices.knots.count());
-    let gradients = pose_backward(&slices, saved.posing.time, upstream.as_slice());
-    [
-        B::from_values(gradients.anchors, [nodes, 3]),
-        B::from_values(gradients.log_radii, [nodes, 1]),
-        B::from_values(gradients.translations, [knots, 3 * nodes]),
-        B::from_values(gradients.rotations, [knots, 4 * nodes]),
-        B::from_values(gradients.affinities, [nodes, saved.posing.affinities]),
-    ]
-}
-
-for_cpu_back_ends! {
-    NodePoseKernels {
-        type Posed = CpuSaved;
-
-        fn node_poses_forward(nodes: NodeTensors<Self>, posing: Posing) -> (FloatTensor<Self>, CpuSaved) {
-            forward_on_cpu(nodes, posing)
-        }
-
-        fn node_poses_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> [FloatTensor<Self>; LEARNED] {
-            backward_on_cpu::<Self>(saved, gradient)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + NodePoseKernels> NodePoseKernels for Fusion<B> {
-    type Posed = B::Posed;
-
-    fn node_poses_forward(nodes: NodeTensors<Self>, posing: Posing) -> (FloatTensor<Self>, B::Posed) {
-        let nodes = NodeTensors::from_array(nodes.into_array().map(resolve::<B>));
-        let (posed, saved) = B::node_poses_forward(nodes, posing);
-        (leaf::<B>(posed), saved)
-    }
-
-    fn node_poses_backward(saved: B::Posed, gradient: FloatTensor<Self>) -> [FloatTensor<Self>; LEARNED] {
-        B::node_poses_backward(saved, resolve::<B>(gradient)).map(leaf::<B>)
+        recorded::<B, C, _, _>(parents, B::node_poses_forward(inner, posing), B::node_poses_backward)
     }
 }
 

@@ -3,7 +3,7 @@
 use glam::{Mat3, Vec3};
 use light4gs_render::rotation::{normalization_backward, rotation_backward, rotation_matrix};
 
-use crate::kernels::spline::Spline;
+use super::spline::Spline;
 
 /// Knots of all nodes' trajectories.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +43,7 @@ impl Knots<'_> {
     }
 }
 
-/// C columns of the spline through knots of so many columns.
+/// Columns `first..first + C` of the spline through knots `[K, columns]`.
 fn at<const C: usize>(knots: &[f32], columns: usize, first: usize, spline: &Spline) -> [f32; C] {
     let mut sums = [0.0; C];
     for (k, weight) in spline.weights.iter().enumerate() {
@@ -61,7 +61,7 @@ impl NodeMotion {
     }
 }
 
-/// Adds what a gradient of the spline's value at one node is by the knots, to those of so many columns.
+/// Adds to the gradients of knots `[K, columns]` what follows from the `gradient` of the spline at one node.
 pub(crate) fn add_to_knots<const C: usize>(
     of_knots: &mut [f32],
     columns: usize,

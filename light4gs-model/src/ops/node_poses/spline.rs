@@ -10,7 +10,7 @@ pub(crate) struct Spline {
 }
 
 impl Spline {
-    /// Of so many knots, 4 or more, at a time in [0, 1].
+    /// The four of `knots` knots, 4 or more, that count at a time in [0, 1].
     pub(crate) fn at(time: f32, knots: usize) -> Self {
         let place = time * (knots - 3) as f32;
         let first = (place.max(0.0) as usize).min(knots - 4);

@@ -1,11 +1,17 @@
 //! The regularizer of control nodes, with its gradients.
 
+use std::sync::Arc;
+
+use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use glam::{Mat3, Vec3};
 use rayon::prelude::*;
 
-use super::node_motion::{Knots, NodeMotion, add_to_knots};
-use crate::kernels::node_regularizer::{ROTATIONS, Regularization, VARIANCE};
-use crate::kernels::spline::Spline;
+use super::{LEARNED, NodeRegularizerKernels, ROTATIONS, Regularization, RegularizedTensors, VARIANCE};
+use crate::ops::for_cpu_back_ends;
+use crate::ops::host::HostBackend;
+use crate::ops::node_poses::motion::{Knots, NodeMotion, add_to_knots};
+use crate::ops::node_poses::spline::Spline;
 
 /// Nodes of a task: one meets all others, which is little work where there are few.
 const TASK: usize = 16;
@@ -13,16 +19,16 @@ const TASK: usize = 16;
 /// The loss, and its gradients row by row.
 #[derive(Clone, Debug)]
 pub struct Regularized {
-    pub(crate) loss: f32,
+    loss: f32,
     /// `[B, 3]`
-    pub(crate) anchors: Vec<f32>,
+    anchors: Vec<f32>,
     /// `[K, 3 B]`
-    pub(crate) translations: Vec<f32>,
+    translations: Vec<f32>,
     /// `[K, 4 B]`
-    pub(crate) rotations: Vec<f32>,
+    rotations: Vec<f32>,
 }
 
-/// One node with what its neighbors need of it.
+/// A node as its neighbors see it.
 struct Node {
     anchor: Vec3,
     /// Where it is at the time.
@@ -51,7 +57,7 @@ struct Sums {
     of_turn: [f32; 4],
 }
 
-/// What one node adds: as the one that sees and as the one that is seen.
+/// The terms in which a node sees a neighbor, and those in which a neighbor sees it.
 fn strain_of(own: &Node, all: &[Node]) -> Sums {
     let mut sums = Sums::default();
     let mut of_rotation = Mat3::ZERO;
@@ -89,13 +95,8 @@ fn bend(knots: &[f32], columns: usize, scale: f32, gradients: &mut [f32]) -> f32
     sum / differences as f32
 }
 
-/// See [`regularize`](crate::ops::node_regularizer::regularize). Anchors are `[B, 3]`, logarithms of radii `[B, 1]`.
-pub(crate) fn regularize(
-    anchors: &[f32],
-    log_radii: &[f32],
-    knots: Knots,
-    regularization: &Regularization,
-) -> Regularized {
+/// See [`regularize`](super::regularize). Anchors are `[B, 3]`, logarithms of radii `[B, 1]`.
+fn regularize_slices(anchors: &[f32], log_radii: &[f32], knots: Knots, regularization: &Regularization) -> Regularized {
     let Regularization { rigidity, smoothness, time } = *regularization;
     let spline = Spline::at(time, knots.count());
     let node = |node: usize| {
@@ -130,4 +131,48 @@ pub(crate) fn regularize(
         add_to_knots(&mut regularized.rotations, of_rotations, node, &spline, of_turn);
     }
     regularized
+}
+
+fn forward_on_cpu<B: HostBackend>(
+    nodes: RegularizedTensors<B>,
+    regularization: &Regularization,
+) -> (FloatTensor<B>, Arc<Regularized>) {
+    let count = nodes.anchors.shape()[0];
+    let inputs = nodes.into_array().map(B::to_host);
+    let [anchors, translations, rotations, log_radii] = inputs.each_ref().map(|input| input.as_slice());
+    let knots = Knots { translations, rotations, nodes: count };
+    let regularized = regularize_slices(anchors, log_radii, knots, regularization);
+    (B::from_values(vec![regularized.loss], [1]), Arc::new(regularized))
+}
+
+fn backward_on_cpu<B: HostBackend>(regularized: &Regularized, gradient: FloatTensor<B>) -> [FloatTensor<B>; LEARNED] {
+    let scale = B::to_host(gradient).as_slice()[0];
+    let scaled = |values: &[f32], rows: usize| {
+        let columns = values.len() / rows;
+        B::from_values(values.iter().map(|value| scale * value).collect(), [rows, columns])
+    };
+    let nodes = regularized.anchors.len() / 3;
+    let knots = regularized.translations.len() / (3 * nodes);
+    let Regularized { anchors, translations, rotations, .. } = regularized;
+    [scaled(anchors, nodes), scaled(translations, knots), scaled(rotations, knots)]
+}
+
+for_cpu_back_ends! {
+    NodeRegularizerKernels {
+        type Derivatives = Arc<Regularized>;
+
+        fn node_regularizer_forward(
+            nodes: RegularizedTensors<Self>,
+            regularization: Regularization,
+        ) -> (FloatTensor<Self>, Arc<Regularized>) {
+            forward_on_cpu(nodes, &regularization)
+        }
+
+        fn node_regularizer_backward(
+            derivatives: Arc<Regularized>,
+            gradient: FloatTensor<Self>,
+        ) -> [FloatTensor<Self>; LEARNED] {
+            backward_on_cpu::<Self>(&derivatives, gradient)
+        }
+    }
 }

@@ -1,26 +1,80 @@
-//! What keeps the motion of control nodes plausible where no view says how it is, as a Burn operation.
+//! The regularizer of control nodes, as a Burn operation: it keeps their motion plausible where no view shows it.
 
-use std::sync::Arc;
+mod cpu;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
+use std::fmt::Debug;
+
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
+use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
 use burn::tensor::Tensor;
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::HostBackend;
 use super::node_poses::NodeParameters;
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::node_motion::Knots;
-use crate::cpu::node_regularizer::{Regularized, regularize as regularize_slices};
-use crate::kernels::node_regularizer::LEARNED;
-pub use crate::kernels::node_regularizer::{NodeRegularizerKernels, Regularization, RegularizedTensors};
+use super::{for_all_back_ends, recorded};
+
+/// Weight of rotations relative to translations: a quaternion's component is larger than a share of the extent.
+const ROTATIONS: f32 = 0.1;
+/// Neighbors count by their distance at rest, in a bell curve of this variance, in squares of a radius.
+const VARIANCE: f32 = 2.0;
+
+/// The parameters of the nodes that the loss depends on, in the shapes of
+/// [`NodeTensors`](super::node_poses::NodeTensors).
+#[derive(ExtensionType)]
+pub struct RegularizedTensors<B: Backend> {
+    /// `[B, 3]`.
+    pub anchors: FloatTensor<B>,
+    /// `[K, 3 B]`.
+    pub translations: FloatTensor<B>,
+    /// `[K, 4 B]`.
+    pub rotations: FloatTensor<B>,
+    /// `[B, 1]`; weights of neighbors only, which get no gradient.
+    pub log_radii: FloatTensor<B>,
+}
+
+/// Tensors of [`RegularizedTensors`], and those of them that get a gradient: all but the last.
+const INPUTS: usize = 4;
+const LEARNED: usize = 3;
+
+impl<B: Backend> RegularizedTensors<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.anchors, self.translations, self.rotations, self.log_radii]
+    }
+
+    fn from_array([anchors, translations, rotations, log_radii]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { anchors, translations, rotations, log_radii }
+    }
+}
+
+/// Weights of the terms, and the time of the poses.
+#[derive(Clone, Copy, Debug)]
+pub struct Regularization {
+    /// Of how far nodes are from where their neighbors see them.
+    pub rigidity: f32,
+    /// Of the bend of their trajectories.
+    pub smoothness: f32,
+    /// In [0, 1].
+    pub time: f32,
+}
+
+/// A back end's kernels. [`NodeRegularizerOps`] adds the dispatch and the tape.
+pub trait NodeRegularizerKernels: Backend {
+    /// Gradients for a loss that counts once.
+    type Derivatives: Clone + Debug + Send + 'static;
+
+    /// The loss `[1]`. Its gradients are worked out along with it: they need all that it needs.
+    fn node_regularizer_forward(
+        nodes: RegularizedTensors<Self>,
+        regularization: Regularization,
+    ) -> (FloatTensor<Self>, Self::Derivatives);
+
+    /// Gradients of all parameters but the radii, in their order, from that of the loss `[1]`.
+    fn node_regularizer_backward(
+        derivatives: Self::Derivatives,
+        gradient: FloatTensor<Self>,
+    ) -> [FloatTensor<Self>; LEARNED];
+}
 
 /// The loss on every back end that has [`NodeRegularizerKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -44,90 +98,11 @@ for_all_back_ends! {
 
 impl<B: NodeRegularizerOps + NodeRegularizerKernels, C: CheckpointStrategy> NodeRegularizerOps for Autodiff<B, C> {
     fn node_regularizer(nodes: RegularizedTensors<Self>, regularization: Regularization) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct NodeRegularizer;
-
-        impl<B: NodeRegularizerKernels> Backward<B, LEARNED> for NodeRegularizer {
-            type State = B::Derivatives;
-
-            fn backward(self, ops: Ops<Self::State, LEARNED>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, B::node_regularizer_backward);
-            }
-        }
-
         let tensors = nodes.into_array();
         let parents = std::array::from_fn(|k| tensors[k].node());
         let inner = RegularizedTensors::from_array(tensors.map(|tensor| tensor.into_primitive()));
-        let (loss, derivatives) = B::node_regularizer_forward(inner, regularization);
-        match NodeRegularizer.prepare::<C>(parents).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(derivatives, loss),
-            OpsKind::UnTracked(prep) => prep.finish(loss),
-        }
-    }
-}
-
-fn forward_on_cpu<B: HostBackend>(
-    nodes: RegularizedTensors<B>,
-    regularization: &Regularization,
-) -> (FloatTensor<B>, Arc<Regularized>) {
-    let count = nodes.anchors.shape()[0];
-    let inputs = nodes.into_array().map(B::to_host);
-    let [anchors, translations, rotations, log_radii] = inputs.each_ref().map(|input| input.as_slice());
-    let knots = Knots { translations, rotations, nodes: count };
-    let regularized = regularize_slices(anchors, log_radii, knots, regularization);
-    (B::from_values(vec![regularized.loss], [1]), Arc::new(regularized))
-}
-
-fn backward_on_cpu<B: HostBackend>(regularized: &Regularized, gradient: FloatTensor<B>) -> [FloatTensor<B>; LEARNED] {
-    let scale = B::to_host(gradient).as_slice()[0];
-    let scaled = |values: &[f32], rows: usize| {
-        let columns = values.len() / rows;
-        B::from_values(values.iter().map(|value| scale * value).collect(), [rows, columns])
-    };
-    let nodes = regularized.anchors.len() / 3;
-    let knots = regularized.translations.len() / (3 * nodes);
-    let Regularized { anchors, translations, rotations, .. } = regularized;
-    [scaled(anchors, nodes), scaled(translations, knots), scaled(rotations, knots)]
-}
-
-for_cpu_back_ends! {
-    NodeRegularizerKernels {
-        type Derivatives = Arc<Regularized>;
-
-        fn node_regularizer_forward(
-            nodes: RegularizedTensors<Self>,
-            regularization: Regularization,
-        ) -> (FloatTensor<Self>, Arc<Regularized>) {
-            forward_on_cpu(nodes, &regularization)
-        }
-
-        fn node_regularizer_backward(
-            derivatives: Arc<Regularized>,
-            gradient: FloatTensor<Self>,
-        ) -> [FloatTensor<Self>; LEARNED] {
-            backward_on_cpu::<Self>(&derivatives, gradient)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + NodeRegularizerKernels> NodeRegularizerKernels for Fusion<B> {
-    type Derivatives = B::Derivatives;
-
-    fn node_regularizer_forward(
-        nodes: RegularizedTensors<Self>,
-        regularization: Regularization,
-    ) -> (FloatTensor<Self>, B::Derivatives) {
-        let nodes = RegularizedTensors::from_array(nodes.into_array().map(resolve::<B>));
-        let (loss, derivatives) = B::node_regularizer_forward(nodes, regularization);
-        (leaf::<B>(loss), derivatives)
-    }
-
-    fn node_regularizer_backward(
-        derivatives: B::Derivatives,
-        gradient: FloatTensor<Self>,
-    ) -> [FloatTensor<Self>; LEARNED] {
-        B::node_regularizer_backward(derivatives, resolve::<B>(gradient)).map(leaf::<B>)
+        let forward = B::node_regularizer_forward(inner, regularization);
+        recorded::<B, C, _, _>(parents, forward, B::node_regularizer_backward)
     }
 }
 

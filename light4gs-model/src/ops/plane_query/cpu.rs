@@ -5,16 +5,23 @@
 //! which alone writes that block's gradients. So there are no atomics, and the sums are the same for any number of
 //! threads.
 
+use std::sync::Arc;
+
+use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-/// Points of a task in the forward pass.
-const CHUNK: usize = 1024;
+use super::cpu_backward::query_backward;
+use super::{PLANES, PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
+use crate::ops::for_cpu_back_ends;
+use crate::ops::host::{HostBackend, HostTensor};
 
-/// Planes that a scale may have.
-const PLANES: usize = PlaneAxes::ALL.len();
-const PLANE_AXES: [[usize; 2]; PLANES] = {
+/// Points of a task in the forward pass.
+pub(super) const CHUNK: usize = 1024;
+
+pub(super) const PLANE_AXES: [[usize; 2]; PLANES] = {
     let mut axes = [[0; 2]; PLANES];
     let mut plane = 0;
     while plane < PLANES {
@@ -24,23 +31,23 @@ const PLANE_AXES: [[usize; 2]; PLANES] = {
     axes
 };
 
-type Block = [f32; LANES];
+pub(super) type Block = [f32; LANES];
 
 /// The planes of one scale, repacked.
 #[derive(Debug)]
-pub(crate) struct PackedPlanes {
-    channels: usize,
+pub(super) struct PackedPlanes {
+    pub(super) channels: usize,
     /// Cells along x, y, z, t; 1 along an axis that no plane spans.
-    resolution: [usize; AXIS_NAMES.len()],
+    pub(super) resolution: [usize; AXIS_NAMES.len()],
     /// Which planes exist.
-    present: [bool; PLANES],
+    pub(super) present: [bool; PLANES],
     /// For each plane, `[blocks][H · W]`; empty where there is no plane.
     planes: [Vec<Block>; PLANES],
 }
 
 impl PackedPlanes {
     /// Repacks planes over the axes of [`PlaneAxes::ALL`] with shapes `[C, H, W]`; `None` where there is no plane.
-    pub(crate) fn new(planes: [Option<&[f32]>; PLANES], shapes: &[Option<[usize; 3]>; PLANES]) -> Self {
+    fn new(planes: [Option<&[f32]>; PLANES], shapes: &[Option<[usize; 3]>; PLANES]) -> Self {
         let mut resolution = [1; AXIS_NAMES.len()];
         let mut channels = 0;
         for ([across, down], shape) in PLANE_AXES.into_iter().zip(shapes) {
@@ -56,15 +63,15 @@ impl PackedPlanes {
     }
 
     /// Channels of each plane.
-    pub(crate) fn channels(&self) -> usize {
+    fn channels(&self) -> usize {
         self.channels
     }
 
-    fn is_full(&self) -> bool {
+    pub(super) fn is_full(&self) -> bool {
         self.present == [true; PLANES]
     }
 
-    fn blocks(&self) -> usize {
+    pub(super) fn blocks(&self) -> usize {
         self.channels.div_ceil(LANES)
     }
 
@@ -72,7 +79,7 @@ impl PackedPlanes {
         self.planes[plane].len() / self.blocks()
     }
 
-    fn block(&self, plane: usize, block: usize) -> &[Block] {
+    pub(super) fn block(&self, plane: usize, block: usize) -> &[Block] {
         let cells = self.cells(plane);
         &self.planes[plane][block * cells..(block + 1) * cells]
     }
@@ -92,56 +99,14 @@ fn pack(plane: &[f32], channels: usize) -> Vec<Block> {
     packed
 }
 
-fn unpack(blocks: &[&[Block]], channels: usize) -> Vec<f32> {
-    let cells = blocks[0].len();
-    let mut plane = vec![0.0; channels * cells];
-    for (group, block) in plane.chunks_mut(cells * LANES).zip(blocks) {
-        let mut rows: Vec<&mut [f32]> = group.chunks_exact_mut(cells).collect();
-        for (cell, from) in block.iter().enumerate() {
-            for (row, value) in rows.iter_mut().zip(from) {
-                row[cell] = *value;
-            }
-        }
-    }
-    plane
-}
-
-/// Cells of the coarse grid by which points are sorted, along each spatial axis.
-const SORT_CELLS: usize = 16;
-
-/// Points sorted by a coarse grid, so that successive points read the same cells of the planes.
-fn spatial_order(points: &[f32]) -> Vec<u32> {
-    let key = |point: &[f32]| {
-        point[..3].iter().fold(0, |key, &coordinate| {
-            // Saturating: NaN and coordinates outside go to the border.
-            let cell = ((coordinate + 1.0) * 0.5 * SORT_CELLS as f32) as usize;
-            key * SORT_CELLS + cell.min(SORT_CELLS - 1)
-        })
-    };
-    let mut starts = vec![0u32; SORT_CELLS.pow(3) + 1];
-    for point in points.chunks_exact(4) {
-        starts[key(point) + 1] += 1;
-    }
-    for i in 1..starts.len() {
-        starts[i] += starts[i - 1];
-    }
-    let mut order = vec![0; points.len() / 4];
-    for (i, point) in points.chunks_exact(4).enumerate() {
-        let place = &mut starts[key(point)];
-        order[*place as usize] = i as u32;
-        *place += 1;
-    }
-    order
-}
-
 /// The position of a coordinate on an axis.
 #[derive(Clone, Copy)]
-struct AxisSample {
+pub(super) struct AxisSample {
     low: usize,
     high: usize,
-    fraction: f32,
+    pub(super) fraction: f32,
     /// Cells for each unit of the coordinate; 0 where it is clamped to the border.
-    slope: f32,
+    pub(super) slope: f32,
 }
 
 impl AxisSample {
@@ -165,9 +130,9 @@ impl AxisSample {
 
 /// The four cells of a bilinear sample and their weights.
 #[derive(Clone, Copy, Default)]
-struct Corners {
-    index: [usize; 4],
-    weight: [f32; 4],
+pub(super) struct Corners {
+    pub(super) index: [usize; 4],
+    pub(super) weight: [f32; 4],
 }
 
 impl Corners {
@@ -196,7 +161,7 @@ impl Corners {
 
     /// The sample and its derivatives by the fractions `x` (across) and `y` (down).
     #[inline(always)]
-    fn sample_with_slopes<L: Lanes>(&self, cells: &[Block], x: L, y: L) -> (L, [L; 2]) {
+    pub(super) fn sample_with_slopes<L: Lanes>(&self, cells: &[Block], x: L, y: L) -> (L, [L; 2]) {
         let [low_left, low_right] = [L::load(&cells[self.index[0]]), L::load(&cells[self.index[1]])];
         let [high_left, high_right] = [L::load(&cells[self.index[2]]), L::load(&cells[self.index[3]])];
         let (low_step, high_step) = (low_right.sub(low_left), high_right.sub(high_left));
@@ -207,25 +172,13 @@ impl Corners {
     }
 }
 
-/// A block of channels; the last one may be short.
 #[inline(always)]
-fn padded(channels: &[f32]) -> Block {
-    // Full blocks are handled separately: a copy of unknown length is a function call.
-    if let Some(block) = channels.first_chunk() {
-        return *block;
-    }
-    let mut block = [0.0; LANES];
-    block[..channels.len()].copy_from_slice(channels);
-    block
-}
-
-#[inline(always)]
-fn samples(point: &[f32], resolution: [usize; AXIS_NAMES.len()]) -> [AxisSample; 4] {
+pub(super) fn samples(point: &[f32], resolution: [usize; AXIS_NAMES.len()]) -> [AxisSample; 4] {
     std::array::from_fn(|axis| AxisSample::new(point[axis], resolution[axis]))
 }
 
 #[inline(always)]
-fn corners(axes: &[AxisSample; 4], resolution: [usize; AXIS_NAMES.len()]) -> [Corners; PLANES] {
+pub(super) fn corners(axes: &[AxisSample; 4], resolution: [usize; AXIS_NAMES.len()]) -> [Corners; PLANES] {
     // A loop, not `array::map`: its closure is not inlined.
     let mut corners = [Corners::default(); PLANES];
     for (corners, [across, down]) in corners.iter_mut().zip(PLANE_AXES) {
@@ -274,7 +227,7 @@ impl<const FULL: bool> LaneKernel for Forward<'_, FULL> {
 }
 
 /// Features `[N, C]` at points `[N, 4]` in [-1, 1].
-pub(crate) fn query(points: &[f32], planes: &PackedPlanes) -> Vec<f32> {
+pub(super) fn query(points: &[f32], planes: &PackedPlanes) -> Vec<f32> {
     let mut out = vec![0.0; points.len() / 4 * planes.channels];
     out.par_chunks_mut(CHUNK * planes.channels).zip(points.par_chunks(4 * CHUNK)).for_each(
         |(out, points)| match planes.is_full() {
@@ -285,167 +238,54 @@ pub(crate) fn query(points: &[f32], planes: &PackedPlanes) -> Vec<f32> {
     out
 }
 
-/// Gradients of [`query`].
-pub(crate) struct QueryGradients {
-    /// `[N, 4]`, absent if not asked for.
-    pub(crate) points: Option<Vec<f32>>,
-    /// Each `[C, H, W]`; nothing where there is no plane.
-    pub(crate) planes: [Vec<f32>; PLANES],
+/// State of the CPU back ends between forward and backward.
+#[derive(Clone, Debug)]
+pub struct CpuSaved {
+    points: HostTensor,
+    planes: Arc<PackedPlanes>,
+    /// `None` where there is no plane.
+    shapes: [Option<[usize; 3]>; PLANES],
 }
 
-/// Points and their upstream gradients in the order of [`spatial_order`], so that the tasks read them sequentially.
-struct Sorted {
-    order: Vec<u32>,
-    /// `[N][4]`
-    points: Vec<[f32; 4]>,
-    /// `[N][blocks]`
-    upstream: Vec<Block>,
+fn forward_on_cpu<B: HostBackend>(inputs: PlaneQueryInputs<B>, set: PlaneSet) -> (FloatTensor<B>, CpuSaved) {
+    let [points, planes @ ..] = inputs.into_array();
+    let mut present = set.0.into_iter();
+    let planes = planes.map(|plane| present.next().expect("one a plane").then_some(plane));
+    let shapes = planes.each_ref().map(|plane| plane.as_ref().map(|plane| plane.shape().dims::<3>()));
+    let points = B::to_host(points);
+    let planes = planes.map(|plane| plane.map(B::to_host));
+    let packed = PackedPlanes::new(planes.each_ref().map(|plane| plane.as_ref().map(HostTensor::as_slice)), &shapes);
+    let features = query(points.as_slice(), &packed);
+    let count = points.as_slice().len() / 4;
+    let channels = packed.channels();
+    (B::from_values(features, [count, channels]), CpuSaved { points, planes: Arc::new(packed), shapes })
 }
 
-impl Sorted {
-    fn new(points: &[f32], upstream: &[f32], channels: usize) -> Self {
-        let order = spatial_order(points);
-        let blocks = channels.div_ceil(LANES);
-        let mut sorted =
-            Self { points: vec![[0.0; 4]; order.len()], upstream: vec![[0.0; LANES]; order.len() * blocks], order };
-        (
-            sorted.points.par_chunks_mut(CHUNK),
-            sorted.upstream.par_chunks_mut(CHUNK * blocks),
-            sorted.order.par_chunks(CHUNK),
-        )
-            .into_par_iter()
-            .for_each(|(to_points, to_upstream, order)| {
-                for ((point, row), &n) in to_points.iter_mut().zip(to_upstream.chunks_exact_mut(blocks)).zip(order) {
-                    let n = n as usize;
-                    point.copy_from_slice(&points[4 * n..4 * n + 4]);
-                    for (block, channels) in
-                        row.iter_mut().zip(upstream[channels * n..channels * (n + 1)].chunks(LANES))
-                    {
-                        *block = padded(channels);
-                    }
-                }
-            });
-        sorted
+fn backward_on_cpu<B: HostBackend>(
+    saved: CpuSaved,
+    gradient: FloatTensor<B>,
+    with_points: bool,
+) -> PlaneQueryGradients<B> {
+    let upstream = B::to_host(gradient);
+    let points = saved.points.as_slice();
+    let gradients = query_backward(points, &saved.planes, upstream.as_slice(), with_points);
+    let mut shapes = saved.shapes.into_iter();
+    PlaneQueryGradients {
+        points: gradients.points.map(|values| B::from_values(values, [points.len() / 4, 4])),
+        planes: gradients.planes.map(|values| Some(B::from_values(values, shapes.next()??))),
     }
 }
 
-/// `FULL` as in [`Forward`].
-struct Backward<'a, const FULL: bool> {
-    sorted: &'a Sorted,
-    planes: &'a PackedPlanes,
-    block: usize,
-    with_points: bool,
-}
+for_cpu_back_ends! {
+    PlaneQueryKernels {
+        type Saved = CpuSaved;
 
-/// The gradients from one block of channels.
-struct BlockGradients {
-    planes: [Vec<Block>; PLANES],
-    /// In the order of [`Sorted`]; empty if not requested.
-    points: Vec<[f32; 4]>,
-}
-
-impl<const FULL: bool> LaneKernel for Backward<'_, FULL> {
-    type Output = BlockGradients;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self) -> Self::Output {
-        let planes = self.planes;
-        let sorted = self.sorted;
-        let cells: [&[Block]; PLANES] = std::array::from_fn(|plane| planes.block(plane, self.block));
-        let mut gradients: [Vec<Block>; PLANES] = std::array::from_fn(|plane| vec![[0.0; LANES]; cells[plane].len()]);
-        let mut point_gradients = Vec::with_capacity(if self.with_points { sorted.points.len() } else { 0 });
-        let upstream = sorted.upstream.iter().skip(self.block).step_by(planes.blocks());
-        for (point, upstream) in sorted.points.iter().zip(upstream) {
-            let axes = samples(point, planes.resolution);
-            let corners = corners(&axes, planes.resolution);
-            let upstream = L::load(upstream);
-            let mut fractions = [upstream; 4];
-            for axis in 0..4 {
-                fractions[axis] = L::splat(axes[axis].fraction);
-            }
-            // Loops, not `array::from_fn`: with a call that is not inlined, values leave the vector registers.
-            let mut values = [L::splat(1.0); PLANES];
-            let mut slopes = [[L::splat(0.0); 2]; PLANES];
-            for plane in 0..PLANES {
-                if !FULL && !planes.present[plane] {
-                    continue;
-                }
-                let [across, down] = PLANE_AXES[plane];
-                (values[plane], slopes[plane]) =
-                    corners[plane].sample_with_slopes(cells[plane], fractions[across], fractions[down]);
-            }
-
-            // The product of all other samples, without division: upstream · prefix · suffix.
-            let mut prefix = [upstream; PLANES];
-            for plane in 1..PLANES {
-                prefix[plane] = prefix[plane - 1].mul(values[plane - 1]);
-            }
-            let mut suffix = L::splat(1.0);
-            for plane in (0..PLANES).rev() {
-                if !FULL && !planes.present[plane] {
-                    continue;
-                }
-                let gradient = prefix[plane].mul(suffix);
-                suffix = suffix.mul(values[plane]);
-                let Corners { index, weight } = &corners[plane];
-                for k in 0..4 {
-                    let cell = &mut gradients[plane][index[k]];
-                    gradient.mul_add(L::splat(weight[k]), L::load(cell)).store(cell);
-                }
-                slopes[plane] = [slopes[plane][0].mul(gradient), slopes[plane][1].mul(gradient)];
-            }
-            if self.with_points {
-                let [xy, xz, xt, yz, yt, zt] = slopes;
-                let along = [
-                    xy[0].add(xz[0]).add(xt[0]),
-                    xy[1].add(yz[0]).add(yt[0]),
-                    xz[1].add(yz[1]).add(zt[0]),
-                    xt[1].add(yt[1]).add(zt[1]),
-                ];
-                let mut gradient = [0.0; 4];
-                for axis in 0..4 {
-                    gradient[axis] = along[axis].sum() * axes[axis].slope;
-                }
-                point_gradients.push(gradient);
-            }
+        fn query_forward(inputs: PlaneQueryInputs<Self>, planes: PlaneSet) -> (FloatTensor<Self>, CpuSaved) {
+            forward_on_cpu(inputs, planes)
         }
-        BlockGradients { planes: gradients, points: point_gradients }
+
+        fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> PlaneQueryGradients<Self> {
+            backward_on_cpu(saved, gradient, with_points)
+        }
     }
-}
-
-/// Gradients of the planes and, on request, of the points, from `upstream [N, C]`.
-pub(crate) fn query_backward(
-    points: &[f32],
-    planes: &PackedPlanes,
-    upstream: &[f32],
-    with_points: bool,
-) -> QueryGradients {
-    let sorted = Sorted::new(points, upstream, planes.channels);
-    let blocks: Vec<BlockGradients> = (0..planes.blocks())
-        .into_par_iter()
-        .map(|block| match planes.is_full() {
-            true => dispatch(Backward::<true> { sorted: &sorted, planes, block, with_points }),
-            false => dispatch(Backward::<false> { sorted: &sorted, planes, block, with_points }),
-        })
-        .collect();
-    let unpacked: Vec<Vec<f32>> = (0..PLANES)
-        .into_par_iter()
-        .map(|plane| {
-            if !planes.present[plane] {
-                return Vec::new();
-            }
-            let parts: Vec<&[Block]> = blocks.iter().map(|block| block.planes[plane].as_slice()).collect();
-            unpack(&parts, planes.channels)
-        })
-        .collect();
-    let points = with_points.then(|| {
-        let mut sum = vec![0.0; points.len()];
-        for (place, &n) in sorted.order.iter().enumerate() {
-            for (axis, sum) in sum[4 * n as usize..][..4].iter_mut().enumerate() {
-                *sum = blocks.iter().map(|block| block.points[place][axis]).sum();
-            }
-        }
-        sum
-    });
-    QueryGradients { points, planes: unpacked.try_into().expect("as many planes out as in") }
 }

@@ -1,23 +1,21 @@
 //! The query of feature planes on a GPU.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::client::Client;
 use cubecl::server::Handle;
 use light4gs_codec::plane_layout::{AXIS_NAMES, PlaneAxes};
 use light4gs_shaders::{PLANE_GATHER, PLANE_PACK, PLANE_QUERY, PLANE_QUERY_BACKWARD, Shader};
 
-use super::context::{Gpu, Places, buffer_of, first_words};
-use super::kernel::Kernel;
-use super::launch::Launch;
-use super::sort::{bits_for, ranges, sort};
+use super::{PLANES, PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
+use crate::gpu::sort::{bits_for, ranges, sort};
+use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::plane_query::{PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
-
-/// Planes that a scale may have.
-const MOST_PLANES: usize = PlaneAxes::ALL.len();
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::GpuOperation;
 
 /// Shapes of one query.
 #[derive(Clone, Debug)]
@@ -53,7 +51,7 @@ impl Layout {
             let [across, down] = axes.axes();
             (resolution[across], resolution[down]) = (shape[2], shape[1]);
         }
-        let first_cells = (0..=MOST_PLANES).map(|plane| self.first_cell(plane));
+        let first_cells = (0..=PLANES).map(|plane| self.first_cell(plane));
         let sizes = [self.points, self.channels, self.quads(), 0, 0];
         resolution.into_iter().chain(first_cells).chain(sizes).map(|value| value as u32).collect()
     }
@@ -69,9 +67,12 @@ fn kernel(shader: Shader, planes: impl IntoIterator<Item = PlaneAxes>) -> Kernel
     Kernel::new(shader).constant("PLANES", count).constant("AXIS_PAIRS", pairs)
 }
 
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "plane_query", kernels, samples: &[] };
+
 /// The kernels of this file, for every set of planes.
-pub(super) fn kernels() -> Vec<Kernel> {
-    let sets = (1..1u32 << MOST_PLANES).flat_map(|set| {
+fn kernels() -> Vec<Kernel> {
+    let sets = (1..1u32 << PLANES).flat_map(|set| {
         let planes = move || PlaneAxes::ALL.into_iter().filter(move |axes| set >> *axes as u32 & 1 == 1);
         [PLANE_QUERY, PLANE_QUERY_BACKWARD, PLANE_GATHER].map(|shader| kernel(shader, planes()))
     });
@@ -149,7 +150,7 @@ fn backward(
     let starts = ranges(&gpu, &sorted.keys, samples, layout.cells())?;
     let places = Places::new(&layout.planes.iter().map(|(_, shape)| shape.num_elements()).collect::<Vec<_>>());
     let mut firsts = places.starts.clone();
-    firsts.resize(MOST_PLANES, places.total);
+    firsts.resize(PLANES, places.total);
     let gradients = gpu.allocate("gradients of planes", places.total)?;
     // No cell has more samples than there are points.
     let at_most = gpu.longest_loop().min(layout.points.max(1));
@@ -167,7 +168,7 @@ fn backward(
     }
 
     let points = with_points.then(|| gpu.tensor(of_points.of(&point_gradients, 0), Shape::from([layout.points, 4])));
-    let mut planes = [const { None }; MOST_PLANES];
+    let mut planes = [const { None }; PLANES];
     for (k, (axes, shape)) in layout.planes.into_iter().enumerate() {
         planes[axes as usize] = Some(gpu.tensor(places.of(&gradients, k), shape));
     }
@@ -183,5 +184,20 @@ impl PlaneQueryKernels for CubeBackend {
 
     fn query_backward(saved: GpuQuerySaved, gradient: CubeTensor, with_points: bool) -> PlaneQueryGradients<Self> {
         backward(saved, gradient, with_points).unwrap_or_else(|error| error.raise())
+    }
+}
+
+impl<B: FusionBackend + PlaneQueryKernels> PlaneQueryKernels for Fusion<B> {
+    type Saved = B::Saved;
+
+    fn query_forward(inputs: PlaneQueryInputs<Self>, planes: PlaneSet) -> (FloatTensor<Self>, B::Saved) {
+        let inputs = PlaneQueryInputs::from_array(inputs.into_array().map(resolve::<B>));
+        let (features, saved) = B::query_forward(inputs, planes);
+        (leaf::<B>(features), saved)
+    }
+
+    fn query_backward(saved: B::Saved, gradient: FloatTensor<Self>, with_points: bool) -> PlaneQueryGradients<Self> {
+        let PlaneQueryGradients { points, planes } = B::query_backward(saved, resolve::<B>(gradient), with_points);
+        PlaneQueryGradients { points: points.map(leaf::<B>), planes: planes.map(|plane| plane.map(leaf::<B>)) }
     }
 }

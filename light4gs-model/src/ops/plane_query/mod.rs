@@ -1,23 +1,87 @@
 //! The query of feature planes as a Burn operation: bilinear samples and their product, one scale at a time.
 
-use std::sync::Arc;
+mod cpu;
+mod cpu_backward;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
+
+use std::fmt::Debug;
 
 use burn::backend::autodiff::checkpoint::base::Checkpointer;
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, TensorMetadata, backend_extension};
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
+use burn::backend::{Autodiff, Backend, ExtensionType, backend_extension};
+use light4gs_codec::plane_layout::PlaneAxes;
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::{HostBackend, HostTensor};
-use super::{for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::planes::{PackedPlanes, query, query_backward};
-use crate::kernels::plane_query::{INPUTS, PLANES};
-pub use crate::kernels::plane_query::{PlaneQueryGradients, PlaneQueryInputs, PlaneQueryKernels, PlaneSet};
+use super::for_all_back_ends;
+
+/// Which of the planes xy, xz, xt, yz, yt, zt exist; at least one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PlaneSet(pub [bool; PLANES]);
+
+impl PlaneSet {
+    /// Whether all of them exist.
+    pub fn is_full(self) -> bool {
+        self.0 == [true; PLANES]
+    }
+}
+
+/// Points, and the planes of one scale, which have equal sizes along common axes. A placeholder for a plane that does
+/// not exist is not read.
+#[derive(ExtensionType)]
+pub struct PlaneQueryInputs<B: Backend> {
+    /// `[N, 4]`: x, y, z, t in [-1, 1]; coordinates outside are clamped to the border.
+    pub points: FloatTensor<B>,
+    /// `[C, res y, res x]`.
+    pub xy: FloatTensor<B>,
+    /// `[C, res z, res x]`.
+    pub xz: FloatTensor<B>,
+    /// `[C, res t, res x]`.
+    pub xt: FloatTensor<B>,
+    /// `[C, res z, res y]`.
+    pub yz: FloatTensor<B>,
+    /// `[C, res t, res y]`.
+    pub yt: FloatTensor<B>,
+    /// `[C, res t, res z]`.
+    pub zt: FloatTensor<B>,
+}
+
+/// Planes that a scale may have.
+const PLANES: usize = PlaneAxes::ALL.len();
+/// Tensors of [`PlaneQueryInputs`].
+const INPUTS: usize = 1 + PLANES;
+
+impl<B: Backend> PlaneQueryInputs<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.points, self.xy, self.xz, self.xt, self.yz, self.yt, self.zt]
+    }
+
+    fn from_array([points, xy, xz, xt, yz, yt, zt]: [FloatTensor<B>; INPUTS]) -> Self {
+        Self { points, xy, xz, xt, yz, yt, zt }
+    }
+}
+
+/// Gradients of a query.
+pub struct PlaneQueryGradients<B: Backend> {
+    /// `[N, 4]`; `None` if not requested.
+    pub points: Option<FloatTensor<B>>,
+    /// In the shapes of the planes; `None` where there is no plane.
+    pub planes: [Option<FloatTensor<B>>; PLANES],
+}
+
+/// A back end's kernels. [`PlaneQueryOps`] adds the dispatch and the tape.
+pub trait PlaneQueryKernels: Backend {
+    /// What the backward pass needs from the forward pass.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Features `[N, C]`.
+    fn query_forward(inputs: PlaneQueryInputs<Self>, planes: PlaneSet) -> (FloatTensor<Self>, Self::Saved);
+
+    /// Gradients of planes and, if `with_points`, of the points.
+    fn query_backward(saved: Self::Saved, gradient: FloatTensor<Self>, with_points: bool) -> PlaneQueryGradients<Self>;
+}
 
 /// The query on every back end that has [`PlaneQueryKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -67,73 +131,5 @@ impl<B: PlaneQueryOps + PlaneQueryKernels, C: CheckpointStrategy> PlaneQueryOps 
             OpsKind::Tracked(prep) => prep.finish(saved, features),
             OpsKind::UnTracked(prep) => prep.finish(features),
         }
-    }
-}
-
-/// State of the CPU back ends between forward and backward.
-#[derive(Clone, Debug)]
-pub struct CpuSaved {
-    points: HostTensor,
-    planes: Arc<PackedPlanes>,
-    /// `None` where there is no plane.
-    shapes: [Option<[usize; 3]>; PLANES],
-}
-
-fn forward_on_cpu<B: HostBackend>(inputs: PlaneQueryInputs<B>, set: PlaneSet) -> (FloatTensor<B>, CpuSaved) {
-    let [points, planes @ ..] = inputs.into_array();
-    let mut present = set.0.into_iter();
-    let planes = planes.map(|plane| present.next().expect("one a plane").then_some(plane));
-    let shapes = planes.each_ref().map(|plane| plane.as_ref().map(|plane| plane.shape().dims::<3>()));
-    let points = B::to_host(points);
-    let planes = planes.map(|plane| plane.map(B::to_host));
-    let packed = PackedPlanes::new(planes.each_ref().map(|plane| plane.as_ref().map(HostTensor::as_slice)), &shapes);
-    let features = query(points.as_slice(), &packed);
-    let count = points.as_slice().len() / 4;
-    let channels = packed.channels();
-    (B::from_values(features, [count, channels]), CpuSaved { points, planes: Arc::new(packed), shapes })
-}
-
-fn backward_on_cpu<B: HostBackend>(
-    saved: CpuSaved,
-    gradient: FloatTensor<B>,
-    with_points: bool,
-) -> PlaneQueryGradients<B> {
-    let upstream = B::to_host(gradient);
-    let points = saved.points.as_slice();
-    let gradients = query_backward(points, &saved.planes, upstream.as_slice(), with_points);
-    let mut shapes = saved.shapes.into_iter();
-    PlaneQueryGradients {
-        points: gradients.points.map(|values| B::from_values(values, [points.len() / 4, 4])),
-        planes: gradients.planes.map(|values| Some(B::from_values(values, shapes.next()??))),
-    }
-}
-
-for_cpu_back_ends! {
-    PlaneQueryKernels {
-        type Saved = CpuSaved;
-
-        fn query_forward(inputs: PlaneQueryInputs<Self>, planes: PlaneSet) -> (FloatTensor<Self>, CpuSaved) {
-            forward_on_cpu(inputs, planes)
-        }
-
-        fn query_backward(saved: CpuSaved, gradient: FloatTensor<Self>, with_points: bool) -> PlaneQueryGradients<Self> {
-            backward_on_cpu(saved, gradient, with_points)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + PlaneQueryKernels> PlaneQueryKernels for Fusion<B> {
-    type Saved = B::Saved;
-
-    fn query_forward(inputs: PlaneQueryInputs<Self>, planes: PlaneSet) -> (FloatTensor<Self>, B::Saved) {
-        let inputs = PlaneQueryInputs::from_array(inputs.into_array().map(resolve::<B>));
-        let (features, saved) = B::query_forward(inputs, planes);
-        (leaf::<B>(features), saved)
-    }
-
-    fn query_backward(saved: B::Saved, gradient: FloatTensor<Self>, with_points: bool) -> PlaneQueryGradients<Self> {
-        let PlaneQueryGradients { points, planes } = B::query_backward(saved, resolve::<B>(gradient), with_points);
-        PlaneQueryGradients { points: points.map(leaf::<B>), planes: planes.map(|plane| plane.map(leaf::<B>)) }
     }
 }

@@ -1,28 +1,33 @@
 //! The sums for significance pruning on a GPU: the kernels of splatting without color.
 
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use light4gs_render::{SCORES, View};
 use light4gs_shaders::{SIGNIFICANCE, SIGNIFICANCE_GATHER};
 
-use super::context::{Gpu, first_words};
-use super::kernel::Kernel;
-use super::launch::Launch;
-use super::splat::{Begun, begin};
-use super::team::Team;
+use super::SignificanceOps;
+use crate::gpu::{Gpu, Kernel, Launch, Team, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::splat::{SplatInputs, SplatView};
+use crate::ops::fusion::leaf;
+use crate::ops::sample::GpuOperation;
+use crate::ops::splat::gpu::{Begun, begin, resolve_inputs};
+use crate::ops::splat::{SplatInputs, SplatView};
 
 /// Values of an intersection's sums.
 const SUMS: usize = 3;
 
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "significance", kernels, samples: &[] };
+
 /// The kernels of this file.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     let blending = Team::all().map(|team| Kernel::new(SIGNIFICANCE).blending(team));
     blending.chain([SIGNIFICANCE_GATHER.into()]).collect()
 }
 
+/// Scores `[N, 4]`; see [`SCORES`].
 fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs.means)?;
     let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { view, room: None })?;
@@ -54,7 +59,14 @@ fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, Gp
     Ok(gpu.tensor(first_words(&scores, values), Shape::from([frame.gaussians, SCORES])))
 }
 
-/// Scores `[N, 4]` on a wgpu device; see [`SCORES`].
-pub(crate) fn significance_on_gpu(inputs: SplatInputs<CubeBackend>, view: View) -> CubeTensor {
-    scores(inputs, view).unwrap_or_else(|error| error.raise())
+impl SignificanceOps for CubeBackend {
+    fn significance(inputs: SplatInputs<Self>, SplatView { view, .. }: SplatView) -> FloatTensor<Self> {
+        scores(inputs, view).unwrap_or_else(|error| error.raise())
+    }
+}
+
+impl<B: FusionBackend + SignificanceOps> SignificanceOps for Fusion<B> {
+    fn significance(inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self> {
+        leaf::<B>(B::significance(resolve_inputs::<B>(inputs), view))
+    }
 }

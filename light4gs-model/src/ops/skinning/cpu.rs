@@ -4,49 +4,57 @@
 //! then for the weights, then twice for half of the blended pose each, since sixteen sums and a weight do not fit into the
 //! sixteen vector registers of AVX2.
 
+use std::ops::Range;
+use std::sync::Arc;
+
+use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use crate::kernels::skinning::{self, PLACE, POSE, POSED, VECTOR};
+use super::cpu_backward::skin_backward;
+use super::{MOVED, PLACE, POSE, POSED, SkinningKernels, SkinningTensors, VECTOR};
+use crate::ops::for_cpu_back_ends;
+use crate::ops::host::{HostBackend, HostTensor};
 
 /// Numbers of a Gaussian's orientation: quaternion, and a vector that turns along, here for all.
-pub(crate) const ORIENTATION: usize = 4 + VECTOR;
+pub(super) const ORIENTATION: usize = 4 + VECTOR;
 /// Numbers of a moved Gaussian: position, quaternion, turned vector.
-pub(crate) const MOVED: usize = skinning::MOVED + VECTOR;
+pub(super) const ALL_MOVED: usize = MOVED + VECTOR;
 
 /// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.
-pub(crate) const CHUNK: usize = 256;
+pub(super) const CHUNK: usize = 256;
 
 /// Exponent of 2, relative to the largest, below which a weight is 0. Such a weight is 12 digits below rounding, and times a small
 /// gradient it would be a denormal number, on which processors are slow.
 const SMALLEST_EXPONENT: f32 = -64.0;
 
 /// One value for each Gaussian of a group of eight.
-pub(crate) type Block = [f32; LANES];
+pub(super) type Block = [f32; LANES];
 
 /// Gaussians and nodes, row by row.
 #[derive(Clone, Copy)]
-pub(crate) struct SkinningSlices<'a> {
+pub(super) struct SkinningSlices<'a> {
     /// `[N, 3]`
-    pub(crate) means: &'a [f32],
+    pub(super) means: &'a [f32],
     /// `[N, 7]`: quaternions, then vectors
-    pub(crate) orientations: &'a [f32],
+    pub(super) orientations: &'a [f32],
     /// `[N, W]`: stillness, then affinities
-    pub(crate) stillness: &'a [f32],
+    pub(super) stillness: &'a [f32],
     /// `[B, 19 + W]`: anchor, precision, pose, affinities
-    pub(crate) nodes: &'a [f32],
+    pub(super) nodes: &'a [f32],
     /// `W - 1`
-    pub(crate) affinities: usize,
+    pub(super) affinities: usize,
 }
 
 impl SkinningSlices<'_> {
     /// Gaussians.
-    pub(crate) fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.means.len() / 3
     }
 
     /// The nodes, each with its numbers next to each other.
-    pub(crate) fn nodes<const W: usize>(&self) -> Vec<Node<W>> {
+    pub(super) fn nodes<const W: usize>(&self) -> Vec<Node<W>> {
         let nodes = self.nodes.chunks_exact(POSED + self.affinities).map(|row| {
             let mut affinities = [0.0; W];
             affinities[1..].copy_from_slice(&row[POSED..]);
@@ -62,20 +70,20 @@ impl SkinningSlices<'_> {
 }
 
 /// A node at one time.
-pub(crate) struct Node<const W: usize> {
+pub(super) struct Node<const W: usize> {
     anchor: [f32; 3],
     /// Behind a zero in the place of the stillness.
-    pub(crate) affinities: [f32; W],
+    pub(super) affinities: [f32; W],
     /// Exponent of 2 a unit of squared distance.
     sharpness: f32,
-    pub(crate) pose: [f32; POSE],
+    pub(super) pose: [f32; POSE],
 }
 
 impl<const W: usize> Node<W> {
     /// Offsets from the anchor, their squared length, and the exponent of 2 of the weight before the softmax. `scaled` are the
     /// Gaussians' stillness and affinities as exponents of 2.
     #[inline(always)]
-    pub(crate) fn reach<L: Lanes>(&self, mean: &[L; 3], scaled: &[L; W]) -> ([L; 3], L, L) {
+    pub(super) fn reach<L: Lanes>(&self, mean: &[L; 3], scaled: &[L; W]) -> ([L; 3], L, L) {
         let x = mean[0].sub(L::splat(self.anchor[0]));
         let y = mean[1].sub(L::splat(self.anchor[1]));
         let z = mean[2].sub(L::splat(self.anchor[2]));
@@ -90,7 +98,7 @@ impl<const W: usize> Node<W> {
 
 /// Numbers as exponents of 2.
 #[inline(always)]
-pub(crate) fn as_exponents<L: Lanes, const W: usize>(numbers: &[L; W]) -> [L; W] {
+pub(super) fn as_exponents<L: Lanes, const W: usize>(numbers: &[L; W]) -> [L; W] {
     let mut scaled = [L::splat(0.0); W];
     for k in 0..W {
         scaled[k] = numbers[k].mul(L::splat(std::f32::consts::LOG2_E));
@@ -98,17 +106,17 @@ pub(crate) fn as_exponents<L: Lanes, const W: usize>(numbers: &[L; W]) -> [L; W]
     scaled
 }
 
-/// What eight Gaussians make of the nodes.
+/// The nodes, blended for eight Gaussians.
 #[derive(Clone, Debug)]
-pub(crate) struct BlendedGroup {
-    /// `A`, `t` and `q` of [`skin`](crate::ops::skinning::skin).
-    pub(crate) pose: [Block; POSE],
+pub(super) struct BlendedGroup {
+    /// `A`, `t` and `q` of [`skin`](super::skin).
+    pub(super) pose: [Block; POSE],
     /// The largest exponent of 2.
-    pub(crate) largest: Block,
+    pub(super) largest: Block,
     /// Sum of the weights before the softmax divides by it, inverted.
-    pub(crate) inverse_sum: Block,
+    pub(super) inverse_sum: Block,
     /// Weight of the node that stands still.
-    pub(crate) still: Block,
+    pub(super) still: Block,
 }
 
 impl Default for BlendedGroup {
@@ -120,42 +128,64 @@ impl Default for BlendedGroup {
 
 /// The weight of an exponent before the softmax divides.
 #[inline(always)]
-pub(crate) fn weight<L: Lanes>(exponent: L, largest: L) -> L {
+pub(super) fn weight<L: Lanes>(exponent: L, largest: L) -> L {
     let relative = exponent.sub(largest);
     relative.at_least(L::splat(SMALLEST_EXPONENT)).and(relative.exp2())
 }
 
+/// Values from memory. Here and below loops, not `array::map`: a call that is not inlined leaves the vector registers.
+#[inline(always)]
+pub(super) fn loaded<L: Lanes, const C: usize>(blocks: &[Block; C]) -> [L; C] {
+    let mut values = [L::splat(0.0); C];
+    for c in 0..C {
+        values[c] = L::load(&blocks[c]);
+    }
+    values
+}
+
+/// Values to memory.
+#[inline(always)]
+pub(super) fn stored<L: Lanes, const C: usize>(values: &[L; C]) -> [Block; C] {
+    let mut blocks = [[0.0; LANES]; C];
+    for c in 0..C {
+        values[c].store(&mut blocks[c]);
+    }
+    blocks
+}
+
+/// The same numbers for all Gaussians of a group.
+#[inline(always)]
+pub(super) fn spread<L: Lanes, const C: usize>(numbers: &[f32; C]) -> [L; C] {
+    let mut values = [L::splat(0.0); C];
+    for c in 0..C {
+        values[c] = L::splat(numbers[c]);
+    }
+    values
+}
+
 /// Columns of up to eight rows, zeros where there is none.
 #[inline(always)]
-pub(crate) fn columns<L: Lanes, const C: usize>(rows: &[f32]) -> [L; C] {
+pub(super) fn columns<L: Lanes, const C: usize>(rows: &[f32]) -> [L; C] {
     let mut blocks = [[0.0; LANES]; C];
     for (lane, row) in rows.as_chunks::<C>().0.iter().enumerate().take(LANES) {
         for c in 0..C {
             blocks[c][lane] = row[c];
         }
     }
-    // Loops, not `array::map`: a call that is not inlined leaves the vector registers.
-    let mut columns = [L::splat(0.0); C];
-    for c in 0..C {
-        columns[c] = L::load(&blocks[c]);
-    }
-    columns
+    loaded(&blocks)
 }
 
 /// Quaternions and vectors of up to eight Gaussians.
 #[inline(always)]
-pub(crate) fn orientation<L: Lanes>(rows: &[f32]) -> ([L; 4], [L; 3]) {
+pub(super) fn orientation<L: Lanes>(rows: &[f32]) -> ([L; 4], [L; 3]) {
     let all = columns::<L, ORIENTATION>(rows);
     ([all[0], all[1], all[2], all[3]], [all[4], all[5], all[6]])
 }
 
-/// Writes columns to as many rows as there are.
+/// Writes columns to up to eight rows.
 #[inline(always)]
-pub(crate) fn to_rows<L: Lanes, const C: usize>(columns: &[L; C], rows: &mut [f32]) {
-    let mut blocks = [[0.0; LANES]; C];
-    for c in 0..C {
-        columns[c].store(&mut blocks[c]);
-    }
+pub(super) fn to_rows<L: Lanes, const C: usize>(columns: &[L; C], rows: &mut [f32]) {
+    let blocks = stored(columns);
     for (lane, row) in rows.as_chunks_mut::<C>().0.iter_mut().enumerate().take(LANES) {
         for c in 0..C {
             row[c] = blocks[c][lane];
@@ -165,7 +195,7 @@ pub(crate) fn to_rows<L: Lanes, const C: usize>(columns: &[L; C], rows: &mut [f3
 
 /// Hamilton's product.
 #[inline(always)]
-pub(crate) fn product<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> [L; 4] {
+pub(super) fn product<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> [L; 4] {
     [
         a[0].mul(b[0]).sub(a[1].mul(b[1])).sub(a[2].mul(b[2])).sub(a[3].mul(b[3])),
         a[0].mul(b[1]).add(a[1].mul(b[0])).add(a[2].mul(b[3])).sub(a[3].mul(b[2])),
@@ -176,7 +206,7 @@ pub(crate) fn product<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> [L; 4] {
 
 /// `A vector + offset`, with the matrix of a blended pose.
 #[inline(always)]
-pub(crate) fn mapped<L: Lanes>(pose: &[L; POSE], vector: &[L; 3], mut offset: [L; 3]) -> [L; 3] {
+pub(super) fn mapped<L: Lanes>(pose: &[L; POSE], vector: &[L; 3], mut offset: [L; 3]) -> [L; 3] {
     for i in 0..3 {
         for j in 0..3 {
             offset[i] = pose[3 * i + j].mul_add(vector[j], offset[i]);
@@ -199,7 +229,7 @@ fn half_of_pose<L: Lanes, const W: usize>(weights: &[Block], nodes: &[Node<W>], 
 }
 
 /// Pose of the node that stands still.
-pub(crate) const STILL: [f32; POSE] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
+pub(super) const STILL: [f32; POSE] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
 struct Forward<'a, const W: usize> {
     nodes: &'a [Node<W>],
@@ -218,7 +248,7 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
         let mut weights = vec![[0.0; LANES]; self.nodes.len()];
         let inputs = self.means.chunks(3 * LANES).zip(self.orientations.chunks(ORIENTATION * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
-        let outputs = self.moved.chunks_mut(MOVED * LANES).zip(self.blended);
+        let outputs = self.moved.chunks_mut(ALL_MOVED * LANES).zip(self.blended);
         for (((means, orientations), stillness), (moved, blended)) in inputs.zip(outputs) {
             let mean = columns::<L, 3>(means);
             let scaled = as_exponents(&columns::<L, W>(stillness));
@@ -249,14 +279,12 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
             let at = mapped(&pose, &mean, [pose[9], pose[10], pose[11]]);
             let turned = product(&[pose[12], pose[13], pose[14], pose[15]], &quat);
             let vector = mapped(&pose, &vector, [L::splat(0.0); 3]);
-            let mut all = [L::splat(0.0); MOVED];
+            let mut all = [L::splat(0.0); ALL_MOVED];
             all[..3].copy_from_slice(&at);
             all[3..7].copy_from_slice(&turned);
             all[7..].copy_from_slice(&vector);
             to_rows(&all, moved);
-            for k in 0..POSE {
-                pose[k].store(&mut blended.pose[k]);
-            }
+            blended.pose = stored(&pose);
             largest.store(&mut blended.largest);
             inverse_sum.store(&mut blended.inverse_sum);
             still.mul(inverse_sum).store(&mut blended.still);
@@ -264,8 +292,8 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
     }
 }
 
-/// Positions, quaternions and vectors `[N, 10]`, and what the backward pass wants to see again.
-pub(crate) fn skin(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
+/// Positions, quaternions and vectors `[N, 10]`, and the state for the backward pass.
+fn skin_slices(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
     match inputs.affinities {
         0 => skin_with::<1>(inputs),
         1 => skin_with::<2>(inputs),
@@ -278,17 +306,117 @@ pub(crate) fn skin(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
 fn skin_with<const W: usize>(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
     let nodes = inputs.nodes::<W>();
     let count = inputs.count();
-    let mut moved = vec![0.0; MOVED * count];
+    let mut moved = vec![0.0; ALL_MOVED * count];
     let mut blended = vec![BlendedGroup::default(); count.div_ceil(LANES)];
     let chunks = (
         inputs.means.par_chunks(3 * CHUNK),
         inputs.orientations.par_chunks(ORIENTATION * CHUNK),
         inputs.stillness.par_chunks(W * CHUNK),
-        moved.par_chunks_mut(MOVED * CHUNK),
+        moved.par_chunks_mut(ALL_MOVED * CHUNK),
         blended.par_chunks_mut(CHUNK / LANES),
     );
     chunks.into_par_iter().for_each(|(means, orientations, stillness, moved, blended)| {
         dispatch(Forward { nodes: &nodes, means, orientations, stillness, moved, blended });
     });
     (moved, blended)
+}
+
+/// State of the CPU back ends between forward and backward.
+#[derive(Clone, Debug)]
+pub struct CpuSaved {
+    means: HostTensor,
+    orientations: Arc<Vec<f32>>,
+    stillness: Arc<Vec<f32>>,
+    nodes: HostTensor,
+    affinities: usize,
+    /// Numbers of a vector: none or three.
+    vector: usize,
+    blended: Arc<Vec<BlendedGroup>>,
+}
+
+impl CpuSaved {
+    fn slices(&self) -> SkinningSlices<'_> {
+        SkinningSlices {
+            means: self.means.as_slice(),
+            orientations: &self.orientations,
+            stillness: &self.stillness,
+            nodes: self.nodes.as_slice(),
+            affinities: self.affinities,
+        }
+    }
+}
+
+/// Rows of two matrices as rows of one, `columns` wide; what both leave of it is 0.
+fn side_by_side([(first, width), (second, other)]: [(&[f32], usize); 2], columns: usize) -> Vec<f32> {
+    let mut rows = vec![0.0; first.len() / width * columns];
+    for (row, own) in rows.chunks_exact_mut(columns).zip(first.chunks_exact(width)) {
+        row[..width].copy_from_slice(own);
+    }
+    if other > 0 {
+        for (row, own) in rows.chunks_exact_mut(columns).zip(second.chunks_exact(other)) {
+            row[width..width + other].copy_from_slice(own);
+        }
+    }
+    rows
+}
+
+/// Some columns of a matrix that is `width` wide.
+fn columns_of(matrix: &[f32], width: usize, columns: Range<usize>) -> Vec<f32> {
+    matrix.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect()
+}
+
+fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
+    let (vector, affinities) = (tensors.vectors.shape()[1], tensors.affinities.shape()[1]);
+    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
+    let orientations = side_by_side([(quats.as_slice(), 4), (vectors.as_slice(), vector)], ORIENTATION);
+    let stillness = side_by_side([(stillness.as_slice(), 1), (of_gaussians.as_slice(), affinities)], 1 + affinities);
+    let mut saved = CpuSaved {
+        means,
+        orientations: Arc::new(orientations),
+        stillness: Arc::new(stillness),
+        nodes,
+        affinities,
+        vector,
+        blended: Arc::default(),
+    };
+    let (moved, blended) = skin_slices(&saved.slices());
+    saved.blended = Arc::new(blended);
+    let count = moved.len() / ALL_MOVED;
+    let moved = if vector == 0 { columns_of(&moved, ALL_MOVED, 0..MOVED) } else { moved };
+    (B::from_values(moved, [count, MOVED + vector]), saved)
+}
+
+fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
+    let upstream = B::to_host(gradient);
+    let CpuSaved { affinities, vector, .. } = saved;
+    let widened = (vector == 0).then(|| side_by_side([(upstream.as_slice(), MOVED), (&[], 0)], ALL_MOVED));
+    let gradients = skin_backward(&saved.slices(), &saved.blended, widened.as_deref().unwrap_or(upstream.as_slice()));
+    let count = gradients.means.len() / 3;
+    let part = |matrix: &[f32], width: usize, columns: Range<usize>| {
+        let shape = [count, columns.len()];
+        B::from_values(columns_of(matrix, width, columns), shape)
+    };
+    let columns = POSED + affinities;
+    SkinningTensors {
+        quats: part(&gradients.orientations, ORIENTATION, 0..4),
+        vectors: part(&gradients.orientations, ORIENTATION, 4..4 + vector),
+        stillness: part(&gradients.stillness, 1 + affinities, 0..1),
+        affinities: part(&gradients.stillness, 1 + affinities, 1..1 + affinities),
+        means: B::from_values(gradients.means, [count, 3]),
+        nodes: B::from_values(gradients.nodes, [saved.nodes.as_slice().len() / columns, columns]),
+    }
+}
+
+for_cpu_back_ends! {
+    SkinningKernels {
+        type Saved = CpuSaved;
+
+        fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, CpuSaved) {
+            forward_on_cpu(tensors)
+        }
+
+        fn skinning_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SkinningTensors<Self> {
+            backward_on_cpu(saved, gradient)
+        }
+    }
 }

@@ -15,31 +15,31 @@
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use super::skinning::{
-    BlendedGroup, Block, CHUNK, MOVED, Node, ORIENTATION, STILL, SkinningSlices, as_exponents, columns, orientation,
-    product, to_rows, weight,
+use super::cpu::{
+    ALL_MOVED, BlendedGroup, Block, CHUNK, Node, ORIENTATION, STILL, SkinningSlices, as_exponents, columns, loaded,
+    orientation, product, spread, stored, to_rows, weight,
 };
-use crate::kernels::skinning::{PLACE, POSE, POSED};
+use super::{PLACE, POSE, POSED};
 
-/// Tasks at most, so that their sums take no more memory than some thousand Gaussians.
+/// Most tasks, so that their sums take no more memory than some thousand Gaussians.
 const MOST_TASKS: usize = 64;
 
-/// Gradients of [`skin`](super::skinning::skin), row by row.
-pub(crate) struct SkinningGradients {
+/// Gradients of [`skin`](super::skin), row by row.
+pub(super) struct SkinningGradients {
     /// `[N, 3]`
-    pub(crate) means: Vec<f32>,
+    pub(super) means: Vec<f32>,
     /// `[N, 7]`
-    pub(crate) orientations: Vec<f32>,
+    pub(super) orientations: Vec<f32>,
     /// `[N, W]`
-    pub(crate) stillness: Vec<f32>,
+    pub(super) stillness: Vec<f32>,
     /// `[B, 19 + W]`
-    pub(crate) nodes: Vec<f32>,
+    pub(super) nodes: Vec<f32>,
 }
 
-/// What eight Gaussians hand to all nodes.
+/// Numbers of eight Gaussians that every node reads.
 struct Handed<const W: usize> {
     mean: [Block; 3],
-    /// Stillness and affinities.
+    /// Affinities, behind the stillness, which no node reads.
     stillness: [Block; W],
     /// `F`: derivatives by the blended pose.
     by_pose: [Block; POSE],
@@ -99,83 +99,107 @@ struct Backward<'a, const W: usize> {
     of_stillness: &'a mut [f32],
 }
 
-/// The gradients of eight Gaussians, and what they hand to the nodes.
+/// Eight Gaussians at rest, and the gradients of what they become.
+struct Group<L> {
+    mean: [L; 3],
+    quat: [L; 4],
+    vector: [L; 3],
+    by_position: [L; 3],
+    by_turned_quat: [L; 4],
+    by_turned_vector: [L; 3],
+}
+
+impl<L: Lanes> Group<L> {
+    #[inline(always)]
+    fn new(means: &[f32], orientations: &[f32], upstream: &[f32]) -> Self {
+        let (quat, vector) = orientation::<L>(orientations);
+        let upstream = columns::<L, ALL_MOVED>(upstream);
+        Self {
+            mean: columns::<L, 3>(means),
+            quat,
+            vector,
+            by_position: [upstream[0], upstream[1], upstream[2]],
+            by_turned_quat: [upstream[3], upstream[4], upstream[5], upstream[6]],
+            by_turned_vector: [upstream[7], upstream[8], upstream[9]],
+        }
+    }
+
+    /// Gradients of quaternions and vectors, given the blended pose: `conjugate of q ⊗ by_turned_quat`, and
+    /// `Aᵀ by_turned_vector`.
+    #[inline(always)]
+    fn of_orientation(&self, pose: &[L; POSE]) -> [L; ORIENTATION] {
+        let blended_quat = [pose[12], pose[13], pose[14], pose[15]];
+        let mut gradient = [L::splat(0.0); ORIENTATION];
+        gradient[..4].copy_from_slice(&product(&conjugate(blended_quat), &self.by_turned_quat));
+        gradient[4..].copy_from_slice(&mapped_back(pose, &self.by_turned_vector));
+        gradient
+    }
+
+    /// `F`: by the matrix `by_position meanᵀ + by_turned_vector vectorᵀ`, by the offset `by_position`, by the quaternion
+    /// `by_turned_quat ⊗ conjugate of quat`.
+    #[inline(always)]
+    fn by_pose(&self) -> [L; POSE] {
+        let mut by_pose = [L::splat(0.0); POSE];
+        for i in 0..3 {
+            for j in 0..3 {
+                let by_place = self.by_position[i].mul(self.mean[j]);
+                by_pose[3 * i + j] = self.by_turned_vector[i].mul_add(self.vector[j], by_place);
+            }
+            by_pose[9 + i] = self.by_position[i];
+        }
+        by_pose[12..].copy_from_slice(&product(&self.by_turned_quat, &conjugate(self.quat)));
+        by_pose
+    }
+}
+
+#[inline(always)]
+fn conjugate<L: Lanes>(q: [L; 4]) -> [L; 4] {
+    let zero = L::splat(0.0);
+    [q[0], zero.sub(q[1]), zero.sub(q[2]), zero.sub(q[3])]
+}
+
+/// `Aᵀ vector`, with the matrix of a blended pose.
+#[inline(always)]
+fn mapped_back<L: Lanes>(pose: &[L; POSE], vector: &[L; 3]) -> [L; 3] {
+    let mut mapped = [L::splat(0.0); 3];
+    for j in 0..3 {
+        for i in 0..3 {
+            mapped[j] = pose[3 * i + j].mul_add(vector[i], mapped[j]);
+        }
+    }
+    mapped
+}
+
+/// Writes the gradients of eight Gaussians, but for their affinities, and returns the numbers for the nodes.
 #[inline(always)]
 fn hand<L: Lanes, const W: usize>(
     [means, orientations, stillness, upstream]: [&[f32]; 4],
     blended: &BlendedGroup,
     [of_means, of_orientations]: [&mut [f32]; 2],
-    of_stillness: &mut [Block; W],
+    of_stillness: &mut Block,
 ) -> Handed<W> {
-    let mean = columns::<L, 3>(means);
-    let (quat, vector) = orientation::<L>(orientations);
-    let upstream = columns::<L, MOVED>(upstream);
-    let by_position = [upstream[0], upstream[1], upstream[2]];
-    let by_turned = [upstream[3], upstream[4], upstream[5], upstream[6]];
-    let by_vector = [upstream[7], upstream[8], upstream[9]];
-    let mut pose = [L::splat(0.0); POSE];
-    for k in 0..POSE {
-        pose[k] = L::load(&blended.pose[k]);
-    }
-    let zero = L::splat(0.0);
-    let conjugate = |q: [L; 4]| [q[0], zero.sub(q[1]), zero.sub(q[2]), zero.sub(q[3])];
-    let blended_quat = [pose[12], pose[13], pose[14], pose[15]];
-    let by_blended_quat = product(&by_turned, &conjugate(quat));
+    let group = Group::<L>::new(means, orientations, upstream);
+    let pose = loaded(&blended.pose);
+    to_rows(&mapped_back(&pose, &group.by_position), of_means);
+    to_rows(&group.of_orientation(&pose), of_orientations);
 
-    let (mut of_mean, mut of_vector) = ([zero; 3], [zero; 3]);
-    for j in 0..3 {
-        for i in 0..3 {
-            of_mean[j] = pose[3 * i + j].mul_add(by_position[i], of_mean[j]);
-            of_vector[j] = pose[3 * i + j].mul_add(by_vector[i], of_vector[j]);
-        }
-    }
-    to_rows(&of_mean, of_means);
-    let of_quat = product(&conjugate(blended_quat), &by_turned);
-    let mut of_orientation = [zero; ORIENTATION];
-    of_orientation[..4].copy_from_slice(&of_quat);
-    of_orientation[4..].copy_from_slice(&of_vector);
-    to_rows(&of_orientation, of_orientations);
+    let by_pose = stored(&group.by_pose());
+    let product = inner_product::<L>(&by_pose, &pose);
+    let by_weight = inner_product::<L>(&by_pose, &spread(&STILL));
+    L::load(&blended.still).mul(by_weight.sub(product)).store(of_stillness);
 
-    let mut by_pose = [zero; POSE];
-    for i in 0..3 {
-        for j in 0..3 {
-            by_pose[3 * i + j] = by_vector[i].mul_add(vector[j], by_position[i].mul(mean[j]));
-        }
-        by_pose[9 + i] = by_position[i];
-    }
-    by_pose[12..].copy_from_slice(&by_blended_quat);
-    let mut handed = Handed {
-        mean: [[0.0; LANES]; 3],
-        stillness: [[0.0; LANES]; W],
-        by_pose: [[0.0; LANES]; POSE],
-        product: [0.0; LANES],
+    let [product] = stored(&[product]);
+    Handed {
+        mean: stored(&group.mean),
+        stillness: if W > 1 { stored(&columns::<L, W>(stillness)) } else { [[0.0; LANES]; W] },
+        by_pose,
+        product,
         largest: blended.largest,
         inverse_sum: blended.inverse_sum,
-    };
-    for i in 0..3 {
-        mean[i].store(&mut handed.mean[i]);
     }
-    if W > 1 {
-        let stillness = columns::<L, W>(stillness);
-        for k in 1..W {
-            stillness[k].store(&mut handed.stillness[k]);
-        }
-    }
-    for k in 0..POSE {
-        by_pose[k].store(&mut handed.by_pose[k]);
-    }
-    let product = inner_product(&handed.by_pose, &pose);
-    product.store(&mut handed.product);
-    let mut still = [zero; POSE];
-    for k in 0..POSE {
-        still[k] = L::splat(STILL[k]);
-    }
-    let of_still = inner_product(&handed.by_pose, &still).sub(product);
-    L::load(&blended.still).mul(of_still).store(&mut of_stillness[0]);
-    handed
 }
 
-/// What a chunk of Gaussians adds to the gradients of a node, and what the node adds to those of their affinities. `weights` is
+/// Sums over a chunk of Gaussians for the gradients of a node. Adds the node's share to the gradients of their affinities. `weights` is
 /// room for one block a group.
 #[inline(always)]
 fn sums<L: Lanes, const W: usize>(
@@ -188,19 +212,13 @@ fn sums<L: Lanes, const W: usize>(
     let mut offset_sums = [L::splat(0.0); 3];
     let mut squared_sum = L::splat(0.0);
     for ((group, place), of_stillness) in handed.iter().zip(weights.iter_mut()).zip(of_stillness) {
-        let mean = [L::load(&group.mean[0]), L::load(&group.mean[1]), L::load(&group.mean[2])];
-        let mut stillness = [L::splat(0.0); W];
-        for k in 1..W {
-            stillness[k] = L::load(&group.stillness[k]);
-        }
+        let mean = loaded(&group.mean);
+        let stillness = loaded(&group.stillness);
         let (offset, squared, exponent) = node.reach(&mean, &as_exponents(&stillness));
         let weight = weight(exponent, L::load(&group.largest)).mul(L::load(&group.inverse_sum));
         weight.store(place);
-        let mut pose = [L::splat(0.0); POSE];
-        for k in 0..POSE {
-            pose[k] = L::splat(node.pose[k]);
-        }
-        let by_logit = weight.mul(inner_product(&group.by_pose, &pose).sub(L::load(&group.product)));
+        let by_weight = inner_product(&group.by_pose, &spread(&node.pose));
+        let by_logit = weight.mul(by_weight.sub(L::load(&group.product)));
         for i in 0..3 {
             offset_sums[i] = by_logit.mul_add(offset[i], offset_sums[i]);
         }
@@ -246,7 +264,7 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
         let mut of_stillness = vec![[[0.0; LANES]; W]; CHUNK / LANES];
         let inputs = self.means.chunks(3 * LANES).zip(self.orientations.chunks(ORIENTATION * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
-        let inputs = inputs.zip(self.upstream.chunks(MOVED * LANES)).zip(self.blended);
+        let inputs = inputs.zip(self.upstream.chunks(ALL_MOVED * LANES)).zip(self.blended);
         let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_orientations.chunks_mut(ORIENTATION * LANES));
         let mut rows_of_stillness = self.of_stillness.chunks_mut(W * LANES);
         let last = self.blended.len() - 1;
@@ -255,17 +273,13 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
             let of_stillness_here = &mut of_stillness[handed.len()];
             *of_stillness_here = [[0.0; LANES]; W];
             let inputs = [means, orientations, stillness, upstream];
-            handed.push(hand::<L, W>(inputs, blended, [of_means, of_orientations], of_stillness_here));
+            handed.push(hand::<L, W>(inputs, blended, [of_means, of_orientations], &mut of_stillness_here[0]));
             if handed.len() == CHUNK / LANES || group == last {
                 for (node, total) in self.nodes.iter().zip(&mut totals) {
                     total.add(&sums::<L, W>(node, &handed, &mut weights, &mut of_stillness));
                 }
                 for (blocks, rows) in of_stillness.iter().take(handed.len()).zip(&mut rows_of_stillness) {
-                    let mut columns = [L::splat(0.0); W];
-                    for k in 0..W {
-                        columns[k] = L::load(&blocks[k]);
-                    }
-                    to_rows(&columns, rows);
+                    to_rows(&loaded::<L, W>(blocks), rows);
                 }
                 handed.clear();
             }
@@ -275,7 +289,7 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
 }
 
 /// Gradients of all inputs from `upstream [N, 10]`.
-pub(crate) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
+pub(super) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
     match inputs.affinities {
         0 => skin_backward_with::<1>(inputs, blended, upstream),
         1 => skin_backward_with::<2>(inputs, blended, upstream),
@@ -301,7 +315,7 @@ fn skin_backward_with<const W: usize>(
         inputs.orientations.par_chunks(ORIENTATION * task),
         inputs.stillness.par_chunks(W * task),
         blended.par_chunks(task / LANES),
-        upstream.par_chunks(MOVED * task),
+        upstream.par_chunks(ALL_MOVED * task),
         means.par_chunks_mut(3 * task),
         orientations.par_chunks_mut(ORIENTATION * task),
         stillness.par_chunks_mut(W * task),

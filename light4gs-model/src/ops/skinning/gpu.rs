@@ -1,28 +1,37 @@
 //! Linear blend skinning on a GPU.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn::tensor::{Device, TensorData};
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
 use light4gs_shaders::{SKINNING, SKINNING_AFFINITIES, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
 
-use super::context::{Gpu, Places, buffer_of, first_words};
-use super::kernel::Kernel;
-use super::launch::Launch;
+use super::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningInputs, SkinningKernels, SkinningTensors, VECTOR, skin};
+use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::skinning::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningKernels, SkinningTensors, VECTOR};
+use crate::ops::fusion::{leaf, resolve};
+use crate::ops::sample::{GpuOperation, Numbers};
 
-/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five vectors each.
+/// Values of a Gaussian for the backward pass, and for the nodes: five vectors each.
 const BLENDED: usize = 20;
 const HANDED: usize = 20;
 
-/// Gaussians of a slice, unless there are so many slices then that their sums take more memory than they are worth.
+/// Gaussians of a slice. Where that makes more than [`MOST_SLICES`], whose sums take memory, slices are longer.
 const SLICE: usize = 64;
 const MOST_SLICES: usize = 256;
 
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation {
+    name: "skinning",
+    kernels,
+    samples: &[|device| sample(device, 0), |device| sample(device, MOST_AFFINITIES)],
+};
+
 /// The kernels of this file, with vectors or without, for every number of affinities.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     let by_affinities = |affinities| {
         let moving = [0, VECTOR].map(|vector| moving(affinities, vector));
         moving.into_iter().chain([SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities)))
@@ -158,4 +167,36 @@ impl SkinningKernels for CubeBackend {
     fn skinning_backward(saved: GpuSaved, gradient: CubeTensor) -> SkinningTensors<Self> {
         backward(saved, gradient).unwrap_or_else(|error| error.raise())
     }
+}
+
+impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
+    type Saved = B::Saved;
+
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, B::Saved) {
+        let tensors = SkinningTensors::from_array(tensors.into_array().map(resolve::<B>));
+        let (moved, saved) = B::skinning_forward(tensors);
+        (leaf::<B>(moved), saved)
+    }
+
+    fn skinning_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self> {
+        let gradients = B::skinning_backward(saved, resolve::<B>(gradient)).into_array();
+        SkinningTensors::from_array(gradients.map(leaf::<B>))
+    }
+}
+
+/// With vectors where there are affinities.
+fn sample(device: &Device, affinities: usize) -> Vec<TensorData> {
+    let mut numbers = Numbers::new(&device.clone().autodiff());
+    let (gaussians, nodes) = (777, 21);
+    let inputs = SkinningInputs {
+        means: numbers.leaf(gaussians, 3, -1.0, 1.0),
+        quats: numbers.leaf(gaussians, 4, -1.0, 1.0),
+        vectors: (affinities > 0).then(|| numbers.leaf(gaussians, 3, -1.0, 1.0)),
+        stillness: numbers.leaf(gaussians, 1, -3.0, 1.0),
+        affinities: (affinities > 0).then(|| numbers.leaf(gaussians, affinities, -3.0, 1.0)),
+        nodes: numbers.leaf(nodes, 20 + affinities, 0.0, 1.0),
+    };
+    let leaves = [&inputs.means, &inputs.quats, &inputs.stillness, &inputs.nodes].map(Clone::clone);
+    let leaves: Vec<_> = leaves.into_iter().chain(inputs.vectors.clone()).chain(inputs.affinities.clone()).collect();
+    numbers.with_gradients(skin(inputs), &leaves)
 }

@@ -1,27 +1,77 @@
 //! Linear blend skinning of Gaussians by control nodes (Lewis et al. 2000; for Gaussians SC-GS, Huang et al. 2024), as a Burn
 //! operation.
 
-use std::ops::Range;
-use std::sync::Arc;
+mod cpu;
+mod cpu_backward;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
+use std::fmt::Debug;
+
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, Dispatch, TensorMetadata, backend_extension};
+use burn::backend::{Autodiff, Backend, Dispatch, ExtensionType, backend_extension};
 use burn::tensor::Tensor;
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{leaf, resolve};
-use super::host::{HostBackend, HostTensor};
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::skinning::{BlendedGroup, MOVED as ALL_MOVED, ORIENTATION, SkinningSlices, skin as skin_slices};
-use crate::cpu::skinning_backward::skin_backward;
-use crate::kernels::skinning::{INPUTS, MOVED, POSED, VECTOR};
-pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTensors};
+use super::{for_all_back_ends, recorded};
+
+/// Numbers of a node's pose: rotation matrix row by row (9), offset (3), quaternion (4).
+const POSE: usize = 16;
+/// Where a node's pose begins, behind its anchor (3) and precision (1).
+pub(crate) const PLACE: usize = 4;
+/// Numbers of a posed node before its affinities.
+pub(crate) const POSED: usize = PLACE + POSE;
+/// Numbers of a moved Gaussian: position (3), quaternion (4); turned vectors (3) stand behind them.
+const MOVED: usize = 7;
+/// Numbers of a vector that turns along.
+const VECTOR: usize = 3;
+
+/// Most affinities of a Gaussian and of a node.
+pub const MOST_AFFINITIES: usize = 4;
+
+/// The differentiable inputs, or their gradients, in the order in which gradients are registered.
+#[derive(ExtensionType)]
+pub struct SkinningTensors<B: Backend> {
+    /// `[N, 3]`, world units.
+    pub means: FloatTensor<B>,
+    /// `[N, 4]`: quaternions (w, x, y, z) of any length.
+    pub quats: FloatTensor<B>,
+    /// `[N, V]`, V 0 or 3: vectors that turn along.
+    pub vectors: FloatTensor<B>,
+    /// `[N, 1]`, logits of the node that stands still.
+    pub stillness: FloatTensor<B>,
+    /// `[N, H]`.
+    pub affinities: FloatTensor<B>,
+    /// `[B, 20 + H]`: anchor (3), precision (1), pose (16): rotation matrix row by row (9), offset (3), quaternion (4); then
+    /// affinities.
+    pub nodes: FloatTensor<B>,
+}
+
+/// Tensors of [`SkinningTensors`].
+const INPUTS: usize = 6;
+
+impl<B: Backend> SkinningTensors<B> {
+    fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.means, self.quats, self.vectors, self.stillness, self.affinities, self.nodes]
+    }
+
+    fn from_array(tensors: [FloatTensor<B>; INPUTS]) -> Self {
+        let [means, quats, vectors, stillness, affinities, nodes] = tensors;
+        Self { means, quats, vectors, stillness, affinities, nodes }
+    }
+}
+
+/// A back end's kernels. [`SkinningOps`] adds the dispatch and the tape.
+pub trait SkinningKernels: Backend {
+    /// What the backward pass needs from the forward pass.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Positions, quaternions and vectors `[N, 7 + V]`.
+    fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
+
+    /// Gradients of all inputs from that of the output `[N, 7 + V]`.
+    fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
+}
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -42,143 +92,12 @@ for_all_back_ends! {
 
 impl<B: SkinningOps + SkinningKernels, C: CheckpointStrategy> SkinningOps for Autodiff<B, C> {
     fn skinning(tensors: SkinningTensors<Self>) -> FloatTensor<Self> {
-        #[derive(Debug)]
-        struct Skinning;
-
-        impl<B: SkinningKernels> Backward<B, INPUTS> for Skinning {
-            type State = B::Saved;
-
-            fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |state, gradient| {
-                    B::skinning_backward(state, gradient).into_array()
-                });
-            }
-        }
-
         let tensors = tensors.into_array();
         let nodes = tensors.each_ref().map(|tensor| tensor.node());
         let inner = SkinningTensors::from_array(tensors.map(|tensor| tensor.into_primitive()));
-        let (moved, saved) = B::skinning_forward(inner);
-        match Skinning.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(saved, moved),
-            OpsKind::UnTracked(prep) => prep.finish(moved),
-        }
-    }
-}
-
-/// State of the CPU back ends between forward and backward.
-#[derive(Clone, Debug)]
-pub struct CpuSaved {
-    means: HostTensor,
-    orientations: Arc<Vec<f32>>,
-    stillness: Arc<Vec<f32>>,
-    nodes: HostTensor,
-    affinities: usize,
-    /// Numbers of a vector: none or three.
-    vector: usize,
-    blended: Arc<Vec<BlendedGroup>>,
-}
-
-impl CpuSaved {
-    fn slices(&self) -> SkinningSlices<'_> {
-        SkinningSlices {
-            means: self.means.as_slice(),
-            orientations: &self.orientations,
-            stillness: &self.stillness,
-            nodes: self.nodes.as_slice(),
-            affinities: self.affinities,
-        }
-    }
-}
-
-/// Rows of two matrices as rows of one, `columns` wide; what both leave of it is 0.
-fn side_by_side([(first, width), (second, other)]: [(&[f32], usize); 2], columns: usize) -> Vec<f32> {
-    let mut rows = vec![0.0; first.len() / width * columns];
-    for (row, own) in rows.chunks_exact_mut(columns).zip(first.chunks_exact(width)) {
-        row[..width].copy_from_slice(own);
-    }
-    if other > 0 {
-        for (row, own) in rows.chunks_exact_mut(columns).zip(second.chunks_exact(other)) {
-            row[width..width + other].copy_from_slice(own);
-        }
-    }
-    rows
-}
-
-/// Some columns of a matrix that is `width` wide.
-fn columns_of(matrix: &[f32], width: usize, columns: Range<usize>) -> Vec<f32> {
-    matrix.chunks_exact(width).flat_map(|row| &row[columns.clone()]).copied().collect()
-}
-
-fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
-    let (vector, affinities) = (tensors.vectors.shape()[1], tensors.affinities.shape()[1]);
-    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
-    let orientations = side_by_side([(quats.as_slice(), 4), (vectors.as_slice(), vector)], ORIENTATION);
-    let stillness = side_by_side([(stillness.as_slice(), 1), (of_gaussians.as_slice(), affinities)], 1 + affinities);
-    let mut saved = CpuSaved {
-        means,
-        orientations: Arc::new(orientations),
-        stillness: Arc::new(stillness),
-        nodes,
-        affinities,
-        vector,
-        blended: Arc::default(),
-    };
-    let (moved, blended) = skin_slices(&saved.slices());
-    saved.blended = Arc::new(blended);
-    let count = moved.len() / ALL_MOVED;
-    let moved = if vector == 0 { columns_of(&moved, ALL_MOVED, 0..MOVED) } else { moved };
-    (B::from_values(moved, [count, MOVED + vector]), saved)
-}
-
-fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
-    let upstream = B::to_host(gradient);
-    let CpuSaved { affinities, vector, .. } = saved;
-    let widened = (vector == 0).then(|| side_by_side([(upstream.as_slice(), MOVED), (&[], 0)], ALL_MOVED));
-    let gradients = skin_backward(&saved.slices(), &saved.blended, widened.as_deref().unwrap_or(upstream.as_slice()));
-    let count = gradients.means.len() / 3;
-    let part = |matrix: &[f32], width: usize, columns: Range<usize>| {
-        let shape = [count, columns.len()];
-        B::from_values(columns_of(matrix, width, columns), shape)
-    };
-    let columns = POSED + affinities;
-    SkinningTensors {
-        quats: part(&gradients.orientations, ORIENTATION, 0..4),
-        vectors: part(&gradients.orientations, ORIENTATION, 4..4 + vector),
-        stillness: part(&gradients.stillness, 1 + affinities, 0..1),
-        affinities: part(&gradients.stillness, 1 + affinities, 1..1 + affinities),
-        means: B::from_values(gradients.means, [count, 3]),
-        nodes: B::from_values(gradients.nodes, [saved.nodes.as_slice().len() / columns, columns]),
-    }
-}
-
-for_cpu_back_ends! {
-    SkinningKernels {
-        type Saved = CpuSaved;
-
-        fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, CpuSaved) {
-            forward_on_cpu(tensors)
-        }
-
-        fn skinning_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SkinningTensors<Self> {
-            backward_on_cpu(saved, gradient)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
-    type Saved = B::Saved;
-
-    fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, B::Saved) {
-        let tensors = SkinningTensors::from_array(tensors.into_array().map(resolve::<B>));
-        let (moved, saved) = B::skinning_forward(tensors);
-        (leaf::<B>(moved), saved)
-    }
-
-    fn skinning_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self> {
-        let gradients = B::skinning_backward(saved, resolve::<B>(gradient)).into_array();
-        SkinningTensors::from_array(gradients.map(leaf::<B>))
+        recorded::<B, C, _, _>(nodes, B::skinning_forward(inner), |saved, gradient| {
+            B::skinning_backward(saved, gradient).into_array()
+        })
     }
 }
 

@@ -1,22 +1,21 @@
 //! Splatting on a GPU: the kernels of `shaders/` in their order.
 
 use burn::backend::TensorMetadata;
+use burn::backend::tensor::FloatTensor;
 use burn::tensor::Shape;
-use burn_wgpu::CubeBackend;
-use burn_wgpu::CubeTensor;
+use burn_fusion::{Fusion, FusionBackend};
+use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
 use light4gs_codec::rendering::{FRUSTUM_MARGIN, TILE};
 use light4gs_render::{CHANNELS, View};
 use light4gs_shaders::{CELL_COUNTS, INTERSECT, PROJECT, PROJECT_BACKWARD, RASTERIZE, RASTERIZE_BACKWARD, Shader};
 
-use super::context::{Gpu, PLACE_ALIGNMENT, Places, buffer_of, first_words};
-use super::kernel::Kernel;
-use super::launch::Launch;
-use super::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
-use super::subgroups::choose_team;
-use super::team::{CHUNK, Team};
+use super::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
+use crate::gpu::sort::{Sorted, bits_for, prefix_sum, ranges, sort};
+use crate::gpu::{CHUNK, Gpu, Kernel, Launch, PLACE_ALIGNMENT, Places, Team, buffer_of, choose_team, first_words};
 use crate::gpu_error::GpuError;
-use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
+use crate::ops::fusion::{int_leaf, leaf, resolve};
+use crate::ops::sample::GpuOperation;
 
 /// Bits of a key in the order of depths: four digits of the sort.
 const DEPTH_BITS: u32 = 28;
@@ -25,10 +24,10 @@ const SUMS: usize = 10;
 
 /// Values that the kernels of one image share.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frame {
+pub(in crate::ops) struct Frame {
     view: View,
-    pub(super) team: Team,
-    pub(super) gaussians: usize,
+    pub(in crate::ops) team: Team,
+    pub(in crate::ops) gaussians: usize,
     /// Coefficients of `sh_rest` for each Gaussian.
     rest: usize,
     /// Intersections that there is room for; `None`: for all, as soon as they are counted.
@@ -40,16 +39,16 @@ impl Frame {
         [self.view.camera.width, self.view.camera.height]
     }
 
-    pub(super) fn pixels(&self) -> usize {
+    pub(in crate::ops) fn pixels(&self) -> usize {
         self.size().iter().map(|side| *side as usize).product()
     }
 
-    pub(super) fn cells(&self) -> usize {
+    pub(in crate::ops) fn cells(&self) -> usize {
         self.size().iter().map(|side| side.div_ceil(self.team.cell) as usize).product()
     }
 
     /// `View` of `shaders/include/view.wgsl`, for chunk `chunk` of `chunks` of the cells' lists.
-    pub(super) fn uniform(&self, chunk: usize, chunks: usize) -> Vec<u32> {
+    pub(in crate::ops) fn uniform(&self, chunk: usize, chunks: usize) -> Vec<u32> {
         let camera = &self.view.camera;
         let [width, height] = self.size();
         let (tan_x, tan_y) = camera.tan_half_fov();
@@ -80,7 +79,7 @@ impl Frame {
     }
 
     /// The number of launches for the longest possible list: no Gaussian is in a cell's list twice.
-    pub(super) fn chunks(&self, intersections: usize) -> usize {
+    pub(in crate::ops) fn chunks(&self, intersections: usize) -> usize {
         intersections.min(self.gaussians).div_ceil(CHUNK).max(1)
     }
 }
@@ -99,20 +98,20 @@ struct InputBuffers {
 
 /// Gaussians on the screen, and the cells that each of them touches.
 #[derive(Clone, Debug)]
-pub(super) struct Intersections {
-    pub(super) splats: Handle,
+pub(in crate::ops) struct Intersections {
+    pub(in crate::ops) splats: Handle,
     /// `[1]`: number of all intersections.
     total: Handle,
     /// Intersections that the lists have room for: the number of all, or what the caller has chosen.
-    pub(super) count: usize,
+    pub(in crate::ops) count: usize,
     /// `[N]`: the first intersection of each Gaussian; the others follow it.
-    pub(super) first_of_gaussian: Handle,
+    pub(in crate::ops) first_of_gaussian: Handle,
     /// `[count]`: the Gaussian of each intersection.
-    pub(super) gaussians: Handle,
+    pub(in crate::ops) gaussians: Handle,
     /// `[count]`: intersections cell by cell, nearest first.
-    pub(super) order: Handle,
+    pub(in crate::ops) order: Handle,
     /// `[cells + 1]`: where each cell begins in `order`.
-    pub(super) starts: Handle,
+    pub(in crate::ops) starts: Handle,
 }
 
 /// State between forward and backward.
@@ -125,8 +124,11 @@ pub struct GpuSplatSaved {
     rendering: Handle,
 }
 
+/// The operation for checks.
+pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "splat", kernels, samples: &[] };
+
 /// The kernels of this file.
-pub(super) fn kernels() -> Vec<Kernel> {
+fn kernels() -> Vec<Kernel> {
     let cells = Team::cells().into_iter().flat_map(|cell| [projecting(cell), by_cells(INTERSECT, cell)]);
     let teams =
         Team::all().flat_map(|team| [RASTERIZE, RASTERIZE_BACKWARD].map(|shader| Kernel::new(shader).blending(team)));
@@ -216,17 +218,17 @@ fn rasterize(gpu: &Gpu, frame: &Frame, lists: &Intersections) -> Result<Handle, 
 }
 
 /// An image's Gaussians on the screen, sorted into cells: the beginning of every pass over its pixels.
-pub(super) struct Begun {
-    pub(super) frame: Frame,
+pub(in crate::ops) struct Begun {
+    pub(in crate::ops) frame: Frame,
     shapes: [Shape; 7],
     inputs: InputBuffers,
-    pub(super) intersections: Intersections,
+    pub(in crate::ops) intersections: Intersections,
     /// `[N]` in pixels.
     radii: Handle,
 }
 
 /// Projects, intersects and sorts.
-pub(super) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: SplatView) -> Result<Begun, GpuError> {
+pub(in crate::ops) fn begin(gpu: &Gpu, inputs: SplatInputs<CubeBackend>, view: SplatView) -> Result<Begun, GpuError> {
     let inputs = inputs.into_array();
     let shapes = inputs.each_ref().map(|tensor| tensor.shape());
     let SplatView { view, room } = view;
@@ -318,14 +320,35 @@ impl SplatKernels for CubeBackend {
     }
 }
 
+impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
+    type Saved = B::Saved;
+
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, B::Saved) {
+        let (outputs, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
+        let SplatOutputs { rendering, radii, intersections } = outputs;
+        let [radii, intersections] = [radii, intersections].map(int_leaf::<B>);
+        (SplatOutputs { rendering: leaf::<B>(rendering), radii, intersections }, saved)
+    }
+
+    fn splat_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
+        let gradients = B::splat_backward(saved, resolve::<B>(gradient)).into_array();
+        SplatInputs::from_array(gradients.map(leaf::<B>))
+    }
+}
+
+/// The tensors inside of a fusion stream.
+pub(in crate::ops) fn resolve_inputs<B: FusionBackend>(inputs: SplatInputs<Fusion<B>>) -> SplatInputs<B> {
+    SplatInputs::from_array(inputs.into_array().map(resolve::<B>))
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
     use light4gs_data::Camera;
 
-    use super::super::context::tests::gpu;
-    use super::super::team::Communication::{SubgroupOfFew, SubgroupOfMany, WorkgroupMemory};
     use super::*;
+    use crate::gpu::Communication::{SubgroupOfFew, SubgroupOfMany, WorkgroupMemory};
+    use crate::gpu::default_gpu;
 
     const COUNT: usize = 300;
     const SIZE: [u32; 2] = [50, 37];
@@ -366,7 +389,7 @@ mod tests {
 
     #[test]
     fn every_team_draws_the_same() {
-        let gpu = gpu();
+        let gpu = default_gpu();
         let chosen = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
         let (expected, _) = run(&gpu, chosen, None);
         assert!(expected[0].iter().any(|value| *value > 1.0), "the scene is empty");
@@ -395,7 +418,7 @@ mod tests {
     /// The same to the bit, whatever the room, and a number that says where there is too little.
     #[test]
     fn room_for_the_lists_changes_nothing_but_the_waiting() {
-        let gpu = gpu();
+        let gpu = default_gpu();
         let team = choose_team(&gpu, SIZE[0], SIZE[1]).unwrap();
         let (expected, count) = run(&gpu, team, None);
         for room in [count, count + 1, 2 * count, 100 * count] {

@@ -1,24 +1,92 @@
 //! Gaussian splatting as a Burn operation: projection, binning, sorting, blending, and the derivative.
 
-use std::sync::Arc;
+pub(super) mod cpu;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
 
-use burn::backend::autodiff::checkpoint::base::Checkpointer;
+use std::fmt::Debug;
+
 use burn::backend::autodiff::checkpoint::strategy::CheckpointStrategy;
-use burn::backend::autodiff::grads::Gradients;
-use burn::backend::autodiff::ops::{Backward, Ops, OpsKind};
-use burn::backend::tensor::FloatTensor;
-use burn::backend::{Autodiff, Backend, TensorMetadata, backend_extension};
-use burn::tensor::TensorData;
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-use light4gs_render::{CHANNELS, GaussianSlices, TileLists, TilePixels, View, assemble, rasterize, splat_backward};
+use burn::backend::tensor::{FloatTensor, IntTensor};
+use burn::backend::{Autodiff, Backend, ExtensionType, backend_extension};
+use light4gs_data::Camera;
+use light4gs_render::View;
 
-#[cfg(feature = "wgpu")]
-use super::fusion::{int_leaf, leaf, resolve};
-use super::host::{HostBackend, HostTensor};
-use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::kernels::splat::INPUTS;
-pub use crate::kernels::splat::{SplatInputs, SplatKernels, SplatOutputs, SplatView};
+use super::{for_all_back_ends, recorded};
+
+/// The differentiable inputs, in the order in which gradients are registered.
+#[derive(ExtensionType)]
+pub struct SplatInputs<B: Backend> {
+    /// `[N, 3]`, world units.
+    pub means: FloatTensor<B>,
+    /// `[N, 4]` as (w, x, y, z), normalized inside.
+    pub quats: FloatTensor<B>,
+    /// `[N, 3]`, standard deviations in world units.
+    pub scales: FloatTensor<B>,
+    /// `[N, 1]` in [0, 1].
+    pub opacities: FloatTensor<B>,
+    /// `[N, 1, 3]`.
+    pub sh_dc: FloatTensor<B>,
+    /// `[N, K, 3]`, K >= (degree + 1)^2 - 1.
+    pub sh_rest: FloatTensor<B>,
+    /// `[N, 2]`, added to the screen position in units of half the image.
+    pub screen_offsets: FloatTensor<B>,
+}
+
+/// Tensors of [`SplatInputs`].
+const INPUTS: usize = 7;
+
+impl<B: Backend> SplatInputs<B> {
+    pub(super) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
+        [self.means, self.quats, self.scales, self.opacities, self.sh_dc, self.sh_rest, self.screen_offsets]
+    }
+
+    pub(super) fn from_array(
+        [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets]: [FloatTensor<B>; INPUTS],
+    ) -> Self {
+        Self { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
+    }
+}
+
+/// The outputs.
+#[derive(ExtensionType)]
+pub struct SplatOutputs<B: Backend> {
+    /// `[5 · H · W]`: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+    pub rendering: FloatTensor<B>,
+    /// `[N]` in pixels; 0 = not on the screen, -1 = not finite or without orientation, so not drawn.
+    pub radii: IntTensor<B>,
+    /// `[1]`: pairs of a Gaussian and a cell of the image that it touches. If there was room for fewer, the image is incomplete.
+    pub intersections: IntTensor<B>,
+}
+
+/// A back end's kernels. [`SplatOps`] adds the dispatch and the tape.
+pub trait SplatKernels: Backend {
+    /// What the backward pass needs from the forward pass.
+    type Saved: Clone + Debug + Send + 'static;
+
+    /// Draws the image.
+    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, Self::Saved);
+
+    /// Gradients of all inputs from that of the image `[5 · H · W]`.
+    fn splat_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self>;
+}
+
+/// Camera, background and active SH degree of one image.
+#[derive(Clone, Copy, Debug)]
+pub struct SplatView {
+    pub(super) view: View,
+    /// Intersections that there is room for; `None`: for all. Only a GPU has to know.
+    #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
+    pub(crate) room: Option<usize>,
+}
+
+impl SplatView {
+    /// The image of `camera` over `background` (red, green, blue). `sh_degree` (0 to 3) is the highest degree of the spherical
+    /// harmonics that is used; `sh_rest` must have at least its `(degree + 1)^2 - 1` coefficients.
+    pub fn new(camera: Camera, background: [f32; 3], sh_degree: usize) -> Self {
+        Self { view: View { camera, background, sh_degree }, room: None }
+    }
+}
 
 /// Splatting on every back end that has [`SplatKernels`], differentiable under [`Autodiff`].
 #[backend_extension(
@@ -39,108 +107,14 @@ for_all_back_ends! {
 
 impl<B: SplatOps + SplatKernels, C: CheckpointStrategy> SplatOps for Autodiff<B, C> {
     fn splat(inputs: SplatInputs<Self>, view: SplatView) -> SplatOutputs<Self> {
-        #[derive(Debug)]
-        struct Splat;
-
-        impl<B: SplatKernels> Backward<B, INPUTS> for Splat {
-            type State = B::Saved;
-
-            fn backward(self, ops: Ops<Self::State, INPUTS>, grads: &mut Gradients, _: &mut Checkpointer) {
-                differentiate::<B, _, _>(ops, grads, |state, gradient| B::splat_backward(state, gradient).into_array());
-            }
-        }
-
         let inputs = inputs.into_array();
         let nodes = inputs.each_ref().map(|input| input.node());
         let inner = SplatInputs::from_array(inputs.map(|input| input.into_primitive()));
         let (outputs, saved) = B::splat_forward(inner, view);
-        let rendering = match Splat.prepare::<C>(nodes).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(saved, outputs.rendering),
-            OpsKind::UnTracked(prep) => prep.finish(outputs.rendering),
-        };
-        SplatOutputs { rendering, radii: outputs.radii, intersections: outputs.intersections }
-    }
-}
-
-/// State of the CPU back ends between forward and backward.
-#[derive(Clone, Debug)]
-pub struct CpuSaved {
-    inputs: [HostTensor; INPUTS],
-    shapes: [Vec<usize>; INPUTS],
-    view: View,
-    lists: Arc<TileLists>,
-    pixels: Arc<Vec<TilePixels>>,
-}
-
-pub(super) fn slices(inputs: &[HostTensor; INPUTS]) -> GaussianSlices<'_> {
-    let [means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets] = inputs.each_ref().map(|i| i.as_slice());
-    GaussianSlices { means, quats, scales, opacities, sh_dc, sh_rest, screen_offsets }
-}
-
-fn forward_on_cpu<B: HostBackend>(
-    inputs: SplatInputs<B>,
-    SplatView { view, .. }: SplatView,
-) -> (SplatOutputs<B>, CpuSaved) {
-    let inputs = inputs.into_array();
-    let device = inputs[0].device();
-    let shapes = inputs.each_ref().map(|input| input.shape().iter().copied().collect());
-    let inputs = inputs.map(B::to_host);
-    let lists = TileLists::build(&slices(&inputs), &view);
-    let pixels = rasterize(&lists, &view);
-    let rendering = assemble(&pixels, &view);
-    let radii = lists.radii();
-    let count = radii.len();
-    let outputs = SplatOutputs {
-        rendering: B::from_values(rendering, [view.camera.height as usize * view.camera.width as usize * CHANNELS]),
-        radii: B::int_from_data(TensorData::new(radii, [count]), &device),
-        intersections: B::int_from_data(TensorData::from([lists.intersections() as i32]), &device),
-    };
-    (outputs, CpuSaved { inputs, shapes, view, lists: Arc::new(lists), pixels: Arc::new(pixels) })
-}
-
-fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SplatInputs<B> {
-    let upstream = B::to_host(gradient);
-    let g = splat_backward(&slices(&saved.inputs), &saved.view, &saved.lists, &saved.pixels, upstream.as_slice());
-    let values = [g.means, g.quats, g.scales, g.opacities, g.sh_dc, g.sh_rest, g.screen_offsets];
-    let mut shapes = saved.shapes.into_iter();
-    SplatInputs::from_array(
-        values.map(|values| B::from_values(values, shapes.next().expect("a shape for every input"))),
-    )
-}
-
-for_cpu_back_ends! {
-    SplatKernels {
-        type Saved = CpuSaved;
-
-        fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, CpuSaved) {
-            forward_on_cpu(inputs, view)
-        }
-
-        fn splat_backward(saved: CpuSaved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
-            backward_on_cpu(saved, gradient)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + SplatKernels> SplatKernels for Fusion<B> {
-    type Saved = B::Saved;
-
-    fn splat_forward(inputs: SplatInputs<Self>, view: SplatView) -> (SplatOutputs<Self>, B::Saved) {
-        let (outputs, saved) = B::splat_forward(resolve_inputs::<B>(inputs), view);
         let SplatOutputs { rendering, radii, intersections } = outputs;
-        let [radii, intersections] = [radii, intersections].map(int_leaf::<B>);
-        (SplatOutputs { rendering: leaf::<B>(rendering), radii, intersections }, saved)
+        let rendering = recorded::<B, C, _, _>(nodes, (rendering, saved), |saved, gradient| {
+            B::splat_backward(saved, gradient).into_array()
+        });
+        SplatOutputs { rendering, radii, intersections }
     }
-
-    fn splat_backward(saved: B::Saved, gradient: FloatTensor<Self>) -> SplatInputs<Self> {
-        let gradients = B::splat_backward(saved, resolve::<B>(gradient)).into_array();
-        SplatInputs::from_array(gradients.map(leaf::<B>))
-    }
-}
-
-/// The tensors inside of a fusion stream.
-#[cfg(feature = "wgpu")]
-pub(super) fn resolve_inputs<B: FusionBackend>(inputs: SplatInputs<Fusion<B>>) -> SplatInputs<B> {
-    SplatInputs::from_array(inputs.into_array().map(resolve::<B>))
 }

@@ -1,23 +1,13 @@
 //! Uniform noise in place of rounding, from a seed: the same numbers on every back end and for any number of threads. Not
 //! differentiable.
 
+mod cpu;
+#[cfg(feature = "wgpu")]
+pub(super) mod gpu;
+
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Dispatch, TensorMetadata, backend_extension};
+use burn::backend::{Backend, Dispatch, backend_extension};
 use burn::tensor::Tensor;
-#[cfg(feature = "wgpu")]
-use burn_fusion::{Fusion, FusionBackend};
-#[cfg(feature = "wgpu")]
-use burn_wgpu::CubeBackend;
-use rayon::prelude::*;
-
-use super::super::for_cpu_back_ends;
-#[cfg(feature = "wgpu")]
-use super::super::fusion::{leaf, resolve};
-use super::super::host::HostBackend;
-#[cfg(feature = "wgpu")]
-use crate::gpu::uniform_noise_on_gpu;
-
-const CHUNK: usize = 1 << 14;
 
 /// The noise on every back end.
 #[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
@@ -31,80 +21,12 @@ pub trait UniformNoiseOps: Backend {
     ) -> FloatTensor<Self>;
 }
 
-/// A hash of 32 bits with little bias ("lowbias32" of C. Wellons's Hash Prospector, 2018).
-fn mixed(mut x: u32) -> u32 {
-    x = (x ^ (x >> 16)).wrapping_mul(0x7feb_352d);
-    x = (x ^ (x >> 15)).wrapping_mul(0x846c_a68b);
-    x ^ (x >> 16)
-}
-
-/// In [-1/2, 1/2): a multiple of 2^-24. `shaders/elementwise/uniform_noise.wgsl` computes the same.
-fn noise(place: u32, seed: [u32; 2]) -> f32 {
-    let bits = mixed(mixed(place.wrapping_add(seed[0])) ^ seed[1]);
-    (bits >> 8) as f32 * (1.0 / 16_777_216.0) - 0.5
-}
-
-fn noise_on_cpu<B: HostBackend>(
-    values: FloatTensor<B>,
-    widths: FloatTensor<B>,
-    which: usize,
-    seed: [u32; 2],
-) -> FloatTensor<B> {
-    let shape = values.shape();
-    let (values, widths) = (B::to_host(values), B::to_host(widths));
-    let (values, width) = (values.as_slice(), widths.as_slice()[which]);
-    let mut noisy = vec![0.0; values.len()];
-    noisy.par_chunks_mut(CHUNK).zip(values.par_chunks(CHUNK)).enumerate().for_each(|(chunk, (noisy, values))| {
-        for (i, (noisy, value)) in noisy.iter_mut().zip(values).enumerate() {
-            *noisy = value + width * noise((chunk * CHUNK + i) as u32, seed);
-        }
-    });
-    B::from_values(noisy, shape)
-}
-
-for_cpu_back_ends! {
-    UniformNoiseOps {
-        fn uniform_noise(
-            values: FloatTensor<Self>,
-            widths: FloatTensor<Self>,
-            which: usize,
-            seed: [u32; 2],
-        ) -> FloatTensor<Self> {
-            noise_on_cpu::<Self>(values, widths, which, seed)
-        }
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl UniformNoiseOps for CubeBackend {
-    fn uniform_noise(
-        values: FloatTensor<Self>,
-        widths: FloatTensor<Self>,
-        which: usize,
-        seed: [u32; 2],
-    ) -> FloatTensor<Self> {
-        uniform_noise_on_gpu(values, widths, which, seed)
-    }
-}
-
-#[cfg(feature = "wgpu")]
-impl<B: FusionBackend + UniformNoiseOps> UniformNoiseOps for Fusion<B> {
-    fn uniform_noise(
-        values: FloatTensor<Self>,
-        widths: FloatTensor<Self>,
-        which: usize,
-        seed: [u32; 2],
-    ) -> FloatTensor<Self> {
-        leaf::<B>(B::uniform_noise(resolve::<B>(values), resolve::<B>(widths), which, seed))
-    }
-}
-
 /// Values with independent noise, uniform in an interval around 0 whose width is one of the widths `[W]`, the one at `which`.
 /// On a GPU, a slice of the widths would be one more launch for each tensor.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
+/// use light4gs_model::ops::uniform_noise::add_uniform_noise;
 ///
 /// let device = Device::flex();
 /// let widths = Tensor::from_floats([0.1, 0.5], &device);
@@ -119,29 +41,4 @@ pub fn add_uniform_noise<const D: usize>(values: Tensor<D>, widths: Tensor<1>, w
     assert!(!values.device().is_autodiff(), "noise has no derivative: give it inner tensors");
     let seed = [seed as u32, (seed >> 32) as u32];
     Tensor::from_dispatch(Dispatch::uniform_noise(values.into_dispatch(), widths.into_dispatch(), which, seed))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Mean, variance and correlation of neighbors, of other seeds and of twice the place, within five standard deviations.
-    #[test]
-    fn noise_is_uniform_and_independent() {
-        const COUNT: u32 = 200_000;
-        let seed = [12_345, 678];
-        let mean = |of: &dyn Fn(u32) -> f64| (0..COUNT).map(of).sum::<f64>() / f64::from(COUNT);
-        let own = |place: u32| f64::from(noise(place, seed));
-        let error = |deviation: f64| 5.0 * deviation / f64::from(COUNT).sqrt();
-        assert!(mean(&own).abs() < error(0.289));
-        assert!((mean(&|i| own(i).powi(2)) - 1.0 / 12.0).abs() < error(0.075));
-        let others: [&dyn Fn(u32) -> f64; 4] =
-            [&|i| own(i + 1), &|i| own(2 * i + 1), &|i| f64::from(noise(i, [seed[0] + 1, seed[1] + 1])), &|i| {
-                f64::from(noise(i, [seed[0], seed[1] + 1]))
-            }];
-        for other in others {
-            assert!(mean(&|i| own(i) * other(i)).abs() < error(1.0 / 12.0));
-        }
-        assert!((0..COUNT).all(|i| (-0.5..0.5).contains(&own(i))));
-    }
 }

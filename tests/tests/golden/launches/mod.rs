@@ -10,19 +10,8 @@ mod transcript;
 use std::path::Path;
 
 use burn::tensor::{Device, Tensor};
-use light4gs_model::gpu::{Communication, RecordedLaunch, Team, record, with_team};
-use light4gs_model::ops::activation::{bounded_exponential, sigmoid};
-use light4gs_model::ops::adam::{AdamStep, adam_step};
-use light4gs_model::ops::columns::columns;
-use light4gs_model::ops::image_difference::{Difference, mean_difference};
-use light4gs_model::ops::lower_bound::lower_bound;
-use light4gs_model::ops::node_poses::{NodeParameters, pose};
-use light4gs_model::ops::node_regularizer::{Regularization, regularize};
-use light4gs_model::ops::normal_cdf::normal_cdf;
-use light4gs_model::ops::rate::mixture_bits::{MixtureInputs, mixture_bits};
-use light4gs_model::ops::rate::neighborhoods::{Neighborhoods, neighborhoods};
-use light4gs_model::ops::rate::uniform_noise::add_uniform_noise;
-use light4gs_model::ops::skinning::{MOST_AFFINITIES, SkinningInputs, skin};
+use light4gs_model::gpu::{Communication, Team, record, with_team};
+use light4gs_model::ops::ON_GPU;
 use light4gs_model::{PlaneTensors, Significance, Splatter};
 use light4gs_tests::golden::{Golden, values_of};
 use light4gs_tests::odd_scenes::dots;
@@ -43,10 +32,7 @@ fn launches_of_golden_scenes() {
     blending(&mut transcript, "workgroup memory", Team::WITHOUT_SUBGROUPS);
     crowded(&mut transcript);
     planes(&mut transcript);
-    skinning(&mut transcript);
-    control_nodes(&mut transcript);
-    rate(&mut transcript);
-    elementwise(&mut transcript);
+    operations(&mut transcript);
     transcript.assert_complete();
     // SwiftShader's subgroups have four members, for which the program has no team. Here a workgroup of four is a part of a
     // subgroup, and computes the same.
@@ -205,104 +191,12 @@ fn planes(transcript: &mut Transcript) {
     }
 }
 
-fn skinning(transcript: &mut Transcript) {
-    for affinities in [0, MOST_AFFINITIES] {
-        let mut random = Random::new(8);
-        let ((), launches) = record(|| {
-            let device = device().autodiff();
-            let mut tensor = |rows: usize, columns: usize, low: f64, high: f64| {
-                let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(low, high) as f32).collect();
-                Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
-            };
-            let (gaussians, nodes) = (777, 21);
-            let moved = skin(SkinningInputs {
-                means: tensor(gaussians, 3, -1.0, 1.0),
-                quats: tensor(gaussians, 4, -1.0, 1.0),
-                vectors: (affinities > 0).then(|| tensor(gaussians, 3, -1.0, 1.0)),
-                stillness: tensor(gaussians, 1, -3.0, 1.0),
-                affinities: (affinities > 0).then(|| tensor(gaussians, affinities, -3.0, 1.0)),
-                nodes: tensor(nodes, 20 + affinities, 0.0, 1.0),
-            });
-            (moved.clone() * moved).sum().backward();
-        });
-        transcript.add(&format!("skinning, {affinities} affinities"), launches, Vec::new());
-    }
-}
-
-/// Poses of nodes and their regularizer, with gradients.
-fn control_nodes(transcript: &mut Transcript) {
-    for affinities in [0, MOST_AFFINITIES] {
-        let mut random = Random::new(9);
-        let ((), launches) = record(|| {
-            let device = device().autodiff();
-            let mut tensor = |rows: usize, columns: usize| {
-                let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(-0.7, 0.7) as f32).collect();
-                Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
-            };
-            let (nodes, knots) = (77, 9);
-            let parameters = NodeParameters {
-                anchors: tensor(nodes, 3),
-                log_radii: tensor(nodes, 1),
-                translations: tensor(knots, 3 * nodes),
-                rotations: tensor(knots, 4 * nodes),
-                affinities: (affinities > 0).then(|| tensor(nodes, affinities)),
-                unit: Tensor::from_floats([2.5], &device),
-            };
-            let posed = pose(parameters.clone(), 0.3);
-            let regularization = Regularization { rigidity: 0.75, smoothness: 0.5, time: 0.6 };
-            let loss = regularize(parameters, regularization);
-            ((posed.clone() * posed).sum() + loss).backward();
-        });
-        transcript.add(&format!("control nodes, {affinities} affinities"), launches, Vec::new());
-    }
-}
-
-/// Bits of rows of a table and of their neighbors, some of which are chosen several times, and their derivative.
-fn rate(transcript: &mut Transcript) {
-    let mut random = Random::new(10);
-    let ((), launches) = record(|| {
-        let device = device().autodiff();
-        let mut tensor = |rows: usize, columns: usize, low: f64, high: f64| {
-            let values: Vec<f32> = (0..rows * columns).map(|_| random.uniform(low, high) as f32).collect();
-            Tensor::<1>::from_floats(values.as_slice(), &device).reshape([rows, columns]).require_grad()
-        };
-        let (count, columns, components) = (321, 3, 3);
-        let channels = 3 * columns;
-        let rows: Vec<u32> = (0..500).map(|place| place * place % count as u32).collect();
-        let neighbors: Vec<_> = rows.iter().map(|row| [row / 2, row / 3, row / 3, row / 5]).collect();
-        let table = tensor(count, columns, -2.0, 2.0);
-        let inputs = MixtureInputs {
-            values: neighborhoods(table, Neighborhoods::new(&rows, &neighbors, count)),
-            widths: tensor(channels, 1, 0.01, 0.5),
-            weight_logits: tensor(channels, components, -1.0, 1.0),
-            means: tensor(channels, components, -0.5, 0.5),
-            log_scales: tensor(channels, components, -3.0, 0.0),
-        };
-        let bits = mixture_bits(inputs, 1e-9);
-        (bits.clone() * bits).sum().backward();
-    });
-    transcript.add("rate of attributes", launches, Vec::new());
-}
-
-/// The entropy models' functions far into their tails, and a step of the optimizer.
-fn elementwise(transcript: &mut Transcript) {
-    let places: Vec<f32> = (0..2600).map(|i| i as f32 * 0.01 - 13.0).collect();
-    let leaf = |device: &Device| Tensor::<1>::from_floats(places.as_slice(), device);
-    let functions = [normal_cdf as fn(Tensor<1>) -> Tensor<1>, |x| lower_bound(x, 0.11), sigmoid, bounded_exponential];
-    let ((), launches): (_, Vec<RecordedLaunch>) = record(|| {
-        for function in functions {
-            let upstream = leaf(&device().autodiff()).sin();
-            (function(leaf(&device().autodiff()).require_grad()) * upstream).sum().backward();
+/// Each operation by itself, forward and backward.
+fn operations(transcript: &mut Transcript) {
+    for operation in ON_GPU {
+        for sample in operation.samples {
+            let (_, launches) = record(|| sample(&device()));
+            transcript.add(operation.name, launches, Vec::new());
         }
-        for difference in [Difference::Absolute, Difference::Squared] {
-            let image = leaf(&device().autodiff()).require_grad();
-            mean_difference(difference, image, leaf(&device().autodiff()).cos()).backward();
-        }
-        columns(leaf(&device().autodiff()).reshape([1, -1]).require_grad(), 1..3).sum().backward();
-        let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 3 };
-        let moments = [leaf(&device()).cos(), leaf(&device()).sin() * 0.1, leaf(&device()).abs() * 0.01];
-        adam_step(moments, leaf(&device()), step);
-        add_uniform_noise(leaf(&device()), Tensor::from_floats([0.5, 0.25], &device()), 1, 1 << 40 | 5);
-    });
-    transcript.add("elementwise", launches, Vec::new());
+    }
 }

@@ -3,7 +3,8 @@
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-use light4gs_model::gpu::{Kernel, RecordedLaunch, kernels};
+use light4gs_model::gpu::{Kernel, RecordedLaunch};
+use light4gs_model::ops::kernels;
 use light4gs_shaders::SUBGROUPS;
 use serde_json::{Value, json};
 

@@ -3,7 +3,7 @@
 
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_model::ops::lower_bound::lower_bound;
-use light4gs_model::ops::rate::mixture_bits::{MOST_COMPONENTS, MixtureInputs, mixture_bits};
+use light4gs_model::ops::mixture_bits::{MOST_COMPONENTS, MixtureInputs, mixture_bits};
 use light4gs_model::{LogisticMixture, LogisticMixtureConfig};
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::random::Random;

@@ -2,7 +2,7 @@
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 use light4gs_codec::attributes::NEIGHBORS;
-use light4gs_model::ops::rate::neighborhoods::{Neighborhoods, neighborhoods};
+use light4gs_model::ops::neighborhoods::{Neighborhoods, neighborhoods};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
 

@@ -3,9 +3,9 @@
 
 use super::placement::square;
 use super::{AFFINITY, NodesField, STILLNESS, numbers};
-use crate::kernels::skinning::{PLACE, POSED};
 use crate::ops::activation::sigmoid;
 use crate::ops::node_poses::pose;
+use crate::ops::skinning::{PLACE, POSED};
 use crate::scene::field::SceneAtRest;
 
 /// Smallest weight with which a node counts.

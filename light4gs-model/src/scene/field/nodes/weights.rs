@@ -5,8 +5,8 @@ use std::ops::Range;
 use burn::tensor::{Tensor, s};
 
 use super::{NodesField, tensor};
-use crate::kernels::skinning::{PLACE, POSED};
 use crate::ops::node_poses::pose;
+use crate::ops::skinning::{PLACE, POSED};
 use crate::scene::GaussianTensors;
 
 /// Nodes whose weights one call of the kernel gives.
