@@ -50,7 +50,6 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.profile.begin_step();
         if stage == Stage::Fine {
             self.begin_motion_step(iteration);
-            self.refine_motion(iteration)?;
         }
         let indices = self.batch(stage, iteration)?;
         let batch = indices.len();

@@ -2,7 +2,6 @@
 
 mod golden;
 mod motion;
-mod relocation;
 mod survey;
 
 use burn::module::Param;

@@ -9,7 +9,6 @@
 //! |---|---|
 //! | `trajectory` | trajectories over time, and where nodes are on them |
 //! | `placement` | where the nodes are when motion begins |
-//! | `relocation` | nodes that move to where motion is not explained, while training |
 //! | `survey` | what all times have shown before a window widens |
 //! | `affinity` | which nodes a Gaussian follows beyond its place |
 //! | `lifetime` | what comes and goes |
@@ -22,7 +21,6 @@ mod affinity;
 mod lifetime;
 mod placement;
 mod plain;
-mod relocation;
 mod shading;
 mod stream;
 mod survey;
@@ -41,9 +39,7 @@ pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
 pub use shading::SHADING;
 
-use super::{
-    DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest, ScenePoints,
-};
+use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, ScenePoints};
 use crate::ops::columns::columns;
 use crate::ops::node_poses::{NodeParameters, pose};
 use crate::ops::node_regularizer::{Regularization, regularize};
@@ -111,15 +107,6 @@ pub struct NodesFieldConfig {
     /// How much faster than the usual rate anchors (as shares of the scene's extent) and logarithms of radii are learned.
     #[config(default = 5.0)]
     pub anchor_rate: f64,
-    /// Nodes that do little are moved to where motion is not explained, every so many iterations; 0: they never are.
-    #[config(default = 0)]
-    pub relocation_interval: usize,
-    /// The share of the fine stage after which nodes are no longer moved.
-    #[config(default = 0.67)]
-    pub relocation_until: f64,
-    /// At most this share of the nodes is moved at a time.
-    #[config(default = 0.0625)]
-    pub relocation_share: f64,
 }
 
 /// `B` nodes on trajectories of `K` knots. Lengths are shares of `unit`.
@@ -280,19 +267,6 @@ impl DeformationField for NodesField {
         let translations = self.translations_beyond(low, high);
         let translations = translations.unwrap_or_else(|| trajectory::continued(self.translations.val(), low, high));
         self.translations = renewed(&self.translations, translations);
-    }
-
-    fn refinement_views(&self, position: &FinePosition) -> usize {
-        self.relocation_views(position)
-    }
-
-    fn refine(
-        &mut self,
-        scene: &SceneAtRest<'_>,
-        views: &[PositionGradients],
-        position: &FinePosition,
-    ) -> Vec<Renewed> {
-        self.relocate(scene, views, position)
     }
 
     fn passing(&self, attribute: &Attribute, moment: &Moment) -> Option<Vec<f32>> {
