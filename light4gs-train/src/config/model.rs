@@ -120,9 +120,6 @@ keys! {
         /// not move together.
         affinities: usize = nodes().affinities; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS",
             "numbers by which every Gaussian learns which nodes it follows beyond its place";
-        /// Every Gaussian learns how its brightness changes as it turns: a vector that turns along, and one direction of the light
-        /// for the scene.
-        shading: bool = nodes().shading; Flag, "ours", "every Gaussian learns how its brightness changes as it turns";
         /// Weight of the term that keeps neighboring nodes in place as seen from each other.
         rigidity: f64 = nodes().rigidity; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
@@ -183,7 +180,6 @@ impl ModelConfig {
             stillness: table.stillness.then_some(table.stillness_start),
             lifetime: table.lifetime,
             affinities: table.affinities,
-            shading: table.shading,
             rigidity: table.rigidity,
             smoothness: table.smoothness,
             translation_rate: table.translation_rate,

@@ -22,9 +22,7 @@ use light4gs_codec::MotionArrays;
 pub use built_in::{BuiltInField, BuiltInFieldConfig};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use hexplane::{HexPlaneField, HexPlaneFieldConfig};
-pub use nodes::{
-    AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, SHADING, STILLNESS,
-};
+pub use nodes::{AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS};
 pub use still::StillField;
 
 use super::arrays::ModelError;
