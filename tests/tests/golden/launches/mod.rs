@@ -218,7 +218,6 @@ fn skinning(transcript: &mut Transcript) {
             let moved = skin(SkinningInputs {
                 means: tensor(gaussians, 3, -1.0, 1.0),
                 quats: tensor(gaussians, 4, -1.0, 1.0),
-                vectors: (affinities > 0).then(|| tensor(gaussians, 3, -1.0, 1.0)),
                 stillness: tensor(gaussians, 1, -3.0, 1.0),
                 affinities: (affinities > 0).then(|| tensor(gaussians, affinities, -3.0, 1.0)),
                 nodes: tensor(nodes, 20 + affinities, 0.0, 1.0),
