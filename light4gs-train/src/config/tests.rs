@@ -267,7 +267,7 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
         ("compression.rate.weighting = 'megabyte'", "compression.rate.weighting", "megabytes"),
         ("compression.context.architecture = 'compcat'", "compression.context.architecture", "compact"),
         ("compression.sh.model = 'factorised'", "compression.sh.model", "factorized"),
-        ("train.loss = 'charboner'", "train.loss", "charbonnier"),
+        ("train.loss = 'fotometric'", "train.loss", "photometric"),
         ("train.sampling = 'sametime'", "train.sampling", "same_time"),
         ("train.densify.strategy = 'adaptiv'", "train.densify.strategy", "adaptive"),
         ("train.prune.score = 'wieght'", "train.prune.score", "weight"),

@@ -22,7 +22,7 @@ keys! {
         /// The loss by which rendered views are compared with the frames. The keys of each loss are in a table of its name.
         loss: LossKind = LossKind::Photometric;
             Kind { names: LossKind::NAMES, list: "light4gs-train/src/loss/mod.rs" },
-            "3DGS", "or \"charbonnier\"";
+            "3DGS";
         /// The keys of the losses.
         #[serde(flatten)]
         losses: Losses;
