@@ -270,8 +270,8 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
         ("train.loss = 'fotometric'", "train.loss", "photometric"),
         ("train.sampling = 'sametime'", "train.sampling", "same_time"),
         ("train.densify.strategy = 'adaptiv'", "train.densify.strategy", "adaptive"),
-        ("train.prune.score = 'wieght'", "train.prune.score", "weight"),
-        ("train.prune.volume = 'unclampd'", "train.prune.volume", "unclamped"),
+        ("train.prune.score = 'sensitivty'", "train.prune.score", "sensitivity"),
+        ("train.prune.volume = 'clampd'", "train.prune.volume", "clamped"),
         ("eval.splits = ['tset']", "eval.splits", "test"),
         ("device = 'flax'", "device", "flex"),
     ] {
