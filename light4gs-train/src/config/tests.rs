@@ -268,7 +268,7 @@ fn an_unknown_choice_is_named_with_its_key_and_the_nearest_one() {
         ("compression.context.architecture = 'compcat'", "compression.context.architecture", "compact"),
         ("compression.sh.model = 'factorised'", "compression.sh.model", "factorized"),
         ("train.loss = 'fotometric'", "train.loss", "photometric"),
-        ("train.sampling = 'sametime'", "train.sampling", "same_time"),
+        ("train.sampling = 'shufled'", "train.sampling", "shuffled"),
         ("train.densify.strategy = 'adaptiv'", "train.densify.strategy", "adaptive"),
         ("train.prune.score = 'sensitivty'", "train.prune.score", "sensitivity"),
         ("train.prune.volume = 'clampd'", "train.prune.volume", "clamped"),

@@ -29,7 +29,7 @@ use crate::observers::metrics_log::MetricsLog;
 use crate::optimization::adam::Adam;
 use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder};
-use crate::sampling::{FrameSampler, StageFrames};
+use crate::sampling::{CandidateFrames, FrameSampler};
 use crate::stage::Stage;
 
 /// The parts of a [`Trainer`]. Parts that are not given are made as the configuration says.
@@ -352,7 +352,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             None => config.device.computes_on_processor(),
         };
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
-        let stage_frames = StageFrames::new(config.train.coarse_times, &data.train);
+        let candidates = CandidateFrames::new(&data.train);
         Ok(Trainer {
             config,
             device,
@@ -367,7 +367,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             observers: all,
             stop,
             sampler,
-            stage_frames,
+            candidates,
             regularizers,
             profile: Profile::off(),
             view_pools,

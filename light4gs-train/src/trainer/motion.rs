@@ -30,7 +30,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         FinePosition {
             iteration,
             iterations: self.config.train.iterations(Stage::Fine),
-            times: self.stage_frames.of(Stage::Fine).times.len(),
+            times: self.candidates.times.len(),
             window: window(iteration),
             window_before: window(iteration.saturating_sub(1)),
             seed,

@@ -155,7 +155,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let train = &self.config.train;
         BatchRequest {
             frames: &self.data.train,
-            candidates: self.stage_frames.of(stage),
+            candidates: &self.candidates,
             batch_size: train.batch_size.max(1),
             stage,
             iteration,
