@@ -31,10 +31,7 @@ fn main(
         sum += vec3<f32>(sums[at], sums[at + 1u], sums[at + 2u]);
         at += 3u;
     }
-    var opacity = 0.0;
-    if (cells > 0u) {
-        opacity = splats[4u * i].w;
-    }
+    let opacity = select(0.0, splats[4u * i].w, cells > 0u);
     scores[3u * i] = sum.x;
     scores[3u * i + 1u] = sum.y;
     scores[3u * i + 2u] = opacity * sum.z;
