@@ -27,7 +27,7 @@ fn kernels() -> Vec<Kernel> {
     blending.chain([SIGNIFICANCE_GATHER.into()]).collect()
 }
 
-/// Scores `[N, 4]`; see [`SCORES`].
+/// Scores `[N, 3]`; see [`SCORES`].
 fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, GpuError> {
     let gpu = Gpu::of(&inputs.means)?;
     let Begun { frame, intersections: lists, .. } = begin(&gpu, inputs, SplatView { view, room: None })?;

@@ -12,7 +12,7 @@ use super::splat::{SplatInputs, SplatView};
 /// The sums on every back end.
 #[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
 pub trait SignificanceOps: Backend {
-    /// `[N, 4]`, sums over the pixels that blend each Gaussian: pixels, `T · alpha`, `T · opacity`, opacity, with `T`
-    /// the transmittance before the Gaussian.
+    /// `[N, 3]`, sums over the pixels that blend each Gaussian: pixels, `T · alpha`, `T · opacity`, with `T` the
+    /// transmittance before the Gaussian.
     fn significance(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self>;
 }

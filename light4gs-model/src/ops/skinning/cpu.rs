@@ -13,14 +13,9 @@ use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::cpu_backward::skin_backward;
-use super::{MOVED, PLACE, POSE, POSED, SkinningKernels, SkinningTensors, VECTOR};
+use super::{MOVED, PLACE, POSE, POSED, SkinningKernels, SkinningTensors};
 use crate::ops::for_cpu_back_ends;
 use crate::ops::host::{HostBackend, HostTensor};
-
-/// Numbers of a Gaussian's orientation: quaternion, and a vector that turns along, here for all.
-pub(super) const ORIENTATION: usize = 4 + VECTOR;
-/// Numbers of a moved Gaussian: position, quaternion, turned vector.
-pub(super) const ALL_MOVED: usize = MOVED + VECTOR;
 
 /// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.
 pub(super) const CHUNK: usize = 256;
@@ -37,8 +32,8 @@ pub(super) type Block = [f32; LANES];
 pub(super) struct SkinningSlices<'a> {
     /// `[N, 3]`
     pub(super) means: &'a [f32],
-    /// `[N, 7]`: quaternions, then vectors
-    pub(super) orientations: &'a [f32],
+    /// `[N, 4]`
+    pub(super) quats: &'a [f32],
     /// `[N, W]`: stillness, then affinities
     pub(super) stillness: &'a [f32],
     /// `[B, 19 + W]`: anchor, precision, pose, affinities
@@ -175,13 +170,6 @@ pub(super) fn columns<L: Lanes, const C: usize>(rows: &[f32]) -> [L; C] {
     loaded(&blocks)
 }
 
-/// Quaternions and vectors of up to eight Gaussians.
-#[inline(always)]
-pub(super) fn orientation<L: Lanes>(rows: &[f32]) -> ([L; 4], [L; 3]) {
-    let all = columns::<L, ORIENTATION>(rows);
-    ([all[0], all[1], all[2], all[3]], [all[4], all[5], all[6]])
-}
-
 /// Writes columns to up to eight rows.
 #[inline(always)]
 pub(super) fn to_rows<L: Lanes, const C: usize>(columns: &[L; C], rows: &mut [f32]) {
@@ -204,15 +192,16 @@ pub(super) fn product<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> [L; 4] {
     ]
 }
 
-/// `A vector + offset`, with the matrix of a blended pose.
+/// `A mean + t` of a blended pose.
 #[inline(always)]
-pub(super) fn mapped<L: Lanes>(pose: &[L; POSE], vector: &[L; 3], mut offset: [L; 3]) -> [L; 3] {
+fn place<L: Lanes>(pose: &[L; POSE], mean: &[L; 3]) -> [L; 3] {
+    let mut place = [pose[9], pose[10], pose[11]];
     for i in 0..3 {
         for j in 0..3 {
-            offset[i] = pose[3 * i + j].mul_add(vector[j], offset[i]);
+            place[i] = pose[3 * i + j].mul_add(mean[j], place[i]);
         }
     }
-    offset
+    place
 }
 
 /// Sums over the nodes of weight times the eight numbers of the pose from `first` on.
@@ -234,7 +223,7 @@ pub(super) const STILL: [f32; POSE] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1
 struct Forward<'a, const W: usize> {
     nodes: &'a [Node<W>],
     means: &'a [f32],
-    orientations: &'a [f32],
+    quats: &'a [f32],
     stillness: &'a [f32],
     moved: &'a mut [f32],
     blended: &'a mut [BlendedGroup],
@@ -246,10 +235,10 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let mut weights = vec![[0.0; LANES]; self.nodes.len()];
-        let inputs = self.means.chunks(3 * LANES).zip(self.orientations.chunks(ORIENTATION * LANES));
+        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
-        let outputs = self.moved.chunks_mut(ALL_MOVED * LANES).zip(self.blended);
-        for (((means, orientations), stillness), (moved, blended)) in inputs.zip(outputs) {
+        let outputs = self.moved.chunks_mut(MOVED * LANES).zip(self.blended);
+        for (((means, quats), stillness), (moved, blended)) in inputs.zip(outputs) {
             let mean = columns::<L, 3>(means);
             let scaled = as_exponents(&columns::<L, W>(stillness));
             let still_exponent = scaled[0];
@@ -275,14 +264,12 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
                     pose[first + k] = with_still.mul(inverse_sum);
                 }
             }
-            let (quat, vector) = orientation::<L>(orientations);
-            let at = mapped(&pose, &mean, [pose[9], pose[10], pose[11]]);
+            let quat = columns::<L, 4>(quats);
+            let at = place(&pose, &mean);
             let turned = product(&[pose[12], pose[13], pose[14], pose[15]], &quat);
-            let vector = mapped(&pose, &vector, [L::splat(0.0); 3]);
-            let mut all = [L::splat(0.0); ALL_MOVED];
+            let mut all = [L::splat(0.0); MOVED];
             all[..3].copy_from_slice(&at);
-            all[3..7].copy_from_slice(&turned);
-            all[7..].copy_from_slice(&vector);
+            all[3..].copy_from_slice(&turned);
             to_rows(&all, moved);
             blended.pose = stored(&pose);
             largest.store(&mut blended.largest);
@@ -292,7 +279,7 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
     }
 }
 
-/// Positions, quaternions and vectors `[N, 10]`, and the state for the backward pass.
+/// Positions and quaternions `[N, 7]`, and the state for the backward pass.
 fn skin_slices(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
     match inputs.affinities {
         0 => skin_with::<1>(inputs),
@@ -306,17 +293,17 @@ fn skin_slices(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
 fn skin_with<const W: usize>(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
     let nodes = inputs.nodes::<W>();
     let count = inputs.count();
-    let mut moved = vec![0.0; ALL_MOVED * count];
+    let mut moved = vec![0.0; MOVED * count];
     let mut blended = vec![BlendedGroup::default(); count.div_ceil(LANES)];
     let chunks = (
         inputs.means.par_chunks(3 * CHUNK),
-        inputs.orientations.par_chunks(ORIENTATION * CHUNK),
+        inputs.quats.par_chunks(4 * CHUNK),
         inputs.stillness.par_chunks(W * CHUNK),
-        moved.par_chunks_mut(ALL_MOVED * CHUNK),
+        moved.par_chunks_mut(MOVED * CHUNK),
         blended.par_chunks_mut(CHUNK / LANES),
     );
-    chunks.into_par_iter().for_each(|(means, orientations, stillness, moved, blended)| {
-        dispatch(Forward { nodes: &nodes, means, orientations, stillness, moved, blended });
+    chunks.into_par_iter().for_each(|(means, quats, stillness, moved, blended)| {
+        dispatch(Forward { nodes: &nodes, means, quats, stillness, moved, blended });
     });
     (moved, blended)
 }
@@ -325,12 +312,10 @@ fn skin_with<const W: usize>(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedG
 #[derive(Clone, Debug)]
 pub struct CpuSaved {
     means: HostTensor,
-    orientations: Arc<Vec<f32>>,
+    quats: HostTensor,
     stillness: Arc<Vec<f32>>,
     nodes: HostTensor,
     affinities: usize,
-    /// Numbers of a vector: none or three.
-    vector: usize,
     blended: Arc<Vec<BlendedGroup>>,
 }
 
@@ -338,7 +323,7 @@ impl CpuSaved {
     fn slices(&self) -> SkinningSlices<'_> {
         SkinningSlices {
             means: self.means.as_slice(),
-            orientations: &self.orientations,
+            quats: self.quats.as_slice(),
             stillness: &self.stillness,
             nodes: self.nodes.as_slice(),
             affinities: self.affinities,
@@ -346,16 +331,12 @@ impl CpuSaved {
     }
 }
 
-/// Rows of two matrices as rows of one, `columns` wide; what both leave of it is 0.
-fn side_by_side([(first, width), (second, other)]: [(&[f32], usize); 2], columns: usize) -> Vec<f32> {
-    let mut rows = vec![0.0; first.len() / width * columns];
-    for (row, own) in rows.chunks_exact_mut(columns).zip(first.chunks_exact(width)) {
-        row[..width].copy_from_slice(own);
-    }
-    if other > 0 {
-        for (row, own) in rows.chunks_exact_mut(columns).zip(second.chunks_exact(other)) {
-            row[width..width + other].copy_from_slice(own);
-        }
+/// Stillness `[N, 1]` and affinities `[N, H]`, a Gaussian's numbers next to each other.
+fn side_by_side(stillness: &[f32], affinities: &[f32], width: usize) -> Vec<f32> {
+    let mut rows = Vec::with_capacity(stillness.len() + affinities.len());
+    for (i, stillness) in stillness.iter().enumerate() {
+        rows.push(*stillness);
+        rows.extend_from_slice(&affinities[width * i..width * (i + 1)]);
     }
     rows
 }
@@ -366,43 +347,32 @@ fn columns_of(matrix: &[f32], width: usize, columns: Range<usize>) -> Vec<f32> {
 }
 
 fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
-    let (vector, affinities) = (tensors.vectors.shape()[1], tensors.affinities.shape()[1]);
-    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
-    let orientations = side_by_side([(quats.as_slice(), 4), (vectors.as_slice(), vector)], ORIENTATION);
-    let stillness = side_by_side([(stillness.as_slice(), 1), (of_gaussians.as_slice(), affinities)], 1 + affinities);
-    let mut saved = CpuSaved {
-        means,
-        orientations: Arc::new(orientations),
-        stillness: Arc::new(stillness),
-        nodes,
-        affinities,
-        vector,
-        blended: Arc::default(),
-    };
+    let affinities = tensors.affinities.shape()[1];
+    let [means, quats, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
+    let stillness = side_by_side(stillness.as_slice(), of_gaussians.as_slice(), affinities);
+    let mut saved =
+        CpuSaved { means, quats, stillness: Arc::new(stillness), nodes, affinities, blended: Arc::default() };
     let (moved, blended) = skin_slices(&saved.slices());
     saved.blended = Arc::new(blended);
-    let count = moved.len() / ALL_MOVED;
-    let moved = if vector == 0 { columns_of(&moved, ALL_MOVED, 0..MOVED) } else { moved };
-    (B::from_values(moved, [count, MOVED + vector]), saved)
+    let count = moved.len() / MOVED;
+    (B::from_values(moved, [count, MOVED]), saved)
 }
 
 fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
     let upstream = B::to_host(gradient);
-    let CpuSaved { affinities, vector, .. } = saved;
-    let widened = (vector == 0).then(|| side_by_side([(upstream.as_slice(), MOVED), (&[], 0)], ALL_MOVED));
-    let gradients = skin_backward(&saved.slices(), &saved.blended, widened.as_deref().unwrap_or(upstream.as_slice()));
+    let affinities = saved.affinities;
+    let gradients = skin_backward(&saved.slices(), &saved.blended, upstream.as_slice());
     let count = gradients.means.len() / 3;
-    let part = |matrix: &[f32], width: usize, columns: Range<usize>| {
+    let part = |columns: Range<usize>| {
         let shape = [count, columns.len()];
-        B::from_values(columns_of(matrix, width, columns), shape)
+        B::from_values(columns_of(&gradients.stillness, 1 + affinities, columns), shape)
     };
     let columns = POSED + affinities;
     SkinningTensors {
-        quats: part(&gradients.orientations, ORIENTATION, 0..4),
-        vectors: part(&gradients.orientations, ORIENTATION, 4..4 + vector),
-        stillness: part(&gradients.stillness, 1 + affinities, 0..1),
-        affinities: part(&gradients.stillness, 1 + affinities, 1..1 + affinities),
+        stillness: part(0..1),
+        affinities: part(1..1 + affinities),
         means: B::from_values(gradients.means, [count, 3]),
+        quats: B::from_values(gradients.quats, [count, 4]),
         nodes: B::from_values(gradients.nodes, [saved.nodes.as_slice().len() / columns, columns]),
     }
 }

@@ -16,10 +16,10 @@ use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::cpu::{
-    ALL_MOVED, BlendedGroup, Block, CHUNK, Node, ORIENTATION, STILL, SkinningSlices, as_exponents, columns, loaded,
-    orientation, product, spread, stored, to_rows, weight,
+    BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, loaded, product, spread, stored,
+    to_rows, weight,
 };
-use super::{PLACE, POSE, POSED};
+use super::{MOVED, PLACE, POSE, POSED};
 
 /// Most tasks, so that their sums take no more memory than some thousand Gaussians.
 const MOST_TASKS: usize = 64;
@@ -28,8 +28,8 @@ const MOST_TASKS: usize = 64;
 pub(super) struct SkinningGradients {
     /// `[N, 3]`
     pub(super) means: Vec<f32>,
-    /// `[N, 7]`
-    pub(super) orientations: Vec<f32>,
+    /// `[N, 4]`
+    pub(super) quats: Vec<f32>,
     /// `[N, W]`
     pub(super) stillness: Vec<f32>,
     /// `[B, 19 + W]`
@@ -89,65 +89,65 @@ fn inner_product<L: Lanes>(by_pose: &[Block; POSE], pose: &[L; POSE]) -> L {
 struct Backward<'a, const W: usize> {
     nodes: &'a [Node<W>],
     means: &'a [f32],
-    orientations: &'a [f32],
+    quats: &'a [f32],
     stillness: &'a [f32],
     blended: &'a [BlendedGroup],
-    /// `[N, 10]`
+    /// `[N, 7]`
     upstream: &'a [f32],
     of_means: &'a mut [f32],
-    of_orientations: &'a mut [f32],
+    of_quats: &'a mut [f32],
     of_stillness: &'a mut [f32],
 }
 
-/// Eight Gaussians at rest, and the gradients of what they become.
+/// Eight Gaussians at rest, and the gradients of their places and of their turned quaternions.
 struct Group<L> {
     mean: [L; 3],
     quat: [L; 4],
-    vector: [L; 3],
     by_position: [L; 3],
-    by_turned_quat: [L; 4],
-    by_turned_vector: [L; 3],
+    by_turned: [L; 4],
 }
 
 impl<L: Lanes> Group<L> {
     #[inline(always)]
-    fn new(means: &[f32], orientations: &[f32], upstream: &[f32]) -> Self {
-        let (quat, vector) = orientation::<L>(orientations);
-        let upstream = columns::<L, ALL_MOVED>(upstream);
+    fn new(means: &[f32], quats: &[f32], upstream: &[f32]) -> Self {
+        let upstream = columns::<L, MOVED>(upstream);
         Self {
             mean: columns::<L, 3>(means),
-            quat,
-            vector,
+            quat: columns::<L, 4>(quats),
             by_position: [upstream[0], upstream[1], upstream[2]],
-            by_turned_quat: [upstream[3], upstream[4], upstream[5], upstream[6]],
-            by_turned_vector: [upstream[7], upstream[8], upstream[9]],
+            by_turned: [upstream[3], upstream[4], upstream[5], upstream[6]],
         }
     }
 
-    /// Gradients of quaternions and vectors, given the blended pose: `conjugate of q ⊗ by_turned_quat`, and
-    /// `Aᵀ by_turned_vector`.
+    /// Gradients of the means, `Aᵀ by_position`, with the matrix of the blended pose.
     #[inline(always)]
-    fn of_orientation(&self, pose: &[L; POSE]) -> [L; ORIENTATION] {
-        let blended_quat = [pose[12], pose[13], pose[14], pose[15]];
-        let mut gradient = [L::splat(0.0); ORIENTATION];
-        gradient[..4].copy_from_slice(&product(&conjugate(blended_quat), &self.by_turned_quat));
-        gradient[4..].copy_from_slice(&mapped_back(pose, &self.by_turned_vector));
-        gradient
+    fn of_means(&self, pose: &[L; POSE]) -> [L; 3] {
+        let mut of_means = [L::splat(0.0); 3];
+        for j in 0..3 {
+            for i in 0..3 {
+                of_means[j] = pose[3 * i + j].mul_add(self.by_position[i], of_means[j]);
+            }
+        }
+        of_means
     }
 
-    /// `F`: by the matrix `by_position meanᵀ + by_turned_vector vectorᵀ`, by the offset `by_position`, by the quaternion
-    /// `by_turned_quat ⊗ conjugate of quat`.
+    /// Gradients of the quaternions, `conjugate of q ⊗ by_turned`, with the quaternion of the blended pose.
+    #[inline(always)]
+    fn of_quats(&self, pose: &[L; POSE]) -> [L; 4] {
+        product(&conjugate([pose[12], pose[13], pose[14], pose[15]]), &self.by_turned)
+    }
+
+    /// `F`: by the matrix `by_position meanᵀ`, by the offset `by_position`, by the quaternion `by_turned ⊗ conjugate of quat`.
     #[inline(always)]
     fn by_pose(&self) -> [L; POSE] {
         let mut by_pose = [L::splat(0.0); POSE];
         for i in 0..3 {
             for j in 0..3 {
-                let by_place = self.by_position[i].mul(self.mean[j]);
-                by_pose[3 * i + j] = self.by_turned_vector[i].mul_add(self.vector[j], by_place);
+                by_pose[3 * i + j] = self.by_position[i].mul(self.mean[j]);
             }
             by_pose[9 + i] = self.by_position[i];
         }
-        by_pose[12..].copy_from_slice(&product(&self.by_turned_quat, &conjugate(self.quat)));
+        by_pose[12..].copy_from_slice(&product(&self.by_turned, &conjugate(self.quat)));
         by_pose
     }
 }
@@ -158,30 +158,18 @@ fn conjugate<L: Lanes>(q: [L; 4]) -> [L; 4] {
     [q[0], zero.sub(q[1]), zero.sub(q[2]), zero.sub(q[3])]
 }
 
-/// `Aᵀ vector`, with the matrix of a blended pose.
-#[inline(always)]
-fn mapped_back<L: Lanes>(pose: &[L; POSE], vector: &[L; 3]) -> [L; 3] {
-    let mut mapped = [L::splat(0.0); 3];
-    for j in 0..3 {
-        for i in 0..3 {
-            mapped[j] = pose[3 * i + j].mul_add(vector[i], mapped[j]);
-        }
-    }
-    mapped
-}
-
 /// Writes the gradients of eight Gaussians, but for their affinities, and returns the numbers for the nodes.
 #[inline(always)]
 fn hand<L: Lanes, const W: usize>(
-    [means, orientations, stillness, upstream]: [&[f32]; 4],
+    [means, quats, stillness, upstream]: [&[f32]; 4],
     blended: &BlendedGroup,
-    [of_means, of_orientations]: [&mut [f32]; 2],
+    [of_means, of_quats]: [&mut [f32]; 2],
     of_stillness: &mut Block,
 ) -> Handed<W> {
-    let group = Group::<L>::new(means, orientations, upstream);
+    let group = Group::<L>::new(means, quats, upstream);
     let pose = loaded(&blended.pose);
-    to_rows(&mapped_back(&pose, &group.by_position), of_means);
-    to_rows(&group.of_orientation(&pose), of_orientations);
+    to_rows(&group.of_means(&pose), of_means);
+    to_rows(&group.of_quats(&pose), of_quats);
 
     let by_pose = stored(&group.by_pose());
     let product = inner_product::<L>(&by_pose, &pose);
@@ -262,18 +250,18 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
         let mut handed = Vec::with_capacity(CHUNK / LANES);
         let mut weights = vec![[0.0; LANES]; CHUNK / LANES];
         let mut of_stillness = vec![[[0.0; LANES]; W]; CHUNK / LANES];
-        let inputs = self.means.chunks(3 * LANES).zip(self.orientations.chunks(ORIENTATION * LANES));
+        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
-        let inputs = inputs.zip(self.upstream.chunks(ALL_MOVED * LANES)).zip(self.blended);
-        let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_orientations.chunks_mut(ORIENTATION * LANES));
+        let inputs = inputs.zip(self.upstream.chunks(MOVED * LANES)).zip(self.blended);
+        let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_quats.chunks_mut(4 * LANES));
         let mut rows_of_stillness = self.of_stillness.chunks_mut(W * LANES);
         let last = self.blended.len() - 1;
-        for (group, (input, (of_means, of_orientations))) in inputs.zip(outputs).enumerate() {
-            let ((((means, orientations), stillness), upstream), blended) = input;
+        for (group, (input, (of_means, of_quats))) in inputs.zip(outputs).enumerate() {
+            let ((((means, quats), stillness), upstream), blended) = input;
             let of_stillness_here = &mut of_stillness[handed.len()];
             *of_stillness_here = [[0.0; LANES]; W];
-            let inputs = [means, orientations, stillness, upstream];
-            handed.push(hand::<L, W>(inputs, blended, [of_means, of_orientations], &mut of_stillness_here[0]));
+            let inputs = [means, quats, stillness, upstream];
+            handed.push(hand::<L, W>(inputs, blended, [of_means, of_quats], &mut of_stillness_here[0]));
             if handed.len() == CHUNK / LANES || group == last {
                 for (node, total) in self.nodes.iter().zip(&mut totals) {
                     total.add(&sums::<L, W>(node, &handed, &mut weights, &mut of_stillness));
@@ -288,7 +276,7 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
     }
 }
 
-/// Gradients of all inputs from `upstream [N, 10]`.
+/// Gradients of all inputs from `upstream [N, 7]`.
 pub(super) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
     match inputs.affinities {
         0 => skin_backward_with::<1>(inputs, blended, upstream),
@@ -308,34 +296,23 @@ fn skin_backward_with<const W: usize>(
     let count = inputs.count();
     let task = count.div_ceil(MOST_TASKS).max(1).next_multiple_of(CHUNK);
     let mut means = vec![0.0; 3 * count];
-    let mut orientations = vec![0.0; ORIENTATION * count];
+    let mut quats = vec![0.0; 4 * count];
     let mut stillness = vec![0.0; W * count];
     let tasks = (
         inputs.means.par_chunks(3 * task),
-        inputs.orientations.par_chunks(ORIENTATION * task),
+        inputs.quats.par_chunks(4 * task),
         inputs.stillness.par_chunks(W * task),
         blended.par_chunks(task / LANES),
-        upstream.par_chunks(ALL_MOVED * task),
+        upstream.par_chunks(MOVED * task),
         means.par_chunks_mut(3 * task),
-        orientations.par_chunks_mut(ORIENTATION * task),
+        quats.par_chunks_mut(4 * task),
         stillness.par_chunks_mut(W * task),
     );
-    let parts = tasks.into_par_iter().map(
-        |(means, orientations, stillness, blended, upstream, of_means, of_orientations, of_stillness)| {
+    let parts =
+        tasks.into_par_iter().map(|(means, quats, stillness, blended, upstream, of_means, of_quats, of_stillness)| {
             let nodes = &nodes;
-            dispatch(Backward {
-                nodes,
-                means,
-                orientations,
-                stillness,
-                blended,
-                upstream,
-                of_means,
-                of_orientations,
-                of_stillness,
-            })
-        },
-    );
+            dispatch(Backward { nodes, means, quats, stillness, blended, upstream, of_means, of_quats, of_stillness })
+        });
     let parts: Vec<Vec<NodeSums<W>>> = parts.collect();
     let mut totals = vec![NodeSums::<W>::ZERO; nodes.len()];
     for part in &parts {
@@ -346,5 +323,5 @@ fn skin_backward_with<const W: usize>(
         let of_anchor = sums.offset.map(|sum| 2.0 * row[PLACE - 1] * sum);
         of_anchor.into_iter().chain([-sums.squared]).chain(sums.pose).chain(sums.affinities[1..].iter().copied())
     });
-    SkinningGradients { means, orientations, stillness, nodes: of_nodes.collect() }
+    SkinningGradients { means, quats, stillness, nodes: of_nodes.collect() }
 }

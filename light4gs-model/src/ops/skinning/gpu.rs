@@ -2,22 +2,21 @@
 
 use burn::backend::TensorMetadata;
 use burn::backend::tensor::FloatTensor;
-use burn::tensor::Shape;
-use burn::tensor::{Device, TensorData};
+use burn::tensor::{Device, Shape, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
 use light4gs_shaders::{SKINNING, SKINNING_AFFINITIES, SKINNING_BACKWARD, SKINNING_GATHER, SKINNING_NODES, Shader};
 
-use super::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningInputs, SkinningKernels, SkinningTensors, VECTOR, skin};
+use super::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningInputs, SkinningKernels, SkinningTensors, skin};
 use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
 use crate::ops::sample::{GpuOperation, Numbers};
 
-/// Values of a Gaussian for the backward pass, and for the nodes: five vectors each.
+/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five and four vectors.
 const BLENDED: usize = 20;
-const HANDED: usize = 20;
+const HANDED: usize = 16;
 
 /// Gaussians of a slice. Where that makes more than [`MOST_SLICES`], whose sums take memory, slices are longer.
 const SLICE: usize = 64;
@@ -30,23 +29,12 @@ pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation {
     samples: &[|device| sample(device, 0), |device| sample(device, MOST_AFFINITIES)],
 };
 
-/// The kernels of this file, with vectors or without, for every number of affinities.
+/// The kernels of this file, for every number of affinities.
 fn kernels() -> Vec<Kernel> {
-    let by_affinities = |affinities| {
-        let moving = [0, VECTOR].map(|vector| moving(affinities, vector));
-        moving.into_iter().chain([SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities)))
-    };
+    let by_affinities =
+        |affinities| [SKINNING, SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities));
     let of_affinities = (1..=MOST_AFFINITIES).map(|affinities| kernel(SKINNING_AFFINITIES, affinities));
-    let backward = [0, VECTOR].map(moving_back);
-    (0..=MOST_AFFINITIES).flat_map(by_affinities).chain(of_affinities).chain(backward).collect()
-}
-
-fn moving(affinities: usize, vector: usize) -> Kernel {
-    kernel(SKINNING, affinities).constant("VECTOR", vector as u32)
-}
-
-fn moving_back(vector: usize) -> Kernel {
-    Kernel::new(SKINNING_BACKWARD).constant("VECTOR", vector as u32)
+    (0..=MOST_AFFINITIES).flat_map(by_affinities).chain(of_affinities).chain([Kernel::new(SKINNING_BACKWARD)]).collect()
 }
 
 fn kernel(shader: Shader, affinities: usize) -> Kernel {
@@ -64,11 +52,8 @@ pub struct GpuSaved {
     count: usize,
     node_count: usize,
     affinities: usize,
-    /// Numbers of a vector: none or three.
-    vector: usize,
     means: Handle,
     quats: Handle,
-    vectors: Handle,
     of_gaussians: Handle,
     nodes: Handle,
     blended: Handle,
@@ -81,15 +66,13 @@ fn words(values: &[usize]) -> Vec<u32> {
 fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
     let gpu = Gpu::of(&tensors.means)?;
     let (count, node_count) = (tensors.means.shape()[0], tensors.nodes.shape()[0]);
-    let (affinities, vector) = (tensors.affinities.shape()[1], tensors.vectors.shape()[1]);
-    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(buffer_of);
-    let columns = MOVED + vector;
-    let moved = gpu.allocate("moved Gaussians", columns * count)?;
+    let affinities = tensors.affinities.shape()[1];
+    let [means, quats, stillness, of_gaussians, nodes] = tensors.into_array().map(buffer_of);
+    let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
-    Launch::new(&gpu.client, moving(affinities, vector))
+    Launch::new(&gpu.client, kernel(SKINNING, affinities))
         .reads(&means)
         .reads(&quats)
-        .reads(&vectors)
         .reads(&stillness)
         .reads(&of_gaussians)
         .reads(&nodes)
@@ -97,35 +80,34 @@ fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSave
         .writes(&blended)
         .uniform(&words(&[count, node_count]))
         .invocations(count)?;
-    let output = gpu.tensor(first_words(&moved, columns * count), Shape::from([count, columns]));
-    let saved = GpuSaved { count, node_count, affinities, vector, means, quats, vectors, of_gaussians, nodes, blended };
+    let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
+    let saved = GpuSaved { count, node_count, affinities, means, quats, of_gaussians, nodes, blended };
     Ok((output, saved))
 }
 
 fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let GpuSaved { count, node_count, affinities, vector, means, quats, vectors, of_gaussians, nodes, blended } = saved;
+    let GpuSaved { count, node_count, affinities, means, quats, of_gaussians, nodes, blended } = saved;
     let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
     // Those of the Gaussians in one buffer, in the order of the inputs.
-    let widths = [3, 4, vector, 1, affinities];
+    let widths = [3, 4, 1, affinities];
     let layout = Places::new(&widths.map(|width| width * count));
     let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
-    Launch::new(&gpu.client, moving_back(vector))
+    Launch::new(&gpu.client, Kernel::new(SKINNING_BACKWARD))
         .reads(&means)
         .reads(&quats)
-        .reads(&vectors)
         .reads(&blended)
         .reads(&buffer_of(upstream))
         .writes(&handed)
         .writes(&gradients)
-        .uniform(&words(&[count, layout.starts[1], layout.starts[2], layout.starts[3]]))
+        .uniform(&words(&[count, layout.starts[1], layout.starts[2]]))
         .invocations(count)?;
     if affinities > 0 {
         Launch::new(&gpu.client, kernel(SKINNING_AFFINITIES, affinities))
             .reads(&handed)
             .reads(&nodes)
             .reads(&of_gaussians)
-            .writes(&layout.of(&gradients, 4))
+            .writes(&layout.of(&gradients, 3))
             .uniform(&words(&[count, node_count]))
             .invocations(count)?;
     }
@@ -154,7 +136,7 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
     let mut of_gaussians =
         (0..INPUTS - 1).map(|k| gpu.tensor(layout.of(&gradients, k), Shape::from([count, widths[k]])));
     let mut next = || of_gaussians.next().expect("a piece for each input");
-    Ok(SkinningTensors::from_array([next(), next(), next(), next(), next(), of_nodes]))
+    Ok(SkinningTensors::from_array([next(), next(), next(), next(), of_nodes]))
 }
 
 impl SkinningKernels for CubeBackend {
@@ -184,19 +166,17 @@ impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
     }
 }
 
-/// With vectors where there are affinities.
 fn sample(device: &Device, affinities: usize) -> Vec<TensorData> {
     let mut numbers = Numbers::new(&device.clone().autodiff());
     let (gaussians, nodes) = (777, 21);
     let inputs = SkinningInputs {
         means: numbers.leaf(gaussians, 3, -1.0, 1.0),
         quats: numbers.leaf(gaussians, 4, -1.0, 1.0),
-        vectors: (affinities > 0).then(|| numbers.leaf(gaussians, 3, -1.0, 1.0)),
         stillness: numbers.leaf(gaussians, 1, -3.0, 1.0),
         affinities: (affinities > 0).then(|| numbers.leaf(gaussians, affinities, -3.0, 1.0)),
         nodes: numbers.leaf(nodes, 20 + affinities, 0.0, 1.0),
     };
     let leaves = [&inputs.means, &inputs.quats, &inputs.stillness, &inputs.nodes].map(Clone::clone);
-    let leaves: Vec<_> = leaves.into_iter().chain(inputs.vectors.clone()).chain(inputs.affinities.clone()).collect();
+    let leaves: Vec<_> = leaves.into_iter().chain(inputs.affinities.clone()).collect();
     numbers.with_gradients(skin(inputs), &leaves)
 }

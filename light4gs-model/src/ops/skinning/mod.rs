@@ -21,10 +21,8 @@ const POSE: usize = 16;
 pub(crate) const PLACE: usize = 4;
 /// Numbers of a posed node before its affinities.
 pub(crate) const POSED: usize = PLACE + POSE;
-/// Numbers of a moved Gaussian: position (3), quaternion (4); turned vectors (3) stand behind them.
+/// Numbers of a moved Gaussian: position (3), quaternion (4).
 const MOVED: usize = 7;
-/// Numbers of a vector that turns along.
-const VECTOR: usize = 3;
 
 /// Most affinities of a Gaussian and of a node.
 pub const MOST_AFFINITIES: usize = 4;
@@ -36,8 +34,6 @@ pub struct SkinningTensors<B: Backend> {
     pub means: FloatTensor<B>,
     /// `[N, 4]`: quaternions (w, x, y, z) of any length.
     pub quats: FloatTensor<B>,
-    /// `[N, V]`, V 0 or 3: vectors that turn along.
-    pub vectors: FloatTensor<B>,
     /// `[N, 1]`, logits of the node that stands still.
     pub stillness: FloatTensor<B>,
     /// `[N, H]`.
@@ -48,16 +44,16 @@ pub struct SkinningTensors<B: Backend> {
 }
 
 /// Tensors of [`SkinningTensors`].
-const INPUTS: usize = 6;
+const INPUTS: usize = 5;
 
 impl<B: Backend> SkinningTensors<B> {
     fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.means, self.quats, self.vectors, self.stillness, self.affinities, self.nodes]
+        [self.means, self.quats, self.stillness, self.affinities, self.nodes]
     }
 
     fn from_array(tensors: [FloatTensor<B>; INPUTS]) -> Self {
-        let [means, quats, vectors, stillness, affinities, nodes] = tensors;
-        Self { means, quats, vectors, stillness, affinities, nodes }
+        let [means, quats, stillness, affinities, nodes] = tensors;
+        Self { means, quats, stillness, affinities, nodes }
     }
 }
 
@@ -66,10 +62,10 @@ pub trait SkinningKernels: Backend {
     /// What the backward pass needs from the forward pass.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// Positions, quaternions and vectors `[N, 7 + V]`.
+    /// Positions and quaternions `[N, 7]`.
     fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the output `[N, 7 + V]`.
+    /// Gradients of all inputs from that of the output `[N, 7]`.
     fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
 }
 
@@ -78,7 +74,7 @@ pub trait SkinningKernels: Backend {
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait SkinningOps: Backend {
-    /// Positions, quaternions and vectors `[N, 7 + V]`; see [`skin`].
+    /// Positions and quaternions `[N, 7]`; see [`skin`].
     fn skinning(#[extension_type] tensors: SkinningTensors<Self>) -> FloatTensor<Self>;
 }
 
@@ -108,8 +104,6 @@ pub struct SkinningInputs {
     pub means: Tensor<2>,
     /// `[N, 4]`: their orientations at rest as quaternions (w, x, y, z), of any length.
     pub quats: Tensor<2>,
-    /// `[N, 3]`: a vector for each that turns along.
-    pub vectors: Option<Tensor<2>>,
     /// `[N, 1]`: logit of the node that stands still.
     pub stillness: Tensor<2>,
     /// `[N, H]`: each Gaussian's affinities, H up to [`MOST_AFFINITIES`].
@@ -121,12 +115,12 @@ pub struct SkinningInputs {
 }
 
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
-/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized; or `[N, 10]`, with turned vectors (3).
+/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized.
 ///
 /// ```text
 /// w   = softmax over b of (affinities · affinities_b - precision_b |mean - anchor_b|², and stillness for the node that stands still)
 /// A   = Σ w_b R_b + w_still I,   t = Σ w_b t_b,   q = Σ w_b q_b + w_still (1, 0, 0, 0)
-/// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product),   turned vector = A vector
+/// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product)
 /// ```
 ///
 /// A weight of less than 2⁻⁶⁴ of the largest is 0 on the CPU.
@@ -146,8 +140,6 @@ pub struct SkinningInputs {
 /// let moved = skin(SkinningInputs {
 ///     means: rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3),
 ///     quats: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 4),
-///     // Each with a vector along x.
-///     vectors: Some(rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3)),
 ///     // The first Gaussian goes with the node, the second stands still.
 ///     stillness: rows(&[-60.0, 60.0], 1),
 ///     affinities: None,
@@ -157,28 +149,20 @@ pub struct SkinningInputs {
 ///     ], 20),
 /// });
 /// let moved = moved.into_data().to_vec::<f32>().unwrap();
-/// assert_eq!(moved[..10], [0.0, 1.0, 2.0, half, 0.0, 0.0, half, 0.0, 1.0, 0.0]);
-/// assert_eq!(moved[10..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+/// assert_eq!(moved[..7], [0.0, 1.0, 2.0, half, 0.0, 0.0, half]);
+/// assert_eq!(moved[7..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
 /// ```
 ///
 /// # Panics
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
+    let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
     let count = means.dims()[0];
     assert!(nodes.dims()[0] > 0, "nodes must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
     assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");
     assert_eq!(stillness.dims(), [count, 1], "stillness must be [N, 1]");
-    let nothing = || Tensor::empty([count, 0], &means.device());
-    let vectors = match vectors {
-        Some(vectors) => {
-            assert_eq!(vectors.dims(), [count, VECTOR], "vectors must be [N, 3]");
-            vectors
-        }
-        None => nothing(),
-    };
-    let affinities = affinities.unwrap_or_else(nothing);
+    let affinities = affinities.unwrap_or_else(|| Tensor::empty([count, 0], &means.device()));
     let [rows, columns] = affinities.dims();
     assert!(columns <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
     assert_eq!(rows, count, "affinities must be [N, H]");
@@ -186,7 +170,6 @@ pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
     Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {
         means: means.into_dispatch(),
         quats: quats.into_dispatch(),
-        vectors: vectors.into_dispatch(),
         stillness: stillness.into_dispatch(),
         affinities: affinities.into_dispatch(),
         nodes: nodes.into_dispatch(),
