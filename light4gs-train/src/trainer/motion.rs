@@ -11,7 +11,6 @@ use rand::Rng;
 use super::Trainer;
 use super::learning_rates::GroupRates;
 use crate::compression::EntropyModels;
-use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
 use crate::optimization::parameters::ParameterGroup;
 use crate::randomness::{Purpose, generator};
