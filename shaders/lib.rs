@@ -1,4 +1,5 @@
-//! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with what it includes.
+//! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with its
+//! includes.
 //!
 //! `README.md` says what each kernel does. The host side is `light4gs_model::gpu`: it assembles a kernel from constants
 //! (those of rendering come from `light4gs_codec::rendering`), then includes, then the kernel itself.
@@ -10,12 +11,12 @@ use include::{
     POSE, QUATERNION, SPHERICAL_HARMONICS, SPLAT, VIEW,
 };
 
-/// One kernel: a file of a folder here, with what it includes.
+/// One kernel: a file of a folder here, with its includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shader {
     /// The file's name without its ending.
     pub name: &'static str,
-    /// What comes before it, in this order.
+    /// The includes that come before it, in this order.
     pub includes: &'static [&'static str],
     /// The file.
     pub source: &'static str,
@@ -75,7 +76,7 @@ shaders! {
     NODE_POSES_BACKWARD = "nodes" / "node_poses_backward" [QUATERNION, NODE_SPLINE, NODE_MOTION];
     /// Second half of the regularizer of control nodes: the loss, and all gradients.
     NODE_REGULARIZER = "nodes" / "node_regularizer" [NODE_SPLINE];
-    /// First half of the regularizer of control nodes: how far they are from where their neighbors see them.
+    /// First half of the regularizer of control nodes: the distance of each from the place where its neighbors see it.
     NODE_STRAIN = "nodes" / "node_strain" [EXPONENTIAL, QUATERNION, NODE_SPLINE, NODE_MOTION];
     /// The standard normal distribution function, by Chebyshev's fit of erfc with a small relative error
     /// everywhere (Press et al., Numerical Recipes, section 6.2): the coefficients and the order of operations of
@@ -114,17 +115,19 @@ shaders! {
     SIGNIFICANCE = "splatting" / "significance" [ARITHMETIC, VIEW, PIXELS, FOOTPRINT];
     /// Adds up every Gaussian's sums over its cells.
     SIGNIFICANCE_GATHER = "splatting" / "significance_gather" [];
-    /// Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
+    /// Linear blend skinning: positions and rotations of the Gaussians after the nodes have moved.
     SKINNING = "skinning" / "skinning" [EXPONENTIAL, QUATERNION, POSE, NODE];
     /// One of the parts of skinning's derivative: the gradients of the Gaussians' affinities.
     SKINNING_AFFINITIES = "skinning" / "skinning_affinities" [EXPONENTIAL, POSE, NODE];
-    /// First of the parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
+    /// First of the parts of skinning's derivative: the gradients of the Gaussians, and the values that they hand to
+    /// the nodes.
     SKINNING_BACKWARD = "skinning" / "skinning_backward" [QUATERNION, POSE];
     /// Last of the parts of skinning's derivative: adds up the slices, in their order.
     SKINNING_GATHER = "skinning" / "skinning_gather" [];
-    /// One of the parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
+    /// One of the parts of skinning's derivative: the sums over a slice of the Gaussians, for the gradients of the
+    /// nodes.
     SKINNING_NODES = "skinning" / "skinning_nodes" [EXPONENTIAL, POSE, NODE];
-    /// Tells how many invocations of a workgroup that is meant to be one subgroup are in one.
+    /// Counts the invocations of a subgroup in a workgroup that is meant to be one subgroup.
     SUBGROUPS = "elementwise" / "subgroups" [];
     /// Values with uniform noise.
     UNIFORM_NOISE = "elementwise" / "uniform_noise" [];
@@ -154,7 +157,7 @@ pub mod include {
         MIXTURE = "include/mixture";
         /// A node at one time.
         NODE = "include/node";
-        /// How a control node is moved and turned at a time.
+        /// Translation and rotation of a control node at a time.
         NODE_MOTION = "include/node_motion";
         /// Knots of the splines of control nodes, and those that count at a time.
         NODE_SPLINE = "include/node_spline";
@@ -172,9 +175,9 @@ pub mod include {
         SPHERICAL_HARMONICS = "include/spherical_harmonics";
         /// One Gaussian on the screen: four vectors in `splats`, at 4 * Gaussian.
         SPLAT = "include/splat";
-        /// What a team agrees on, in a form of which every compiler knows that it is the same for all members.
+        /// Values on which a team agrees, in a form that every compiler knows to be uniform.
         TEAM_AGREED = "team/agreed";
-        /// What a team agrees on, for Mesa's software driver, where the other way is slow.
+        /// Values on which a team agrees, for Mesa's software driver, where the other form is slow.
         TEAM_TRUSTED = "team/trusted";
         /// A team whose members communicate through subgroup operations.
         TEAM_SUBGROUP = "team/subgroup";

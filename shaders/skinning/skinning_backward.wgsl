@@ -1,4 +1,5 @@
-// First of the parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
+// First of the parts of skinning's derivative: the gradients of the Gaussians, and the values that they hand to the
+// nodes.
 //
 // One invocation owns one Gaussian. Reads it, its blended pose (see `skinning.wgsl`) and `upstream` [N, 7 + VECTOR]. Writes to
 // `gradients` those of mean, quaternion, vector if there are any, and stillness, and five vectors of `handed`:

@@ -1,6 +1,6 @@
-//! Launches of the wgpu back end on golden scenes, written down for other implementations of WebGPU: each kernel's text, what
-//! it was given and what it made of it here, and what the golden vectors say must come out in the end. `.ci/webgpu` runs them
-//! in Chromium.
+//! Launches of the wgpu back end on golden scenes, written down for other implementations of WebGPU: each kernel's
+//! text, its inputs, its outputs here, and the results that the golden vectors demand in the end. `.ci/webgpu` runs
+//! them in Chromium.
 //!
 //! `LIGHT4GS_LAUNCHES` names the folder that they are written to. Without it the test checks only that every kernel which is
 //! launched is in the list of all kernels, and that every shader is launched.
@@ -257,7 +257,7 @@ fn control_nodes(transcript: &mut Transcript) {
     }
 }
 
-/// Bits of rows of a table and of their neighbors, some of which are chosen several times, and their derivative.
+/// Rows of a table and their neighbors, some of them chosen several times, and their derivative.
 fn rate(transcript: &mut Transcript) {
     let mut random = Random::new(10);
     let ((), launches) = record(|| {

@@ -57,7 +57,7 @@ fn distance(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt()
 }
 
-/// Nodes without which little changes go to where the loss pulls some Gaussians away from their neighbors, and nothing jumps.
+/// Nodes that matter little move to Gaussians that the loss pulls away from their neighbors, and nothing jumps.
 #[test]
 fn nodes_move_to_where_motion_is_not_explained() {
     let device = Device::flex().autodiff();
