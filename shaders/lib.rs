@@ -1,4 +1,5 @@
-//! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with what it includes.
+//! The WGSL kernels of Light4GS's wgpu back end: each constant is a file of a folder here, named after it, with its
+//! includes.
 //!
 //! `README.md` says what each kernel does. The host side is `light4gs_model::ops`, where every operation has a folder with the
 //! name of its folder here; it assembles a kernel from constants (those of rendering come from `light4gs_codec::rendering`), then
@@ -6,12 +7,12 @@
 
 #![no_std]
 
-/// One kernel: a file of a folder here, with what it includes.
+/// One kernel: a file of a folder here, with its includes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shader {
     /// The file's name without its ending.
     pub name: &'static str,
-    /// What comes before it, in this order.
+    /// The includes that come before it, in this order.
     pub includes: &'static [&'static str],
     /// The file.
     pub source: &'static str,

@@ -12,7 +12,7 @@ use light4gs_train::dataset::load_options;
 use light4gs_train::regularizer::{Regularizer, RegularizerInput};
 use light4gs_train::trainer::Trainer;
 
-/// Mean over the Gaussians of how far the ratio of longest to shortest axis lies above a limit.
+/// Mean over the Gaussians of `max(0, ratio of longest to shortest axis - limit)`.
 struct Roundness {
     /// Ratio up to which there is no penalty.
     limit: f32,

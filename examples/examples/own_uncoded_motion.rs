@@ -1,6 +1,6 @@
-//! A motion whose coding is not written yet: the whole scene turns about the world's z axis, by an angle that one
-//! learned number gives. A field needs no more than this to be trained and measured in memory. Only writing a file
-//! needs more, and the error says what.
+//! A motion whose coding is not written yet: the whole scene turns about the world's z axis, by a learned angle. A
+//! field needs no more than this to be trained and measured in memory. Writing a file needs more, and the error names
+//! it.
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, s};

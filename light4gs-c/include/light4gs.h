@@ -15,13 +15,13 @@
 #include <stddef.h>
 #include <stdint.h>
 
-// What a function returns. `l4gs_last_error` and `l4gs_last_error_kind` say more.
+// The status of a call. `l4gs_last_error` and `l4gs_last_error_kind` say more.
 typedef enum L4gsStatus {
   // All is well.
   L4GS_STATUS_OK = 0,
-  // An argument is wrong: a null pointer, a time outside of [0, 1], a camera that is none, a buffer that is too short.
+  // An argument is wrong: a null pointer, a time outside of [0, 1], an illegal camera, a buffer that is too short.
   L4GS_STATUS_ARGUMENT = 1,
-  // The operating system does not give the file.
+  // The operating system refuses to read the file.
   L4GS_STATUS_FILE = 2,
   // The bytes are no `.l4gs` stream.
   L4GS_STATUS_NOT_L4GS = 3,

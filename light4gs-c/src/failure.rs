@@ -1,4 +1,4 @@
-//! What a function returns when something is wrong, and what the thread remembers of it.
+//! The status that a function returns, and the last error, which its thread remembers.
 
 use std::cell::RefCell;
 use std::ffi::{CStr, CString};
@@ -6,15 +6,15 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use light4gs_codec::CodecError;
 
-/// What a function returns. `l4gs_last_error` and `l4gs_last_error_kind` say more.
+/// The status of a call. `l4gs_last_error` and `l4gs_last_error_kind` say more.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum L4gsStatus {
     /// All is well.
     Ok = 0,
-    /// An argument is wrong: a null pointer, a time outside of [0, 1], a camera that is none, a buffer that is too short.
+    /// An argument is wrong: a null pointer, a time outside of [0, 1], an illegal camera, a buffer that is too short.
     Argument = 1,
-    /// The operating system does not give the file.
+    /// The operating system refuses to read the file.
     File = 2,
     /// The bytes are no `.l4gs` stream.
     NotL4gs = 3,
@@ -71,7 +71,7 @@ thread_local! {
     static LAST: RefCell<(CString, CString)> = RefCell::default();
 }
 
-/// A C string; what C could not show is left out.
+/// A C string, without the characters that C cannot hold.
 pub(crate) fn c_string(text: &str) -> CString {
     let bytes: Vec<u8> = text.bytes().filter(|&byte| byte != 0).collect();
     CString::new(bytes).unwrap_or_default()

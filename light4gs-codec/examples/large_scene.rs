@@ -1,4 +1,5 @@
-//! Makes a large scene of a small one, for tests and measurements of the player: large_scene FILE OUT GAUSSIANS [LAYERS].
+//! Makes a large scene from a small one, for tests and measurements of the player: large_scene FILE OUT GAUSSIANS
+//! [LAYERS].
 //!
 //! Each Gaussian is replaced by smaller ones around it. Without LAYERS the file is without loss. With them it is compressed, so
 //! its Gaussians are made to differ; planes, motion and what belongs to them are copied byte by byte.
@@ -56,7 +57,7 @@ fn make(file: &str, gaussians: &str, layers: Option<&String>) -> Result<Vec<u8>,
     Ok(bytes)
 }
 
-/// Layers of Gaussians with what another file has besides its Gaussians.
+/// Layers of Gaussians, with the other sections of another file.
 fn with_shared(from: &[u8], layers: &[u8]) -> Vec<u8> {
     let sections = |bytes: &[u8], layered: bool| -> Vec<(Vec<u8>, Vec<u8>)> {
         let table = PRELUDE + u32::from_le_bytes(bytes[16..20].try_into().unwrap_or_default()) as usize;
@@ -83,7 +84,7 @@ fn with_shared(from: &[u8], layers: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// The Gaussians without the harmonics beyond degree 1, of which large files would have too many for the limits of readers.
+/// The Gaussians without the harmonics beyond degree 1: with these, large files would exceed the limits of readers.
 fn of_degree_1(gaussians: &GaussianArrays) -> GaussianArrays {
     let rest = gaussians.sh_rest.len() / gaussians.len().max(1);
     let kept = gaussians.sh_rest.chunks_exact(rest.max(1)).flat_map(|row| row.iter().copied().chain([0.0; 9]).take(9));
@@ -91,8 +92,8 @@ fn of_degree_1(gaussians: &GaussianArrays) -> GaussianArrays {
     GaussianArrays { sh_degree: 1, sh_rest, ..gaussians.clone() }
 }
 
-/// `count` Gaussians in place of fewer. The parts of one have its opacity and colors, a normal distribution around its
-/// center, and together its area and its covariance.
+/// `count` Gaussians instead of fewer. The parts of one have its opacity and colors and a normal distribution around
+/// its center; their total area and covariance are those of the one.
 fn divided(gaussians: &GaussianArrays, count: usize) -> GaussianArrays {
     let sources = gaussians.len().max(1);
     let indices: Vec<u32> = (0..count).map(|index| (index % sources) as u32).collect();

@@ -9,8 +9,8 @@ const SMALL_THINGS: u64 = 16 << 20;
 /// Nanoseconds for each byte of a stream, besides those for counts and sizes: a byte may hold several decisions.
 const NANOSECONDS_A_BYTE: u64 = 60;
 
-/// What the parts of a stream have asked for so far. Nothing is given back: whether a stream is refused must not depend
-/// on the order of its parts.
+/// The memory and the time that the parts of a stream have asked for so far. Nothing is given back, since the order of
+/// the parts must not decide whether a stream is refused.
 #[derive(Debug)]
 pub(crate) struct Budget {
     pub(crate) limits: Limits,
@@ -25,7 +25,7 @@ impl Budget {
         Self::resumed(limits, Demand { memory_bytes: SMALL_THINGS, nanoseconds: 0 })
     }
 
-    /// A budget of which others have taken a part: what [`Budget::demand`] has told, or nothing.
+    /// A budget after other parts of the stream, which have `spent` what [`Budget::demand`] returned.
     pub(crate) fn resumed(limits: &Limits, spent: Demand) -> Self {
         let Demand { memory_bytes, nanoseconds } = spent;
         Self {

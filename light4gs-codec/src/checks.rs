@@ -48,8 +48,8 @@ pub fn feature_planes(channels: u32, layout: &PlaneLayout) -> Result<(), CodecEr
     })
 }
 
-/// Refuses a network that no stream can hold, by its size: the number of its weights, biases included, and of the
-/// channels of all its values, inputs included. `section` is for the message.
+/// Refuses a network that is too large for a stream. `weights` includes the biases, `channels` is the sum over all its
+/// values, inputs included. `section` is for the message.
 ///
 /// # Errors
 /// Names the number that is too large.
@@ -59,7 +59,7 @@ pub fn network_size(section: &'static str, weights: u64, channels: u64) -> Resul
     at_most(section, "number of weights", weights, limits.layer_weights)
 }
 
-/// Refuses points at which no Gaussian can be: beyond ±1e30 along an axis, or NaN.
+/// Refuses points with a coordinate beyond ±1e30, or NaN: a stream cannot hold Gaussians there.
 ///
 /// # Errors
 /// Names the first one.

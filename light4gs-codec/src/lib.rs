@@ -1,9 +1,29 @@
-//! The `.l4gs` stream: plain arrays in, bytes out.
+//! The `.l4gs` stream: plain arrays in, bytes out, and back, bit for bit, on every machine.
 //!
 //! A dynamic scene is a set of Gaussians, scene coordinates that normalize their positions, multiscale feature planes and a
-//! small deformation network. [`SceneData`] holds all of it as plain arrays, [`encode`] turns it into one byte
-//! stream and [`decode`] turns the stream back, bit for bit, on every machine. `docs/format.md` describes the
-//! stream byte by byte.
+//! small deformation network. [`SceneData`] holds all of it as plain arrays. `docs/format.md` describes the stream byte
+//! by byte.
+//!
+//! # Which of these do I need?
+//!
+//! | task | start with |
+//! |---|---|
+//! | read a scene | [`decode`] for bytes, `read_file` for a file |
+//! | know what a file holds, without decoding it | [`info`], `read_info` |
+//! | write a scene without loss | [`encode`] |
+//! | write a small file | [`encode_compressed`] with a [`CompressionInput`] |
+//! | know beforehand whether the encoder accepts a scene | [`checks`] |
+//! | have the Gaussians at many times | [`MotionEvaluator`]; for images see the crate `light4gs-render` |
+//! | show a file while it comes | [`StreamDecoder`] |
+//! | read one section, or one layer of Gaussians | [`OpenStream`] |
+//! | accept files of strangers | nothing: the default [`Limits`] are for these. [`Limits::large`] is for your own |
+//! | describe a network to the codec | [`network`] |
+//! | name the planes of a field | [`plane_layout`] |
+//!
+//! **In short:** [`encode`] and [`decode`] suffice for most programs. Training needs [`encode_compressed`] too, and a player
+//! [`StreamDecoder`] and [`MotionEvaluator`].
+//!
+//! # Example
 //!
 //! ```
 //! use light4gs_codec::{GaussianArrays, SceneCoordinateArrays, SceneData, SceneMeta, decode, encode, info};
@@ -27,6 +47,7 @@
 //! let bytes = encode(&scene)?;
 //! assert_eq!(decode(&bytes)?, scene);
 //! assert_eq!(info(&bytes)?.gaussian_count, 1);
+//! assert_eq!(scene.positions_at(0.5)?, [[0.0, 0.5, 2.0]]); // half-way through the time
 //!
 //! // Damage is found, and named.
 //! let mut damaged = bytes.clone();
@@ -35,36 +56,28 @@
 //! # Ok::<(), light4gs_codec::CodecError>(())
 //! ```
 //!
-//! The positions of the Gaussians half-way through the time:
-//!
-//! ```no_run
-//! let scene = light4gs_codec::read_file("scene.l4gs".as_ref())?;
-//! for [x, y, z] in scene.positions_at(0.5)? {
-//!     println!("{x} {y} {z}");
-//! }
-//! # Ok::<(), light4gs_codec::CodecError>(())
-//! ```
-//!
 //! # Compression
 //!
-//! [`encode_compressed`] quantizes a scene and codes it under learned distributions: planes under a [context
-//! model](ContextModelArrays), spherical harmonics under [tables or small networks](ShCoding), other [`attributes`] and
-//! [network weights](network_weights) adaptively. The networks that give coding intervals are evaluated by an executor
-//! of this crate, in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
-//! The stream holds them as [descriptions](network), so a model is free in what its networks consist of. The encoder
-//! decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`] reads one
-//! section by section, and [`info`] tells what is inside.
+//! [`encode_compressed`] quantizes a scene and codes it under learned distributions:
 //!
-//! # Hostile bytes, other platforms
+//! - planes under a [context model](ContextModelArrays),
+//! - spherical harmonics under [tables or small networks](ShCoding),
+//! - the other [`attributes`] and the [weights of networks](network_weights) adaptively.
+//!
+//! A coding interval must be the same in the encoder and in every decoder. So an executor of this crate evaluates the networks
+//! that give the intervals, in plain float32 arithmetic of a fixed order. The stream holds the networks as
+//! [descriptions](network), so a model may compose its networks freely. The encoder decodes its own bytes and compares
+//! before it returns.
+//!
+//! # Limits
 //!
 //! A reader trusts nothing: every length and every count is checked against the bytes that are there and against
-//! [`Limits`] before memory or time is taken, so hostile input gets a [`CodecError`], never a panic. `SECURITY.md` has
-//! the promises. The functions of [`checks`] say beforehand whether the encoder will refuse something.
+//! [`Limits`] before memory or time is taken. Hostile input gets a [`CodecError`], never a panic. `SECURITY.md` has the
+//! promises.
 //!
-//! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`.
-//! There, `read_file`, `read_file_and` and `read_info` are absent and all work is done by one thread. Elsewhere planes are coded by the
-//! threads of rayon's current pool; the bytes do not depend on their number.
-
+//! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`. There
+//! `read_file`, `read_file_and` and `read_info` are absent, and one thread does all work. Elsewhere the threads of rayon's
+//! current pool code the planes; the bytes do not depend on their number.
 #![forbid(unsafe_code)]
 
 mod adaptive;

@@ -94,8 +94,8 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// For files that are trusted, such as your own. A file may take 64 GiB and half an hour. What the encoder writes
-    /// is within these limits.
+    /// For files that are trusted, such as your own. A file may take 64 GiB and half an hour. The encoder writes only
+    /// files within these limits.
     pub fn large() -> Self {
         Self {
             image_pixels: 1 << 28,

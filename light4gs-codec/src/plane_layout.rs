@@ -1,9 +1,9 @@
-//! Which feature planes a field has, at which scale, over which axes and of which size; their names; the order in which
-//! they are coded; and from which planes a plane may be predicted.
+//! The feature planes of a field: scale, axes and size of each, their names, the order in which they are coded, and the
+//! planes that predict a plane.
 //!
 //! Model, codec and training all use this description of the planes. A hexplane has a plane over each pair of axes at
-//! each scale; a tri-plane has those over space alone; other fields have others. A plane's place in the list gives only
-//! its order; scale and axes are stated.
+//! each scale, a tri-plane has those over space alone, and other fields may have any others. Each plane states its
+//! scale and its axes; its place in the list is only the order.
 
 use std::error::Error;
 use std::fmt;

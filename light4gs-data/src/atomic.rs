@@ -22,7 +22,7 @@ fn refuse_special_file(path: &Path) -> io::Result<()> {
     let special = fs::metadata(path).is_ok_and(|metadata| !(metadata.is_file() || metadata.is_dir()));
     let of_a_process = || fs::read_link(path).is_ok_and(|target| target.starts_with("/proc"));
     if special || of_a_process() {
-        let problem = "it is a pipe, a socket or a device, which a file would replace; name a file";
+        let problem = "it is a pipe, a socket or a device, and a file would replace it; name a file";
         return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
     Ok(())
@@ -52,8 +52,8 @@ pub fn is_temporary_name(name: &str) -> bool {
     name.starts_with(PREFIX) && (name.ends_with(".part") || name.ends_with(".tmp"))
 }
 
-/// Removes what killed writes have left in a folder: temporary files and folders that no process has locked. What
-/// cannot be read or removed stays. A folder that does not exist is no error.
+/// Removes from a folder the temporary files and folders that no process has locked: killed processes have left them.
+/// Those that cannot be read or removed stay. A folder that does not exist is no error.
 pub fn sweep_leftovers(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if entry.file_name().to_str().is_some_and(is_temporary_name) {

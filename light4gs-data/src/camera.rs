@@ -244,7 +244,7 @@ impl Camera {
         intrinsics: &Intrinsics,
     ) -> Result<Self, PoseError> {
         let camera = Self::from_pose(rotation, -(rotation.transpose() * translation), intrinsics)?;
-        // Of a rotation that was rounded, the way over the center would give other digits.
+        // Not by way of the center: if the rotation was rounded, the translation would get other digits.
         Ok(Self { translation: translation.as_vec3(), ..camera })
     }
 
@@ -298,8 +298,8 @@ impl Camera {
         }
     }
 
-    /// The same view with fewer pixels, each the size of `factor`×`factor` of these. What is left at the right and at the
-    /// lower edge is not seen. The image for it is [`crate::RgbImage8::reduced`].
+    /// The same view with fewer pixels, each the size of `factor`×`factor` of these. Columns and rows that are left
+    /// over at the right and the lower edge are not seen. The image for it is [`crate::RgbImage8::reduced`].
     ///
     /// # Panics
     /// If `factor` is 0.
@@ -474,7 +474,7 @@ mod tests {
         ] {
             assert!(matches!(pose(absurd, 0.0), Err(PoseError::Intrinsics { .. })), "{absurd:?}");
         }
-        // What is accepted has a field of view that a stream takes.
+        // An accepted camera has a field of view that a stream takes.
         for fx in [1e-5 * 64.0, 1e6 * 64.0] {
             let (x, _) = pose(Intrinsics { fx, ..usual }, 0.0).unwrap().fov();
             assert!(x > 0.0 && x < std::f32::consts::PI, "{x}");

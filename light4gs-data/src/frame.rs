@@ -24,7 +24,7 @@ pub enum MaskMeaning {
     Still,
 }
 
-/// A camera, a time, and where the image lies. The image itself is read by [`crate::ImageStore`].
+/// A camera, a time, and the path of the image. The image itself is read by [`crate::ImageStore`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Frame {
     /// A name without folder and extension, such as `r_003`. [`crate::Scene::new`] makes it unique in its split.
@@ -39,7 +39,7 @@ pub struct Frame {
     pub source_width: u32,
     /// Height of the image in its file, pixels; 0 without an image.
     pub source_height: u32,
-    /// Which camera of the capture took it; 0 where there is only one.
+    /// Number of the capture's camera that took it; 0 where there is only one.
     pub camera_id: u32,
     /// A file that marks pixels.
     pub mask: Option<Mask>,

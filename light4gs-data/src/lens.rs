@@ -2,7 +2,7 @@
 
 use glam::DVec2;
 
-/// How a lens bends rays: from a point `(x / z, y / z)` in front of the camera to where it is recorded.
+/// How a lens bends rays: it maps a point `(x / z, y / z)` in front of the camera to the place where it is recorded.
 ///
 /// Coefficients are those of OpenCV and COLMAP, without units; they do not depend on the image's size.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,14 +1,60 @@
-//! Cameras, frames, point clouds and dataset readers.
+//! Datasets and files of other programs: cameras, images, point clouds, Gaussians.
 //!
-//! [`Scene::open`] turns a folder into cameras with times, a point cloud and an extent. A [`DatasetLayout`] reads one
-//! kind of folder, and [`Layouts`] lists those that are known. [`ImageStore`] decodes the images lazily, within a
-//! memory bound. [`write_synthetic`] makes a small moving scene for trying things out. Nothing here depends on Burn,
-//! and no user input makes this crate panic.
+//! A dataset is a folder with images and their cameras. [`Scene::open`] reads its metadata: cameras with times, a point cloud
+//! and an extent. [`ImageStore`] decodes the images when they are needed. Nothing here depends on Burn.
 //!
-//! Conventions: cameras are OpenCV pinholes
-//! (+x right, +y down, +z forward), time is in `[0, 1]`, images are `[H, W, 3]`, row-major,
-//! already composited on the background, in the byte values of the file (no gamma handling).
-
+//! # Which of these do I need?
+//!
+//! | task | start with |
+//! |---|---|
+//! | open a dataset of a known layout | [`Scene::open`] with [`LoadOptions`] |
+//! | read a layout of your own | a [`DatasetLayout`], added to [`Layouts`] |
+//! | make a dataset from videos | [`prepare`], which runs `ffmpeg` and `colmap` |
+//! | try things out without a dataset | [`write_synthetic`]: a small moving scene |
+//! | decode images within a memory bound | [`ImageStore`] |
+//! | take metrics over parts of an image | [`regions`] |
+//! | notice that a dataset has changed | [`DatasetDigest`] |
+//! | make a camera, or a path of cameras | [`Camera::look_at`], [`orbit_path`] |
+//! | undo the distortion of a lens | nothing: [`ImageStore`] does it; [`Lens`] is the model |
+//! | read or write point clouds and Gaussians as PLY | [`PointCloud`], [`GaussianPly`], [`ply`] |
+//! | write Gaussians for other players | [`write_glb`], [`write_four_dgs`], [`write_ply_zip`] |
+//! | read tensors of PyTorch, without executing anything | [`read_pytorch`] |
+//! | write a file whole or not at all | [`write_atomically`] |
+//!
+//! **In short:** [`Scene::open`] and [`ImageStore`] suffice for training.
+//!
+//! # Example
+//!
+//! ```
+//! use light4gs_data::{ImageStore, LoadOptions, Scene, SyntheticOptions, write_synthetic};
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! let root = folder.path().join("scene");
+//! let synthetic = SyntheticOptions { resolution: 16, train_frames: 3, test_frames: 1, ..Default::default() };
+//! write_synthetic(&root, &synthetic)?;
+//!
+//! let options = LoadOptions::default();
+//! let scene = Scene::open(&root, &options)?; // metadata only
+//! assert_eq!(scene.layout, "dnerf");
+//! assert_eq!(scene.train.iter().map(|frame| frame.time).collect::<Vec<_>>(), [0.0, 0.5, 1.0]);
+//!
+//! let images = ImageStore::new(&options, 1 << 20); // at most 1 MiB in memory
+//! let image = images.get(&scene.train[0])?; // decoded now
+//! assert_eq!((image.width, image.height, image.pixels.len()), (16, 16, 16 * 16 * 3));
+//! # Ok::<(), light4gs_data::DataError>(())
+//! ```
+//!
+//! # Conventions
+//!
+//! - Cameras are OpenCV pinholes: +x right, +y down, +z forward. Focal lengths and principal points are in pixels.
+//! - Time is in `[0, 1]`.
+//! - Images are `[H, W, 3]`, row-major, already composited on the background, in the byte values of the file (no gamma
+//!   handling).
+//!
+//! # Limits
+//!
+//! No user input makes this crate panic, and memory is taken only for bytes that are there. An error names the file, the
+//! field, what was expected and the remedy. Images of captures have at most 2^26 pixels when they are used.
 #![forbid(unsafe_code)]
 
 mod atomic;

@@ -1,4 +1,4 @@
-//! How to open a scene: layout, image size, background, and where the Gaussians start without a point cloud.
+//! How to open a scene: layout, image size, background, and random points for a dataset without a point cloud.
 
 use crate::error::DataError;
 

@@ -36,7 +36,7 @@ pub fn read_regular_file(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
 /// The same for text. The byte order mark (U+FEFF) with which some programs of Windows begin a file is left out.
 ///
 /// # Errors
-/// As [`read_regular_file`]; [`io::ErrorKind::InvalidData`] for what is not UTF-8.
+/// As [`read_regular_file`]; [`io::ErrorKind::InvalidData`] for bytes that are not UTF-8.
 pub fn read_regular_text(path: &Path, limit: u64) -> io::Result<String> {
     let mut text = String::from_utf8(read_regular_file(path, limit)?)
         .map_err(|_| io::Error::new(io::ErrorKind::InvalidData, "it is not UTF-8 text"))?;

@@ -67,7 +67,7 @@ pub struct SplitFrames {
     pub video: Vec<Frame>,
 }
 
-/// A dataset: cameras and times of every image, where the Gaussians start, and how large it is.
+/// A dataset: camera and time of every image, the points at which the Gaussians start, and the extent.
 ///
 /// Images stay on disk; [`crate::ImageStore`] reads them.
 #[derive(Clone, Debug, PartialEq)]
@@ -95,8 +95,7 @@ pub struct Scene {
     /// 1.1 times the largest distance of a training camera's center from their mean, world units
     /// (1 if they all coincide, since learning rates are multiplied by it).
     pub extent: f32,
-    /// What a user should know about how the folder was read, such as images without a pose, or frames that were left
-    /// out.
+    /// Notes for the user about reading the folder, such as images without a pose, or frames that were left out.
     pub notes: Vec<String>,
 }
 

@@ -1,5 +1,5 @@
-//! The part of the Python package `light4gs` that is written in Rust: it decodes, evaluates and draws with the interpreter's lock
-//! released. The package around it, in `python/`, makes NumPy arrays and classes of what comes from here.
+//! The part of the Python package `light4gs` that is written in Rust: it decodes, evaluates and draws with the
+//! interpreter's lock released. The package around it, in `python/`, turns the results into NumPy arrays and classes.
 //!
 //! Arrays leave as `bytearray`s of float32, so that the module needs only Python's stable interface.
 
@@ -14,7 +14,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::{PyByteArray, PyDict};
 
-/// Names of limits, with how to read and write each by name.
+/// Names of limits, and functions that read and write each by its name.
 macro_rules! limits {
     ($($name:ident)*) => {
         /// All limits, by name.
@@ -49,7 +49,7 @@ limits! {
     attribute_width channels resolution scales networks nodes layer_width layer_weights memory_bytes nanoseconds
 }
 
-/// An error of the decoder as an exception: `OSError` for what the system refuses, otherwise `light4gs.Error`.
+/// An error of the decoder as an exception: `OSError` if the system refused, otherwise `light4gs.Error`.
 fn exception(py: Python<'_>, error: CodecError) -> PyErr {
     if let CodecError::Io { action, path, error } = error {
         let message = format!("cannot {action} {}: {error}", path.display());
@@ -99,7 +99,7 @@ impl Scene {
         py.detach(|| PlayableScene::decode(bytes, &limits)).map(Self).map_err(|error| exception(py, error))
     }
 
-    /// What the file holds, by name.
+    /// Metadata of the file, by name.
     fn metadata<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let info = self.0.info();
         let meta = &info.meta;

@@ -5,7 +5,7 @@ use light4gs_codec::{GaussianArrays, sh_rest_coefficients};
 
 /// As gsplat's `rasterization` takes them.
 ///
-/// A Gaussian whose quaternion has no direction is drawn by nobody: it gets the identity and opacity 0.
+/// No renderer draws a Gaussian whose quaternion has no direction. Here it gets the identity and opacity 0.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Gsplat {
     /// `[N, 3]`, centers in world units.
@@ -47,8 +47,8 @@ impl Gsplat {
     }
 }
 
-/// As the PLY files of the original 3D Gaussian Splatting have them: before the activations, to the bit as the file gives
-/// them.
+/// As in the PLY files of the original 3D Gaussian Splatting: before the activations, with the bits of the `.l4gs`
+/// file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Inria {
     /// `[N, 3]`, centers in world units: `x`, `y`, `z`.

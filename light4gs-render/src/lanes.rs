@@ -43,11 +43,12 @@ pub trait Lanes: Copy {
     fn select(self, yes: Self, no: Self) -> Self;
     /// Bit i is the sign of lane i; for a mask, whether lane i is set.
     fn signs(self) -> u32;
-    /// 2^n for lanes that hold whole numbers in [-126, 127], plus their sum with the rounding constant removed.
+    /// `2^n` for lanes that hold `n + 1.5 · 2^23`, with `n` a whole number in [-126, 127]: `n` is in their lowest bits.
     fn exp2_of_rounded(self) -> Self;
-    /// The sum of the lanes.
+    /// The sum of the lanes, `((0 + 4) + (2 + 6)) + ((1 + 5) + (3 + 7))`.
     fn sum(self) -> f32;
-    /// The sums of eight vectors, each `((0 + 1) + (2 + 3)) + ((4 + 5) + (6 + 7))` of its lanes: less work than one by one.
+    /// The sums of eight vectors, each `((0 + 1) + (2 + 3)) + ((4 + 5) + (6 + 7))` of its lanes. Less work than one by
+    /// one.
     fn sums(vectors: &[Self; LANES]) -> [f32; LANES];
 
     /// 2^x for x in [-126, 1], relative error below 2e-7: a polynomial of degree six, fitted for the least relative
@@ -70,7 +71,7 @@ pub trait Lanes: Copy {
     }
 }
 
-/// A computation that is generic over the vector type.
+/// A computation that is generic over the vector type; [`dispatch`] runs it.
 pub trait LaneKernel {
     /// What it gives.
     type Output;
@@ -207,8 +208,8 @@ mod avx2 {
         kernel.run::<Avx2>()
     }
 
-    /// The same operations on the same eight lanes, so the results have the same bits; but the compiler has 32 registers in
-    /// place of 16.
+    /// The same operations on the same eight lanes, so the results have the same bits; but the compiler has 32
+    /// registers instead of 16.
     ///
     /// # Safety
     /// The processor must have AVX2, FMA, AVX-512F and AVX-512VL.
@@ -344,7 +345,8 @@ mod tests {
         }
     }
 
-    /// The results of every operation on some pairs and triples of values, as bits; that of the fused one is rounded.
+    /// The results of every operation on some pairs and triples of values, as bits. The result of the fused
+    /// multiply-add is rounded.
     struct EveryOperation;
     impl LaneKernel for EveryOperation {
         type Output = Vec<u32>;

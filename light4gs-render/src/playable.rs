@@ -1,4 +1,4 @@
-//! A decoded file, of which any time can be computed and drawn.
+//! A decoded file: the scene can be computed and drawn at any time.
 
 use light4gs_codec::rendering::{TILE, opacity, scale};
 use light4gs_codec::{
@@ -10,15 +10,15 @@ use light4gs_data::Camera;
 use crate::splatting::{CHANNELS, GaussianSlices, TileLists, assemble, rasterize};
 use crate::view::View;
 
-/// What a scene takes while it is shown, and an image while it is drawn, in shares of [`Limits::memory_bytes`]: decoding
-/// takes at most one.
+/// Most memory of a shown scene, and of an image that is drawn, as a multiple of [`Limits::memory_bytes`]. (Decoding
+/// takes at most one of these.)
 const SHARES: u64 = 8;
 
-/// Bytes of a pair of a tile and a Gaussian in it: the tile twice, the Gaussian, its place, the pixels that it hits; a list
-/// that grows may have twice the room that it needs.
+/// Bytes of an intersection (a Gaussian in a tile): the tile twice, the Gaussian, its place, and twice the pixels that
+/// it hits, since a growing list may have twice the room that it needs.
 const PAIR_BYTES: u64 = 4 * 6;
 
-/// A decoded file, of which any time can be computed and drawn.
+/// A decoded file: the scene can be computed and drawn at any time.
 ///
 /// All methods take `&self`, and several threads may call them at once.
 ///
@@ -39,7 +39,7 @@ pub struct PlayableScene {
     info: StreamInfo,
     evaluator: MotionEvaluator,
     limits: Limits,
-    /// The most that showing may take, bytes.
+    /// Most memory that showing may take, bytes.
     memory_bytes: u64,
 }
 
@@ -47,8 +47,8 @@ impl PlayableScene {
     /// Decodes a stream.
     ///
     /// # Errors
-    /// As [`light4gs_codec::decode`]; an attribute that nobody knows; a motion that takes more than eight times the memory of
-    /// `limits`.
+    /// As [`light4gs_codec::decode`]; an attribute that neither this crate nor the file explains; a motion that takes
+    /// more than eight times the memory of `limits`.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, CodecError> {
         let info = info_with_limits(bytes, limits)?;
         let scene = decode_with_limits(bytes, limits)?;
@@ -61,7 +61,7 @@ impl PlayableScene {
     /// Decodes a file. Not in a browser, which has none.
     ///
     /// # Errors
-    /// As [`PlayableScene::decode`], and what the system refuses to read; the message names the file.
+    /// As [`PlayableScene::decode`], and a file that the system cannot read; the message names the file.
     #[cfg(not(target_os = "unknown"))]
     pub fn open(path: &std::path::Path, limits: &Limits) -> Result<Self, CodecError> {
         light4gs_codec::read_file_and(path, limits, |bytes| Self::decode(bytes, limits))
@@ -143,7 +143,7 @@ impl PlayableScene {
         Ok(image)
     }
 
-    /// Bytes that drawing takes for the Gaussians: the moved ones, the activated ones, those on the screen.
+    /// Bytes of the Gaussians while drawing: the moved ones, the activated ones, those on the screen.
     fn gaussian_bytes(&self) -> u64 {
         let attributes: usize = self.canonical.attributes().map(|attribute| attribute.width).sum();
         self.len() as u64 * (4 * attributes as u64 + 4 * 6 + TileLists::BYTES_OF_A_GAUSSIAN)
@@ -157,7 +157,7 @@ fn pixel_bytes(view: &View) -> u64 {
     4 * CHANNELS as u64 * (pixels + in_tiles)
 }
 
-/// Bytes that [`MotionEvaluator`] takes for each Gaussian, all together; for the planes it takes less than the scene.
+/// Bytes of a [`MotionEvaluator`] for all Gaussians together. (For the planes it takes less than the scene.)
 fn motion_bytes(scene: &SceneData) -> u64 {
     let reads_features =
         scene.motion.network.as_ref().is_some_and(|motion| motion.sources.contains(&MotionSource::Features));

@@ -1,4 +1,4 @@
-//! Rotations of unit quaternions (w, x, y, z), and what their gradients are by a quaternion of any length.
+//! Rotations of unit quaternions (w, x, y, z), and their gradients with respect to a quaternion of any length.
 
 use glam::{Mat3, Vec3};
 

@@ -1,4 +1,4 @@
-//! What is drawn of a scene: camera, background, harmonics.
+//! How a scene is drawn: camera, background, degree of the harmonics.
 
 use light4gs_codec::rendering::TILE;
 use light4gs_data::Camera;
@@ -6,7 +6,7 @@ use light4gs_data::Camera;
 /// Camera, background and active SH degree of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
-    /// From where. It has at least one pixel.
+    /// The camera. It has at least one pixel.
     pub camera: Camera,
     /// Color behind the Gaussians: red, green, blue.
     pub background: [f32; 3],

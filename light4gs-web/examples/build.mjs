@@ -23,7 +23,7 @@ export async function buildExamples(folder, player = `${here}/../dist/light4gs-p
     entryPoints: ENGINES.map((engine) => ({ in: `${engine}/main.js`, out: `${engine}/main` })),
     outdir: folder,
     bundle: true,
-    // One copy of the library for the four; and what an engine loads only when it needs it stays in files of their own.
+    // One copy of the library for the four. Modules that an engine loads only when needed stay in files of their own.
     splitting: true,
     format: "esm",
     target: "es2022",

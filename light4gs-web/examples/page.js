@@ -1,4 +1,4 @@
-// What the four examples have in common: the scene, where it is seen from, and the clock.
+// Shared by the four examples: the scene, the viewpoint, and the clock.
 
 import { load } from "light4gs-player";
 

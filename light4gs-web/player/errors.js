@@ -1,4 +1,4 @@
-// What can go wrong, for the page to choose its words by.
+// Errors by kind, so that the page can choose its words.
 
 /**
  * A scene that was refused; `kind` is one of `not-l4gs`, `newer`, `too-large`, `damaged`, `memory`,

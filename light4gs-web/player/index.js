@@ -9,7 +9,7 @@ export { Scene, dismiss, load, prepare } from "./scene/scene.js";
 export { SplatRenderer } from "./drawing/splat_renderer.js";
 export { baseColors } from "./scene/colors.js";
 
-// Types of what goes in and out, for users of TypeScript.
+// Types of arguments and results, for users of TypeScript.
 /** @typedef {import("./scene/scene.js").GaussiansAt} GaussiansAt */
 /** @typedef {import("./scene/scene.js").SceneInfo} SceneInfo */
 /** @typedef {import("./scene/scene.js").Viewpoint} Viewpoint */

@@ -28,7 +28,7 @@ import { SplatRenderer } from "./drawing/splat_renderer.js";
 const STILL = 150;
 /** Milliseconds between two looks at the graphics card. */
 const WATCH = 3;
-/** How much more than the image a draft's list covers. */
+/** A draft's list covers this factor of the image's extent. */
 const SPARE_SPREAD = 1.25;
 /** A viewpoint that has everything before it. */
 const EVERYWHERE = { row: [0, 0, 0, 1], eye: [0, 0, 0] };
@@ -69,9 +69,9 @@ export class Player extends EventTarget {
   #wasDraft = false;
   /** Pixels of the image in full. */
   #size = { width: 1, height: 1 };
-  /** When something was last to be seen otherwise. */
+  /** When the image was last due to change. */
   #lastChange = -Infinity;
-  /** The image that the graphics card is at. @type {{ fence: WebGLSync | null, since: number, moving: boolean } | null} */
+  /** The image that the graphics card is drawing. @type {{ fence: WebGLSync | null, since: number, moving: boolean } | null} */
   #drawing = null;
   /** @type {number[]} */
   #frameTimes = [];
@@ -101,7 +101,7 @@ export class Player extends EventTarget {
     this.camera = new Camera();
     this.home = this.camera.clone();
     this.camera.lens = sourceLens(scene.info);
-    /** What the last frames took, in milliseconds. */
+    /** Times of the last frames, milliseconds. */
     this.timings = { evaluate: 0, sort: 0, upload: 0, draw: 0 };
     this.#time = Math.min(1, Math.max(0, Number(options.time) || 0));
     /** Resolves when the first image is on the canvas. @type {Promise<void>} */
@@ -164,7 +164,7 @@ export class Player extends EventTarget {
     this.#size = { width: Math.max(1, Math.round(width)), height: Math.max(1, Math.round(height)) };
   }
 
-  /** What is seen now. @returns {View} */
+  /** The current view. @returns {View} */
   get view() {
     return this.camera.view(this.#size.width, this.#size.height);
   }
@@ -199,7 +199,7 @@ export class Player extends EventTarget {
     this.dispatchEvent(new Event("statechange"));
   }
 
-  /** Back to where the view began. */
+  /** Back to the view at the beginning. */
   resetView() {
     this.camera = this.home.clone();
     this.following = false;
@@ -234,7 +234,7 @@ export class Player extends EventTarget {
     this.dispatchEvent(new Event("camerachange"));
   }
 
-  /** What is on the canvas is not what is to be seen. */
+  /** The image on the canvas is out of date. */
   #change() {
     this.#dirty = true;
     this.#lastChange = performance.now();
@@ -286,12 +286,12 @@ export class Player extends EventTarget {
     return !(this.#playing && this.scene.info.moves) && now - this.#lastChange > STILL;
   }
 
-  /** Whether the list is that of the time and the viewpoint that are to be seen. */
+  /** Whether the list is that of the current time and viewpoint. */
   #isShown() {
     return this.#moment === this.#shownTime && this.#viewpointKey() === this.#shownFrom;
   }
 
-  /** The time, where it makes a difference. */
+  /** The time; 0 if the scene does not move. */
   get #moment() {
     return this.scene.info.moves ? this.#time : 0;
   }
@@ -312,7 +312,7 @@ export class Player extends EventTarget {
     this.dispatchEvent(new CustomEvent("error", { detail: error }));
   };
 
-  /** Has the worker make what is to be seen now, if that is not what it made last. */
+  /** Has the worker make a list for the current time and viewpoint, if its last one is another. */
   #update() {
     if (this.#busy || this.#undrawn) return;
     const still = this.#isStill(performance.now());
@@ -356,7 +356,7 @@ export class Player extends EventTarget {
   /** @type {DatasetCamera | null} */
   #followed = null;
 
-  /** Where it is seen from. */
+  /** The viewpoint. */
   #viewpoint() {
     const { axes, position } = this.camera;
     const forward = axes[2];
@@ -374,7 +374,7 @@ export class Player extends EventTarget {
   }
 
   /**
-   * Has the worker make the list for what is to be seen now, and gives it to the renderer.
+   * Has the worker make the list for the current time and viewpoint, and gives it to the renderer.
    * @param {number} [level]  of detail
    */
   async #show(level = 0) {
@@ -383,7 +383,7 @@ export class Player extends EventTarget {
       const time = this.#moment;
       const key = this.#viewpointKey();
       const memory = this.#spare;
-      // A draft may leave out what is not seen: the image at rest has a list of its own.
+      // A draft may leave out Gaussians outside of the image: the image at rest has a list of its own.
       const viewpoint = level > 0 ? { ...this.#viewpoint(), spread: this.#spread() } : this.#viewpoint();
       this.#spare = null;
       const { list, evaluateMs, sortMs } = await this.scene.frame(time, viewpoint, memory, level);
@@ -417,7 +417,7 @@ export class Player extends EventTarget {
     while (this.#frameTimes.length > 1 && start - this.#frameTimes[0] > 1000) this.#frameTimes.shift();
   }
 
-  /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
+  /** The share of the canvas's pixels along each side that is drawn while something moves: 1 if there is time for all. */
   get draftScale() {
     return this.#draft.scale;
   }
@@ -461,7 +461,7 @@ export class Player extends EventTarget {
     return this.renderer.readPixels();
   }
 
-  /** Stops, and gives back what the graphics card holds. The scene stays open. */
+  /** Stops, and frees the memory of the graphics card. The scene stays open. */
   dispose() {
     this.#disposed = true;
     cancelAnimationFrame(this.#request);

@@ -59,9 +59,9 @@ pub extern "C" fn begin() {
     state().arrival = Some(Arrival::default());
 }
 
-/// Takes the input as the next piece of the file, which may be empty, and frees it. Decodes at most one layer. Returns 1 if the
-/// scene is another one now, since there is more to be seen; 2 if it is not; 0 if the file is damaged. [`text`] has the
-/// description or the error.
+/// Takes the input as the next piece of the file, which may be empty, and frees it. Decodes at most one layer. Returns
+/// 1 if there is a new scene, with more Gaussians; 2 if not; 0 if the file is damaged. [`text`] has the description or
+/// the error.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn push() -> u32 {
     let state = &mut *state();
@@ -115,14 +115,14 @@ pub extern "C" fn digest() -> u64 {
     light4gs_codec::decode(&input).map_or(0, |scene| crate::digest(&scene))
 }
 
-/// Chooses the level of detail that [`evaluate`] and [`draw_list`] are about: 0 is the scene itself. Returns 1 if nothing of it
+/// Chooses the level of detail for [`evaluate`] and [`draw_list`]: 0 is the scene itself. Returns 1 if nothing of it
 /// is evaluated yet, else 0.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn show_level(level: u32) -> u32 {
     state().scene.as_mut().map_or(0, |scene| u32::from(scene.show_level(level)))
 }
 
-/// How many Gaussians the level of [`show_level`] has.
+/// The number of Gaussians of the level of [`show_level`].
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn count() -> usize {
     state().scene.as_ref().map_or(0, OpenScene::count)
@@ -136,9 +136,10 @@ pub extern "C" fn evaluate(time: f32, first: usize, last: usize) {
     }
 }
 
-/// What is drawn, back to front: 16 numbers each, center, opacity, covariance xx, xy, xz, yy, yz, zz, color, and three zeros;
-/// filled up to a multiple of 256 with zeros. The depth of a point is `x · row_x + y · row_y + z · row_z + row_w`; the camera
-/// stands at the eye and sees the cone with this tangent, or all in front of it. [`list_length`] says how many numbers.
+/// The Gaussians to draw, back to front, 16 numbers each: center, opacity, covariance xx, xy, xz, yy, yz, zz, color,
+/// and three zeros. Filled up to a multiple of 256 Gaussians with zeros. The depth of a point is `x · row_x + y · row_y
+/// + z · row_z + row_w`; the camera stands at the eye and sees the cone with this tangent, or all in front of it.
+/// [`list_length`] is their number.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn draw_list(
     row_x: f32,
@@ -157,13 +158,13 @@ pub extern "C" fn draw_list(
     list.as_ptr()
 }
 
-/// How many numbers [`draw_list`] returned.
+/// The number of numbers that [`draw_list`] returned.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn list_length() -> usize {
     state().list_length
 }
 
-/// All attributes at a time. [`numbers_length`] says how many numbers.
+/// All attributes at a time. [`numbers_length`] is the number of numbers.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn attributes_at(time: f32) -> *const f32 {
     let state = &mut *state();
@@ -171,7 +172,7 @@ pub extern "C" fn attributes_at(time: f32) -> *const f32 {
     state.numbers.as_ptr()
 }
 
-/// How many numbers [`attributes_at`] returned.
+/// The number of numbers that [`attributes_at`] returned.
 #[cfg_attr(target_os = "unknown", unsafe(no_mangle))]
 pub extern "C" fn numbers_length() -> usize {
     state().numbers.len()

@@ -14,8 +14,9 @@ pub struct Arrival {
 }
 
 impl Arrival {
-    /// Takes the next bytes, or none. Decodes one more layer, if there is one, and returns the scene with the Gaussians so far,
-    /// enlarged to stand for those that have not come: what can be seen is shown before the next layer is decoded.
+    /// Takes the next bytes, or none. Decodes one more layer, if there is one, and returns the scene with the Gaussians
+    /// so far, enlarged to stand for the missing ones. Only one layer at a time, so that the scene can be shown before
+    /// the next one is decoded.
     ///
     /// # Errors
     /// As [`StreamDecoder::push`] and [`StreamDecoder::decode`].
@@ -43,7 +44,7 @@ impl Arrival {
     /// The whole scene.
     ///
     /// # Errors
-    /// As [`StreamDecoder::finish`]: a file of which bytes are missing.
+    /// As [`StreamDecoder::finish`]: bytes are missing.
     pub fn finish(self) -> Result<SceneData, CodecError> {
         self.decoder.finish()
     }
@@ -63,9 +64,9 @@ impl OpenScene {
     }
 }
 
-/// What scales are multiplied by where only some layers have come. Layers are divided by opacity times area, and few
-/// Gaussians have most of that: the share of the area is about the square root of the share of the Gaussians, and that of
-/// the Gaussians about the share of their bytes.
+/// The factor of the scales if only some layers have come. Gaussians are put into layers by opacity times area, and few
+/// Gaussians have most of it. So `share of the area ≈ sqrt(share of the Gaussians) ≈ sqrt(share of their bytes)`, and
+/// scales grow by the square root of the area's inverse share.
 fn growth(sections: &[SectionInfo], shown: usize) -> f32 {
     let layers: Vec<u64> = sections.iter().filter(|s| s.name == "gaussians").map(|section| section.bytes).collect();
     let sum = |layers: &[u64]| layers.iter().sum::<u64>().max(1) as f32;

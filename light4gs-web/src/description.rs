@@ -4,18 +4,18 @@ use std::fmt::{Display, Write as _};
 
 use light4gs_codec::{CodecError, SceneData, SceneMeta, SectionInfo, VERSION};
 
-/// What is said of a file besides its scene.
+/// Facts about a file, besides its scene.
 #[derive(Debug)]
 pub(crate) struct Facts<'a> {
     /// Of the whole file.
     pub(crate) bytes: u64,
-    /// Layers of Gaussians, and how many of them have come.
+    /// Number of layers of Gaussians, and of those that have come.
     pub(crate) layers: usize,
     pub(crate) shown: usize,
     pub(crate) sections: &'a [SectionInfo],
 }
 
-/// The description of a scene with so many levels of detail: `{"name": ..., "sections": [...]}`.
+/// The description of a scene with `levels` levels of detail: `{"name": ..., "sections": [...]}`.
 pub(crate) fn describe(scene: &SceneData, facts: &Facts<'_>, levels: u32) -> String {
     let SceneMeta { name, frame_count, fps, bounds, background, width, height, fov_x, extra, .. } = &scene.meta;
     let sizes = SectionInfo::bytes_by_name(facts.sections);

@@ -20,8 +20,8 @@ pub struct Viewpoint {
     pub row: [f32; 4],
     /// The camera's center, world units.
     pub eye: [f32; 3],
-    /// Gaussians that do not reach into the cone around the view axis are left out: the tangent of its angle to the axis, or
-    /// infinity for all in front of the camera.
+    /// Tangent of the angle between the view axis and the cone around it; infinity for everything in front of the
+    /// camera. Gaussians that do not reach into the cone are left out.
     pub spread: f32,
 }
 

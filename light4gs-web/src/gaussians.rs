@@ -39,7 +39,8 @@ fn covariance([w, x, y, z]: [f32; 4], scales: [f32; 3]) -> [f32; 6] {
     [product(0, 0), product(0, 1), product(0, 2), product(1, 1), product(1, 2), product(2, 2)]
 }
 
-/// What the motion of a scene does not change, activated once. A list is empty where it may change.
+/// Activated attributes that the motion does not change, computed once. The list of an attribute that may change is
+/// empty.
 #[derive(Debug, Default)]
 pub(crate) struct Unchanged {
     scales: Vec<[f32; 3]>,

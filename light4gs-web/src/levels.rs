@@ -1,9 +1,10 @@
 //! Levels of detail: fewer, larger Gaussians in place of those of a scene, for images that must be made quickly.
 //!
-//! The method is stochastic simplification (Cook, Halstead, Planck and Ryu, 2007). A Gaussian is kept with a probability
-//! `p` in proportion to its significance, at most 1, and what is kept gets `1 / p` times its area. So the expected area
-//! times opacity stays as it is, and what covers much is not changed at all. The choice is systematic along a Morton
-//! curve: of neighbors that are dropped together, about one in `1 / p` stays and covers the others.
+//! The method is stochastic simplification (Cook, Halstead, Planck and Ryu, 2007). A Gaussian is kept with a
+//! probability `p` in proportion to its significance, at most 1, and a kept one gets `1 / p` times its area. So the
+//! expected area times opacity stays the same, and Gaussians that cover much are not changed at all. The choice is
+//! systematic along a Morton curve: of neighbors that are dropped together, about one in `1 / p` stays and covers the
+//! others.
 
 use light4gs_codec::attributes::CodingOrder;
 use light4gs_codec::rendering::MIN_ALPHA;
@@ -15,10 +16,11 @@ use crate::gaussians::{opacity, scales};
 const FEWEST: usize = 3000;
 /// Each level has half of the Gaussians of the one before.
 const MOST_LEVELS: u32 = 5;
-/// When the significance is looked at besides: each time takes as long as an image of all Gaussians.
+/// Further times at which the significance is computed. There are few, since each takes as long as an image of all
+/// Gaussians.
 const TIMES: [f32; 2] = [0.5, 1.0];
 
-/// What a level is made of.
+/// The Gaussians of a level.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Selection {
     /// Gaussians of the scene, ascending.
@@ -27,13 +29,13 @@ pub(crate) struct Selection {
     pub(crate) growth: Vec<f32>,
 }
 
-/// How many levels a scene of so many Gaussians has besides itself.
+/// The number of levels, besides the scene itself, of a scene with `count` Gaussians.
 pub(crate) fn levels(count: usize) -> u32 {
     (1..=MOST_LEVELS).take_while(|&level| count >> level >= FEWEST).count() as u32
 }
 
-/// What each Gaussian covers where it covers most: of the canonical Gaussians, of those that are `moved` to some time, and
-/// of those at further times. An opacity may change so that it is seen at some times only.
+/// The largest significance of each Gaussian: among the canonical one, the one `moved` to some time, and those at
+/// [`TIMES`]. (Its opacity may be high at some times only.)
 pub(crate) fn most_significance(
     canonical: &GaussianArrays,
     moved: &GaussianArrays,
@@ -70,7 +72,7 @@ pub(crate) fn select(centers: &[[f32; 3]], significance: &[f32], count: usize) -
 }
 
 /// Opacity times the mean of the projected area over all directions, up to a factor: by Cauchy's formula that area is a
-/// quarter of the surface of a convex body, here of a box. 0 for what no view shows.
+/// quarter of the surface of a convex body, here of a box. 0 for Gaussians that no view shows.
 fn significance(gaussians: &GaussianArrays, index: usize) -> f32 {
     let opacity = opacity(gaussians.opacity_logits[index]);
     let [a, b, c] = scales(gaussians.log_scales[index]);
@@ -78,8 +80,8 @@ fn significance(gaussians: &GaussianArrays, index: usize) -> f32 {
     if opacity >= MIN_ALPHA && significance.is_finite() { significance } else { 0.0 }
 }
 
-/// The significance from which on a Gaussian is kept for certain, so that the probabilities of all have the sum `count`; 0
-/// where there are no more than that.
+/// The threshold `t` with `sum(min(1, significance / t)) = count`: Gaussians above it are kept for certain. 0 if there
+/// are at most `count` Gaussians.
 fn threshold(significance: &[f32], count: usize) -> f64 {
     let (mut threshold, mut certain) = (f64::INFINITY, 0);
     loop {

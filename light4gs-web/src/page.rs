@@ -1,4 +1,4 @@
-//! Pages around the player: what `light4gs view`, `light4gs export --html` and a run's report write.
+//! Pages around the player, for `light4gs view`, `light4gs export --html` and the report of a run.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;

@@ -1,4 +1,4 @@
-//! A decoded scene, of which one time after the other is computed.
+//! A decoded scene, computed at one time after the other.
 
 use light4gs_codec::{CodecError, GaussianArrays, MotionEvaluator, SceneData};
 
@@ -16,7 +16,7 @@ pub struct OpenScene {
     /// The level that was asked for last besides the scene itself, with its number. One at a time: it has at most half of
     /// the Gaussians, and so takes at most half of the memory of the scene.
     reduced: Option<(u32, Level)>,
-    /// What each Gaussian covers, from the first reduced level on.
+    /// The significance of each Gaussian, once a reduced level has been asked for.
     significance: Option<Vec<f32>>,
     /// The level that is shown is the reduced one.
     shows_reduced: bool,
@@ -24,7 +24,7 @@ pub struct OpenScene {
     list: DrawList,
 }
 
-/// Gaussians that are moved and drawn together: those of the scene, or fewer in place of them.
+/// Gaussians that are moved and drawn together: those of the scene, or fewer that stand for them.
 #[derive(Debug)]
 struct Level {
     canonical: GaussianArrays,
@@ -84,9 +84,9 @@ impl OpenScene {
         &self.description
     }
 
-    /// Chooses what [`OpenScene::evaluate`] and [`OpenScene::draw_list`] are about: 0 is the scene itself, and each further
-    /// level has half of the Gaussians of the one before. The description says how many there are; beyond the last one it
-    /// is taken. Returns whether the level was made anew: nothing of it is evaluated then.
+    /// Chooses the level for [`OpenScene::evaluate`] and [`OpenScene::draw_list`]: 0 is the scene itself, and each
+    /// further level has half of the Gaussians of the one before. Their number is in the description; a larger number
+    /// means the last one. Returns whether the level was made anew: then nothing of it is evaluated yet.
     pub fn show_level(&mut self, level: u32) -> bool {
         let Level { canonical, moved, evaluator, .. } = &self.full;
         let level = level.min(levels(canonical.len()));
@@ -99,7 +99,7 @@ impl OpenScene {
         let significance = self.significance.get_or_insert_with(|| most_significance(canonical, moved, evaluator));
         let Selection { indices, growth } = select(&canonical.means, significance, canonical.len() >> level);
         self.scene.gaussians = canonical.gathered(&indices);
-        // What was possible with all Gaussians is possible with some of them.
+        // All Gaussians were accepted, so some of them are.
         self.reduced = Level::take(&mut self.scene, growth).ok().map(|reduced| (level, reduced));
         self.shows_reduced = self.reduced.is_some();
         true
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!((scene.count(), scene.attributes_at(0.25)), (count, attributes));
     }
 
-    /// What a level keeps is where it is in the scene, at every time, with the same opacity.
+    /// The Gaussians of a level are where they are in the scene, at every time, with the same opacity.
     #[test]
     fn a_level_moves_as_the_scene_does() {
         let mut scene = scene();

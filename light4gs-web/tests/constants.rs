@@ -1,4 +1,4 @@
-//! The player's `constants.js` is what the program's constants of rendering say.
+//! The player's `constants.js` has the program's constants of rendering.
 
 use light4gs_codec::rendering::{DILATION, FRUSTUM_MARGIN, MAX_ALPHA, MIN_ALPHA, NEAR};
 use light4gs_web::{ENTRY, ROW};

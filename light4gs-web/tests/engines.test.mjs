@@ -1,6 +1,6 @@
 // The examples for other engines in headless Chromium: they play, and their pictures are like the player's.
-// LIGHT4GS_WEB_PICTURES names a folder for the pictures; LIGHT4GS_WEB_TIMES=1 also measures what a time costs. The bounds are those of
-// the scene of the quickstart: with LIGHT4GS_WEB_SCENE they are not checked.
+// LIGHT4GS_WEB_PICTURES names a folder for the pictures; LIGHT4GS_WEB_TIMES=1 also measures the cost of a new time. The
+// bounds are those of the scene of the quickstart: with LIGHT4GS_WEB_SCENE they are not checked.
 
 import assert from "node:assert/strict";
 import { existsSync, mkdirSync, mkdtempSync, readFileSync, readdirSync, rmSync, writeFileSync } from "node:fs";
@@ -73,7 +73,7 @@ describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examp
   for (const [engine, least] of Object.entries(LEAST_PSNR)) {
     test(engine, async () => {
       const page = await examplePage(engine);
-      // It plays: two times, of which none was asked for here.
+      // It plays: two times, neither of which was asked for here.
       const first = await page.evaluate(() => globalThis.example.splats.time);
       await page.waitForFunction((first) => globalThis.example.splats.time !== first, first);
       if (process.env.LIGHT4GS_WEB_TIMES) return measure(page, engine);
@@ -87,7 +87,7 @@ describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examp
         console.log(`  ${engine}, time ${time}: ${distance.toFixed(1)} dB`);
         if (!process.env.LIGHT4GS_WEB_SCENE) assert.ok(distance >= least, `${distance} dB, expected ${least}`);
       }
-      // What has moved has moved as far as in the player.
+      // Objects have moved as far as in the player.
       const between = psnr(shown[0].pixels, shown[1]);
       const expected = psnr(references[0].pixels, references[1]);
       console.log(`  ${engine}, one time against the other: ${between.toFixed(1)} dB, the player's: ${expected.toFixed(1)} dB`);
@@ -154,7 +154,7 @@ describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examp
     const ball = [155, 272];
     assert.ok(Math.hypot(...at(ball).map((value, i) => value - expected(ball)[i])) < 25, `${at(ball)}, expected ${expected(ball)}`);
 
-    // Where the target wants linear colors, as for effects behind it, it gets them.
+    // If the target wants linear colors, such as for later effects, it gets them.
     await page.evaluate(() => (globalThis.example.renderer.outputColorSpace = globalThis.example.THREE.LinearSRGBColorSpace));
     const linear = Array.from((await still(page)).pixels.subarray(4 * (SIZE * ball[1] + ball[0]))).slice(0, 3);
     const converted = expected(ball).map((value) => 255 * (value <= 10.3 ? value / 255 / 12.92 : ((value / 255 + 0.055) / 1.055) ** 2.4));

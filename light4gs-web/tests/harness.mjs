@@ -1,4 +1,5 @@
-// What the browser tests share: a server for the bundle and the scenes, Chromium, cameras, distances between images.
+// Code that the browser tests share: a server for the bundle and the scenes, Chromium, cameras, distances between
+// images.
 
 import { createServer } from "node:http";
 import { existsSync, readFileSync } from "node:fs";

@@ -225,7 +225,7 @@ describe("files that are no good", () => {
     });
   }
 
-  // The browser itself notes what a policy forbids and what a connection loses: only exceptions count here.
+  // The browser itself reports violations of a policy and lost connections: only exceptions count here.
   const pages = {
     "a page that forbids workers": ["no-worker", /cannot start in this page.*worker-src blob:/],
     "a page that forbids WebAssembly": ["no-wasm", /cannot start in this page.*'wasm-unsafe-eval'/],
@@ -552,7 +552,7 @@ describe("the element", () => {
       return results;
     });
     assert.deepEqual(results.drawing, { level: 1, smaller: true, fewer: true, difference: 0 });
-    // How fast it is drawn is this machine's.
+    // The speed of drawing depends on this machine.
     assert.deepEqual({ ...results.worker, smaller: null }, { level: 1, smaller: null, fewer: true, difference: 0 });
     assert.deepEqual(page.problems, []);
     await page.context().close();
@@ -590,7 +590,7 @@ describe("the element", () => {
       const row = [0, 0, 0, 1];
       const alone = [];
       for (const time of [0, 0.5]) alone.push((await scene.frame(time, { row, eye })).list);
-      // Both at once, and the one again without its time having changed.
+      // Both at once, and then one of them again at the same time.
       const [first, second] = await Promise.all([scene.frame(0, { row, eye }), scene.frame(0.5, { row, eye })]);
       const again = await scene.frame(0, { row, eye });
       const difference = (a, b) => a.reduce((sum, value, i) => sum + Math.abs(value - (b[i] ?? 0)), 0);
@@ -769,7 +769,7 @@ describe("speed", () => {
     "100 000 Gaussians": { file: "large.l4gs", decode: 400, first: 1500, playing: 15, turning: 20 },
   };
   for (const [name, most] of Object.entries(scenes)) {
-    // It takes a while to make, and says nothing on a machine that does other work.
+    // It takes a while to make, and means nothing on a machine that does other work.
     const skip = most.file === "large.l4gs" && !process.env.LIGHT4GS_WEB_STRICT;
     test(`${name}: decoding, the first image, playing and turning at 800 × 800`, { skip }, () => speedOf(most));
   }

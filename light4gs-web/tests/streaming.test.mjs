@@ -38,7 +38,7 @@ function bytesToFirstImage(bytes) {
   let end = table + 16 * sections;
   for (let at = table; at < table + 16 * sections; at += 16) {
     end += Number(bytes.readBigUInt64LE(at + 8));
-    // The writer puts what all layers share first, and `sh` (2) last in each layer.
+    // The writer puts the sections that all layers share first, and `sh` (2) last in each layer.
     if (bytes.readUInt16LE(at) === 2) return end;
   }
   throw new Error("no harmonics");

@@ -1,4 +1,4 @@
-// The exponential of what is at most `largest`, so that it is finite.
+// exp(min(x, largest)), which is finite.
 //
 // Each invocation computes one value. It reads `places` and writes `values`.
 
@@ -24,6 +24,6 @@ fn main(
         return;
     }
     let x = places[i];
-    // Not the minimum, which may make a number of what is none.
+    // Not the builtin minimum, which may turn NaN into a number.
     values[i] = exponential(select(x, parameters.largest, x > parameters.largest));
 }

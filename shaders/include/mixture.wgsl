@@ -6,7 +6,7 @@ struct Logistic {
     mean: f32,
     inverse_scale: f32,
     half_width: f32,
-    // exp(-2 half_width), and what it leaves of 1.
+    // exp(-2 half_width), and 1 minus it.
     shrunk: f32,
     rest: f32,
 }

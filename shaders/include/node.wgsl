@@ -26,7 +26,7 @@ fn affinity_of(node: u32, k: u32) -> f32 {
     return nodes[NODE * node + 20u + k];
 }
 
-// What the affinities of Gaussian `i` and of a node add to the logit by which the one follows the other.
+// The inner product of the affinities of Gaussian `i` and of a node, which is added to the logit of the node's weight.
 fn affinity_between(i: u32, node: u32) -> f32 {
     var sum = 0.0;
     for (var k = 0u; k < AFFINITIES; k++) {
@@ -39,10 +39,11 @@ fn squared_length(v: vec3<f32>) -> f32 {
     return fma(v.x, v.x, fma(v.y, v.y, v.z * v.z));
 }
 
-// The logit by which Gaussian `i` follows a node that is so far away, in squares. Forward and backward have to find the same number
-// to the last bit, since a logit may be so large that its rounding is a noticeable weight. So every product that can be is in an `fma`:
-// compilers fuse others or not as they like, one way in one kernel and another way in the next. And so something is added that a compiler
-// cannot know to be 0, as no precision is negative: an `fma` with 0 is a product, which it may fuse with what the caller subtracts.
+// The logit of a node's weight for Gaussian `i` at a squared distance. Forward and backward must compute the same
+// number to the last bit, since a logit may be so large that its rounding is a noticeable weight. A compiler may fuse a
+// product and a sum in one kernel and not in another. So every product here that can be in an `fma` is. The last one
+// adds a number that is always 0, since no precision is negative, but that a compiler cannot know to be 0: an `fma`
+// with a literal 0 is a product, which could be fused with the caller's subtraction.
 fn exponent_between(i: u32, node: u32, squared: f32) -> f32 {
     let sharpness = precision_of(node);
     return fma(-sharpness, squared, affinity_between(i, node) + min(sharpness, 0.0));

@@ -1,4 +1,4 @@
-// How a control node is moved and turned at a time, and where it is at rest, `anchors` [B, 3].
+// Translation and rotation of a control node at a time, and its place at rest, `anchors` [B, 3].
 
 struct Motion {
     translation: vec3<f32>,

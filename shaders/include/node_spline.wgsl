@@ -1,12 +1,12 @@
-// Knots of the splines of control nodes, `translations` [K, 3 B] and `rotations` [K, 4 B], quaternions less (1, 0, 0, 0); and the four of
-// them that count at a time.
+// Knots of the splines of control nodes, `translations` [K, 3 B] and `rotations` [K, 4 B] (quaternions minus (1, 0, 0,
+// 0)), and the weights of the four knots that count at a time.
 
 struct Spline {
     // B
     nodes: u32,
     // K
     knots: u32,
-    // The first of the four knots, and how much each counts.
+    // The first of the four knots, and the weight of each.
     first: u32,
     weight_0: f32,
     weight_1: f32,
@@ -20,7 +20,7 @@ fn weights_of(spline: Spline) -> vec4<f32> {
     return vec4<f32>(spline.weight_0, spline.weight_1, spline.weight_2, spline.weight_3);
 }
 
-// How much a knot counts.
+// The weight of a knot.
 fn weight_of_knot(spline: Spline, knot: u32) -> f32 {
     if (knot < spline.first || knot >= spline.first + 4u) {
         return 0.0;

@@ -14,7 +14,7 @@ fn position_in(pose: Pose, mean: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot(pose.row_x, place), dot(pose.row_y, place), dot(pose.row_z, place));
 }
 
-// What a Gaussian hands to the nodes: itself, and derivatives by what it becomes.
+// The values that a Gaussian hands to the nodes: its own, and the derivatives by its moved ones.
 struct Turning {
     mean: vec3<f32>,
     by_position: vec3<f32>,
@@ -25,9 +25,9 @@ fn row_product(row: vec4<f32>, own: Turning) -> f32 {
     return fma(row.x, own.mean.x, fma(row.y, own.mean.y, fma(row.z, own.mean.z, row.w)));
 }
 
-// The product of a pose with the derivatives by the blended one. Where one weight is 1, the blended pose is that node's own, and the
-// difference of their products has to be exactly 0: Adam would take a step along any rounding error. So every product that can be is in
-// an `fma`, as in `exponent_between`.
+// The inner product of a pose with the derivatives by the blended pose. If one weight is 1, the blended pose is that
+// node's own, and the difference of their products must be exactly 0: Adam would take a step along any rounding error.
+// So every product that can be in an `fma` is, as in `exponent_between`.
 fn inner_product(pose: Pose, own: Turning) -> f32 {
     let x = row_product(pose.row_x, own);
     let y = row_product(pose.row_y, own);

@@ -2,7 +2,7 @@
 //
 //   0: x, y, depth, opacity
 //   1: inverse of the 2D covariance xx, xy, yy; reach
-//   2: red, green, blue (not below 0); what became of the color, see `project.wgsl`
+//   2: red, green, blue (not below 0); flags of clamped channels, see `project.wgsl`
 //   3: 2D covariance xx, yy; radius in pixels; number of cells that it touches
 //
 // The reach is twice the exponent at which alpha falls below 1/255; negative if it never gets there.

@@ -1,4 +1,4 @@
-// Control nodes at a time: their poses, and with them what skinning wants to know of them.
+// Control nodes at a time: their poses, and the other values that skinning reads.
 //
 // One invocation owns one node. Reads its parameters; lengths are shares of `unit`. Writes `posed` [B, 20 + AFFINITIES]: anchor (3) and
 // precision (1), world units, pose (16): matrix row by row, offset, quaternion; affinities.
@@ -40,7 +40,7 @@ fn main(
     for (var k = 0u; k < 4u; k++) {
         posed[at + 16u + k] = motion.turn[k];
     }
-    // A placeholder where there are no affinities; but every binding has to be used.
+    // Without affinities this is a placeholder: every binding must be used.
     for (var k = 0u; k < AFFINITIES; k++) {
         posed[at + 20u + k] = affinities[AFFINITIES * node + k];
     }

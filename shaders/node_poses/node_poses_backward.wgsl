@@ -2,7 +2,7 @@
 //
 // One invocation owns one node, and all knots of its trajectory. Reads `upstream` [B, 20 + AFFINITIES], see `node_poses.wgsl`. Writes the
 // gradients of anchors [B, 3], log_radii [B, 1], translations [K, 3 B], rotations [K, 4 B] and affinities [B, AFFINITIES] into one buffer,
-// each from its place on.
+// each at its own offset.
 
 // #include quaternion, node_spline, node_motion
 

@@ -1,7 +1,7 @@
 // Second half of the regularizer of control nodes: the loss, and all gradients.
 //
 // One invocation owns one node, and all knots of its trajectory. Reads the sums of `node_strain.wgsl` and the knots. Writes the loss, and into
-// one buffer the gradients of anchors [B, 3], translations [K, 3 B] and rotations [K, 4 B], each from its place on.
+// one buffer the gradients of anchors [B, 3], translations [K, 3 B] and rotations [K, 4 B], each at its own offset.
 
 // #include node_spline
 

@@ -1,5 +1,5 @@
-// First half of the regularizer of control nodes: how far nodes are from where their neighbors see them (as rigid as possible, Sorkine
-// and Alexa 2007), and how much trajectories bend.
+// First half of the regularizer of control nodes: the distances of nodes from the places where their neighbors see them
+// (as rigid as possible, Sorkine and Alexa 2007), and the bending of trajectories.
 //
 // One invocation owns one node and meets all others, as the one that sees and as the one that is seen. Reads the nodes. Writes four
 // vectors of `sums`; the first three are not yet divided by the sum of the weights of all nodes:
@@ -18,7 +18,7 @@
 @group(0) @binding(4) var<storage, read_write> sums: array<vec4<f32>>;
 @group(0) @binding(5) var<uniform> spline: Spline;
 
-// Of neighbors at a squared distance, as node `node` sees them.
+// The weight of a neighbor at a squared distance, for node `node`.
 fn weight_at(node: u32, squared: f32) -> f32 {
     return exponential(-0.25 * exp(-2.0 * log_radii[node]) * squared);
 }

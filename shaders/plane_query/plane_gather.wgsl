@@ -4,15 +4,15 @@
 // the next ones along width and height, so a cell reads the samples that begin in it and in three neighbors. Samples
 // are sorted by low cell (`order`, with ranges in `starts`), and within a cell by point. So the four cells are two
 // ranges, every sum has one order, and no atomics are needed. Writes the planes' gradients, each [C, H · W], at the
-// places in `places`. A launch takes only so many samples of a cell that no loop gets too long; later launches add the
-// rest.
+// places in `places`. A launch takes a bounded number of samples of a cell, so that no loop gets too long; later
+// launches add the rest.
 
 // #include planes
 
 struct Places {
     // Where the gradients of the first four planes begin.
     a: vec4<u32>,
-    // Those of two more; the first sample of every cell that this launch takes, and how many.
+    // Those of two more; the first sample of every cell that this launch takes, and their number.
     b: vec4<u32>,
 }
 

@@ -1,4 +1,4 @@
-// Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
+// Linear blend skinning: positions and rotations of the Gaussians after the nodes have moved.
 //
 // One invocation owns one Gaussian and meets all nodes twice: first for the largest exponent, then for the blended pose. Reads
 // Gaussians and nodes. Writes `moved` [N, 7]: position, quaternion. Saves five vectors of `blended` for the backward pass:

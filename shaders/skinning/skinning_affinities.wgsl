@@ -1,7 +1,7 @@
 // One of the parts of skinning's derivative: the gradients of the Gaussians' affinities.
 //
-// One invocation owns one Gaussian and meets all nodes. Reads what it has handed over (see `skinning_backward.wgsl`), its
-// affinities and the nodes. Writes `of_affinities` [N, AFFINITIES].
+// One invocation owns one Gaussian and meets all nodes. Reads the values that it has handed over (see
+// `skinning_backward.wgsl`), its affinities and the nodes. Writes `of_affinities` [N, AFFINITIES].
 
 // #include exponential, pose, node
 

@@ -1,4 +1,5 @@
-// First of the parts of skinning's derivative: the gradients of the Gaussians, and what they hand to the nodes.
+// First of the parts of skinning's derivative: the gradients of the Gaussians, and the values that they hand to the
+// nodes.
 //
 // One invocation owns one Gaussian. Reads it, its blended pose (see `skinning.wgsl`) and `upstream` [N, 7]. Writes to
 // `gradients` those of mean, quaternion and stillness, and four vectors of `handed`:

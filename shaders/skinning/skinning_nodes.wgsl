@@ -1,8 +1,9 @@
-// One of the parts of skinning's derivative: what a slice of the Gaussians adds to the gradients of the nodes.
+// One of the parts of skinning's derivative: the sums over a slice of the Gaussians, for the gradients of the nodes.
 //
 // One invocation owns one node and one slice, and adds up the Gaussians of the slice in their order; neighbors have the same slice, so
-// that they read the same Gaussian at the same time. Reads what Gaussians hand over (see `skinning_backward.wgsl`) and the nodes.
-// Writes `sums`, SUMS a node and slice: anchor (3), precision (1), pose (16), and affinities where there are any.
+// that they read the same Gaussian at the same time. Reads the values that Gaussians hand over (see
+// `skinning_backward.wgsl`) and the nodes. Writes `sums`, SUMS a node and slice: anchor (3), precision (1), pose (16),
+// and affinities where there are any.
 
 // #include exponential, pose, node
 

@@ -1,4 +1,4 @@
-// Beginning of a radix sort: how often each digit of the first pass occurs in each block.
+// Beginning of a radix sort: the count of each digit of the first pass in each block.
 //
 // A workgroup owns a block of BLOCK keys, an invocation EACH neighboring keys; a digit has RADIX_BITS bits. Writes
 // `tables[digit * blocks + block]`, and zeros to the tables of the PASSES - 1 further passes, which `radix_scatter` counts for.

@@ -1,9 +1,9 @@
 // A pass of a radix sort: moves keys and values to their places. Stable: equal keys keep their order.
 //
 // A workgroup owns a block of BLOCK keys, an invocation EACH neighboring keys; a digit has RADIX_BITS bits. Reads this pass's table
-// in `tables`, how often each digit occurs in each block (SUMMED: the prefix sums of that, which it computes itself otherwise), and
-// counts the next pass's digits in the blocks that the keys come to, unless this pass is the LAST. In the FIRST pass the value of a
-// key is its index.
+// in `tables`, the count of each digit in each block (SUMMED: the table holds the prefix sums of these counts;
+// otherwise the kernel computes them), and counts the next pass's digits in the blocks that the keys come to, unless
+// this pass is the LAST. In the FIRST pass the value of a key is its index.
 //
 // Counting is atomic; sums of whole numbers do not depend on their order.
 

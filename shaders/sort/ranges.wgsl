@@ -1,4 +1,4 @@
-// Where each of a number of groups begins among sorted keys.
+// The position among sorted keys at which each group begins.
 //
 // Each invocation computes the beginning of one group, and a further one the end. It finds by bisection the first key
 // that is not below its group's number, and writes the position to `starts`.

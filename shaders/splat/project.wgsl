@@ -23,7 +23,7 @@ fn write_vector(i: u32, k: u32, vector: vec4<f32>) {
     projected[4u * i + k] = bitcast<vec4<u32>>(vector);
 }
 
-// Vectors that an array of `count` vectors takes, with what is left free behind it so that the next one can be bound.
+// Size of an array of `count` vectors, rounded up so that the next array can be bound behind it.
 fn aligned(count: u32) -> u32 {
     return (count + ALIGNMENT / 4u - 1u) / (ALIGNMENT / 4u) * (ALIGNMENT / 4u);
 }

@@ -1,5 +1,5 @@
-// Tells how many invocations of a workgroup that is meant to be one subgroup are in one. Asked once a device, since not
-// every adapter that has subgroup operations is said to have them.
+// Counts the invocations that are really in one subgroup, of a workgroup that is meant to be one. Run once a device,
+// since a workgroup of the size that an adapter reports need not be one subgroup.
 //
 // Writes the number.
 

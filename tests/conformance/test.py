@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Tests of the decoder in Python and of what `check` is made of: python3 tests/conformance/test.py"""
+"""Tests of the decoder in Python and of the parts of `check`: python3 tests/conformance/test.py"""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Forging(unittest.TestCase):
 
 
 class Check(unittest.TestCase):
-    """`check` finds what is wrong with a decoder."""
+    """`check` finds the fault of a decoder."""
 
     def found(self, case: Case, program: str) -> list[str]:
         loaded: dict = {"__name__": "check", "__file__": str(FOLDER / "check")}

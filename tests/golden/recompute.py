@@ -100,7 +100,7 @@ PAIRS = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
 
 
 def sample(plane, first, second, upstream=None):
-    """Bilinear samples [N, C] of a plane [C, H, W]; with `upstream` [N, C] what they hand back to the plane."""
+    """Bilinear samples [N, C] of a plane [C, H, W]; with `upstream` [N, C] also the gradient of the plane."""
     _, height, width = plane.shape
     x = (np.clip(first, -1, 1) + 1) / 2 * (width - 1)
     y = (np.clip(second, -1, 1) + 1) / 2 * (height - 1)

@@ -67,7 +67,7 @@ pub fn make_odd(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut 
     }
 }
 
-/// Makes a Gaussian one that cannot be drawn, at a place in the image. Returns what was done.
+/// Makes a Gaussian impossible to draw, at a place in the image. Returns the name of the change.
 pub fn poison(scene: &mut SplatScene, i: usize, camera: &Camera, random: &mut Random) -> String {
     let place = point_in_view(camera, random.uniform(-0.8, 0.8) as f32, random.uniform(-0.8, 0.8) as f32, 3.0);
     scene.row_mut(MEANS, i).copy_from_slice(&place);

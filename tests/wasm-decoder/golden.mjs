@@ -1,6 +1,6 @@
 // Decodes golden streams in WebAssembly: `node golden.mjs light4gs_wasm_decoder.wasm ../golden-streams`. Each must give the
-// bytes that decoding on x86-64 gave: those of NAME.decoded.l4gs, or the stream itself where nothing was lost. Its frames
-// must be those of frames.txt: name, time, checksum.
+// bytes that decoding on x86-64 gave: those of NAME.decoded.l4gs, or the stream itself if it is without loss. Its
+// frames must be those of frames.txt: name, time, checksum.
 import { createHash } from "node:crypto";
 import { existsSync, readFileSync, readdirSync } from "node:fs";
 

@@ -1,9 +1,8 @@
 // Every WGSL kernel in Chromium's WebGPU, on its software adapter (SwiftShader): compiled, then run on the launches that the
 // test `launches_of_golden_scenes` has written down. usage: node check.mjs FOLDER
-//
-// Each launch gets what it got there, and must make the same of it. Then each scene is run once more from one launch to the
-// next, with its own results, and the last ones must be what the golden vectors say.
-// The exit code is 77 if this browser has no adapter.
+// Each launch gets the inputs that it got there, and must give the same outputs. Then each scene is run once more from
+// one launch to the next, with its own results, and the last ones must be those of the golden vectors. The exit code is
+// 77 if this browser has no adapter.
 
 import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";

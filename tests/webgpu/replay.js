@@ -145,7 +145,8 @@ export async function run(index) {
     compared.push({ kernel, buffers, problem: (await device.popErrorScope())?.message });
   }
 
-  // What a launch made stands for the contents that were made there: a later launch which got those gets these.
+  // The outputs of a launch replace those that were written down: a later launch that read the old ones gets the new
+  // ones.
   const made = new Map();
   const all = launches.map((launch) => {
     const results = dispatch(launch, launch.buffers.map(([before]) => made.get(before) ?? before));

@@ -1,6 +1,6 @@
 //! The decoder as a program that `tests/conformance/check` can run: conformance FILE TIME...
 //!
-//! Prints the checksums of all arrays. Ends with 1 and a message where the file is refused.
+//! Prints the checksums of all arrays. Ends with 1 and a message if the file is refused.
 
 mod text;
 

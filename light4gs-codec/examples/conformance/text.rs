@@ -1,4 +1,5 @@
-//! What the conformance set compares: checksums of all arrays of a scene, as lines of text. See tests/conformance/README.md.
+//! The text that the conformance set compares: checksums of all arrays of a scene, a line each. See
+//! tests/conformance/README.md.
 
 use light4gs_codec::{CodecError, CoordinateMapping, GaussianArrays, MotionEvaluator, SceneData, decode};
 

@@ -4,7 +4,7 @@ use super::{AdaptiveBit, BitCoder};
 
 /// Magnitudes below `2^ROWS` have adaptive leading digits; those of larger ones are close to uniform.
 const ROWS: usize = 12;
-/// Leading binary digits below the first that are adaptive.
+/// Number of adaptive binary digits after the first one.
 const LEADING: u32 = 3;
 
 /// Codes signed integers whose distribution is not known beforehand.

@@ -3,9 +3,9 @@
 //! The models learn while they code, from what encoder and decoder have both seen, so a stream needs no tables. All
 //! arithmetic is on integers: the bytes and the numbers are the same on every machine.
 //!
-//! Encoder and decoder share one function for what is coded, and so cannot differ: it is generic over [`BitCoder`],
-//! takes every value and returns it. When it encodes, it returns the value that it was given. When it decodes, it
-//! ignores the value that it was given and returns the one that was read.
+//! Encoder and decoder are one function, so that they cannot differ. It is generic over [`BitCoder`], takes every value
+//! and returns it. When it encodes, it returns the value that it was given. When it decodes, it ignores the value that
+//! it was given and returns the one that was read.
 
 mod bit;
 mod integer;

@@ -15,16 +15,16 @@ use constriction::{
 /// Bits of a probability.
 const PRECISION: usize = 15;
 const ONE: u16 = 1 << PRECISION;
-/// The bound of a probability near 0 and 1: a decision takes at least some 2^-10 bits, and at most 11.
+/// The smallest probability, and the distance of the largest from 1: a decision takes 2^-10 to 11 bits.
 const LEAST: u32 = 1 << 4;
 /// Most bits that [`BitCoder::raw`] codes at a time.
 const RAW_CHUNK: u32 = 12;
 
-/// What the range coder reads and writes at a time. It is small because the end of a stream takes one or two of them.
+/// The unit of reading and writing. It is small, because the end of a stream takes one or two of them.
 type Word = u16;
 /// The state of the range coder. It is large so that no interval is rounded noticeably.
 type State = u64;
-/// Words that the decoder reads ahead: after a sound stream it reads so many words beyond the end, and no more.
+/// Words that the decoder reads ahead: the most that it reads beyond the end of a sound stream.
 const READ_AHEAD: u32 = State::BITS / Word::BITS;
 
 /// The probability that a bit is one, in units of 2^-15, never 0 and never 1.
@@ -201,7 +201,7 @@ fn raw_chunks(bits: u32) -> impl Iterator<Item = (u32, RawBits)> {
 }
 
 impl RawBits {
-    /// The share of the unit interval, of 2^15, that a symbol has.
+    /// The probability of each symbol, in units of 2^-15.
     #[inline]
     fn share(self) -> u16 {
         ONE >> self.0

@@ -4,7 +4,7 @@ use std::{borrow::Borrow, num::NonZeroU32};
 
 use constriction::stream::model::{DecoderModel, EncoderModel, EntropyModel};
 
-/// Frequencies of a distribution sum to 2 to this power.
+/// The frequencies of a distribution sum to `2^TOTAL_BITS`.
 pub(crate) const TOTAL_BITS: usize = 24;
 const TOTAL: u32 = 1 << TOTAL_BITS;
 /// Upper bits of a quantile that index [`Distribution::search`].
@@ -54,7 +54,7 @@ impl Distribution {
         self.cumulative[slot + 1] - self.cumulative[slot]
     }
 
-    /// What a symbol costs in bits, without the digits that follow an escape.
+    /// Bits that a symbol takes, without the digits that follow an escape.
     pub(super) fn bits(&self, value: i32) -> f64 {
         TOTAL_BITS as f64 - f64::from(self.frequency(self.slot(value))).log2()
     }

@@ -37,8 +37,8 @@ pub struct FrequencyTable {
 }
 
 impl FrequencyTable {
-    /// The table of a distribution: `pmf[i]` is the probability of `first + i`. What the probabilities lack to 1, and
-    /// the far ends of the distribution, go to the escape.
+    /// The table of a distribution: `pmf[i]` is the probability of `first + i`. The escape gets the far ends of the
+    /// distribution, and `1 - sum(pmf)`.
     ///
     /// ```
     /// use light4gs_codec::FrequencyTable;

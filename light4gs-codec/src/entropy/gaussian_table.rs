@@ -14,7 +14,7 @@ const HALF_RATIO: f64 = 1.030_992_021_060_275_7;
 /// Standard deviations that a row covers on either side. The rest, 2e-9, is left to the escape.
 const REACH: f64 = 6.0;
 
-/// Scales between two powers of two are in so many buckets: so narrow that each has one threshold at most.
+/// Buckets from one power of two to the next. They are so narrow that each has one threshold at most.
 const BUCKETS_OF_OCTAVE: u32 = 32;
 /// Powers of two below the first threshold and above the last.
 const BOUNDS: [f32; 2] = [1.0 / 16.0, 256.0];
@@ -41,7 +41,7 @@ impl GaussianTable {
     /// The level whose scale is nearest to `scale` in logarithm. NaN, negative and small scales have the first level.
     #[inline]
     pub(crate) fn level(&self, scale: f32) -> u16 {
-        // NaN and what is too small become the least.
+        // NaN and scales that are too small become the least one.
         let bounded = if scale > BOUNDS[0] { scale.min(BOUNDS[1]) } else { BOUNDS[0] };
         let level = u16::from(self.buckets[bucket(bounded)]);
         level + u16::from(self.thresholds[usize::from(level)] < bounded)

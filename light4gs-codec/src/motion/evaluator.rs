@@ -13,11 +13,11 @@ use crate::{
 
 /// A scene's motion, prepared for evaluation at many times.
 ///
-/// What does not depend on the time is computed once: the product of the space-only samples of each Gaussian, which
-/// takes `4 · features` bytes for each, and what the network computes from attributes and points alone, such as the
-/// weights of control nodes, 4 bytes a channel. What depends on the time alone is computed once for each time. The
-/// evaluator runs any [`MotionNetwork`], follows the model's conventions (docs/design.md) to float tolerance, takes
-/// less than a microsecond for each Gaussian, and uses one thread.
+/// Values that do not depend on the time are computed once: for each Gaussian the product of its space-only samples (`4
+/// · features` bytes), and the network's values of attributes and points alone, such as the weights of control nodes (4
+/// bytes a channel). Values that depend on the time alone are computed once for each time. The evaluator runs any
+/// [`MotionNetwork`], follows the model's conventions (docs/design.md) to float tolerance, takes less than a
+/// microsecond for each Gaussian, and uses one thread.
 ///
 /// ```
 /// use light4gs_codec::{GaussianArrays, MotionEvaluator, SceneData};
@@ -37,8 +37,8 @@ pub struct MotionEvaluator {
 #[derive(Debug)]
 struct Motion {
     program: Program,
-    /// `[blocks, kept channels]`: what the program computes of the place alone; empty where this is computed anew for
-    /// each time.
+    /// `[blocks, kept channels]`: the program's values of the place alone; empty where they are computed anew for each
+    /// time.
     kept: Vec<Lanes>,
     sources: Vec<MotionSource>,
     outputs: Vec<MotionOutput>,
@@ -65,13 +65,13 @@ impl MotionEvaluator {
     /// most [`Limits::memory_bytes`] of the default limits.
     ///
     /// # Errors
-    /// A network that contradicts itself or the planes; an attribute without which the scene would look wrong, and of
-    /// which it is not known what it does ([`SceneData::check_attributes_are_known`]).
+    /// A network that contradicts itself or the planes; an attribute that the scene needs and nobody knows
+    /// ([`SceneData::check_attributes_are_known`]).
     pub fn new(scene: &SceneData) -> Result<Self, CodecError> {
         Self::keeping(scene, Limits::default().memory_bytes)
     }
 
-    /// As [`MotionEvaluator::new`], with at most so many bytes for the network's values that do not depend on the time.
+    /// As [`MotionEvaluator::new`], with at most `most_bytes` for the network's values that do not depend on the time.
     /// If they take more, they are computed anew for each time. The Gaussians are the same to the last bit.
     ///
     /// # Errors
@@ -130,7 +130,8 @@ impl MotionEvaluator {
         self.motion.is_some()
     }
 
-    /// Whether the attribute of an output may change with time, be it that the output is added or replaces it.
+    /// Whether the attribute of an output may change with time. It does not matter whether the output is added or
+    /// replaces it.
     pub fn changes(&self, output: MotionOutput) -> bool {
         let same = |other: &MotionOutput| other.added() == output.added();
         self.motion.as_ref().is_some_and(|motion| motion.outputs.iter().any(same))
@@ -230,7 +231,7 @@ impl Motion {
         }
     }
 
-    /// `[blocks, kept channels]`: what the program computes of the place alone, `count` in all.
+    /// `[blocks, kept channels]`: the program's values of the place alone, `count` in all.
     fn values_of_places(&self, canonical: &GaussianArrays, count: usize) -> Vec<Lanes> {
         let mut values = Vec::with_capacity(count);
         if count == 0 {

@@ -178,7 +178,7 @@ impl Network {
             }
             if let Some(later) = node.inputs.iter().find(|value| value.0 as usize >= self.inputs.len() + index) {
                 let expected =
-                    format!("less than {}, since a node reads only what is before it", self.inputs.len() + index);
+                    format!("less than {}, since a node reads only values before it", self.inputs.len() + index);
                 return refuse(format!("an input of {field} ({operation})"), later.0.to_string(), &expected);
             }
             if let Operation::Layer(layer) = &node.operation {

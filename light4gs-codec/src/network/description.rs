@@ -197,7 +197,7 @@ fn read_node(
         let last = (channels.len() as u32).wrapping_sub(1);
         let value = if index == 0 && reads_last { Value(last) } else { read_value(reader)? };
         if value.0 as usize >= channels.len() {
-            let expected = format!("less than {}, since a node reads only what is before it", channels.len());
+            let expected = format!("less than {}, since a node reads only values before it", channels.len());
             return Err(CodecError::invalid(section, format!("an input of {name}"), value.0, expected));
         }
         inputs.push(value);

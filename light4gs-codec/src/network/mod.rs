@@ -1,8 +1,8 @@
 //! Networks as data: a model describes them, a stream stores them, and the exact executor runs them.
 //!
 //! A [`Network`] is a bounded list of [`Node`]s, each of which reads only values before it. Values are maps `[channels,
-//! height, width]`. Where a network is evaluated for single points, such as Gaussians, height and width are 1. What the
-//! inputs and outputs mean depends on where the network is used: [`crate::Condition`], [`crate::ShPrior`],
+//! height, width]`. Where a network is evaluated for single points, such as Gaussians, height and width are 1. The user
+//! of a network gives its inputs and outputs their meaning: [`crate::Condition`], [`crate::ShPrior`],
 //! [`crate::MotionArrays`]. So a new composition of layers needs no new line in this crate.
 //!
 //! ```

@@ -1,7 +1,7 @@
 //! Compact coding of network weights (docs/design.md).
 //!
 //! Each tensor is quantized uniformly, by a step of its own, and the integers are coded adaptively, as differences from
-//! what the weights before them predict: nothing, the same again, or a straight line (for splines, whose knots are rows
+//! a prediction: zero, the integer before, or a straight line through the two before (for splines, whose knots are rows
 //! of a layer). The context of a weight is the magnitude of the differences before it. Names and lengths are not in the
 //! bytes: the reader of a network knows its shape before it reads the weights.
 //!
@@ -22,8 +22,8 @@
 //! ```
 //!
 //! The bytes are one range-coded stream: for each tensor that is not empty its step as the 32 raw bits of a float32, 0
-//! for a tensor of zeros, then how its integers are predicted, and then these. Zeros at the end fill it up to one byte for 256 weights, so that a
-//! reader can check a length against the bytes.
+//! for a tensor of zeros, then the kind of the prediction, then the integers. Zeros at the end fill it up to one byte
+//! for 256 weights, so that a reader can check a length against the bytes.
 
 use crate::{
     CodecError, Limits,
@@ -144,7 +144,7 @@ pub(crate) fn decode_within(
     at_most(section, "number of tensors", lengths.len() as u64, most)?;
     let weights = lengths.iter().fold(0_u64, |sum, tensor| sum.saturating_add(tensor.length));
     if weights.div_ceil(WEIGHTS_A_BYTE) > bytes.len() as u64 {
-        let expected = format!("at most {WEIGHTS_A_BYTE} a byte, of which there are {}", bytes.len());
+        let expected = format!("at most {WEIGHTS_A_BYTE} a byte, and there are {} bytes", bytes.len());
         return Err(CodecError::invalid(section, "number of weights", weights, expected));
     }
     budget.stream(section, bytes.len())?;
@@ -185,12 +185,12 @@ struct Quantized {
     indices: Vec<i32>,
 }
 
-/// What the integers of a tensor are expected to be.
+/// How the integers of a tensor are predicted.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Prediction {
     /// 0: zero; 1: the integer before; 2: on a line with the two before.
     order: u32,
-    /// It begins anew after so many integers; in the stream only where the order is not 0.
+    /// Length of a row: the prediction begins anew after each. In the stream only where the order is not 0.
     row: u32,
 }
 
@@ -205,9 +205,9 @@ impl Prediction {
         }
     }
 
-    /// The one with which integers take the fewest bits, by a rough count.
+    /// The prediction that costs the fewest bits, by a rough count.
     fn best(indices: &[i32], row: usize) -> Self {
-        // A row that the stream cannot say is as good as none.
+        // A row whose length does not fit into the stream is not used.
         let row = u32::try_from(row).ok().filter(|row| *row < 1 << ROW_BITS).unwrap_or(0);
         let bits = |prediction: &Self| -> u32 {
             let difference = |at: usize| indices[at].wrapping_sub(prediction.of(&indices[..at])).unsigned_abs();

@@ -8,8 +8,8 @@ use crate::{
 
 pub(super) const SECTION: &str = "context_model";
 
-/// Everything that is needed to decode planes: the networks that give each value's distribution, and which planes each
-/// of them is for.
+/// Everything that is needed to decode planes: the networks that give each value's distribution, and the planes of each
+/// network.
 ///
 /// Each plane has a [`PlanePrior`]. Its conditions read values that are decoded before, and its distribution turns
 /// their outputs into the scale and the mean of every value. As inputs of networks, planes have their center
@@ -39,7 +39,7 @@ pub struct LatentArrays {
     pub medians: Vec<f32>,
 }
 
-/// Where the distributions of a plane's values come from.
+/// The networks that give the distributions of a plane's values.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlanePrior {
     /// One for each input of the distribution; `None` where that input is zeros.
@@ -49,7 +49,7 @@ pub struct PlanePrior {
     pub distribution: u32,
 }
 
-/// A network that describes a plane, and what it reads.
+/// A network that describes a plane, and the sources of its inputs.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Condition {
     /// The network, which has one output, of the plane's size.

@@ -16,7 +16,7 @@ use crate::{
     plane_layout::PlaneShape,
 };
 
-/// Nanoseconds of a row, without those of its values.
+/// Nanoseconds of a row, besides those of its values.
 const ROW_NANOSECONDS: u64 = 1000;
 /// Nanoseconds to copy one channel from a condition to a distribution, or from a distribution to a row, at eight
 /// places.

@@ -33,8 +33,8 @@ impl PlaneBytes {
     }
 }
 
-/// Refuses what cannot be coded: a model that is illegal or beyond the limits; planes, steps and latents that
-/// contradict it or each other.
+/// Refuses a model that is illegal or beyond the limits, and planes, steps and latents that contradict it or each
+/// other.
 pub(crate) fn check(planes: &FeaturePlaneArrays, coding: &PlaneCoding, limits: &Limits) -> Result<(), CodecError> {
     let PlaneCoding { model, steps, latent_symbols } = coding;
     model.check(limits)?;

@@ -28,8 +28,8 @@ impl Grid {
     }
 }
 
-/// The integer that with `mean` is nearest to `value`, both in units of the step. Values out of range saturate, and are
-/// refused later.
+/// The integer whose sum with `mean` is nearest to `value`, both in units of the step. Values out of range saturate,
+/// and are refused later.
 pub(crate) fn nearest(value: f32, mean: f32) -> i32 {
     // In float32 the difference from a large mean would be rounded, to 1/8 at 2^20, and the value be further than half
     // a step from its symbol's.

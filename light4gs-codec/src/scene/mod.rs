@@ -152,7 +152,7 @@ impl FeaturePlaneArrays {
         self.planes.last().map_or(0, |plane| plane.scale as usize + 1)
     }
 
-    /// Length of a feature: channels times scales.
+    /// Length of a feature: `channels · scales`.
     pub fn features(&self) -> u64 {
         u64::from(self.channels) * self.scales() as u64
     }

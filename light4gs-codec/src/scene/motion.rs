@@ -53,7 +53,7 @@ pub enum MotionSource {
     Attribute(String),
 }
 
-/// The attribute to which an output of a [`MotionNetwork`] is added, or whose place it takes. Canonical attributes are
+/// The attribute that an output of a [`MotionNetwork`] is added to, or that it replaces. Canonical attributes are
 /// those of [`crate::GaussianArrays`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MotionOutput {
@@ -99,7 +99,8 @@ impl NamedTensor {
 }
 
 impl MotionSource {
-    /// Its channels, for planes with so many features and these Gaussians; `None` if they have no such attribute.
+    /// Its number of channels, for planes with `features` features and these Gaussians; `None` if they have no such
+    /// attribute.
     fn channels(&self, features: u64, gaussians: &GaussianArrays) -> Option<u64> {
         match self {
             Self::Features => Some(features),
@@ -147,8 +148,8 @@ impl MotionOutput {
 }
 
 impl MotionArrays {
-    /// Whether the meaning of an attribute is known: the network reads it, or there is no network, so that only a
-    /// program that knows the kind can show the scene.
+    /// Whether the meaning of an attribute is known: either the network reads it, or there is no network, and then only
+    /// a program that knows the kind can show the scene.
     fn knows(&self, attribute: &str) -> bool {
         let is_read = |source: &MotionSource| matches!(source, MotionSource::Attribute(name) if name == attribute);
         match &self.network {

@@ -192,7 +192,8 @@ pub(crate) fn write(
     Ok((write_streams(gaussians, &coding, conditions, start, writer)?, coding))
 }
 
-/// Writes `sh_rest` of a layer after the first under the tables or networks of that one, as [`write`] has returned them.
+/// Writes `sh_rest` of a layer after the first, under the tables or networks that [`write`] has returned for the first
+/// one.
 pub(crate) fn write_continued(
     gaussians: &GaussianArrays,
     coding: &ShCoding,
@@ -260,7 +261,7 @@ pub(crate) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Reads head and coding, for planes with so many features.
+    /// Reads head and coding. `features` is the length of a feature of the planes.
     pub(crate) fn read(
         bytes: &'a [u8],
         (kind, encoding): (Kind, Encoding),

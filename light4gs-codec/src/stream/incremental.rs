@@ -10,7 +10,7 @@ use crate::{
     CodecError, Demand, GaussianArrays, Limits, SceneData, SceneMeta, budget::Budget, sh::section::FirstCoding,
 };
 
-/// Decodes a stream while its bytes come, and gives the scene as far as it has come: layer after layer of its Gaussians.
+/// Decodes a stream while its bytes come. The scene grows by one layer of Gaussians after the other.
 ///
 /// [`StreamDecoder::push`] takes bytes, in pieces of any length, and finds damage as soon as the bytes of a section are
 /// complete; it takes little time. [`StreamDecoder::decode`] decodes what is complete, each section once. The scene is
@@ -42,7 +42,7 @@ pub struct StreamDecoder {
     header: Option<Header>,
     /// Sections, in the order of the stream, that have come and have their checksums.
     verified: usize,
-    /// Bytes that checksums have been computed of, and the checksum of those that belong to the next section.
+    /// Number of bytes that have gone into checksums, and the checksum of those of the next section.
     summed: u64,
     sum: u32,
     /// Without Gaussians before the first layer.
@@ -50,9 +50,9 @@ pub struct StreamDecoder {
     decoded: usize,
     heads: LayerHeads,
     first_coding: Option<FirstCoding>,
-    /// What was decoded so far has asked for.
+    /// What the decoded parts have asked for.
     spent: Demand,
-    /// What comes next asks for more than so few bytes may.
+    /// The next part asked for more than the bytes so far allow; it is tried again when all bytes are there.
     waits: bool,
     failed: bool,
 }
@@ -91,13 +91,14 @@ impl StreamDecoder {
     /// Takes the next bytes of the stream.
     ///
     /// # Errors
-    /// As [`crate::decode`], as far as damage can be known without decoding: a header that is damaged, or that of something
-    /// else; a section with another checksum; more bytes than the header says; a decoder that has failed.
+    /// Those of [`crate::decode`] that show without decoding: a header that is damaged or of another format; a section
+    /// with another checksum; more bytes than the header says. Also a decoder that has failed before.
     pub fn push(&mut self, bytes: &[u8]) -> Result<(), CodecError> {
         self.unless_failed(|decoder| decoder.take(bytes))
     }
 
-    /// Decodes what has come and has not been decoded. Returns the number of layers that [`StreamDecoder::scene`] has.
+    /// Decodes the parts that have come since the last call. Returns the number of layers that [`StreamDecoder::scene`]
+    /// has.
     ///
     /// # Errors
     /// As [`crate::decode`]; a decoder that has failed.
@@ -145,7 +146,7 @@ impl StreamDecoder {
         self.bytes.len() as u64
     }
 
-    /// Bytes of the whole stream, once the 32 bytes have come that say so.
+    /// Bytes of the whole stream, known after the first 32 bytes.
     pub fn stated(&self) -> Option<u64> {
         let known = self.header.as_ref().map(|header| header.prelude.file_bytes);
         known.or_else(|| Prelude::read(&self.bytes, &self.limits).ok().map(|prelude| prelude.file_bytes))

@@ -78,8 +78,8 @@ pub struct SectionInfo {
 pub struct LayerInfo {
     /// Its Gaussians.
     pub gaussians: u32,
-    /// Bytes from the beginning of the stream with which this layer and those before it can be shown: those of the first
-    /// layer are the bytes to the first image.
+    /// Bytes from the beginning of the stream to the end of this layer. With them it and the layers before can be
+    /// shown: for the first layer, they are the bytes to the first image.
     pub bytes_to_show: u64,
 }
 

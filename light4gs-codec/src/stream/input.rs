@@ -42,7 +42,7 @@ pub struct CompressionInput {
     pub attributes: AttributeSteps,
     /// How finely weights are quantized, in the compact profile.
     pub weights: WeightPrecisions,
-    /// Into how many layers the Gaussians are divided, for files that are shown while they come.
+    /// Number of layers of Gaussians, for files that are shown while they come.
     pub layers: GaussianLayers,
 }
 

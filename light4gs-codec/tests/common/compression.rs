@@ -262,7 +262,7 @@ pub fn sh_tables(degree: u8) -> ShCoding {
     ShCoding::Tables { step: 0.02, tables: vec![laplace_table(0.6); 3 * sh_rest_coefficients(degree)] }
 }
 
-/// What the networks of [`sh_networks`] read.
+/// The sources of the networks of [`sh_networks`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ShKind {
     /// Degree by degree, from the color and all lower degrees.

@@ -1,4 +1,4 @@
-//! Compressed scenes: what is decoded is what the encoder promised, for every shape and every part.
+//! Compressed scenes: the decoded scene is the one that the encoder promised, for every shape and every part.
 
 use crate::common;
 
@@ -16,7 +16,7 @@ use light4gs_codec::{
 };
 use proptest::prelude::*;
 
-/// Encodes, and checks what the encoder promises.
+/// Encodes, and checks the encoder's promises.
 fn round_trip(scene: &SceneData, input: &CompressionInput) -> Encoded {
     let encoded = encode_compressed(scene, input).unwrap();
     assert_eq!(decode(&encoded.bytes).unwrap(), encoded.decoded);
@@ -325,8 +325,8 @@ fn harmonics_need_no_planes_unless_coupled() {
     }
 }
 
-/// The distributions of the decoded planes are those with which the planes were coded: the coded bits are those that
-/// they expect.
+/// The distributions of the decoded planes are those under which the planes were coded: they expect as many bits as
+/// there are.
 #[test]
 fn the_coded_bits_are_those_of_the_distributions() {
     let scene = scene(0, 0, 16, [32, 32, 32, 16], &[1, 2]);

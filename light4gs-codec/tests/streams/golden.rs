@@ -69,7 +69,7 @@ fn every_build_writes_the_same_bytes() {
     assert_eq!(checksums, [0xbc11_daf2, 0x3768_1c72], "{checksums:#x?}");
 }
 
-/// A line for each frame of a stream, with what does not depend on the time kept or computed anew.
+/// A line for each frame of a stream. Values that do not depend on the time are kept, or computed anew.
 fn frames(name: &str, bytes: &[u8], most_bytes: u64) -> String {
     let scene = decode(bytes).unwrap();
     let evaluator = MotionEvaluator::keeping(&scene, most_bytes).unwrap();

@@ -84,7 +84,7 @@ fn info_tells_the_bytes_to_the_first_image() {
         assert!(attributes < gaussians);
         assert_eq!(by_name.iter().map(|(_, bytes)| bytes).sum::<u64>() + info.header_bytes, info.bytes);
 
-        // So many bytes suffice, one less does not.
+        // These bytes suffice, and one less does not.
         for (index, layer) in info.layers.iter().enumerate() {
             for (missing, decoded) in [(0, index + 1), (1, index)] {
                 let mut decoder = StreamDecoder::new();
@@ -167,7 +167,7 @@ fn a_scene_without_gaussians_has_empty_layers() {
     assert!(decode(&bytes).unwrap().gaussians.is_empty());
 }
 
-/// The error of a decoder that gets these pieces, and after how many bytes it comes.
+/// The error of a decoder that gets these pieces, and the number of bytes before it.
 fn refusal(pieces: &[&[u8]]) -> Option<(CodecError, u64)> {
     let mut decoder = StreamDecoder::new();
     let mut pushed = 0;
@@ -238,7 +238,7 @@ fn a_connection_that_is_resumed_elsewhere_is_refused() {
     }
 }
 
-/// The first bytes may ask for less time than what they hold takes, but all bytes may ask for enough.
+/// The first bytes alone do not allow the time that their contents take, but all bytes do.
 #[test]
 fn what_only_the_whole_may_ask_for_waits_for_the_whole() {
     let limits = Limits { nanoseconds: 0, ..Limits::default() };

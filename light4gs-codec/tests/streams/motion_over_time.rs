@@ -1,4 +1,5 @@
-//! What is computed once for all times, and sums that are one step, against the network run anew for each Gaussian.
+//! Values that are computed once for all times, and sums that are one step, against the network run anew for each
+//! Gaussian.
 
 use crate::common;
 
@@ -11,7 +12,7 @@ use light4gs_codec::{
 use proptest::prelude::*;
 
 const GAUSSIANS: usize = 19;
-/// Beyond so many channels a value is not read by what makes wider ones.
+/// Values with more channels are not read by operations whose results are wider.
 const WIDEST: u32 = 48;
 
 /// A network of operations at single places, with the channels of its values.
@@ -104,7 +105,7 @@ fn scene(choices: &[(u8, [u8; 3])], seed: u64) -> SceneData {
     let mut gaussians = common::gaussians(GAUSSIANS, 0);
     gaussians.means.iter_mut().for_each(|mean| *mean = std::array::from_fn(|_| random.normal()));
     let mut further = common::further("share", 5, GAUSSIANS);
-    // As weights are: many zeros, among them whole blocks.
+    // Like weights: many zeros, among them whole blocks.
     further.values =
         (0..further.values.len()).map(|i| if i / 45 == 1 { 0.0 } else { random.normal().max(0.0) }).collect();
     gaussians.further = vec![further];

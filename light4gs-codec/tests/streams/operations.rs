@@ -128,7 +128,7 @@ fn motion_reads_attributes_and_replaces_them() {
     for range in [0..3, 3..9, 9..canonical.len()] {
         evaluator.apply(canonical, time, range, &mut moved);
     }
-    // What is not kept is computed anew, to the same bits.
+    // Values that are not kept are computed anew, to the same bits.
     let mut anew = canonical.clone();
     let forgetful = light4gs_codec::MotionEvaluator::keeping(&scene, 0).unwrap();
     forgetful.apply(canonical, time, 0..canonical.len(), &mut anew);

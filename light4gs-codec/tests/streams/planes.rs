@@ -160,7 +160,7 @@ fn lists_of_planes_that_lie() {
     assert!(matches!(refuse(&own), CodecError::TrailingBytes { section: "feature_planes", .. }));
     assert!(matches!(spoilt(1, 17), CodecError::OverLimit { limit: 16, .. }));
     assert!(spoilt(6, 0).to_string().contains("height of plane 0.xt is 0"));
-    // Fewer planes than the values are for, and more.
+    // Fewer planes than there are values for, and more.
     assert!(matches!(spoilt(2, 0b01_1111), CodecError::Invalid { .. } | CodecError::TrailingBytes { .. }));
     assert!(matches!(refuse(&[1, 2, 0b11_1111, 3, 2, 2, 3, 0b11_1111, 4, 2, 2, 3]), CodecError::Truncated { .. }));
     // Sixteen scales of the largest planes, without their bytes: nothing is allocated for them.

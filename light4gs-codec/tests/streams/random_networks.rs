@@ -1,7 +1,7 @@
 //! Unusual networks: random graphs, huge shapes, and networks that would take very long.
 //!
-//! Whatever the nodes are, a file that holds them either decodes to what the encoder promises or is refused, soon and
-//! in little memory. It never crashes the decoder.
+//! Whatever the nodes are, a file that holds them either decodes to the scene that the encoder promised or is refused,
+//! soon and in little memory. It never crashes the decoder.
 
 use crate::common;
 
@@ -240,7 +240,7 @@ fn a_node_cannot_read_itself_or_what_comes_later() {
         let output = network.layer(value, Random::new(1).linear(M, 2 * M));
         network.output(output);
         let error = refusal(network, &[PlaneSource::LowerScale]).to_string();
-        assert!(error.contains("a node reads only what is before it"), "{error}");
+        assert!(error.contains("a node reads only values before it"), "{error}");
     }
     assert!(condition(0, &[]).is_some());
 }

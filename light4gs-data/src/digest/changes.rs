@@ -23,60 +23,98 @@ pub(super) fn between(before: &DatasetDigest, after: &DatasetDigest) -> Vec<Stri
     changes
 }
 
+/// The changes of a split's frames: removed and added frames, their order, and then differences of frames that are in
+/// both digests.
+fn of_split(split: &str, before: &[FrameDigest], after: &[FrameDigest]) -> Vec<String> {
+    let (before, after) = (KeyedFrames::new(before), KeyedFrames::new(after));
+    let kept = kept_frames(&before, &after);
+    let differing = |differ: fn(&FrameDigest, &FrameDigest) -> bool| -> Vec<&str> {
+        kept.iter().filter(|(old, new)| differ(old, new)).map(|(_, new)| new.file.as_str()).collect()
+    };
+    let image = differing(|a, b| a.content != b.content || a.size != b.size);
+    let mask = differing(|a, b| a.mask != b.mask);
+    let pose = differing(|a, b| far(&a.pose, &b.pose));
+    let intrinsics = differing(|a, b| far(&a.intrinsics, &b.intrinsics) || a.lens != b.lens);
+    let time = differing(|a, b| far(&[a.time], &[b.time]));
+    let changes = [
+        change(&before.missing_in(&after), |count| format!("{} removed", frames_were(count))),
+        change(&after.missing_in(&before), |count| format!("{} added", frames_were(count))),
+        change(&moved(&before, &after), |count| format!("{} in another order", frames_stand(count))),
+        change(&image, |count| format!("{} replaced", images_were(count))),
+        change(&mask, |count| format!("masks of {} changed", frames(count))),
+        change(&pose, |count| format!("poses of {} changed", frames(count))),
+        change(&intrinsics, |count| format!("intrinsics of {} changed", frames(count))),
+        change(&time, |count| format!("times of {} changed", frames(count))),
+    ];
+    changes.into_iter().flatten().map(|change| format!("{split}: {change}")).collect()
+}
+
 /// A file, and the number of the frame among those with this file.
 type Key<'a> = (&'a str, usize);
 
-fn keyed(frames: &[FrameDigest]) -> Vec<(Key<'_>, &FrameDigest)> {
-    let mut seen: HashMap<&str, usize> = HashMap::new();
-    frames
-        .iter()
-        .map(|frame| {
-            let count = seen.entry(&frame.file).or_default();
-            *count += 1;
-            ((frame.file.as_str(), *count), frame)
-        })
-        .collect()
+/// Frames in their order, found by their keys.
+struct KeyedFrames<'a> {
+    in_order: Vec<(Key<'a>, &'a FrameDigest)>,
+    by_key: HashMap<Key<'a>, &'a FrameDigest>,
 }
 
-fn of_split(split: &str, before: &[FrameDigest], after: &[FrameDigest]) -> Vec<String> {
-    let (before, after) = (keyed(before), keyed(after));
-    let old: HashMap<Key, &FrameDigest> = before.iter().copied().collect();
-    let new: HashMap<Key, &FrameDigest> = after.iter().copied().collect();
-    let mut changes = Vec::new();
-    let mut say = |files: Vec<&str>, what: &dyn Fn(&str) -> String| {
-        if let Some(first) = files.first() {
-            let (count, plural) = (files.len(), if files.len() == 1 { "" } else { "s" });
-            let which = if count == 1 { format!(": {first}") } else { format!(", the first is {first}") };
-            changes.push(format!("{split}: {}{which}", what(&format!("{count} frame{plural}"))));
-        }
-    };
-    let were = |frames: &str| if frames.starts_with("1 ") { "was" } else { "were" };
-    let lacking = |from: &[(Key<'_>, &FrameDigest)], other: &HashMap<Key, &FrameDigest>| -> Vec<String> {
-        from.iter().filter(|(key, _)| !other.contains_key(key)).map(|(key, _)| key.0.to_owned()).collect()
-    };
-    let (removed, added) = (lacking(&before, &new), lacking(&after, &old));
-    say(removed.iter().map(String::as_str).collect(), &|frames| format!("{frames} {} removed", were(frames)));
-    say(added.iter().map(String::as_str).collect(), &|frames| format!("{frames} {} added", were(frames)));
-    let kept_before = before.iter().filter(|(key, _)| new.contains_key(key)).map(|(key, _)| key);
-    let kept_after = after.iter().filter(|(key, _)| old.contains_key(key)).map(|(key, _)| key);
-    let moved: Vec<&str> = kept_before.zip(kept_after).filter(|(a, b)| a != b).map(|(_, b)| b.0).collect();
-    say(moved, &|frames| format!("{frames} stand{} in another order", if frames.starts_with("1 ") { "s" } else { "" }));
-    let kept: Vec<(&str, &FrameDigest, &FrameDigest)> =
-        after.iter().filter_map(|(key, new)| Some((key.0, *old.get(key)?, *new))).collect();
-    let differing = |test: fn(&FrameDigest, &FrameDigest) -> bool| -> Vec<&str> {
-        kept.iter().filter(|(_, old, new)| test(old, new)).map(|(file, _, _)| *file).collect()
-    };
-    say(differing(|a, b| a.content != b.content || a.size != b.size), &|frames| {
-        let images = if frames.starts_with("1 ") { "the image of 1 frame was" } else { "" };
-        if images.is_empty() { format!("the images of {frames} were replaced") } else { format!("{images} replaced") }
-    });
-    say(differing(|a, b| a.mask != b.mask), &|frames| format!("masks of {frames} changed"));
-    say(differing(|a, b| far(&a.pose, &b.pose)), &|frames| format!("poses of {frames} changed"));
-    say(differing(|a, b| far(&a.intrinsics, &b.intrinsics) || a.lens != b.lens), &|frames| {
-        format!("intrinsics of {frames} changed")
-    });
-    say(differing(|a, b| far(&[a.time], &[b.time])), &|frames| format!("times of {frames} changed"));
-    changes
+impl<'a> KeyedFrames<'a> {
+    fn new(frames: &'a [FrameDigest]) -> Self {
+        let mut seen: HashMap<&str, usize> = HashMap::new();
+        let key = |frame: &'a FrameDigest| {
+            let count = seen.entry(&frame.file).or_default();
+            *count += 1;
+            (frame.file.as_str(), *count)
+        };
+        let keys: Vec<Key> = frames.iter().map(key).collect();
+        let in_order: Vec<_> = keys.into_iter().zip(frames).collect();
+        Self { by_key: in_order.iter().copied().collect(), in_order }
+    }
+
+    /// Keys of the frames that others have too, in the order of these.
+    fn shared_with(&self, others: &Self) -> Vec<Key<'a>> {
+        self.in_order.iter().map(|(key, _)| *key).filter(|key| others.by_key.contains_key(key)).collect()
+    }
+
+    /// Files of the frames that others do not have.
+    fn missing_in(&self, others: &Self) -> Vec<&'a str> {
+        let missing = self.in_order.iter().filter(|(key, _)| !others.by_key.contains_key(key));
+        missing.map(|(key, _)| key.0).collect()
+    }
+}
+
+/// The frames of both digests, old and new, in the new order.
+fn kept_frames<'a>(before: &KeyedFrames<'a>, after: &KeyedFrames<'a>) -> Vec<(&'a FrameDigest, &'a FrameDigest)> {
+    after.in_order.iter().filter_map(|(key, new)| Some((*before.by_key.get(key)?, *new))).collect()
+}
+
+/// Files of the kept frames at whose place another kept frame stood.
+fn moved<'a>(before: &KeyedFrames<'a>, after: &KeyedFrames<'a>) -> Vec<&'a str> {
+    let pairs = before.shared_with(after).into_iter().zip(after.shared_with(before));
+    pairs.filter(|(old, new)| old != new).map(|(_, new)| new.0).collect()
+}
+
+/// A sentence about some frames, which ends in the only file or the first one; none if there are no frames.
+fn change(files: &[&str], sentence: fn(usize) -> String) -> Option<String> {
+    let first = files.first()?;
+    let which = if files.len() == 1 { format!(": {first}") } else { format!(", the first is {first}") };
+    Some(sentence(files.len()) + &which)
+}
+
+fn frames(count: usize) -> String {
+    if count == 1 { "1 frame".to_owned() } else { format!("{count} frames") }
+}
+
+fn frames_were(count: usize) -> String {
+    format!("{} {}", frames(count), if count == 1 { "was" } else { "were" })
+}
+
+fn frames_stand(count: usize) -> String {
+    format!("{} {}", frames(count), if count == 1 { "stands" } else { "stand" })
+}
+
+fn images_were(count: usize) -> String {
+    if count == 1 { "the image of 1 frame was".to_owned() } else { format!("the images of {count} frames were") }
 }
 
 fn far(a: &[f32], b: &[f32]) -> bool {

@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-/// What a view's numbers are for: attributes of vertices, which glTF wants to know.
+/// The purpose of a view's numbers, which glTF wants to know: attributes of vertices.
 pub(super) const VERTICES: Option<u32> = Some(34962);
 /// Anything else.
 pub(super) const OTHER: Option<u32> = None;

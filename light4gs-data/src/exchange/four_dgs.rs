@@ -17,13 +17,13 @@ use crate::error::DataError;
 use crate::ply::GaussianPly;
 use crate::points::SH_C0;
 
-/// Every how many samples there is a keyframe.
+/// Samples from one keyframe to the next.
 const KEYFRAME_INTERVAL: usize = 8;
 /// The container's Gaussians fade with their distance in time. These fade so slowly, in durations of the scene, that it
 /// cannot be seen.
 const FADING: f64 = 1000.0;
 
-/// The Gaussians from a time on; row `i` is the same Gaussian in every sample.
+/// The Gaussians at one time and until the next sample; row `i` is the same Gaussian in every sample.
 #[derive(Clone, Debug)]
 pub struct MotionSample {
     /// Seconds since the beginning; the first sample's is 0.
@@ -35,7 +35,8 @@ pub struct MotionSample {
 /// Writes samples that together last `duration` seconds. The file is complete or absent.
 ///
 /// # Errors
-/// [`DataError::Field`] with what the container refuses, such as samples out of order; [`DataError::Io`].
+/// [`DataError::Field`] with the container's reason, such as samples out of order; [`DataError::Io`] when the file
+/// cannot be written.
 pub fn write_four_dgs(path: &Path, samples: &[MotionSample], duration: f64) -> Result<(), DataError> {
     let samples: Vec<Sample> = samples.iter().map(|sample| population(sample, duration)).collect();
     let options = KeyframeDeltaOptions {

@@ -106,7 +106,7 @@ pub fn glb_bytes(
     Ok(bytes)
 }
 
-/// Adds what every Gaussian has, and returns the accessors by name.
+/// Adds the attributes of the Gaussians, and returns the accessors by name.
 fn attributes(accessors: &mut Accessors, gaussians: &GaussianPly, options: &GlbOptions) -> Map<String, Value> {
     let mut names = Map::new();
     let mut name = |name: String, accessor: usize| names.insert(name, json!(accessor));

@@ -11,9 +11,9 @@ use crate::error::DataError;
 const SET: usize = 4;
 /// Most joints that a Gaussian follows: two sets.
 const MOST_INFLUENCES: usize = 2 * SET;
-/// A Gaussian follows more than one set of joints if these would have less than this share of its weights.
+/// A Gaussian follows a second set of joints if the first set has less than this share of its weights.
 const LEAST_SHARE: f64 = 0.99;
-/// Most joints of a skin, so that their numbers are those of glTF.
+/// Most joints of a skin: glTF stores their numbers in 16 bits.
 const MOST_JOINTS: usize = 1 << 16;
 
 /// Where a joint is at a time.
@@ -28,14 +28,14 @@ pub struct JointPose {
 /// A rigid body that Gaussians follow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Where it is at rest, world units; there it is not turned.
+    /// Its place at rest, world units; at rest it is not turned.
     pub anchor: [f32; 3],
     /// Its poses, one for each keyframe; none if it never moves.
     pub poses: Vec<JointPose>,
 }
 
 impl Joint {
-    /// What it does to the space around it, so many keyframes after the first one.
+    /// The transformation from rest to `moment`: keyframes since the first one, with fractions between them.
     fn transform(&self, moment: f32) -> Affine3A {
         let last = self.poses.len().saturating_sub(1);
         let at = |keyframe: usize| {
@@ -62,8 +62,8 @@ pub struct Influence {
 }
 
 impl Influence {
-    /// Of the weights of all joints the four largest, or the eight largest where four would lose more than 1 %. They need not
-    /// sum to 1. Numbers of joints are those of the weights.
+    /// The four largest of the weights of all joints, or the eight largest where four would lose more than 1 %.
+    /// `weights[j]` is that of joint `j`; they need not sum to 1.
     ///
     /// ```
     /// use light4gs_data::Influence;
@@ -144,7 +144,7 @@ impl Skin {
         self.influences.len()
     }
 
-    /// When the last keyframe is, seconds.
+    /// Time of the last keyframe, seconds.
     pub fn duration(&self) -> f32 {
         self.seconds.last().copied().unwrap_or(0.0)
     }
@@ -154,8 +154,8 @@ impl Skin {
         self.seconds.len()
     }
 
-    /// Where a program that does what glTF says has the Gaussians, from where they are at rest: so many keyframes after the first
-    /// one, with fractions between keyframes.
+    /// The centers of the Gaussians at a `moment`, as glTF defines them, from their centers `means` at rest; world
+    /// units. `moment` counts keyframes from the first one, with fractions between them.
     pub fn positions(&self, means: &[[f32; 3]], moment: f32) -> Vec<[f32; 3]> {
         let transforms: Vec<Affine3A> = self.joints.iter().map(|joint| joint.transform(moment)).collect();
         let moved = |(mean, influence): (&[f32; 3], &Influence)| {
@@ -165,7 +165,7 @@ impl Skin {
         means.iter().zip(&self.influences).map(|pair| moved(pair).to_array()).collect()
     }
 
-    /// Adds the attributes of the vertices that say which joints they follow.
+    /// Adds the attributes of the vertices with their joints and weights.
     pub(super) fn add_influences(&self, accessors: &mut Accessors, names: &mut Map<String, Value>) {
         let used = self.influences.iter().map(|influence| influence.iter().count()).max().unwrap_or(0);
         for set in 0..used.div_ceil(SET).max(1) {

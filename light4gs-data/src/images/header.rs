@@ -1,4 +1,4 @@
-//! What an image file tells before it is decoded: format, size, and whether its end is there.
+//! The facts that an image file tells before it is decoded: format, size, and whether its end is there.
 
 use crate::error::DataError;
 use crate::regular_file::open_regular_file;
@@ -82,7 +82,7 @@ pub fn image_size(path: &Path) -> Result<(u32, u32), DataError> {
     Ok(read_header(path)?.size)
 }
 
-/// The rotation with which the image stands upright, as its EXIF data say; without EXIF data, none.
+/// The rotation that turns the image upright, from its EXIF data; none without EXIF data.
 pub(crate) fn orientation(path: &Path) -> Result<Orientation, DataError> {
     let decoder = open(path)?.into_decoder();
     Ok(decoder.ok().and_then(|mut decoder| decoder.orientation().ok()).unwrap_or(Orientation::NoTransforms))

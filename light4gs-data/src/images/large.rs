@@ -1,4 +1,4 @@
-//! Images of many megapixels, in memory that depends on the size that is wanted, not on that of the file.
+//! Images of many megapixels, in memory that depends on the wanted size, not on that of the file.
 
 use super::composite::composite;
 use super::resize::resize;
@@ -20,11 +20,11 @@ pub(super) fn resize_rgb(rgb: Vec<u8>, source: (u32, u32), target: (u32, u32)) -
     resize(&colors, source, target, FilterType::Lanczos3)
 }
 
-/// Reads a PNG row by row and shrinks it while reading: first to means of whole blocks of pixels, with blocks so large
-/// that at least twice the wanted size is left; then by the filter of [`resize_rgb`].
+/// Reads a PNG row by row and shrinks it while reading: first to means of whole blocks of pixels, which leave at least
+/// twice the wanted size; then by the filter of [`resize_rgb`].
 ///
-/// `None` where that does not help: if the file is interlaced, so that its rows come in another order, or if the image
-/// does not become smaller by a factor of at least 2.
+/// `None` if that does not help: the file is interlaced, so that its rows come in another order, or the image does not
+/// become smaller by a factor of at least 2.
 pub(super) fn shrink_png(
     path: &Path,
     target: (u32, u32),

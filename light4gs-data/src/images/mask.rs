@@ -1,4 +1,4 @@
-//! Masks as they are read, and which pixels of an image are trained on.
+//! Masks as they are read, and the pixels of an image that are trained on.
 
 use super::decode::decode_upright;
 use super::undistort::{is_recorded_everywhere, undistort_mask};

@@ -27,8 +27,8 @@ impl PixelMask {
     }
 }
 
-/// `size` = `[width, height]` blocks of an image `[H, width, C]`: what `value` says of the sum of a block's pixels and of
-/// their number, for each channel. What is left at the right and at the lower edge belongs to no block.
+/// `size` = `[width, height]` blocks of an image `[H, width, C]`: `value(sum, number)` of the pixels of each block,
+/// channel by channel. Columns and rows that are left over at the right and the lower edge belong to no block.
 fn reduce<const C: usize>(
     pixels: &[u8],
     width: u32,

@@ -12,23 +12,24 @@ pub enum Region {
     Moving,
     /// Where nothing moves.
     Still,
-    /// What is not ignored. Metrics over it are the field's masked metrics.
+    /// The pixels that are not ignored. Metrics over them are the masked metrics of DyCheck.
     Masked,
 }
 
-/// A pixel moves where at least one part of so many of its area does.
+/// A pixel moves if at least `1 / MOVING_PART` of its area does.
 const MOVING_PART: u64 = 4;
 
-/// Marks of what moves, of what stands still, and of what the lens did not record.
+/// Marks of pixels: those that stand still, those that move, and those that the lens did not record.
 const STILL: u8 = 0;
 const MOVING: u8 = 1;
 const UNRECORDED: u8 = 2;
 
 /// The regions that a frame's mask marks, at the size of its camera; none without a mask.
 ///
-/// A mask of motion gives [`Region::Moving`] and [`Region::Still`]. Where the camera is smaller than the mask, a pixel moves if
-/// a quarter of its area does or more: what moves is small, and a pixel that it covers in part shows it. What the lens did not
-/// record belongs to neither. A mask that ignores pixels gives [`Region::Masked`], from the nearest pixels, as in training.
+/// A mask of motion gives [`Region::Moving`] and [`Region::Still`]. Where the camera is smaller than the mask, a pixel
+/// moves if at least a quarter of its area does: moving things are small, and show in pixels that they cover only in
+/// part. Pixels that the lens did not record belong to neither. A mask that ignores pixels gives [`Region::Masked`],
+/// from the nearest pixels, as in training.
 ///
 /// # Errors
 /// [`DataError::Image`] where the mask cannot be read.
@@ -58,8 +59,8 @@ fn moving_and_still(frame: &Frame, mask: &Mask) -> Result<Vec<(Region, PixelMask
     Ok(vec![(Region::Moving, region(true)), (Region::Still, region(false))])
 }
 
-/// Whether at least one [`MOVING_PART`] of the area of each pixel of the size `to` is [`MOVING`] in `[H, W]` marks of the size
-/// `from`. In whole numbers, so that a share of exactly that part counts on every machine.
+/// For each pixel at the size `to`, whether at least `1 / MOVING_PART` of its area is [`MOVING`] in the marks `[H, W]`
+/// at the size `from`. In whole numbers, so that a share of exactly that much counts on every machine.
 fn covered(marks: &[u8], from: (u32, u32), to: (u32, u32)) -> Vec<bool> {
     let (columns, rows) = (overlaps(from.0, to.0), overlaps(from.1, to.1));
     let width = from.0 as usize;
@@ -78,8 +79,8 @@ fn covered(marks: &[u8], from: (u32, u32), to: (u32, u32)) -> Vec<bool> {
     moving
 }
 
-/// For each of `to` equal parts of a line, which of `from` equal parts of it lie in it, and for how long. The line is
-/// `from * to` long, so a part of `to` is `from` long.
+/// A line of length `from * to` is divided into `to` parts of length `from`, and also into `from` parts of length `to`.
+/// For each part of the first kind: the parts of the second kind that overlap it, and the lengths of the overlaps.
 fn overlaps(from: u32, to: u32) -> Vec<Vec<(usize, u64)>> {
     let (from, to) = (u64::from(from), u64::from(to));
     let parts = |i: u64| {

@@ -18,8 +18,8 @@ type Masked = (Arc<RgbImage8>, Option<Arc<PixelMask>>);
 /// An image file at a size.
 type Key = (PathBuf, u32, u32);
 
-/// Whether an image was decoded ahead and not yet asked for, and when it was decoded or last asked for. The smallest is
-/// dropped first: in a shuffled order, the image that has just been used is needed last.
+/// Whether an image was decoded ahead and not yet asked for, and the time when it was decoded or last asked for. The
+/// image with the smallest one is dropped first: in a shuffled order, the image that has just been used is needed last.
 type Age = (bool, u64);
 
 /// A thread-safe store of the images of frames: `[H, W, 3]` bytes, on the background, at the size

@@ -184,7 +184,7 @@ fn find_image(root: &Path, path: &Path, i: usize, value: Option<&Value>) -> Resu
     })
 }
 
-/// What the layout's own images are called.
+/// The names of the layout's own images.
 fn with_suffix(base: &Path) -> PathBuf {
     let mut name = base.as_os_str().to_owned();
     name.push(".png");
@@ -222,8 +222,8 @@ fn frames(root: &Path, split: &RawSplit, last: f64, options: &LoadOptions) -> Re
     split.frames.iter().enumerate().zip(masks).map(to_frame).collect()
 }
 
-/// The masks of a split's images, which are `source` = (width, height) pixels large. All of them, or none: figures over a part
-/// of the views would pass for figures over all.
+/// The masks of a split's images, which are `source` = (width, height) pixels large. All of them, or none: figures over
+/// a part of the views could be taken for figures over all.
 fn find_masks(root: &Path, split: &RawSplit, source: (u32, u32)) -> Result<Vec<Option<Mask>>, DataError> {
     let folder = root.join("mask");
     let expected = |raw: &RawFrame| folder.join(raw.image.strip_prefix(root).unwrap_or(&raw.image));

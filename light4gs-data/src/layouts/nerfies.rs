@@ -83,7 +83,7 @@ impl DatasetLayout for NerfDs {
     }
 }
 
-/// What `dataset.json` and `metadata.json` say about an image.
+/// The entries of `dataset.json` and `metadata.json` about an image.
 struct Entry {
     id: String,
     time: f64,
@@ -196,7 +196,7 @@ fn read_metadata(path: &Path, id: &str, entry: Option<&Value>) -> Result<(f64, u
     Ok((time, camera as u32))
 }
 
-/// The folder of images, of the scale that exists.
+/// The folder of images, at the scale that exists.
 fn image_folder(root: &Path, entries: &[Entry]) -> Result<PathBuf, DataError> {
     let rgb = root.join("rgb");
     let present = |folder: &PathBuf| {

@@ -24,7 +24,7 @@ use std::path::{Path, PathBuf};
 
 /// The remedy for a malformed field.
 const REMEDY: &str = "export the capture again, or correct the field";
-/// Camera models, and whether they bend by the angle.
+/// Camera models that are no fisheyes: their distortion is a function of `x / z` and `y / z`, not of the angle.
 const PINHOLES: [&str; 7] =
     ["OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "SIMPLE_RADIAL", "RADIAL", "FULL_OPENCV", "PERSPECTIVE"];
 
@@ -84,7 +84,8 @@ impl DatasetLayout for Nerfstudio {
     }
 }
 
-/// Names for frames, from their images' paths: the last part, with the folder before it where that alone is not unique.
+/// Names for frames, from their images' paths: the last part, with the folder before it where the last part is not
+/// unique.
 fn frame_names(paths: &[String]) -> Vec<String> {
     let last = |count: usize| -> Vec<String> {
         let of = |path: &String| {

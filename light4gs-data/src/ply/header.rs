@@ -10,7 +10,7 @@ const MAX_HEADER_BYTES: u64 = 64 * 1024;
 /// More properties of a vertex than this are refused.
 const MAX_PROPERTIES: usize = 1024;
 
-/// What a header says about the vertices.
+/// The vertices as the header describes them.
 pub(super) struct Header {
     pub(super) encoding: Encoding,
     pub(super) rows: u64,

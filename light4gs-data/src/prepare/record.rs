@@ -1,4 +1,4 @@
-//! A record of what has been done, on disk, so that a second call can continue.
+//! A record of the phases that are done, on disk, so that a second call can continue.
 
 use super::PrepareOptions;
 use crate::atomic::write_atomically;

@@ -1,4 +1,4 @@
-//! The result, and what to do if it is poor.
+//! The result, and advice if it is poor.
 
 use std::fmt;
 
@@ -9,14 +9,14 @@ const MOST_ERROR: f64 = 1.5;
 /// If there are fewer points, the images had too little texture.
 const LEAST_POINTS: usize = 500;
 
-/// What [`crate::prepare`] found.
+/// The result of [`crate::prepare`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct PrepareSummary {
     /// Images for which poses were searched.
     pub images: usize,
     /// Images with a pose.
     pub registered: usize,
-    /// Mean distance between where points were seen and where they project, pixels.
+    /// Mean reprojection error: the distance between the places where points were seen and where they project, pixels.
     pub reprojection_error: f64,
     /// Points of the sparse model.
     pub points: usize,

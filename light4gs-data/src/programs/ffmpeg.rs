@@ -19,7 +19,7 @@ pub(crate) const FFMPEG: Program = Program {
 /// The version since which the option for frame rates is `-fps_mode`.
 const FPS_MODE: (u32, u32) = (5, 1);
 
-/// Which frames of a video are wanted, and how large.
+/// The wanted frames of a video, and their size.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Wanted {
     /// Wider videos are scaled down to this width, pixels.

@@ -35,7 +35,7 @@ pub struct PlainTensor {
     pub values: Vec<f32>,
 }
 
-/// Where in a file something is wrong, and what: turned into a [`DataError`] with the file's name.
+/// What is wrong in a file, and where. The caller makes it a [`DataError`] with the file's name.
 type Problem = (String, String);
 
 const REMEDY: &str = "copy it again, or save it anew with `torch.save(model.state_dict(), path)`";

@@ -11,7 +11,7 @@ use super::{Problem, problem};
 /// Place of an object in its [`Arena`].
 pub(super) type Id = usize;
 
-/// What a state dict is made of.
+/// The objects of a state dict.
 #[derive(Debug)]
 pub(super) enum Object {
     Nothing,
@@ -88,7 +88,8 @@ struct Machine<'a> {
     /// Heights of the stack at its marks.
     marks: Vec<usize>,
     memo: HashMap<u32, Id>,
-    /// What may still be copied, in objects and characters: a short pickle may refer to a long list many times.
+    /// Objects and characters that may still be copied. It is bounded because a short pickle may refer to a long list
+    /// many times.
     budget: usize,
 }
 
@@ -191,7 +192,7 @@ impl<'a> Machine<'a> {
         let top = self.top()?;
         match &mut self.arena.objects[top] {
             Object::List(list) => list.extend(items),
-            _ => return Err(self.wrong("something is appended to what is no list")),
+            _ => return Err(self.wrong("something is appended to an object that is no list")),
         }
         Ok(())
     }
@@ -200,7 +201,7 @@ impl<'a> Machine<'a> {
         let top = self.top()?;
         match &mut self.arena.objects[top] {
             Object::Dict(entries) => entries.extend(items.as_chunks::<2>().0.iter().map(|[key, value]| (*key, *value))),
-            _ => return Err(self.wrong("an entry is set in what is no dictionary")),
+            _ => return Err(self.wrong("an entry is set in an object that is no dictionary")),
         }
         Ok(())
     }

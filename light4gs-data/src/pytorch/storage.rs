@@ -103,7 +103,10 @@ impl<'a> Storages<'a> {
         let bytes = self.0.get(storage).ok_or_else(|| wrong(format!("its storage `{storage}` is missing")))?;
         let negative = |numbers: &[i64]| numbers.iter().any(|number| *number < 0);
         if shape.len() != strides.len() || shape.len() > 16 || negative(shape) || negative(strides) || *offset < 0 {
-            return Err(wrong(format!("shape {shape:?} with strides {strides:?} at {offset} is none")));
+            let found = format!("shape {shape:?}, strides {strides:?}, offset {offset}");
+            return Err(wrong(format!(
+                "{found}: expected at most 16 axes, each with a stride, and no negative numbers"
+            )));
         }
         let product = |total: usize, side: &i64| total.checked_mul(usize::try_from(*side).ok()?);
         let count = shape.iter().try_fold(1, product).filter(|count| count <= budget);

@@ -32,7 +32,7 @@ const FOV_X: f32 = 0.691_111_2;
 /// Elevations of the test and validation orbits, degrees.
 const ELEVATIONS: [f32; 2] = [30.0, 50.0];
 
-/// What [`write_synthetic`] makes.
+/// Options of [`write_synthetic`].
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SyntheticOptions {
     /// Width and height of the images, pixels; 8 to 4096.
@@ -72,8 +72,8 @@ impl SyntheticOptions {
 }
 
 /// Writes the procedural scene as a new D-NeRF folder: `transforms_{train,test,val}.json` and
-/// RGBA images `train/r_000.png`..., and masks of what moves for the views that are measured, `mask/test/r_000.png`...; the
-/// folder is complete or absent, never half-written.
+/// RGBA images `train/r_000.png`..., and masks of the moving pixels for the test and validation views,
+/// `mask/test/r_000.png`...; the folder is complete or absent, never half-written.
 ///
 /// The same options give the same files.
 ///

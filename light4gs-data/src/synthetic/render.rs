@@ -10,10 +10,10 @@ const SAMPLES: u32 = 4;
 /// Everything is within this distance of the origin.
 const WORLD_RADIUS: f32 = 1.3;
 
-/// From this many rays of a pixel on that meet something that moves, the pixel moves: a quarter of them.
+/// A pixel moves if at least this many of its rays, a quarter of them, meet something that moves.
 const MOVING_RAYS: u32 = SAMPLES * SAMPLES / 4;
 
-/// What a camera sees.
+/// An image, and its mask of motion.
 pub(super) struct Rendering {
     /// `[H, W, 4]` bytes with straight alpha: the share of rays that hit something.
     pub(super) rgba: Vec<u8>,
@@ -21,7 +21,7 @@ pub(super) struct Rendering {
     pub(super) moving: Vec<u8>,
 }
 
-/// Renders what a camera sees at a time in `[0, 1]`.
+/// Renders the view of a camera at a time in `[0, 1]`.
 pub(super) fn render(world: &World, camera: &Camera, time: f32) -> Rendering {
     // A direction is linear in the pixel before it is normalized.
     let axes = camera.rotation.transpose();

@@ -1,11 +1,11 @@
 //! Front-to-back traversal of one tile's splats, eight pixels at a time, for blending, its derivative and the significance
 //! scores.
 //!
-//! Eight pixels are four columns of two rows: most splats are a few pixels wide, and fewer such groups cover one than rows of
-//! eight would.
+//! A group of eight pixels is four columns of two rows. Most splats are a few pixels wide, and it takes fewer such groups to cover
+//! one than rows of eight.
 //!
-//! Only groups of eight pixels are visited that the splat's alpha can reach and that still take splats. The traversal
-//! ends when all pixels have stopped. So the cost is proportional to the pixels that are blended. For each pixel, front
+//! A group is visited if the splat's alpha can reach it and at least one of its pixels still takes splats. The traversal
+//! ends when all pixels have stopped. So the cost is proportional to the number of blended pixels. For each pixel, front
 //! to back:
 //!
 //! ```text
@@ -58,7 +58,7 @@ pub(crate) struct Contribution<L> {
     pub(crate) dy: L,
     /// After the clamp at [`MAX_ALPHA`], of all lanes.
     pub(crate) alpha: L,
-    /// T before this splat, of all lanes; negative where the pixel had stopped.
+    /// T before this splat, valid where it is taken.
     pub(crate) transmittance: L,
     /// `T · alpha`, zero where the splat is not taken.
     pub(crate) weight: L,
@@ -75,22 +75,21 @@ pub(crate) trait TileVisitor<L: Lanes> {
 
     fn begin(&self, splat: &Splat) -> Self::Splat;
     fn visit(&mut self, splat: &mut Self::Splat, contribution: &Contribution<L>);
-    /// `n` counts the tile's splats from the front. It is not called for a splat that was not visited.
+    /// `n` counts the tile's splats from the front. Only splats that hit a pixel get here.
     fn end(&mut self, n: usize, splat: Self::Splat);
 }
 
-/// The groups of a tile in which a splat's alpha is not below the threshold, a set for each of its splats from the front.
+/// For each of a tile's splats from the front: the set of groups in which its alpha reaches the threshold.
 pub(crate) enum Hits<'a> {
-    /// Nobody asks.
+    /// Not needed.
     Unasked,
-    /// Each splat's set is appended.
+    /// To be found: each splat's set is appended.
     Found(&'a mut Vec<u32>),
-    /// They were found before, so that only these groups are visited.
+    /// Found by an earlier traversal: only these groups are visited.
     Known(&'a [u32]),
 }
 
-/// Passes all splats of a tile to the visitor. Returns the remaining transmittance; its sign is set where a pixel has
-/// stopped, and outside the image.
+/// Passes all splats of a tile to the visitor. Returns the transmittance that remains at each pixel.
 #[inline(always)]
 pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     lists: &TileLists,
@@ -100,16 +99,9 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
     mut hits: Hits,
 ) -> TilePlane {
     let (column, row) = (tile % view.tiles_across(), tile / view.tiles_across());
-    let origin = [(column * TILE) as f32, (row * TILE) as f32];
-    let pixels_x: [L; ACROSS] = pixels(|group, lane| origin[0] + (group * WIDTH + lane % WIDTH) as f32);
-    let pixels_y: [L; DOWN] = pixels(|group, lane| origin[1] + (group * HEIGHT + lane / WIDTH) as f32);
-    let rows_y = rows::<L>(origin[1]);
-    let mut transmittance = initial_transmittance(view, column, row);
-    // A bit for every group with a pixel that still takes splats.
-    let mut live = transmittance
-        .iter()
-        .enumerate()
-        .fold(0u32, |bits, (g, lanes)| bits | u32::from(lanes.iter().any(|&t| t > 0.0)) << g);
+    let places = Places::<L>::new(column, row);
+    let mut pixels = pixels_at_start(view, column, row);
+    let mut live = live_groups(&pixels);
 
     for (n, &i) in lists.gaussians[lists.tile_range(tile)].iter().enumerate() {
         if live == 0 {
@@ -118,7 +110,7 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
         let splat = &lists.splats[i as usize];
         let mut groups = match &hits {
             Hits::Known(sets) => sets[n],
-            _ => reached(splat, origin[0], &rows_y),
+            _ => reached(splat, places.left, &places.rows),
         };
         groups &= live;
         let mut hit_groups = 0;
@@ -127,23 +119,17 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
         while groups != 0 {
             let group = groups.trailing_zeros() as usize;
             groups &= groups - 1;
-            let footprint = ellipse.footprint(pixels_x[group / DOWN], pixels_y[group % DOWN]);
+            let footprint = ellipse.footprint(places.x[group / DOWN], places.y[group % DOWN]);
             let Footprint { dx, dy, alpha, free, hit } = footprint;
             hit_groups |= u32::from(hit.signs() != 0) << group;
-            let t = L::load(&transmittance[group]);
-            let weight = t.mul(alpha);
-            let after = t.sub(weight);
-            let taken = hit.and(after.at_least(L::splat(MIN_TRANSMITTANCE)));
-            // Hit but not taken: the pixel stops.
-            let stopped = taken.and_not(hit).and(L::splat(-0.0));
-            let left = taken.select(after, t.or(stopped));
-            left.store(&mut transmittance[group]);
-            if left.signs() == (1 << LANES) - 1 {
+            let before = Pixels::<L>::load(&pixels[group]);
+            let Blended { after, taken, weight } = before.blend(alpha, hit);
+            after.store(&mut pixels[group]);
+            if after.have_all_stopped() {
                 live &= !(1 << group);
             }
-            let weight = taken.and(weight);
-            let contribution = Contribution { group, dx, dy, alpha, transmittance: t, weight, taken, free };
-            visitor.visit(&mut state, &contribution);
+            let transmittance = before.signed_transmittance;
+            visitor.visit(&mut state, &Contribution { group, dx, dy, alpha, transmittance, weight, taken, free });
         }
         if hit_groups != 0 {
             visitor.end(n, state);
@@ -152,7 +138,102 @@ pub(crate) fn walk<L: Lanes, V: TileVisitor<L>>(
             sets.push(hit_groups);
         }
     }
-    transmittance
+    pixels.map(|lanes| lanes.map(f32::abs))
+}
+
+/// The sign bit alone. Set in a transmittance, which is never negative itself, it means that the pixel has stopped: it takes
+/// no splats any more. So one number a pixel is loaded and stored in the innermost loop, not two.
+const STOPPED: f32 = -0.0;
+
+/// The state of eight pixels between two splats.
+#[derive(Clone, Copy)]
+struct Pixels<L> {
+    /// T, with the sign [`STOPPED`] where the pixel has stopped.
+    signed_transmittance: L,
+}
+
+/// Eight pixels after a splat.
+struct Blended<L> {
+    after: Pixels<L>,
+    /// Mask: the pixel takes the splat.
+    taken: L,
+    /// `T · alpha`, zero where the splat is not taken.
+    weight: L,
+}
+
+impl<L: Lanes> Pixels<L> {
+    #[inline(always)]
+    fn load(from: &[f32; LANES]) -> Self {
+        Self { signed_transmittance: L::load(from) }
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [f32; LANES]) {
+        self.signed_transmittance.store(to);
+    }
+
+    /// A pixel that the splat hits takes it, or stops where T would sink below its minimum. A stopped pixel has a negative T,
+    /// which is below the minimum too.
+    #[inline(always)]
+    fn blend(self, alpha: L, hit: L) -> Blended<L> {
+        let before = self.signed_transmittance;
+        let weight = before.mul(alpha);
+        let after = before.sub(weight);
+        let taken = hit.and(after.at_least(L::splat(MIN_TRANSMITTANCE)));
+        let stops = taken.and_not(hit);
+        let stopped = before.or(stops.and(L::splat(STOPPED)));
+        Blended { after: Self { signed_transmittance: taken.select(after, stopped) }, taken, weight: taken.and(weight) }
+    }
+
+    #[inline(always)]
+    fn have_all_stopped(self) -> bool {
+        self.signed_transmittance.signs() == (1 << LANES) - 1
+    }
+}
+
+/// T = 1 at each pixel. Those outside the image have stopped from the beginning.
+fn pixels_at_start(view: &View, column: usize, row: usize) -> TilePlane {
+    let width = view.camera.width as usize - column * TILE;
+    let height = view.camera.height as usize - row * TILE;
+    let mut pixels = [[1.0f32; LANES]; GROUPS];
+    for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
+        if x >= width || y >= height {
+            let (group, lane) = group_and_lane(x, y);
+            pixels[group][lane] = 1.0f32.copysign(STOPPED);
+        }
+    }
+    pixels
+}
+
+/// A bit for every group with a pixel that still takes splats.
+fn live_groups(pixels: &TilePlane) -> u32 {
+    let is_live = |lanes: &[f32; LANES]| lanes.iter().any(|pixel| pixel.is_sign_positive());
+    pixels.iter().enumerate().fold(0, |bits, (group, lanes)| bits | u32::from(is_live(lanes)) << group)
+}
+
+/// Where the pixels of a tile are in the image.
+struct Places<L> {
+    /// The tile's first column.
+    left: f32,
+    /// Columns of the pixels of a group, for the groups next to each other.
+    x: [L; ACROSS],
+    /// Rows of the pixels of a group, for the groups below each other.
+    y: [L; DOWN],
+    /// The same rows, ordered for [`reached`].
+    rows: [L; HEIGHT],
+}
+
+impl<L: Lanes> Places<L> {
+    #[inline(always)]
+    fn new(column: usize, row: usize) -> Self {
+        let (left, top) = ((column * TILE) as f32, (row * TILE) as f32);
+        Self {
+            left,
+            x: coordinates(|group, lane| left + (group * WIDTH + lane % WIDTH) as f32),
+            y: coordinates(|group, lane| top + (group * HEIGHT + lane / WIDTH) as f32),
+            rows: rows(top),
+        }
+    }
 }
 
 /// The splat's exponent, with each value in all lanes.
@@ -172,7 +253,7 @@ struct Footprint<L> {
     dy: L,
     alpha: L,
     free: L,
-    /// Mask: alpha is not below the threshold.
+    /// Mask: alpha reaches the threshold.
     hit: L,
 }
 
@@ -202,8 +283,7 @@ impl<L: Lanes> Ellipse<L> {
     }
 }
 
-/// A bit for every group that the splat's alpha can reach, for all rows of the tile at once. `rows_y` are the rows of all
-/// groups, first the upper ones.
+/// A bit for every group that the splat's alpha can reach, for all rows of the tile at once. `rows_y` come from [`rows`].
 #[inline(always)]
 fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; HEIGHT]) -> u32 {
     let [a, b, _] = splat.conic;
@@ -213,7 +293,7 @@ fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; HEIGHT]) -> u32 
     let (reach, skew) = (L::splat(splat.reach * 1.002 + 1e-2), L::splat(b / a));
     let (x, y) = (L::splat(splat.x - origin_x), L::splat(splat.y));
     let nowhere = L::splat(f32::INFINITY);
-    // The columns that are reached in each row: from infinity on in a row that is not.
+    // The first and last column that the splat reaches in each row; the first is infinite where it reaches none.
     let (mut low, mut high) = ([nowhere; HEIGHT], [nowhere; HEIGHT]);
     for row in 0..HEIGHT {
         let dy = y.sub(rows_y[row]);
@@ -239,7 +319,7 @@ fn reached<L: Lanes>(splat: &Splat, origin_x: f32, rows_y: &[L; HEIGHT]) -> u32 
 
 /// A coordinate of the pixels of each group along one side of the tile, by group and lane.
 #[inline(always)]
-fn pixels<L: Lanes, const N: usize>(coordinate: impl Fn(usize, usize) -> f32) -> [L; N] {
+fn coordinates<L: Lanes, const N: usize>(coordinate: impl Fn(usize, usize) -> f32) -> [L; N] {
     let mut vectors = [L::splat(0.0); N];
     for (group, vector) in vectors.iter_mut().enumerate() {
         let values: [f32; LANES] = std::array::from_fn(|lane| coordinate(group, lane));
@@ -251,21 +331,7 @@ fn pixels<L: Lanes, const N: usize>(coordinate: impl Fn(usize, usize) -> f32) ->
 /// The rows of all groups from the row `first` on: their upper ones, then their lower ones.
 #[inline(always)]
 fn rows<L: Lanes>(first: f32) -> [L; HEIGHT] {
-    pixels(|row, group| first + (group * HEIGHT + row) as f32)
-}
-
-/// Pixels outside the image have stopped from the beginning.
-fn initial_transmittance(view: &View, column: usize, row: usize) -> TilePlane {
-    let width = view.camera.width as usize - column * TILE;
-    let height = view.camera.height as usize - row * TILE;
-    let mut plane = [[1.0; LANES]; GROUPS];
-    for (y, x) in (0..TILE).flat_map(|y| (0..TILE).map(move |x| (y, x))) {
-        if x >= width || y >= height {
-            let (group, lane) = group_and_lane(x, y);
-            plane[group][lane] = -1.0;
-        }
-    }
-    plane
+    coordinates(|row, group| first + (group * HEIGHT + row) as f32)
 }
 
 #[cfg(test)]

@@ -14,7 +14,7 @@ pub const CHANNELS: usize = 5;
 
 const EMPTY: TilePlane = [[0.0; LANES]; GROUPS];
 
-/// Sums over a tile's pixels after all its splats.
+/// The sums at a tile's pixels after all its splats; [`assemble`] makes an image of them.
 #[derive(Clone, Debug)]
 pub struct TilePixels {
     pub(crate) color: [TilePlane; 3],
@@ -63,14 +63,13 @@ impl LaneKernel for RasterizeTile<'_> {
     fn run<L: Lanes>(self) -> TilePixels {
         let mut hits = Vec::with_capacity(self.lists.tile_range(self.tile).len());
         let mut pixels = TilePixels { color: [EMPTY; 3], depth: EMPTY, transmittance: EMPTY, hits: Vec::new() };
-        let left = walk::<L, _>(self.lists, self.view, self.tile, &mut pixels, Hits::Found(&mut hits));
+        pixels.transmittance = walk::<L, _>(self.lists, self.view, self.tile, &mut pixels, Hits::Found(&mut hits));
         pixels.hits = hits;
-        pixels.transmittance = left.map(|lanes| lanes.map(f32::abs));
         pixels
     }
 }
 
-/// Blends every tile. Outputs are in tile order.
+/// Blends the pixels of every tile. The result has one entry for each tile, row by row.
 pub fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
     (0..view.tiles_across() * view.tiles_down())
         .into_par_iter()
@@ -78,7 +77,8 @@ pub fn rasterize(lists: &TileLists, view: &View) -> Vec<TilePixels> {
         .collect()
 }
 
-/// Assembles the tiles: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H, W]`.
+/// Assembles the tiles to `5 H W` numbers: color over the background `[H, W, 3]`, then alpha `[H, W]`, then depth `[H,
+/// W]` (world units along the view axis, `sum(T · alpha · z)`).
 ///
 /// It is one flat array with contiguous parts, since an operation on the tape has one output and contiguous slices are
 /// cheap.

@@ -155,7 +155,9 @@ pub struct GaussianGradients {
     pub screen_offsets: Vec<f32>,
 }
 
-/// Chain rule from the image's gradient to those of the Gaussians.
+/// Chain rule from the gradient of an image to those of the Gaussians. `gaussians`, `view` and `lists` are those of the
+/// image, and `pixels` those of [`rasterize`](crate::rasterize). `upstream` is the gradient of the loss by
+/// the `5 H W` numbers of [`assemble`](crate::assemble), in the same layout.
 pub fn splat_backward(
     gaussians: &GaussianSlices,
     view: &View,

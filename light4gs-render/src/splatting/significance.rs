@@ -57,7 +57,7 @@ impl<L: Lanes> TileVisitor<L> for Score<'_> {
     }
 }
 
-/// Scores `[N, 3]` of one image; see [`SCORES`].
+/// Scores `[N, 3]` of the Gaussians in one image, row-major; see [`SCORES`]. `lists` are those of the same `view`.
 pub fn significance(lists: &TileLists, view: &View) -> Vec<f32> {
     let mut sums: Vec<Sums> = vec![[0.0; 3]; lists.gaussians.len()];
     lists.split_by_tile(&mut sums).into_par_iter().enumerate().for_each(|(tile, sums)| {

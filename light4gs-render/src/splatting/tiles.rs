@@ -1,4 +1,4 @@
-//! Which splats touch which tile, sorted front to back.
+//! The splats of each tile, sorted front to back.
 
 use light4gs_codec::rendering::TILE;
 use rayon::prelude::*;
@@ -28,8 +28,8 @@ pub struct TileLists {
     pub(crate) tile_order: Vec<u32>,
 }
 
-/// Whether the splat's alpha reaches the threshold anywhere in the tile: compares the smallest exponent over the
-/// rectangle of the tile's pixels, which is found on its edges unless the center is inside.
+/// Whether the splat's alpha reaches the threshold anywhere in the tile. The smallest exponent over the rectangle of
+/// the tile's pixels decides; it is on an edge, unless the center is inside.
 fn reaches(splat: &Splat, column: usize, row: usize) -> bool {
     let (x0, y0) = ((column * TILE) as f32 - splat.x, (row * TILE) as f32 - splat.y);
     let (x1, y1) = (x0 + (TILE - 1) as f32, y0 + (TILE - 1) as f32);
@@ -115,8 +115,8 @@ impl TileLists {
     /// sort.
     pub const BYTES_OF_A_GAUSSIAN: u64 = 2 * size_of::<Splat>() as u64 + 4 * 3 + 8;
 
-    /// An upper bound of the pairs of a tile and a Gaussian in it that [`TileLists::build`] lists, so that a program can refuse
-    /// them before they take memory.
+    /// An upper bound of the number of intersections that [`TileLists::build`] lists, so that a program can refuse them
+    /// before they take memory.
     pub fn most_pairs(gaussians: &GaussianSlices, view: &View) -> u64 {
         let chunk = |chunk: usize| {
             let range = chunk * CHUNK..((chunk + 1) * CHUNK).min(gaussians.len());

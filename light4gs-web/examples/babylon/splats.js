@@ -10,11 +10,11 @@ export async function createSplats(scene, world, shDegree = scene.info.shDegree)
   const object = new GaussianSplattingMesh("light4gs", null, world);
   const data = new ArrayBuffer(SPLAT * scene.count);
   const floats = new Float32Array(data);
-  // Rounds, and cuts what lies outside.
+  // Rounds, and clamps to the range of a byte.
   const bytes = new Uint8ClampedArray(data);
   const colors = new Float32Array(4 * scene.count);
   const all = 3 * (scene.info.shDegree + 1) ** 2;
-  // What depends on the view, as bytes of [-1, 1], 16 of a splat in each texture.
+  // The coefficients that depend on the view, as bytes of [-1, 1], 16 of a splat in each texture.
   const rest = 3 * (shDegree + 1) ** 2 - 3;
   const textures = Array.from({ length: Math.ceil(rest / 16) }, () => new Uint8ClampedArray(16 * scene.count));
   const follower = new Follower((time) => scene.gaussiansAt(time), (gaussians) => {

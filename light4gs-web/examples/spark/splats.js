@@ -21,7 +21,7 @@ export async function createSplats(scene) {
       );
     }
     packed.needsUpdate = true; // its texture
-    if (object) object.needsUpdate = true; // and what Spark has made of it
+    if (object) object.needsUpdate = true; // and Spark's own copy
   });
   await follower.update(0);
   object = new SplatMesh({ packedSplats: packed });

@@ -79,13 +79,13 @@ export async function createSplats(scene, camera) {
     glslVersion: THREE.GLSL3, vertexShader, fragmentShader, uniforms, transparent: true, premultipliedAlpha: true, depthWrite: false, side: THREE.DoubleSide,
   });
   const object = new THREE.Mesh(geometry, material);
-  object.frustumCulled = false; // the worker leaves out what is behind the camera
+  object.frustumCulled = false; // the worker leaves out Gaussians behind the camera
   object.raycast = () => {};
   const size = new THREE.Vector4();
   object.onBeforeRender = (renderer) => {
     renderer.getCurrentViewport(size);
     uniforms.viewport.value.set(size.z, size.w);
-    // Colors are sRGB; what still has to be converted for the screen wants linear ones.
+    // Colors are sRGB. Where the output is converted for the screen, it needs linear ones.
     const target = renderer.getRenderTarget();
     const space = target && !target.isXRRenderTarget ? target.texture.colorSpace : renderer.outputColorSpace;
     uniforms.linear.value = space !== THREE.SRGBColorSpace;

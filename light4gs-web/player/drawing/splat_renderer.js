@@ -35,11 +35,11 @@ export class SplatRenderer {
     const gl = /** @type {WebGL2RenderingContext | null} */ (canvas.getContext("webgl2", options));
     if (!gl) throw new GraphicsError("this browser has no WebGL2");
     this.gl = gl;
-    /** Whether sums are half floats; bytes lose faint layers. */
+    /** Whether images are summed in half floats. Bytes lose faint layers. */
     this.halfFloats = Boolean(gl.getExtension("EXT_color_buffer_float") ?? gl.getExtension("EXT_color_buffer_half_float"));
     /**
-     * Whether the page gives the canvas its size, whatever its pixels are: a draft is a smaller canvas then, and nothing has
-     * to be enlarged here. Not known: null.
+     * Whether the page gives the canvas its size, independent of its pixels: a draft is then a smaller canvas, and nothing has to
+     * be enlarged here. Null before it is known.
      * @type {boolean | null}
      */
     this.stretched = null;
@@ -147,7 +147,7 @@ export class SplatRenderer {
   }
 
   /**
-   * Draws what was set, over a background.
+   * Draws the list that was set, over a background.
    * @param {View} view
    * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
    * @param {number} [scale]  below 1: a draft of so many of the pixels along each side, in bytes, and enlarged
@@ -197,7 +197,7 @@ export class SplatRenderer {
     gl.bindVertexArray(null);
   }
 
-  /** A mark behind everything that was asked for until now. */
+  /** A mark behind all commands so far. */
   fence() {
     const fence = this.gl.fenceSync(this.gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
     this.gl.flush();
@@ -205,7 +205,7 @@ export class SplatRenderer {
   }
 
   /**
-   * Whether the graphics card has come to a mark. Takes the mark away then.
+   * Whether the graphics card has reached a mark. If so, the mark is deleted.
    * @param {WebGLSync | null} fence
    */
   isDone(fence) {
@@ -232,7 +232,7 @@ export class SplatRenderer {
     return pixels;
   }
 
-  /** Gives everything back. */
+  /** Frees everything on the graphics card. */
   dispose() {
     const { gl, parts } = this;
     for (const texture of [parts.target, parts.list]) gl.deleteTexture(texture);

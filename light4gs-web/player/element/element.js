@@ -47,7 +47,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   /** @type {DatasetCamera[]} */
   #cameras = [];
   #loading = 0;
-  /** Ends what an element does while it stands in the page: listening, downloads, looking at what is watched. */
+  /** Ends the work of an element in the page: listening, downloads, and watching an address. */
   #abort = new AbortController();
   #connected = false;
   #panelTimer = 0;
@@ -117,7 +117,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   async load(address, cameras, { keep = false } = {}) {
     const loading = ++this.#loading;
     const { signal } = this.#abort;
-    /** The scene, once there is something to see of it. @type {Scene | null} */
+    /** The scene, as soon as something of it can be seen. @type {Scene | null} */
     let scene = null;
     let share = 0;
     const report = (/** @type {number} */ now) => {
@@ -135,7 +135,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       }
       report(0);
       const coming = load(pieces(address, signal, report));
-      // Where the cameras do not come, the scene is not shown.
+      // Without its cameras the scene is not shown.
       list.catch(() => coming.then((unwanted) => unwanted.close(), () => {}));
       const [loaded, known] = await Promise.all([coming, list]);
       if (loading !== this.#loading) {
@@ -159,7 +159,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
         this.#fail(error);
         return false;
       }
-      // What comes still is not reported any more.
+      // The rest of the file is not reported any more.
       if (loading === this.#loading) {
         this.#loading++;
         this.#fail(error);
@@ -198,7 +198,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
       await this.player.ready;
       if (loading !== this.#loading) return;
       this.#begin();
-      // Where the list has it still.
+      // If the list still has it.
       this.find("camera").value = chosen;
       if (!this.find("camera").value) this.#showCamera();
     } catch (error) {
@@ -246,7 +246,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.dispatchEvent(new Event("load"));
   }
 
-  /** What screen readers say of the scene. */
+  /** The description of the scene for screen readers. */
   #nameCanvas() {
     const { info } = /** @type {Player} */ (this.player).scene;
     this.canvas.setAttribute("aria-label", `${info.name || "Scene"}: ${info.count} Gaussians${info.moves ? `, ${info.frameCount} frames` : ""}`);
@@ -333,7 +333,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
     this.shadowRoot?.addEventListener("keydown", (event) => this.#key(/** @type {KeyboardEvent} */ (event)));
   }
 
-  /** What a button or a key asks for. @param {string} what */
+  /** Does what a button or a key asks for. @param {string} what */
   #do(what) {
     const { player } = this;
     if (!player) return;
@@ -365,7 +365,7 @@ export class L4gsPlayer extends (globalThis.HTMLElement ?? class {}) {
   /** Keys that nothing in the page has asked for belong to a player that is the page. @param {KeyboardEvent} event */
   #takeKey(event) {
     const nobody = document.activeElement === document.body || document.activeElement === null;
-    // What is sent to the canvas here comes by again.
+    // An event that is sent to the canvas here arrives here once more.
     if (!nobody || event.defaultPrevented || !event.isTrusted) return;
     if (this.canvas.dispatchEvent(new KeyboardEvent(event.type, event))) return;
     event.preventDefault();

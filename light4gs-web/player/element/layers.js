@@ -1,4 +1,4 @@
-// What lies over the canvas while there is nothing to see on it: one layer at a time.
+// Layers over the canvas while there is nothing to see on it: one at a time.
 
 import { explain } from "./messages.js";
 

@@ -1,4 +1,4 @@
-// What the element consists of.
+// The parts of the element.
 
 import style from "virtual:style";
 

@@ -1,4 +1,4 @@
-// What a person is told when something is wrong: a sentence, what to do, and the details for a report.
+// Messages to the user about errors: a sentence, a remedy, and the details for a report.
 
 /** @type {Record<string, [string, string]>} */
 const SCENE_MESSAGES = {

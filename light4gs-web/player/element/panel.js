@@ -1,4 +1,4 @@
-// The panel with facts about the scene and what a frame takes.
+// The panel: facts about the scene, and the times of a frame.
 
 /** @typedef {import("../player.js").Player} Player */
 

@@ -1,4 +1,4 @@
-// Where the bytes of a scene come from: an address, or the page itself.
+// Sources of the bytes of a scene: an address, or the page itself.
 
 import { SceneError } from "../errors.js";
 
@@ -20,7 +20,7 @@ async function* read(reader, report) {
       yield value;
     }
   } finally {
-    // Where nobody wants the rest.
+    // If nobody wants the rest.
     reader.cancel().catch(() => {});
   }
 }
@@ -36,7 +36,7 @@ async function* read(reader, report) {
 export async function* pieces(address, signal, report = () => {}) {
   let received = 0;
   let total = NaN;
-  /** Says that it is still the same file. */
+  /** The file's tag. While it stays the same, so does the file. */
   let tag = "";
   for (let resumes = 0; ; resumes++) {
     try {

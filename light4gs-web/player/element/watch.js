@@ -18,7 +18,7 @@ export async function watch(address, signal, say, load) {
       if (signal.aborted) return;
       const { status, scene } = JSON.parse(text);
       say(status ?? "");
-      // What did not come is asked for again.
+      // A text that did not come is asked for again.
       if (scene && shown !== String(scene) && (await load())) shown = String(scene);
     } catch {
       if (!signal.aborted) say("The server does not answer");

@@ -33,9 +33,9 @@ export class Decoder {
     this.wasm = /** @type {Exports} */ (/** @type {unknown} */ (new WebAssembly.Instance(module, {}).exports));
     /** @type {import("./scene.js").SceneInfo | null} */
     this.info = null;
-    /** Where the Gaussians of the scene are, and those of the level beside it: NaN before the first evaluation. */
+    /** The times to which the Gaussians of the scene and those of its level were moved: NaN before the first evaluation. */
     this.times = [NaN, NaN];
-    /** Of the two, the one that is shown. */
+    /** Which of the two is shown. */
     this.shown = 0;
   }
 
@@ -90,7 +90,7 @@ export class Decoder {
     try {
       answer = ask();
     } catch (error) {
-      // The module stops itself where memory runs out: there is nothing to unwind to.
+      // The module stops itself when memory runs out: there is nothing to unwind to.
       throw new SceneError("memory", `the decoder stopped (${error instanceof Error ? error.message : error})`);
     }
     if (answer > 1) return null;
@@ -109,7 +109,7 @@ export class Decoder {
     return this.wasm.count();
   }
 
-  /** Where the Gaussians of the level that is shown are. */
+  /** The time to which the Gaussians of the shown level were moved. */
   get time() {
     return this.times[this.shown];
   }
@@ -137,7 +137,7 @@ export class Decoder {
   }
 
   /**
-   * What is drawn of the last evaluation, as abi.rs says.
+   * The list for drawing the last evaluation, see abi.rs.
    * @param {import("./scene.js").Viewpoint} viewpoint
    * @param {ArrayBuffer | null} memory  to be used again
    */

@@ -1,10 +1,10 @@
-// Has a renderer of others follow a clock: asks for one time after another, without a queue.
+// Makes a foreign renderer follow a clock: asks for one time after another, without a queue.
 
 import { SceneError } from "../errors.js";
 
 /**
- * One request at a time. Of what is wanted meanwhile, the newest is asked for next, and the rest never is: so a renderer that is
- * slower than the clock drops times in place of falling behind.
+ * One request at a time. Of the times that are wanted meanwhile, only the newest is asked for next. So a renderer that is slower
+ * than the clock drops times instead of falling behind.
  * @template Wanted  what is asked for, as JSON can hold it: a time, or a time and a viewpoint
  * @template Answer
  */
@@ -17,7 +17,7 @@ export class Follower {
   /** @type {Promise<void> | null} */
   #running = null;
   #stopped = false;
-  /** What was applied last. @type {Wanted | null} */
+  /** The request that was applied last. @type {Wanted | null} */
   shown = null;
 
   /**
@@ -30,7 +30,7 @@ export class Follower {
   }
 
   /**
-   * Says what is wanted now: for each frame, changed or not.
+   * Sets the request. To be called for each frame, changed or not.
    * @param {Wanted} wanted
    * @returns {Promise<void>}  settles when the newest is applied; fails with what `ask` or `apply` throws, and so it stays
    */

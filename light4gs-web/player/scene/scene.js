@@ -64,7 +64,7 @@ function decoderModule() {
     return WebAssembly.compile(await new Response(stream).arrayBuffer());
   };
   module ??= unpack().catch((error) => {
-    // Whoever asks again may have more luck.
+    // A second attempt may succeed.
     module = null;
     throw new SceneError("blocked", error instanceof Error ? error.message : String(error));
   });
@@ -141,7 +141,7 @@ export class Scene extends EventTarget {
     this.#prepared.catch(() => {});
     /** @type {SceneInfo} */
     this.info = /** @type {any} */ (null);
-    /** What decoding took, in milliseconds. */
+    /** Time of decoding, milliseconds. */
     this.decodeMs = 0;
     /** Resolves when the whole file is there; fails with a {@link SceneError} where it does not come. @type {Promise<void>} */
     this.whole = Promise.resolve();
@@ -192,7 +192,7 @@ export class Scene extends EventTarget {
 
   /** @param {AsyncIterable<Uint8Array>} pieces @param {() => void} show  called once there is something to see */
   async #receive(pieces, show) {
-    /** What has come while the decoder was at work: it gets all of it at once. @type {Uint8Array[]} */
+    /** Pieces that have come while the decoder was at work: it gets all of them at once. @type {Uint8Array[]} */
     let waiting = [];
     /** @type {Promise<void> | null} */
     let working = null;
@@ -262,7 +262,7 @@ export class Scene extends EventTarget {
   }
 
   /**
-   * What the renderer draws at a time from a viewpoint.
+   * The list of Gaussians to draw at a time from a viewpoint.
    * @param {number} time  in [0, 1]
    * @param {Viewpoint} viewpoint
    * @param {ArrayBuffer | null} [memory]  to be used again
@@ -282,7 +282,7 @@ export class Scene extends EventTarget {
     return (await this.#ask({ type: "digest", bytes })).digest;
   }
 
-  /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
+  /** Ends the worker and frees its memory. Open requests fail with a {@link SceneError} `closed`. */
   close() {
     if (!this.#url) return;
     this.#worker.terminate();

@@ -24,7 +24,7 @@ const pause = () =>
  */
 const send = (answer, transfer = []) => /** @type {any} */ (self).postMessage(answer, transfer);
 
-/** What was asked for last of that which needs the Gaussians at one time, done or not. @type {Promise<void>} */
+/** The last request that needs the Gaussians at one time, done or not. @type {Promise<void>} */
 let last = Promise.resolve();
 
 /** One after the other: the decoder moves the Gaussians of one scene to one time only, and pauses meanwhile. */

@@ -38,7 +38,7 @@ export function turn(v, axis, angle) {
   return add(add([v[0] * cosine, v[1] * cosine, v[2] * cosine], across, sine), axis, along);
 }
 
-/** What a camera cannot do without, and how many numbers each has; 0 for a number by itself. */
+/** Required fields of a camera, with the length of each list; 0 for a single number. */
 const FIELDS = { rotation: 9, translation: 3, fx: 0, fy: 0, cx: 0, cy: 0, width: 0, height: 0 };
 
 /**
@@ -87,9 +87,9 @@ const POLE = 0.03;
 export class Camera {
   /** World axes of the camera: right, down, forward. @type {[Vector, Vector, Vector]} */
   axes = [[1, 0, 0], [0, 0, -1], [0, 1, 0]];
-  /** Where it stands. @type {Vector} */
+  /** Its center, world units. @type {Vector} */
   position = [0, -4, 0];
-  /** How far ahead the point lies that it turns around. */
+  /** Distance to the point that it turns around, ahead. */
   distance = 4;
   /** Upwards in the world. @type {Vector} */
   up = [0, 0, 1];
@@ -183,7 +183,7 @@ export class Camera {
   }
 
   /**
-   * What a canvas of so many pixels shows: all of the lens's image, and more on two sides where the shape differs.
+   * The view on a canvas of `width` × `height` pixels: all of the lens's image, and more on two sides if the shape differs.
    * @param {number} width @param {number} height
    * @returns {View}
    */
@@ -201,7 +201,7 @@ export class Camera {
 }
 
 /**
- * The direction that most of a dataset's cameras have above them; z where there is none.
+ * The upward direction of most of a dataset's cameras; z without cameras.
  * @param {DatasetCamera[]} cameras
  * @returns {Vector}
  */

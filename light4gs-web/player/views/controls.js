@@ -114,7 +114,7 @@ export class Controls {
   };
 
   /**
-   * Moves the camera by what is held down. Says whether it moved since the last call.
+   * Moves the camera by the keys that are held down. Returns whether it moved since the last call.
    * @param {number} seconds
    */
   step(seconds) {
@@ -144,7 +144,7 @@ export class Controls {
     return moved;
   }
 
-  /** Lets nothing go on moving by itself. */
+  /** Ends all movement. */
   rest() {
     this.#inertia = { sideways: 0, upwards: 0 };
     this.#moved = false;

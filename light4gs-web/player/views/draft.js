@@ -1,13 +1,13 @@
-// How much of the image's resolution and of the Gaussians there is time for while something moves.
+// Resolution of the image, and level of detail of the Gaussians, that there is time for while something moves.
 
 /**
- * Shares of the pixels along each side, and levels of detail, each faster than the one before. Of what takes the same time,
- * this is what looks best (docs/player.md).
+ * Shares of the pixels along each side, and levels of detail, each faster than the one before. Of the pairs that take the same
+ * time, these look best (docs/player.md).
  */
 const LADDER = [[1, 0], [0.7, 0], [0.7, 1], [0.5, 1], [0.5, 2], [0.35, 2], [0.35, 3], [0.35, 4], [0.35, 5]];
 /** Milliseconds of an image: above, the next faster step; below, a slower one is tried after a while. */
 const [SLOW, FAST] = [28, 14];
-/** In place of the first, where the next step would look worse than fewer images a second. */
+/** Replaces the first number where the next step would look worse than fewer images a second. */
 const VERY_SLOW = 45;
 /** The last step of the ladder that looks well. */
 const LAST_GOOD = LADDER.findIndex(([, level]) => level > 2) - 1;
@@ -33,13 +33,13 @@ class Steps {
   }
 
   /**
-   * Something took so long for an image.
+   * Records that an image took `interval`.
    * @param {number} interval  milliseconds
    * @param {number} now
    * @returns {number} by how many steps that changed the step
    */
   measure(interval, now) {
-    // Whoever looked elsewhere for a while says nothing about the machine.
+    // After a pause, such as in another tab, an interval says nothing about the machine.
     if (interval > 5000) return 0;
     this.#intervals.push(interval);
     const hopeless = this.#intervals.length > 1 && Math.min(...this.#intervals) > 3 * SLOW;
@@ -61,7 +61,7 @@ class Steps {
   }
 }
 
-/** Chooses scale and level from the time that images take. What stands still is always drawn in full. */
+/** Chooses scale and level from the time that images take. A still image is always drawn in full. */
 export class Draft {
   #drawing = new Steps(LADDER.length - 1, LAST_GOOD);
   #worker;
@@ -78,13 +78,13 @@ export class Draft {
     return LADDER[this.#drawing.step][0];
   }
 
-  /** The level of detail of moving images: what both drawing and worker have time for. */
+  /** The level of detail of moving images, for which both drawing and worker have time. */
   get level() {
     return Math.min(this.levels, Math.max(LADDER[this.#drawing.step][1], this.#worker.step));
   }
 
   /**
-   * A moving image was drawn in so long.
+   * Records that drawing a moving image took `interval`.
    * @param {number} interval  milliseconds
    * @param {number} now
    */
@@ -92,12 +92,12 @@ export class Draft {
     const { scale, level } = this;
     const steps = this.#drawing;
     const change = Math.sign(steps.measure(interval, now));
-    // Steps that are none, since the scene has no such level or the worker needs a higher one anyway.
+    // Steps without effect are skipped: the scene has no such level, or the worker needs a higher one anyway.
     while (change !== 0 && scale === this.scale && level === this.level && LADDER[steps.step + change]) steps.step += change;
   }
 
   /**
-   * The worker made the list of a moving image in so long.
+   * Records that the list of a moving image took the worker `interval`.
    * @param {number} interval  milliseconds
    * @param {number} now
    */

@@ -1,4 +1,4 @@
-// Where a view begins: at the dataset's first camera, or where all Gaussians but outliers are seen.
+// The first view: that of the dataset's first camera, or one that shows all Gaussians except outliers.
 
 import { commonTarget, commonUp } from "./camera.js";
 import { ENTRY, NEAR } from "../drawing/constants.js";
@@ -50,7 +50,7 @@ function extent(list) {
 }
 
 /**
- * Moves a camera to where the view begins.
+ * Moves a camera to the first view.
  * @param {Camera} camera
  * @param {DatasetCamera[]} cameras
  * @param {Float32Array} list  what is drawn at the beginning, seen from anywhere

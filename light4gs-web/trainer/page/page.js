@@ -1,4 +1,4 @@
-// The page that trains a scene in a worker, and shows what comes.
+// The page that trains a scene in a worker, and shows its messages.
 
 import workerSource from "virtual:trainer-worker";
 import { Curve } from "./curve.js";
@@ -85,7 +85,7 @@ function replace(element, field, value) {
 /** @param {Uint8Array | undefined} bytes */
 function show(bytes) {
   const player = /** @type {L4gsPlayer} */ (find("player"));
-  // The scene before is closed by `keep` alone.
+  // The scene before is closed only by `keep`.
   if (bytes) player.open(bytes, { keep: player.player !== null });
 }
 

@@ -54,7 +54,7 @@ function read(root, path) {
 /** @param {MessageEvent<Start>} event */
 self.onmessage = async ({ data: { module, files, settings } }) => {
   const root = tree(files);
-  /** What the program says besides messages: why it panicked. @type {string[]} */
+  /** Text of the program besides messages, such as the reason of a panic. @type {string[]} */
   const said = [];
   const fds = [
     new OpenFile(new File([])),

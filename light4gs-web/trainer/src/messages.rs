@@ -4,7 +4,7 @@ use std::io::Write;
 
 use serde_json::Value;
 
-/// Says something to the page. Nobody may be listening any more: that is no error.
+/// Sends a message to the page. It is no error if nobody is listening any more.
 pub(crate) fn say(message: &Value) {
     let mut out = std::io::stdout().lock();
     let _ = writeln!(out, "{message}").and_then(|()| out.flush());

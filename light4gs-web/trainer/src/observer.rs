@@ -1,4 +1,4 @@
-//! What the page is told while a scene is trained.
+//! Messages to the page while a scene is trained.
 
 use std::io::Cursor;
 use std::path::{Path, PathBuf};

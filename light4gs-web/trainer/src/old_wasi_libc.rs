@@ -1,5 +1,6 @@
-//! What Rust's standard library asks of a C library for WASI, and that of Debian 12, of 2022, does not have. The library of
-//! `rustup target add wasm32-wasip1` has the same: there are no threads, and links are not followed.
+//! Functions that Rust's standard library needs from a C library for WASI, and that Debian 12's library of 2022 lacks.
+//! They do the same as in the library of `rustup target add wasm32-wasip1`: there are no threads, and links are not
+//! followed.
 
 use std::ffi::{c_char, c_int, c_void};
 

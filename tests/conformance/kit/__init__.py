@@ -1,1 +1,1 @@
-"""What `check` is made of. It knows the frame of a stream, and nothing of what sections hold."""
+"""The parts of `check`. They know the frame of a stream, and nothing of the contents of sections."""

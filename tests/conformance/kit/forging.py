@@ -1,4 +1,4 @@
-"""Files of the set that are made of others: bytes replaced, and then lengths and checksums that fit.
+"""Files of the set that are made from others: bytes replaced, and then lengths and checksums that fit.
 
 An edit replaces `length` bytes at `offset` of a part. Parts are `prelude`, `meta`, `table` and the sections by name, those of
 further layers with a number, as in `gaussians_2`. After these

@@ -1,4 +1,4 @@
-"""The lists of files, and what a decoder does with each.
+"""The lists of files, and the expected answer of a decoder to each.
 
 A block begins with `accepted NAME` or `refused NAME`. `from PATH` names a file, from the folder of the lists; `edit ...` lines make
 another one of it (forging.py). A file that is accepted then has its lines: SCENE-OR-TIME ARRAY CHECKSUM. One that is refused

@@ -1,4 +1,4 @@
-"""What every decoder must refuse: one file for each rule. `check --write` makes manifest/refused.txt of it.
+"""Files that every decoder must refuse: one for each rule. `check --write` makes manifest/refused.txt of it.
 
 A rule has a name, a file, and what to change in it. A change names a field as `fields` prints it: `PART: FIELD` or, for its
 `n`-th occurrence, `PART: FIELD #n`, from 0. After `=` come the bytes in its place, in hexadecimal; `{same}` stands for those that were
@@ -480,7 +480,7 @@ def _filled(text: str, sizes: dict[str, int], as_byte: bool = False) -> str:
 
 
 def list_of_refusals(folder: pathlib.Path) -> str:
-    """The text of manifest/refused.txt, with what the decoder of this folder says about each file."""
+    """The text of manifest/refused.txt, with the message of the decoder of this folder about each file."""
     blocks = ["# Files that every decoder refuses. `check --write` makes this list of ../kit/refusals.py.\n"]
     for name, source, changes in RULES:
         data = (folder / source).read_bytes()

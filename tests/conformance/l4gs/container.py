@@ -38,7 +38,7 @@ SH_TABLES, SH_NETWORKS, SH_CONTINUED = 2, 3, 5
 
 @dataclass
 class Meta:
-    """What the stream says about its scene."""
+    """Facts about the scene, from the header."""
 
     name: str
     frames: int
@@ -55,7 +55,7 @@ class Meta:
 
 @dataclass
 class Section:
-    """A section's bytes, and what the table says about them."""
+    """A section's bytes, and its entry of the table."""
 
     name: str
     kind: int
@@ -143,7 +143,7 @@ def _read_meta(reader: Reader) -> Meta:
 
 
 def _read_table(table: Reader, count: int, data: bytes) -> dict[str, Section]:
-    """The sections by name. `data` is what follows the table."""
+    """The sections by name. `data` are the bytes after the table."""
     sections: dict[str, Section] = {}
     begin = 0
     for _ in range(count):

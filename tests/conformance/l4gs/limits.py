@@ -39,7 +39,7 @@ class Budget:
         self._left = max(_LEAST_MEMORY, 4 * stream_bytes) - _MEMORY_AT_FIRST
 
     def take(self, part: str, field: str, count: int, bytes_each: int) -> None:
-        """Refuses what does not fit any more, before it is taken."""
+        """Takes memory, or refuses before it is taken if it does not fit any more."""
         self._left -= count * bytes_each
         if self._left < 0:
             raise Refused(part, field, "no more numbers than the memory of the limits is enough for")

@@ -1,4 +1,4 @@
-"""What the conformance set compares: checksums of all arrays, as lines of text. See tests/conformance/README.md."""
+"""The text that the conformance set compares: checksums of all arrays, a line each. See tests/conformance/README.md."""
 
 from __future__ import annotations
 

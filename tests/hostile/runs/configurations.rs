@@ -92,7 +92,7 @@ const ODD: [&str; 22] = [
     "17",
 ];
 
-/// A configuration with a few odd keys, and a description of what is odd.
+/// A configuration with a few odd keys, and a description of them.
 pub fn odd(random: &mut impl Rng) -> String {
     let mut pairs = Vec::new();
     for _ in 0..random.random_range(1..4) {

@@ -1,4 +1,4 @@
-//! Compiles kernels with naga, wgpu's own compiler, to what Vulkan, Metal and Direct3D take.
+//! Compiles kernels with naga, wgpu's own compiler, for Vulkan, Metal and Direct3D.
 //! usage: light4gs-shader-targets FOLDER, which the test `launches_of_golden_scenes` has written.
 
 use std::error::Error;
@@ -28,7 +28,7 @@ fn main() -> Result<ExitCode, Box<dyn Error>> {
 /// Compiles a kernel for every target.
 fn targets(text: &str) -> Result<(), Box<dyn Error>> {
     let module = naga::front::wgsl::parse_str(text).map_err(|error| error.emit_to_string(text))?;
-    // What a WebGPU adapter with subgroups has, and nothing else.
+    // The capabilities of a WebGPU adapter with subgroups, and nothing else.
     let mut validator = Validator::new(ValidationFlags::all(), Capabilities::SUBGROUP);
     validator.subgroup_stages(ShaderStages::COMPUTE).subgroup_operations(SubgroupOperationSet::all());
     let info = validator.validate(&module).map_err(|error| error.emit_to_string(text))?;
@@ -46,7 +46,7 @@ fn to_spirv(module: &Module, info: &ModuleInfo) -> Result<(), Box<dyn Error>> {
 }
 
 fn to_msl(module: &Module, info: &ModuleInfo) -> Result<(), Box<dyn Error>> {
-    // Metal 2.1 is what the oldest Macs have on which wgpu offers subgroups.
+    // Metal 2.1 is the version of the oldest Macs on which wgpu offers subgroups.
     let options = msl::Options { lang_version: (2, 1), ..msl::Options::default() };
     let (_, translation) = msl::write_string(module, info, &options, &msl::PipelineOptions::default())
         .map_err(|error| format!("MSL: {error}"))?;

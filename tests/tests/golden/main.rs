@@ -1,4 +1,4 @@
-//! The golden vectors c01 to c13 on every back end. `tests/README.md` says what each is.
+//! The golden vectors c01 to c13 on every back end. `tests/README.md` describes each.
 
 mod context;
 mod dnerf;

@@ -1,4 +1,4 @@
-//! Golden cases c09 (MS-SSIM, D-SSIM on 8-bit images) and c13 (LPIPS) on every back end, and what the metrics have in common.
+//! Golden cases c09 (MS-SSIM, D-SSIM on 8-bit images) and c13 (LPIPS) on every back end, and properties of all metrics.
 
 use std::path::PathBuf;
 
@@ -11,7 +11,7 @@ use light4gs_train::metrics::{
     MS_SSIM_LEAST_SIDE, Metric, PixelMap, RegionMetric, d_ssim, decibels, ms_ssim, psnr, ssim, ssim_map, ssim_valid,
 };
 
-/// An image of bytes as `[H, W, 3]` in [0, 1]; `channels_first` says how the file has it.
+/// An image of bytes as `[H, W, 3]` in [0, 1]; with `channels_first` the file has it as `[3, H, W]`.
 fn bytes_image(golden: &Golden, key: &str, channels_first: bool, device: &Device) -> Tensor<3> {
     let shape: [usize; 3] = golden.shape(key).try_into().unwrap();
     let image = Tensor::<3>::from_data(TensorData::new(golden.values(key), shape), device) / 255.0;

@@ -91,7 +91,7 @@ fn the_estimate_is_near_the_bytes_of_the_codec() {
     }
 }
 
-/// What neighbors and channels before tell is not in the estimate, as it is not in the file.
+/// Information that neighbors and earlier channels give is neither in the estimate nor in the file.
 #[test]
 fn the_estimate_knows_neighbors_and_channels_before() {
     let device = Device::flex();

@@ -182,8 +182,8 @@ fn every_configuration_makes_a_file_that_decodes() {
     }
 }
 
-/// The coder learns its statistics and knows more than a density, so that it writes other bits than are expected, until these are
-/// corrected.
+/// The coder learns its statistics and knows more than a density. So it writes another number of bits than expected,
+/// until the expected bits are corrected.
 #[test]
 fn corrected_bits_are_those_that_are_written() {
     let device = Device::flex().autodiff();

@@ -1,5 +1,5 @@
-//! Properties of the context model that do not depend on golden vectors: which values may depend on which, and that
-//! every ablation works.
+//! Properties of the context model that do not depend on golden vectors: values depend only on values decoded before,
+//! and every ablation works.
 
 use burn::module::Param;
 use burn::optim::{AdamConfig, GradientsParams};

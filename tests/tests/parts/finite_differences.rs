@@ -32,7 +32,7 @@ fn wide(values: &[f32]) -> impl Iterator<Item = f64> {
     values.iter().map(|v| f64::from(*v))
 }
 
-/// `values + step · direction`, rounded to float32 like everything that the operation sees.
+/// `values + step · direction`, rounded to float32 like all inputs of the operation.
 fn moved(values: &[f64], direction: &[f64], step: f64) -> Vec<f64> {
     values.iter().zip(direction).map(|(v, d)| f64::from((v + step * d) as f32)).collect()
 }

@@ -232,7 +232,7 @@ impl Source {
     }
 }
 
-/// The names that a crate's root shows, and the rooms that they come from.
+/// The names that a crate's root exports, and the rooms that they come from.
 struct Shown(BTreeMap<String, String>);
 
 impl Shown {

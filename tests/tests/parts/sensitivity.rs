@@ -1,4 +1,4 @@
-//! What a Gaussian's sensitivity says, beside images from which it is left out, on every back end.
+//! A Gaussian's sensitivity against images without it, on every back end.
 
 use burn::tensor::{Device, Tensor};
 use light4gs_data::Camera;

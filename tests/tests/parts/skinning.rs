@@ -76,7 +76,7 @@ impl Case {
         (values_of(&moved), leaves.map(|leaf| values_of(&leaf.grad(&gradients).expect("a leaf has a gradient"))))
     }
 
-    /// Every number of the output in float64, with weights as if the Gaussians were at `weighed` `[N, 3]`.
+    /// Every number of the output in float64. The weights are those of Gaussians at `weighed` `[N, 3]`.
     fn twin(&self, weighed: &[f64]) -> Vec<f64> {
         let [means, quats, stillness, anchors, precisions, poses] = &self.inputs;
         let [_, _, own, place, ..] = self.columns();
@@ -170,8 +170,9 @@ fn cases() -> impl Iterator<Item = (String, Case, Vec<f64>)> {
     })
 }
 
-/// The gradient by a logit is a weight times the difference of two terms, of which one is the inner product of the output with
-/// its weights in the loss: float32 rounds such a difference by the size of its terms, and that of a sole Gaussian may be nothing else.
+/// The gradient by a logit is a weight times a difference of two terms; one of them is the inner product of the output
+/// with its weights in the loss. The rounding of such a difference in float32 has the size of its terms, and for a
+/// single Gaussian it may be all that is left.
 #[track_caller]
 fn assert_alike(what: &str, found: &(Vec<f32>, [Vec<f32>; 6]), expected: &(Vec<f32>, [Vec<f32>; 6]), weights: &[f64]) {
     assert_close_relative(&format!("{what}: output"), &found.0, &expected.0, 3e-6);
@@ -210,7 +211,8 @@ fn where_all_weights_but_one_are_lost() {
             case.inputs[4].fill(precision);
             let weights = loss_weights(60, &mut random);
             let what = format!("at {place}, precision {precision}, stillness {stillness}");
-            // Where all exponents are 1e8, float32 decides which node is the nearest by rounding: there only numbers are asked for.
+            // Where all exponents are 1e8, rounding decides in float32 which node is the nearest: there the results
+            // only have to be finite.
             let expected = case.run(&Device::flex(), &weights, plain);
             for (name, device) in devices() {
                 let found = case.run(&device, &weights, skin);

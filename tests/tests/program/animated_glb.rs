@@ -1,4 +1,4 @@
-//! `export` of control nodes to glTF: what another program makes of skin and animation, against the scene itself.
+//! `export` of control nodes to glTF: skin and animation as another program runs them, against the scene itself.
 
 use std::fs;
 use std::path::Path;
@@ -17,7 +17,7 @@ const LIFETIMES: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/golden-streams/lif
 /// Twelve nodes, and one joint that never moves.
 const JOINTS: usize = 13;
 const FPS: f64 = 25.0;
-/// Rounding of float32, of which the model makes use.
+/// Bound of the rounding in float32, with which the model computes.
 const ROUNDING: f64 = 2e-6;
 
 /// A program that knows glTF 2.0 and nothing else; no part of it is shared with the writer.
@@ -72,7 +72,7 @@ impl Player {
         from.iter().zip(to).map(|(from, to)| keep * from + take * to).collect()
     }
 
-    /// What each joint does to vertices.
+    /// The transformation of vertices by each joint.
     fn joint_matrices(&self, seconds: f64) -> Vec<DMat4> {
         let mut nodes = self.json["nodes"].as_array().unwrap().clone();
         let animation = &self.json["animations"][0];
@@ -130,7 +130,7 @@ fn points(tensor: &Tensor<2>) -> Vec<DVec3> {
     values_of(tensor).as_chunks::<3>().0.iter().map(|point| DVec3::from_array(point.map(f64::from))).collect()
 }
 
-/// What the scene's own joints do to space.
+/// The transformations of the scene's own joints.
 fn exact_matrices(nodes: &NodesField, time: f32) -> Vec<DMat4> {
     let (places, quats) = nodes.places(time);
     let rotations = values_of(&quats);
@@ -148,12 +148,12 @@ fn exact_matrices(nodes: &NodesField, time: f32) -> Vec<DMat4> {
 struct Errors {
     /// Of a Gaussian's position.
     largest: f64,
-    /// Between keyframes, of where a single joint has a Gaussian that follows it.
+    /// Of the position, between keyframes, that a single joint gives a Gaussian.
     of_joints: f64,
 }
 
-/// Compares at the keyframes and halfway between them, each position with the bound that follows from the weights that were
-/// left out: these joints have the Gaussian elsewhere than the others.
+/// Compares at the keyframes and halfway between them. The bound of each position follows from the weights that were
+/// left out, since those joints would move the Gaussian elsewhere.
 fn compare(player: &Player, scene: &DynamicScene, keyframes: usize) -> Errors {
     let BuiltInField::Nodes(nodes) = &scene.field else { panic!("no nodes") };
     let weights = values_of(&nodes.weights(&scene.gaussians.tensors()));

@@ -109,7 +109,7 @@ fn both_devices_train() {
     }
 }
 
-/// Expected bits of all attributes are those of each, and what is written for each is in the file.
+/// The expected bits of all attributes are the sum over each, and the bits that are written for each are in the file.
 fn assert_bits_of_attributes_add_up(coding: &serde_json::Value) {
     let attributes = coding["attributes"].as_array().unwrap();
     let names: Vec<&str> = attributes.iter().map(|attribute| attribute["name"].as_str().unwrap()).collect();
@@ -203,7 +203,7 @@ fn wishes_become_keys() {
     // The preset has 10000 Gaussians for 200 pixels.
     assert_success(&w.train("small", &[]).args(["--pixels", "16"]).output().unwrap());
     assert_eq!((key("small", "resolution"), key("small", "max_gaussians")), (16.0, 291.0));
-    // What is set by hand wins.
+    // Keys that are set by hand win.
     let overrides = ["train.densify.adaptive.max_gaussians=400"];
     assert_success(&w.train("by-hand", &overrides).args(["--pixels", "16"]).output().unwrap());
     assert_eq!((key("by-hand", "resolution"), key("by-hand", "max_gaussians")), (16.0, 400.0));

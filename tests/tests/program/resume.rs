@@ -11,8 +11,8 @@ fn killed_and_resumed_runs_are_bit_identical() {
     killed_and_resumed(&TINY_COMPRESSION);
 }
 
-/// Nodes are made when motion begins, as many as there are Gaussians for; ways of objects are found by a survey, and knots that
-/// were not seen are continued.
+/// Nodes are made when motion begins, at most one a Gaussian. A survey finds the ways of objects, and unseen knots are
+/// continued.
 #[test]
 fn killed_and_resumed_runs_of_control_nodes_are_bit_identical() {
     let nodes = [

@@ -28,11 +28,11 @@ impl Blend {
         }
     }
 
-    /// Each output is the sum of products of its numbers with the `weights`, as a [`super::kept`] product each, in the
-    /// order of the channels. `used` is memory.
+    /// `output = sum(kept(number · weight))` over the channels in their order, see [`super::kept`]. `used` is scratch
+    /// memory.
     ///
-    /// Channels whose weight is 0 at all eight places are left out, where all numbers are finite: their products are
-    /// then +0. No sum is ever -0, since neither 0 nor any product is, so that adding +0 changes no bit.
+    /// If all numbers are finite, channels whose weight is 0 at all eight places are left out. Their products are +0,
+    /// and adding +0 changes no bit, because no sum is ever -0: neither 0 nor any product is.
     #[inline(always)]
     pub(crate) fn apply(&self, weights: &[Lanes], used: &mut Vec<(usize, Lanes)>, outputs: &mut [Lanes]) {
         used.clear();
@@ -47,8 +47,8 @@ impl Blend {
     }
 }
 
-/// Inlined into what runs in the vectors of the processor (see [`crate::vectors`]); elsewhere a separate and simple function, so that
-/// the compiler keeps the sums in vector registers.
+/// On x86-64 inlined, to be compiled for the vectors of the processor (see [`crate::vectors`]). Elsewhere a separate
+/// and simple function, so that the compiler keeps the sums in vector registers.
 #[cfg_attr(target_arch = "x86_64", inline(always))]
 #[cfg_attr(not(target_arch = "x86_64"), inline(never))]
 fn panel_sums(panel: &[Panel], weights: &[(usize, Lanes)]) -> [Lanes; PANEL] {

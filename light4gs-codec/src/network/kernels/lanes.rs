@@ -19,9 +19,10 @@ pub(crate) fn kept(value: f32) -> f32 {
     if value.abs() < LEAST_MAGNITUDE { 0.0 } else { value }
 }
 
-/// Outputs that are counted together in a cost, which must be the same on every machine.
+/// Number of outputs whose cost is counted together: not the width of a panel, since a cost must be the same on every
+/// machine.
 const COUNTED: usize = 4;
-/// Nanoseconds of a product of so many outputs with one input at eight places.
+/// Nanoseconds to add one input to [`COUNTED`] outputs at eight places.
 const PRODUCT_NANOSECONDS: u64 = 4;
 /// Nanoseconds of a matrix without inputs.
 const MATRIX_NANOSECONDS: u64 = 10;
@@ -33,12 +34,12 @@ pub(super) const GATHER_NANOSECONDS: u64 = 8;
 pub(super) struct Matrix {
     columns: usize,
     outputs: usize,
-    /// Panel by panel, each as wide as [`panel_width`] says: the biases of its outputs, then their weights column by
+    /// Panel by panel, with [`panel_width`] outputs each: the biases of its outputs, then their weights column by
     /// column.
     panels: Vec<f32>,
 }
 
-/// Outputs that are computed together, where so many are left.
+/// Outputs of the next panel, of those that are `left`.
 fn panel_width(left: usize) -> usize {
     WIDEST.min(1 << left.ilog2())
 }
@@ -75,7 +76,7 @@ impl Matrix {
         self.outputs.div_ceil(COUNTED) as u64 * (MATRIX_NANOSECONDS + PRODUCT_NANOSECONDS * self.columns as u64)
     }
 
-    /// Bytes of a matrix of so many columns and outputs, with the overhead of vectors and allocator.
+    /// Bytes of a matrix with these numbers of columns and outputs, and the overhead of vectors and allocator.
     pub(super) fn bytes(columns: u64, outputs: u64) -> u64 {
         let counted = outputs.div_ceil(COUNTED as u64) * (COUNTED * size_of::<f32>()) as u64;
         counted.saturating_mul(columns.saturating_add(1)).saturating_add(128)
@@ -101,7 +102,7 @@ impl Matrix {
         }
     }
 
-    /// Computes the outputs of the first panel; returns what is left of panels and outputs.
+    /// Computes the outputs of the first panel; returns the other panels and outputs.
     #[inline(always)]
     fn apply_panel<'a, const WIDTH: usize>(
         &self,
@@ -117,8 +118,8 @@ impl Matrix {
     }
 }
 
-/// Inlined into what runs in the vectors of the processor (see [`crate::vectors`]); elsewhere a separate and simple function, so that
-/// the compiler keeps the sums in vector registers.
+/// On x86-64 inlined, to be compiled for the vectors of the processor (see [`crate::vectors`]). Elsewhere a separate
+/// and simple function, so that the compiler keeps the sums in vector registers.
 #[cfg(not(all(target_arch = "wasm32", target_feature = "simd128")))]
 #[cfg_attr(target_arch = "x86_64", inline(always))]
 #[cfg_attr(not(target_arch = "x86_64"), inline(never))]

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::network::Layer;
 
-/// The anchors of a plane, those positions whose row and column have an odd sum, packed to half the width.
+/// The anchors of a plane (row + column is odd), packed to half the width.
 #[derive(Clone, Debug)]
 pub(crate) struct AnchorMap {
     packed: PaddedMap,

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{Action, Activation, InputKind, MapPlan, Program, Step, StepKind, ValuePlan, dependence::Before};
 use crate::network::{
-    Layer, LayerKind, Network, Operation,
+    Layer, LayerKind, Network, Node, Operation,
     kernels::{Convolution, MaskedConvolution, TransposedConvolution, kept},
 };
 
@@ -27,89 +27,21 @@ impl Program {
         Self::new(network, self.inputs.clone(), present, Some(self))
     }
 
-    /// `shared` is another program of the same network, whose weights are used.
+    /// `shared` is another program of the same network; the new program uses its weights.
     pub(super) fn new(network: &Network, inputs: Vec<InputKind>, present: &[bool], shared: Option<&Self>) -> Self {
-        let channels: Vec<usize> = network.channels().into_iter().map(|channels| channels as usize).collect();
-        let mut values: Vec<ValuePlan> = Vec::with_capacity(channels.len());
-        for &channels in &channels {
-            let slot = values.last().map_or(0, |last| last.slot + last.channels);
-            values.push(ValuePlan { channels, known: channels, slot, border: None });
-        }
-        for (value, &present) in values.iter_mut().zip(present) {
-            value.known = if present { value.channels } else { 0 };
-        }
-        // How often each value is read. If it is once, an activation can be merged into the step before.
-        let mut reads = vec![0usize; channels.len()];
-        network.nodes.iter().flat_map(|node| &node.inputs).for_each(|value| reads[value.0 as usize] += 1);
-        network.outputs.iter().for_each(|value| reads[value.0 as usize] += 1);
-        // The value that replaces each one.
-        let mut stands: Vec<usize> = (0..channels.len()).collect();
-        let mut steps: Vec<Step> = Vec::with_capacity(network.nodes.len());
+        let mut builder = Builder::new(network, inputs, present);
         for (index, node) in network.nodes.iter().enumerate() {
-            let own = inputs.len() + index;
-            let given: Vec<usize> = node.inputs.iter().map(|value| value.0 as usize).collect();
-            let operands: Vec<usize> = given.iter().map(|&value| stands[value]).collect();
-            if let Some(activation) = Activation::of(&node.operation)
-                && let Some(before) = operands[0].checked_sub(inputs.len())
-                && reads[given[0]] == 1
-                && matches!(network.nodes[before].operation, Operation::Layer(_))
-                && steps[before].activation.is_none()
-            {
-                steps[before].activation = Some(activation);
-                stands[own] = operands[0];
-                steps.push(Step { kind: Arc::new(StepKind::Merged), inputs: Vec::new(), activation: None });
-                continue;
-            }
-            if node.operation.reads_map() {
-                let border = &mut values[operands[0]].border;
-                *border = Some(border.unwrap_or(0).max(node.operation.border()));
-            }
-            if node.operation.makes_map() {
-                values[own].border = Some(0);
-            }
-            let known = |value: usize| values[operands[value]].known;
-            values[own].known = match &node.operation {
-                Operation::Concatenate => {
-                    let (mut offset, mut known) = (0, 0);
-                    for &operand in &operands {
-                        if values[operand].known > 0 {
-                            known = offset + values[operand].known;
-                        }
-                        offset += values[operand].channels;
-                    }
-                    known
-                }
-                Operation::Add | Operation::Multiply
-                    if values[operands[0]].channels == values[operands[1]].channels =>
-                {
-                    known(0).max(known(1))
-                }
-                Operation::Relu
-                | Operation::LeakyRelu(_)
-                | Operation::Resize
-                | Operation::MeanOverHeight
-                | Operation::MeanOverWidth
-                | Operation::Transpose
-                | Operation::Spread => known(0),
-                _ => values[own].channels,
-            };
-            let kind = match shared {
-                Some(program) => Arc::clone(&program.steps[index].kind),
-                None => Arc::new(StepKind::of(&node.operation)),
-            };
-            steps.push(Step { kind, inputs: operands, activation: None });
-        }
-        for (value, kind) in values.iter_mut().zip(&inputs) {
-            if *kind == InputKind::Map {
-                value.border = Some(value.border.unwrap_or(0));
+            if let Some((layer, activation)) = builder.activation_of_layer(node) {
+                builder.merge(layer, activation);
+            } else {
+                let kind = match shared {
+                    Some(program) => Arc::clone(&program.steps[index].kind),
+                    None => Arc::new(StepKind::of(&node.operation)),
+                };
+                builder.append(node, kind);
             }
         }
-        let outputs = network.outputs.iter().map(|value| stands[value.0 as usize]).collect();
-        let slots = values.last().map_or(0, |last| last.slot + last.channels);
-        let (schedule, maps) = (Vec::new(), Vec::new());
-        let mut program = Self { inputs, values, steps, outputs, before: Before::default(), schedule, maps, slots };
-        program.plan();
-        program
+        builder.finish()
     }
 
     /// Finds the actions that compute each map and the outputs, and after which map each map can be freed.
@@ -178,6 +110,137 @@ impl Program {
         });
         read.collect()
     }
+}
+
+/// A program of which the steps up to some node are there.
+struct Builder<'a> {
+    network: &'a Network,
+    inputs: Vec<InputKind>,
+    values: Vec<ValuePlan>,
+    steps: Vec<Step>,
+    /// How often each value is read.
+    reads: Vec<usize>,
+    /// The value that stands for each one: itself, or the layer that its activation was merged into.
+    stand_ins: Vec<usize>,
+}
+
+impl<'a> Builder<'a> {
+    fn new(network: &'a Network, inputs: Vec<InputKind>, present: &[bool]) -> Self {
+        let values = planned_values(network, present);
+        let stand_ins = (0..values.len()).collect();
+        let steps = Vec::with_capacity(network.nodes.len());
+        Self { network, inputs, values, steps, reads: times_read(network), stand_ins }
+    }
+
+    /// The layer and the activation, where a node is an activation that can be merged into the layer before it: no other
+    /// node reads the layer, and it has no activation yet.
+    fn activation_of_layer(&self, node: &Node) -> Option<(usize, Activation)> {
+        let activation = Activation::of(&node.operation)?;
+        let given = node.inputs[0].0 as usize;
+        let layer = self.stand_ins[given];
+        let index = layer.checked_sub(self.inputs.len())?;
+        let fits = self.reads[given] == 1
+            && matches!(self.network.nodes[index].operation, Operation::Layer(_))
+            && self.steps[index].activation.is_none();
+        fits.then_some((layer, activation))
+    }
+
+    /// The next node becomes the activation of a layer.
+    fn merge(&mut self, layer: usize, activation: Activation) {
+        let own = self.next_value();
+        self.stand_ins[own] = layer;
+        self.steps[layer - self.inputs.len()].activation = Some(activation);
+        self.steps.push(Step { kind: Arc::new(StepKind::Merged), inputs: Vec::new(), activation: None });
+    }
+
+    /// The next node becomes a step.
+    fn append(&mut self, node: &Node, kind: Arc<StepKind>) {
+        let own = self.next_value();
+        let operands: Vec<usize> = node.inputs.iter().map(|value| self.stand_ins[value.0 as usize]).collect();
+        if node.operation.reads_map() {
+            let border = &mut self.values[operands[0]].border;
+            *border = Some(border.unwrap_or(0).max(node.operation.border()));
+        }
+        if node.operation.makes_map() {
+            self.values[own].border = Some(0);
+        }
+        self.values[own].known = self.known_channels(&node.operation, own, &operands);
+        self.steps.push(Step { kind, inputs: operands, activation: None });
+    }
+
+    /// The value of the next node.
+    fn next_value(&self) -> usize {
+        self.inputs.len() + self.steps.len()
+    }
+
+    /// The channels of a value that may differ from 0, counted from the first one: [`ValuePlan::known`].
+    fn known_channels(&self, operation: &Operation, own: usize, operands: &[usize]) -> usize {
+        let operand = |index: usize| &self.values[operands[index]];
+        match operation {
+            Operation::Concatenate => known_of_concatenation(operands.iter().map(|&value| &self.values[value])),
+            Operation::Add | Operation::Multiply if operand(0).channels == operand(1).channels => {
+                operand(0).known.max(operand(1).known)
+            }
+            Operation::Relu
+            | Operation::LeakyRelu(_)
+            | Operation::Resize
+            | Operation::MeanOverHeight
+            | Operation::MeanOverWidth
+            | Operation::Transpose
+            | Operation::Spread => operand(0).known,
+            _ => self.values[own].channels,
+        }
+    }
+
+    fn finish(mut self) -> Program {
+        for (value, kind) in self.values.iter_mut().zip(&self.inputs) {
+            if *kind == InputKind::Map {
+                value.border = Some(value.border.unwrap_or(0));
+            }
+        }
+        let outputs = self.network.outputs.iter().map(|value| self.stand_ins[value.0 as usize]).collect();
+        let slots = self.values.last().map_or(0, |last| last.slot + last.channels);
+        let Self { inputs, values, steps, .. } = self;
+        let (schedule, maps) = (Vec::new(), Vec::new());
+        let mut program = Program { inputs, values, steps, outputs, before: Before::default(), schedule, maps, slots };
+        program.plan();
+        program
+    }
+}
+
+/// A plan for each value, one behind the other in the slots. No channel of an absent input is known.
+fn planned_values(network: &Network, present: &[bool]) -> Vec<ValuePlan> {
+    let mut slot = 0;
+    let mut values: Vec<ValuePlan> = Vec::new();
+    for channels in network.channels() {
+        let channels = channels as usize;
+        values.push(ValuePlan { channels, known: channels, slot, border: None });
+        slot += channels;
+    }
+    for (value, _) in values.iter_mut().zip(present).filter(|(_, present)| !**present) {
+        value.known = 0;
+    }
+    values
+}
+
+/// How often the nodes and the outputs read each value.
+fn times_read(network: &Network) -> Vec<usize> {
+    let mut reads = vec![0; network.inputs.len() + network.nodes.len()];
+    let by_nodes = network.nodes.iter().flat_map(|node| &node.inputs);
+    by_nodes.chain(&network.outputs).for_each(|value| reads[value.0 as usize] += 1);
+    reads
+}
+
+/// Up to the last operand with a known channel, all channels count.
+fn known_of_concatenation<'v>(operands: impl Iterator<Item = &'v ValuePlan>) -> usize {
+    let (mut offset, mut known) = (0, 0);
+    for operand in operands {
+        if operand.known > 0 {
+            known = offset + operand.known;
+        }
+        offset += operand.channels;
+    }
+    known
 }
 
 impl Activation {

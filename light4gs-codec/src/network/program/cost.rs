@@ -19,7 +19,7 @@ pub(crate) struct Cost {
     pub(crate) numbers: u64,
 }
 
-/// Nanoseconds of one action at eight places, without those for its channels.
+/// Nanoseconds of one action at eight places, besides those of its channels.
 const ACTION: u64 = 16;
 /// Nanoseconds of a channel at eight places: to compute it from as many others, to read it from a map, to write it to a
 /// map.
@@ -39,8 +39,8 @@ const SCATTER: u64 = 40;
 const WORKSPACE: u64 = 6;
 
 impl Program {
-    /// The cost of running over a target, given the sizes of all values: of all maps, and of the outputs at all places;
-    /// and the most numbers that its maps hold at a time.
+    /// The time to compute all maps, and the outputs at all places of a target; and the largest number of numbers in
+    /// its maps at a time. `sizes` are those of all values.
     pub(crate) fn cost(&self, sizes: &[[u32; 2]], target: [u32; 2]) -> Cost {
         let mut cost = Cost::default();
         let first = self.inputs.len();

@@ -1,4 +1,4 @@
-//! What is computed once for all times, once for all places, and at each place and time.
+//! Which values are computed once for all times, which once for all places, and which at each place and time.
 
 use std::sync::Arc;
 
@@ -28,20 +28,20 @@ impl Dependence {
     }
 }
 
-/// What comes before the schedule of a program over places and times, and which values these actions leave to it.
+/// The actions before the schedule of a program over places and times, and the values that they leave to it.
 #[derive(Debug, Default)]
 pub(super) struct Before {
-    /// The actions that compute what is the same everywhere.
+    /// Actions for values that are the same everywhere.
     constant: Vec<Action>,
-    /// Those for what depends on the time alone, and which the outputs need.
+    /// Actions for values that depend on the time alone.
     time: Vec<Action>,
-    /// Those for what depends on the place alone.
+    /// Actions for values that depend on the place alone.
     place: Vec<Action>,
-    /// What the schedule and the outputs read of the place alone, inputs excepted.
+    /// The values of the place alone, inputs excepted, that the schedule or an output reads.
     kept: Vec<usize>,
-    /// Inputs that the schedule or an output reads.
+    /// For each input, whether the schedule or an output reads it.
     read: Vec<bool>,
-    /// Values that are the numbers of blends, and how many channels a blend adds up.
+    /// For each blend, the value that holds its numbers, and the number of channels that it adds up.
     blends: Vec<(usize, usize)>,
 }
 
@@ -52,40 +52,62 @@ impl Program {
     pub(crate) fn over_time(network: &Network, inputs: &[Dependence]) -> Self {
         let kinds = vec![InputKind::Lanes; network.inputs.len()];
         let mut program = Self::new(network, kinds, &vec![true; network.inputs.len()], None);
-        let mut dependence = inputs.to_vec();
-        for (node, step) in network.nodes.iter().zip(&program.steps) {
-            let constant = is_constant(&node.operation) && dependence[step.inputs[0]] == Dependence::TIME;
-            dependence.push(match step.inputs[..] {
-                // The time is finite, so products with 0 are 0.
-                [time] if constant && time < inputs.len() => Dependence::NOTHING,
-                _ => step.inputs.iter().fold(Dependence::NOTHING, |all, &input| all.or(dependence[input])),
-            });
-        }
+        let dependence = program.dependence_of_values(network, inputs);
         program.find_blends(&dependence);
-        for action in std::mem::take(&mut program.schedule) {
-            let (Action::Load(value) | Action::Run(value)) = action;
-            let actions = match dependence[value] {
-                Dependence::NOTHING => &mut program.before.constant,
-                Dependence::TIME => &mut program.before.time,
-                Dependence::PLACE => &mut program.before.place,
-                _ => &mut program.schedule,
-            };
-            actions.push(action);
-        }
-        let steps = program.schedule.iter().filter_map(|action| match *action {
-            Action::Run(value) => Some(&program.steps[value - inputs.len()].inputs),
-            Action::Load(_) => None,
-        });
-        let mut read = vec![false; program.values.len()];
-        steps.chain([&program.outputs]).flatten().for_each(|&value| read[value] = true);
-        let is_kept = |&value: &usize| read[value] && dependence[value] == Dependence::PLACE;
-        program.before.kept = (inputs.len()..read.len()).filter(is_kept).collect();
-        read.truncate(inputs.len());
-        program.before.read = read;
+        program.split_schedule(&dependence);
+        program.find_kept(&dependence);
         program
     }
 
-    /// Sums of products with what is the same at all places become one step each.
+    /// The dependence of every value: that of all that it is computed from.
+    fn dependence_of_values(&self, network: &Network, inputs: &[Dependence]) -> Vec<Dependence> {
+        let mut dependence = inputs.to_vec();
+        for (node, step) in network.nodes.iter().zip(&self.steps) {
+            let of_operands = step.inputs.iter().fold(Dependence::NOTHING, |all, &input| all.or(dependence[input]));
+            // Weights of 0 times the time are 0, because the time is finite. Other values may be infinite.
+            let reads_the_time = of_operands == Dependence::TIME && step.inputs[0] < inputs.len();
+            let constant = reads_the_time && is_constant(&node.operation);
+            dependence.push(if constant { Dependence::NOTHING } else { of_operands });
+        }
+        dependence
+    }
+
+    /// Moves the actions that are not needed at each place and time from the schedule to those before it.
+    fn split_schedule(&mut self, dependence: &[Dependence]) {
+        for action in std::mem::take(&mut self.schedule) {
+            let (Action::Load(value) | Action::Run(value)) = action;
+            let actions = match dependence[value] {
+                Dependence::NOTHING => &mut self.before.constant,
+                Dependence::TIME => &mut self.before.time,
+                Dependence::PLACE => &mut self.before.place,
+                _ => &mut self.schedule,
+            };
+            actions.push(action);
+        }
+    }
+
+    /// Finds the inputs, and the values of the place alone, that the rest of the schedule and the outputs read.
+    fn find_kept(&mut self, dependence: &[Dependence]) {
+        let first = self.inputs.len();
+        let mut read = self.read_by_schedule();
+        let is_kept = |&value: &usize| read[value] && dependence[value] == Dependence::PLACE;
+        self.before.kept = (first..read.len()).filter(is_kept).collect();
+        read.truncate(first);
+        self.before.read = read;
+    }
+
+    /// Whether the schedule or an output reads each value.
+    fn read_by_schedule(&self) -> Vec<bool> {
+        let operands = self.schedule.iter().filter_map(|action| match *action {
+            Action::Run(value) => Some(&self.steps[value - self.inputs.len()].inputs),
+            Action::Load(_) => None,
+        });
+        let mut read = vec![false; self.values.len()];
+        operands.chain([&self.outputs]).flatten().for_each(|&value| read[value] = true);
+        read
+    }
+
+    /// Replaces a sum of products by one step where one factor of each product is the same at all places.
     fn find_blends(&mut self, dependence: &[Dependence]) {
         let first = self.inputs.len();
         let mut reads = vec![0usize; self.values.len()];
@@ -125,7 +147,7 @@ impl Program {
         workspace
     }
 
-    /// Computes what depends on the time alone.
+    /// Computes the values that depend on the time alone.
     pub(crate) fn run_time(&self, workspace: &mut Workspace) {
         self.perform_at_places(&self.before.time, workspace);
         self.set_blends(workspace);
@@ -138,7 +160,7 @@ impl Program {
         }
     }
 
-    /// Computes what depends on the place alone.
+    /// Computes the values that depend on the place alone.
     pub(crate) fn run_place(&self, workspace: &mut Workspace) {
         self.perform_at_places(&self.before.place, workspace);
     }
@@ -153,7 +175,7 @@ impl Program {
         self.before.kept.iter().map(|&value| self.values[value].channels).sum()
     }
 
-    /// Appends what [`Program::run_place`] has computed for [`Program::run`].
+    /// Appends the values of [`Program::run_place`] that [`Program::run`] reads.
     pub(crate) fn save(&self, workspace: &Workspace, to: &mut Vec<Lanes>) {
         for &value in &self.before.kept {
             let ValuePlan { slot, channels, .. } = self.values[value];
@@ -161,7 +183,7 @@ impl Program {
         }
     }
 
-    /// Takes what [`Program::save`] has appended, in place of [`Program::run_place`].
+    /// Takes the values that [`Program::save`] has appended, instead of calling [`Program::run_place`].
     pub(crate) fn load(&self, mut saved: &[Lanes], workspace: &mut Workspace) {
         for &value in &self.before.kept {
             let ValuePlan { slot, channels, .. } = self.values[value];

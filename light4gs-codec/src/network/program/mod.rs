@@ -7,7 +7,7 @@
 //! | file | what |
 //! |---|---|
 //! | `build.rs` | from a network to a program |
-//! | `dependence.rs` | what is computed once for all times, what once for all places |
+//! | `dependence.rs` | which values are computed once for all times, which once for all places |
 //! | `run.rs` | a program over maps, or at single places |
 //! | `cost.rs` | the cost of running it |
 
@@ -41,7 +41,7 @@ pub(crate) struct Program {
     values: Vec<ValuePlan>,
     steps: Vec<Step>,
     outputs: Vec<usize>,
-    /// The actions that come before the schedule, where places and times are told apart.
+    /// The actions before the schedule, in a program over places and times.
     before: dependence::Before,
     /// The actions that compute the outputs at a place.
     schedule: Vec<Action>,
@@ -58,7 +58,7 @@ struct ValuePlan {
     known: usize,
     /// Where its channels begin among the slots of a workspace.
     slot: usize,
-    /// The border that its map needs, where it must be there as a map.
+    /// The border of its map; `None` if it is not computed as a map.
     border: Option<usize>,
 }
 
@@ -107,7 +107,7 @@ enum StepKind {
     GroupMaximum(usize),
     Select(Vec<u32>),
     /// A product with numbers that are the same at all places, and the sum of each of its groups. Its inputs are the
-    /// numbers and the weights; it is the blend of this number.
+    /// numbers and the weights; the field is the index of the blend in the workspace.
     Blend(usize),
     /// Merged into the step before, which computes its value.
     Merged,

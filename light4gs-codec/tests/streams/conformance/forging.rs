@@ -1,4 +1,4 @@
-//! Files of the set that are made of others: `tests/conformance/kit/forging.py` says how.
+//! Files of the set that are made from others, see `tests/conformance/kit/forging.py`.
 
 use crate::common::{ENTRY, forge_header, payload, put, table_at, u32_at};
 

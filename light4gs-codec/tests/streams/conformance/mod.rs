@@ -1,4 +1,4 @@
-//! The conformance set, `tests/conformance`, against this decoder: what it accepts, to the bit, and what it refuses.
+//! The conformance set, `tests/conformance`, against this decoder: accepted files to the bit, and refused files.
 
 mod forging;
 #[path = "../../../examples/conformance/text.rs"]

@@ -94,7 +94,7 @@ fn full_motion(scene: &SceneData, random: &mut Random) -> MotionArrays {
     }
 }
 
-/// A network that every operation occurs in which the golden streams lack, over a plane, a latent and another plane.
+/// A network with every operation that the golden streams lack, over a plane, a latent and another plane.
 fn rare_operations(random: &mut Random, channels: u32) -> Network {
     let (mut network, [below, latent, other]) = Network::new([channels, 1, channels]);
     let half = network.layer(below, random.layer(LayerKind::Halving, channels, 4, 3, 2));
@@ -319,7 +319,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
     };
     streams.push(("clusters", compressed(&many, &coding)));
 
-    // So many equal Gaussians that zeros fill the section.
+    // Equal Gaussians, and so many of them that zeros fill the section.
     let one = clusters(1);
     let equal = GaussianArrays {
         means: vec![one.means[0]; 5000],

@@ -1,10 +1,10 @@
 //! COLMAP: a sparse model (binary or text) and the images that it was made from.
 //!
-//! The model lies in `sparse/0`, `sparse`, `colmap/sparse/0`, `distorted/sparse/0` or the folder itself; of several, one for
-//! each part of the capture that COLMAP could connect, the one with most images is taken. The images lie in
-//! `images`, or a smaller version of them in `images_2`, `images_4`, `images_8`. COLMAP knows no time: it comes from the
-//! images' names, see [`places`]. One folder of numbered frames is one moving camera; folders `cam00`, `cam01`... with the
-//! same numbers are a rig.
+//! The model lies in `sparse/0`, `sparse`, `colmap/sparse/0`, `distorted/sparse/0` or the folder itself; where there
+//! are several (COLMAP writes one for each part of the capture that it could connect), the one with the most images is
+//! taken. The images lie in `images`, or a smaller version of them in `images_2`, `images_4`, `images_8`. COLMAP knows
+//! no time: it comes from the images' names, see [`places`]. One folder of numbered frames is one moving camera;
+//! folders `cam00`, `cam01`... with the same numbers are a rig.
 
 mod binary;
 pub(crate) mod model;
@@ -179,7 +179,7 @@ fn find_images(root: &Path, model: &Model) -> Result<PathBuf, DataError> {
         let expected = root.join("images").join(first);
         DataError::image(
             &expected,
-            format!("missing, with every image that {} names", model.images_file.display()),
+            format!("missing, like every other image that {} names", model.images_file.display()),
             "copy the images into the folder `images`",
         )
     })

@@ -1,4 +1,4 @@
-//! A sparse model of COLMAP in memory, and what its camera models mean.
+//! A sparse model of COLMAP in memory, and the meaning of its camera models.
 
 use crate::camera::Intrinsics;
 use crate::error::DataError;
@@ -8,7 +8,7 @@ use glam::{DMat3, DQuat, DVec3};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
-/// What a malformed file is told.
+/// The remedy for a malformed file.
 pub(super) const REMEDY: &str = "export the model again with `colmap model_converter`";
 
 /// A camera with its lens.

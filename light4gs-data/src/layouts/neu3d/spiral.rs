@@ -8,8 +8,8 @@ const FRAMES: usize = 300;
 const ROUNDS: f64 = 2.0;
 /// How often the path goes back and forth in one turn.
 const DEPTH_RATE: f64 = 0.5;
-/// The depth that is looked at, as a share between the (reciprocal) nearest and farthest depth; and how far beyond the
-/// bounds these two are taken.
+/// The depth of the point that the path looks at, as a share between the (reciprocal) nearest and farthest depth; and
+/// the factors by which these two lie beyond the bounds.
 const FOCUS_SHARE: f64 = 0.75;
 const CLOSE_FACTOR: f64 = 0.9;
 const FAR_FACTOR: f64 = 5.0;
@@ -49,7 +49,7 @@ pub(super) fn spiral(poses: &[(DMat3, DVec3)], near: f64, far: f64) -> Vec<(DMat
         .collect()
 }
 
-/// The value below which that share of the values lies; linear between values.
+/// The quantile at [`RADIUS_PERCENTILE`], linear between the sorted values; 0 without values.
 fn percentile(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let Some(last) = values.len().checked_sub(1) else { return 0.0 };

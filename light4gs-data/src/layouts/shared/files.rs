@@ -72,8 +72,8 @@ pub(crate) fn natural(a: &str, b: &str) -> Ordering {
     left.len().cmp(&right.len()).then_with(|| a.cmp(b))
 }
 
-/// A path that a file of the dataset names, below `root`. Paths that leave the folder are refused: absolute ones, and
-/// those with more `..` than folders before them.
+/// A path from a file of the dataset, as a path below `root`. Paths that leave the folder are refused: absolute ones,
+/// and those with more `..` than folders before them.
 ///
 /// `file` and `field` say where the path was found.
 pub(crate) fn inside(root: &Path, file: &Path, field: &str, name: &str) -> Result<PathBuf, DataError> {

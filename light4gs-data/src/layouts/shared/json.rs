@@ -5,7 +5,7 @@ use crate::regular_file::read_regular_text;
 use serde_json::Value;
 use std::path::Path;
 
-/// A file of cameras has kilobytes; a larger file than this is none.
+/// Largest size in bytes. A file of cameras has kilobytes, so a larger file is something else.
 const MAX_BYTES: u64 = 256 << 20;
 
 /// Reads a JSON file. The words `NaN`, `Infinity` and `-Infinity`, which Python writes though JSON has no such numbers,
@@ -43,7 +43,7 @@ fn quote_non_finite(text: &str) -> String {
     out
 }
 
-/// A short word for what a field holds, for messages.
+/// A short word for the type of a field's value, for messages.
 pub(in crate::layouts) fn describe(value: Option<&Value>) -> String {
     match value {
         None => "missing".into(),

@@ -4,7 +4,7 @@ use crate::error::DataError;
 use crate::regular_file::read_regular_file;
 use std::path::Path;
 
-/// Poses and points have megabytes; a larger file than this is neither.
+/// Largest size in bytes. Poses and points have megabytes, so a larger file is neither.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// A two-dimensional array, row-major.

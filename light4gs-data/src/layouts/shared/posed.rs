@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Most pixels of an image as it is used, so that several fit into memory.
 const MAX_USED_PIXELS: u64 = 1 << 26;
 
-/// An image of a capture with what the capture's files say about it.
+/// An image of a capture, with the facts about it from the capture's files.
 #[derive(Clone, Debug)]
 pub(in crate::layouts) struct PosedImage {
     pub(in crate::layouts) name: String,
@@ -156,7 +156,7 @@ pub(in crate::layouts) fn present<T>(
     if 2 * absent > count {
         return Err(DataError::image(
             &first,
-            format!("missing, with {absent} of the {count} images that {described_in} names"),
+            format!("missing; in all, {absent} of the {count} images that {described_in} names are missing"),
             "copy the images there, or name the folder that holds them",
         ));
     }

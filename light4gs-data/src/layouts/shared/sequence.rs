@@ -4,7 +4,7 @@ use super::files::{natural, stem_of};
 use std::collections::{BTreeSet, HashMap};
 use std::path::Path;
 
-/// One of this many times is held out, where no camera can be.
+/// Where no camera can be held out, one of this many times is.
 const HELD_OUT_EVERY: usize = 8;
 /// A rig with fewer cameras cannot do without one.
 const LEAST_CAMERAS: usize = 4;
@@ -14,7 +14,7 @@ const SPARSEST: u64 = 20;
 /// Camera and time of an image.
 #[derive(Clone, Debug, PartialEq)]
 pub(in crate::layouts) struct Place {
-    /// Which camera took it, counted from 0 in natural order of the cameras' names.
+    /// The camera, counted from 0 in natural order of the cameras' names.
     pub(in crate::layouts) camera: u32,
     /// Time in `[0, 1]`.
     pub(in crate::layouts) time: f64,
@@ -22,7 +22,7 @@ pub(in crate::layouts) struct Place {
 
 /// Cameras and times of images, from their paths relative to the folder of images.
 ///
-/// The last number of a name counts the times. What stands before it, with the folder, names the camera:
+/// The last number of a name counts the times. The text before it, with the folder, names the camera:
 /// `cam03/0017.png` and `cam03_0017.png` are both time 17 of camera `cam03`, and `frame_0017.png` alone is a moving
 /// camera. Where an image was left out, the numbers leave a gap in time, as they should. Names without such numbers are
 /// taken in natural order, one time each.
@@ -76,8 +76,8 @@ fn camera_and_number(name: &str) -> Option<(String, u64)> {
     Some((format!("{folder}/{}|{}", &stem[..start], &stem[end..]), number))
 }
 
-/// Which images are held out for testing, where the dataset has no split: camera 0 of a rig, as is usual; with fewer
-/// than 4 cameras, or a moving one, every eighth time, from the middle of the first eight.
+/// Whether each image is held out for testing, in a dataset without splits. From a rig, camera 0 is held out, as is
+/// usual; with fewer than 4 cameras, or a moving one, every eighth time, from the middle of the first eight.
 pub(in crate::layouts) fn held_out(places: &[Place]) -> Vec<bool> {
     let cameras: BTreeSet<u32> = places.iter().map(|place| place.camera).collect();
     if cameras.len() >= LEAST_CAMERAS {

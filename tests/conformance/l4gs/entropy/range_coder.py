@@ -66,7 +66,7 @@ class RangeDecoder:
         return 1
 
     def raw(self, bits: int) -> int:
-        """An unsigned integer of so many bits, in chunks of 12, the lowest first."""
+        """An unsigned integer of `bits` bits, in chunks of 12, the lowest first."""
         value = shift = 0
         while shift < bits:
             chunk = min(_RAW_CHUNK, bits - shift)

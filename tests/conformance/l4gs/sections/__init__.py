@@ -1,1 +1,1 @@
-"""One file for each section of the stream, and for what several of them share."""
+"""One file for each section of the stream, and for code that several of them share."""

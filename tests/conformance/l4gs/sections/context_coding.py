@@ -32,7 +32,7 @@ def usable_means(means: np.ndarray) -> np.ndarray:
 
 
 def read_context_coded_planes(reader: Reader, planes: Planes, model: ContextModel, budget: Budget) -> None:
-    """Reads what follows the head, and fills in the planes' values."""
+    """Reads the bytes after the head, and fills in the planes' values."""
     take_memory(reader, planes, budget)
     fits = planes.channels == model.channels
     reader.require(fits, "channels", f"those of the context model, {model.channels}, not {planes.channels}")
@@ -108,7 +108,7 @@ class _PlaneDecoder:
         return latent
 
     def _parameters(self, anchors: np.ndarray | None, odd: np.ndarray) -> np.ndarray:
-        """Scales, then means, at every place: `[2 C, H, W]`. Without anchors, what needs them is zeros everywhere."""
+        """Scales, then means, at every place: `[2 C, H, W]`. Without anchors, conditions that need them are zeros everywhere."""
         prior = self.model.prior_of[self.place]
         network = self.model.networks[prior.distribution]
         size = self.planes.sizes[self.place]

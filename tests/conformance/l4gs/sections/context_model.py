@@ -22,7 +22,7 @@ ANCHORS, LATENT, BELOW = 6, 7, 8
 
 @dataclass
 class Condition:
-    """A network and what each of its inputs is; `None` stands for zeros."""
+    """A network and the sources of its inputs; `None` stands for zeros."""
 
     network: int | None
     sources: list[int] = field(default_factory=list)

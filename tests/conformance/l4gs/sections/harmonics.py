@@ -220,7 +220,7 @@ class _Decoder:
         self._means[of, begin:end] = usable_means(parameters[:, prior.channels :])
 
     def _source(self, source: int, begin: int, of: slice) -> np.ndarray:
-        """What an input is, for some Gaussians: `[channels, 1, Gaussians]`."""
+        """The values of an input for some Gaussians: `[channels, 1, Gaussians]`."""
         if source == _CHANNELS_BEFORE:
             value = self._values[of, :begin].T
         elif source == _SPACE_FEATURES:

@@ -1,4 +1,4 @@
-"""What moves the Gaussians: "`motion`"."""
+"""The motion of the Gaussians: "`motion`"."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST_AXES = 8
 
 @dataclass
 class Source:
-    """What an input of the network is; `attribute` is empty where it is none."""
+    """The source of an input of the network; `attribute` is empty unless it is an attribute."""
 
     kind: int
     attribute: str = ""
@@ -105,7 +105,7 @@ def _read_outputs(reader: Reader, network: Network) -> list[int]:
 
 @dataclass
 class Scene:
-    """What the network may read, and what it changes."""
+    """The values that the network may read, and those that it changes."""
 
     gaussians: Gaussians
     harmonics: Harmonics
@@ -138,7 +138,7 @@ class Scene:
             reader.require(channels == wanted, f"input {i}", f"{wanted} channels, not {channels}")
 
     def check_shown(self) -> None:
-        """Refuses to show a scene that would look wrong, since nothing says what one of its attributes does.
+        """Refuses to show a scene that would look wrong, since one of its attributes is not known.
 
         Motion without a network is of a kind that only its own program knows; here such scenes stand still.
         """

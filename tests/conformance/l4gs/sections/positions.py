@@ -14,7 +14,7 @@ _MANY = 16
 
 @cache
 def _splits(count: int) -> list[int]:
-    """0, n, 1, n - 1, 2, ...: how many of `count` codes have a 0, in the order in which the stream asks."""
+    """0, n, 1, n - 1, 2, ...: the numbers of codes, of `count`, with a 0, in the order in which the stream asks."""
     order = []
     for i in range(count // 2 + 1):
         order.append(i)

@@ -10,7 +10,7 @@
 //! | `random.rs` | numbers that follow from a seed |
 //! | `parts.rs` | a stream taken apart, and put together with checksums that fit |
 //! | `sound.rs` | sound streams to begin with |
-//! | `mutations.rs` | what is done to them |
+//! | `mutations.rs` | changes to them |
 //! | `bombs.rs` | streams that promise much with few bytes |
 //! | `transfers.rs` | streams that come in pieces, cut anywhere and resumed anywhere |
 //! | `watch.rs` | memory, time and panics of one decoding |

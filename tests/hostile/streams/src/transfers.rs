@@ -1,7 +1,6 @@
 //! Streams that come in pieces: cut anywhere, resumed anywhere, damaged on the way.
-//!
-//! Whatever happens, an error comes or the right picture: layers that are shown are those of the file that was sent, and a
-//! stream that comes to its end is the scene that [`decode`] gives.
+//! Whatever happens, the result is an error or the right picture: shown layers are those of the file that was sent, and
+//! a complete stream gives the scene of [`decode`].
 
 use light4gs_codec::{CodecError, SceneData, StreamDecoder, decode};
 
@@ -13,12 +12,12 @@ use crate::{
     watch::{Decoder, Outcome},
 };
 
-/// What a decoder gets.
+/// The bytes that a decoder gets, in pieces.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Transfer {
     /// How it was made.
     pub kind: &'static str,
-    /// What comes, one after the other, and whether it is decoded at once.
+    /// The pieces in order, and whether each is decoded at once.
     pub pieces: Vec<(Vec<u8>, bool)>,
     /// Which file was sent; none where the sender lies.
     file: Option<usize>,
@@ -94,7 +93,7 @@ impl Transfers {
         Transfer { kind, pieces: pieces(&sent, &mut random), file }
     }
 
-    /// Decodes what comes while it comes.
+    /// Decodes the pieces as they come.
     pub fn run(&self, transfer: &Transfer, decoder: &Decoder) -> Outcome {
         let whole = decode(&transfer.bytes());
         let sent = transfer.file.map(|file| &self.files[file].1);

@@ -1,4 +1,4 @@
-//! The golden streams of control nodes, damaged field by field: what is refused names its field, and what is not can be
+//! The golden streams of control nodes, damaged field by field: an error names the field, and an accepted stream can be
 //! played.
 
 use light4gs_codec::{MotionEvaluator, decode};
@@ -22,7 +22,7 @@ enum Form {
     Byte,
     Varint,
     Float,
-    /// Of which the first byte is damaged.
+    /// Several bytes, of which only the first is damaged.
     Text,
 }
 
@@ -144,7 +144,7 @@ fn damage(form: Form) -> Vec<Vec<u8>> {
     }
 }
 
-/// What no field of a form may hold.
+/// Values that no field of a form may hold.
 fn absurd(form: Form) -> Vec<u8> {
     match form {
         Form::Byte => vec![0x7f],
@@ -162,7 +162,7 @@ fn with(parts: &Parts, field: &Field, new: &[u8]) -> Vec<u8> {
     parts.assemble()
 }
 
-/// The error of a stream, after which nothing is left to be found fault with; or none, if it can be played.
+/// The error of a stream; none if it can be played.
 fn error(decoder: &Decoder, bytes: &[u8], what: &dyn std::fmt::Debug) -> Option<String> {
     let outcome = decoder.run(bytes);
     assert!(outcome.fault().is_none() && outcome.bytes < 32 << 20, "{what:?}: {outcome:?}");

@@ -1,6 +1,6 @@
-//! Launches of the wgpu back end on golden scenes, written down for other implementations of WebGPU: each kernel's text, what
-//! it was given and what it made of it here, and what the golden vectors say must come out in the end. `.ci/webgpu` runs them
-//! in Chromium.
+//! Launches of the wgpu back end on golden scenes, written down for other implementations of WebGPU: each kernel's
+//! text, its inputs, its outputs here, and the results that the golden vectors demand in the end. `.ci/webgpu` runs
+//! them in Chromium.
 //!
 //! `LIGHT4GS_LAUNCHES` names the folder that they are written to. Without it the test checks only that every kernel which is
 //! launched is in the list of all kernels, and that every shader is launched.

@@ -17,7 +17,7 @@ pub(super) struct Outcome {
 }
 
 impl Outcome {
-    /// `found` are the values of this machine, which say where in the buffers they are.
+    /// `found` are the values of this machine, by which their place in the buffers is found.
     pub(super) fn within(what: &str, found: Vec<f32>, expected: Vec<f32>, tolerance: f32) -> Self {
         assert_eq!(found.len(), expected.len(), "{what}");
         Self { what: what.to_owned(), found, expected, tolerance }
@@ -80,7 +80,7 @@ impl Transcript {
     }
 
     pub(super) fn add(&mut self, name: &str, mut launches: Vec<RecordedLaunch>, outcomes: Vec<Outcome>) {
-        // What this adapter says of its subgroups is no rule for others.
+        // The subgroups of this adapter are no rule for others.
         launches.retain(|launch| launch.kernel.name() != SUBGROUPS.name);
         assert!(!launches.is_empty(), "{name}: nothing was launched");
         let outcomes: Vec<Value> = outcomes

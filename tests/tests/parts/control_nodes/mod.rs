@@ -1,4 +1,4 @@
-//! Control nodes: what a file describes of them is what trains, and hostile descriptions are refused.
+//! Control nodes: the description in a file is the field that trains, and hostile descriptions are refused.
 
 mod golden;
 mod motion;
@@ -75,7 +75,7 @@ fn nothing_moves_when_motion_begins() {
     }
 }
 
-/// The codec runs what a file describes, and finds the Gaussians where the model has them.
+/// The codec runs the description in a file, and moves the Gaussians as the model does.
 #[test]
 fn the_codec_moves_gaussians_as_the_model_does() {
     for (name, device) in devices() {
@@ -100,7 +100,7 @@ fn the_codec_moves_gaussians_as_the_model_does() {
     }
 }
 
-/// Another program that skins by weights and places of the nodes finds the Gaussians where the model has them.
+/// Another program that skins by weights and positions of the nodes moves the Gaussians as the model does.
 #[test]
 fn weights_and_places_of_the_nodes_are_those_of_skinning() {
     for (name, device) in devices() {
@@ -183,7 +183,7 @@ fn what_stands_still_stands_still() {
     assert_close("far from every node", &values_of(&scene.at(0.6).means), &values_of(&far.val()), 1e-5);
 }
 
-/// What a configuration may ask for is a file that everybody reads.
+/// Every configuration that is accepted gives a file that everybody reads.
 #[test]
 fn the_largest_field_is_within_the_limits_for_strangers() {
     let device = Device::flex();
@@ -195,7 +195,7 @@ fn the_largest_field_is_within_the_limits_for_strangers() {
     assert!(decode(&encode(&data).unwrap()).unwrap() == data);
 }
 
-/// Every field by its name, before anything is made of it.
+/// Every field is named, before memory is taken for it.
 #[test]
 fn other_networks_are_refused() {
     let scene = scene(NodesFieldConfig::new().with_nodes(4), &Device::flex());

@@ -71,7 +71,7 @@ impl Case {
         (values_of(&output), leaves.iter().map(gradient).collect())
     }
 
-    /// Where each node is moved, and how it is turned.
+    /// Position and rotation of each node at the time.
     fn motions(&self) -> Vec<(DVec3, DQuat)> {
         let spline = |inputs: &[f64], columns: usize, at: usize| -> f64 {
             let place = self.time * (self.knots - 3) as f64;
@@ -114,7 +114,7 @@ impl Case {
         posed
     }
 
-    /// The regularizer in float64, with weights of neighbors as if the parameters were those of `weighed`.
+    /// The regularizer in float64. The weights of neighbors are those of the parameters `weighed`.
     fn regularized(&self, weighed: &Case, rigidity: f64, smoothness: f64) -> f64 {
         let motions = self.motions();
         let (mut strain, mut weights) = (0.0, 0.0);

@@ -1,4 +1,4 @@
-//! What is found while all times are seen stays when a window narrows: where objects are, and not how they are turned.
+//! Ways that a survey of all times has found stay when the window narrows; rotations do not.
 
 use burn::module::Param;
 use burn::tensor::{Device, Tensor, TensorData};
@@ -100,7 +100,7 @@ fn what_bounces_without_turning_stays_where_it_is() {
     }
 }
 
-/// Turns are taken back, around the middle of what turns.
+/// Rotations are taken back, around the middle of the object.
 #[test]
 fn what_turns_stays_on_its_way() {
     let mut scene = thrown(0.5, &Device::flex().autodiff());

@@ -6,7 +6,7 @@ use light4gs_model::ops::neighborhoods::{Neighborhoods, neighborhoods};
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::random::Random;
 
-/// What rows of a table and their neighbors say, and the gradient of the table for a weighted sum of that.
+/// The neighborhoods of rows of a table, and the gradient of the table for a weighted sum of them.
 fn run(
     device: &Device,
     table: &[f32],
