@@ -52,8 +52,9 @@
 //! [network weights](network_weights) adaptively. The networks that give coding intervals are evaluated by an executor
 //! of this crate, in plain float32 arithmetic of a fixed order, so a stream decodes to the same bits on every machine.
 //! The stream holds them as [descriptions](network), so a model is free in what its networks consist of. The encoder
-//! decodes what it wrote and compares before it returns. [`decode`] reads all streams alike, [`OpenStream`] reads one
-//! section by section, and [`info`] tells what is inside.
+//! decodes what it wrote and compares before it returns, and returns all that it knows: the stream, the decoded scene, the
+//! bytes of each part ([`Encoded`]). [`decode`] reads all streams alike, [`OpenStream`] reads one section by section, or all
+//! of it once with what [`info`] tells.
 //!
 //! # Hostile bytes, other platforms
 //!
@@ -115,8 +116,8 @@ pub use scene::{
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use steps::PerGroup;
 pub use stream::{
-    CompressionInput, CompressionReport, Encoded, GaussianLayers, LayerInfo, OpenStream, Profile, SectionInfo,
+    CompressionInput, Compressor, Decoded, Encoded, GaussianLayers, LayerInfo, OpenStream, Profile, SectionInfo,
     StreamDecoder, StreamInfo, WeightPrecisions, decode, decode_with_limits, encode, encode_compressed,
-    encode_compressed_with_limits, encode_planes, encode_sh, info, info_with_limits, plane_distributions,
-    sh_distributions,
+    encode_compressed_with_limits, encode_exactly, encode_planes, encode_sh, info, info_with_limits,
+    plane_distributions, sh_distributions,
 };

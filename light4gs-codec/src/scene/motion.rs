@@ -99,7 +99,7 @@ impl NamedTensor {
 }
 
 impl MotionSource {
-    /// Its channels, for planes with so many features and these Gaussians; `None` if they have no such attribute.
+    /// Its channels; `None` if the Gaussians have no such attribute. `features` is the length of a feature of the planes.
     fn channels(&self, features: u64, gaussians: &GaussianArrays) -> Option<u64> {
         match self {
             Self::Features => Some(features),
@@ -147,6 +147,25 @@ impl MotionOutput {
 }
 
 impl MotionArrays {
+    /// Its description: the same without weights and without the values of tensors.
+    pub(crate) fn description(&self) -> Self {
+        let bare = |motion: &MotionNetwork| MotionNetwork {
+            network: motion.network.clone().without_weights(),
+            sources: motion.sources.clone(),
+            outputs: motion.outputs.clone(),
+        };
+        let tensor = |tensor: &NamedTensor| NamedTensor {
+            name: tensor.name.clone(),
+            shape: tensor.shape.clone(),
+            values: Vec::new(),
+        };
+        Self {
+            kind: self.kind.clone(),
+            network: self.network.as_ref().map(bare),
+            tensors: self.tensors.iter().map(tensor).collect(),
+        }
+    }
+
     /// Whether the meaning of an attribute is known: the network reads it, or there is no network, so that only a
     /// program that knows the kind can show the scene.
     fn knows(&self, attribute: &str) -> bool {

@@ -83,7 +83,8 @@ impl ShSource {
         Self::ALL.get(usize::try_from(number).ok()?).copied()
     }
 
-    /// Channels of this source, for planes with so many features, after so many decoded channels.
+    /// Channels of this source. `features` is the length of a feature of the planes, `decoded` the number of channels decoded
+    /// before.
     fn channels(self, features: u64, decoded: u64) -> u64 {
         match self {
             Self::Dc | Self::Position | Self::LogScale => 3,

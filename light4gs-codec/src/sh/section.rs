@@ -38,7 +38,7 @@ impl Head {
         Ok(head)
     }
 
-    fn of(gaussians: &GaussianArrays) -> Self {
+    pub(crate) fn of(gaussians: &GaussianArrays) -> Self {
         Self { count: gaussians.len() as u32, degree: gaussians.sh_degree }
     }
 
@@ -260,7 +260,7 @@ pub(crate) struct Parts<'a> {
 }
 
 impl<'a> Parts<'a> {
-    /// Reads head and coding, for planes with so many features.
+    /// Reads head and coding. `features` is the length of a feature of the planes.
     pub(crate) fn read(
         bytes: &'a [u8],
         (kind, encoding): (Kind, Encoding),

@@ -50,9 +50,9 @@ pub struct StreamDecoder {
     decoded: usize,
     heads: LayerHeads,
     first_coding: Option<FirstCoding>,
-    /// What was decoded so far has asked for.
+    /// Memory and time of what has been decoded.
     spent: Demand,
-    /// What comes next asks for more than so few bytes may.
+    /// Whether the next part asks for more memory or time than the bytes so far allow.
     waits: bool,
     failed: bool,
 }
