@@ -206,6 +206,14 @@ impl<'a> Container<'a> {
         Ok(Self { bytes, header: Cow::Owned(Header::read(bytes, prelude, limits)?), verified: false })
     }
 
+    /// The same, with the checksums of all sections checked.
+    pub(crate) fn verified(&self) -> Result<Container<'_>, CodecError> {
+        for entry in &self.header.entries {
+            self.payload(entry)?;
+        }
+        Ok(Container::beginning(self.bytes, &self.header))
+    }
+
     /// The kind, encoding and bytes of a section; the bytes are checked against their checksum.
     pub(crate) fn section(&self, section: Section) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
         self.layer(section, 0)
@@ -214,17 +222,22 @@ impl<'a> Container<'a> {
     /// As [`Container::section`], for one of the layers.
     pub(crate) fn layer(&self, section: Section, layer: usize) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
         let entry = self.header.entry(section, layer)?;
+        Ok((entry.kind, entry.encoding, self.payload(entry)?))
+    }
+
+    /// The bytes of an entry of the table, checked against their checksum.
+    fn payload(&self, entry: &Entry) -> Result<&'a [u8], CodecError> {
         let needed = entry.end();
         let available = self.bytes.len() as u64;
         if needed > available {
-            let field = "the section".into();
-            return Err(CodecError::Truncated { section: section.name(), field, needed, available });
+            let (section, field) = (entry.section.name(), "the section".into());
+            return Err(CodecError::Truncated { section, field, needed, available });
         }
         let payload = &self.bytes[entry.offset as usize..needed as usize];
         if !self.verified {
             entry.check(crc32c::crc32c(payload))?;
         }
-        Ok((entry.kind, entry.encoding, payload))
+        Ok(payload)
     }
 }
 

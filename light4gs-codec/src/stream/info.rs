@@ -178,8 +178,8 @@ pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
 /// # Errors
 /// As [`info`].
 pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, CodecError> {
-    let stream = OpenStream::with_limits(bytes, limits)?;
-    stream.check_sums()?;
+    let opened = OpenStream::with_limits(bytes, limits)?;
+    let stream = opened.verified()?;
     let (heads, limits) = (stream.heads()?, limits.for_stream(bytes.len()));
     let open = |section: Section| {
         let (kind, _, payload) = stream.container.section(section)?;

@@ -109,13 +109,9 @@ impl<'a> OpenStream<'a> {
         self.container.header.layers()
     }
 
-    /// Refuses a section that has not the checksum of the table.
-    pub(super) fn check_sums(&self) -> Result<(), CodecError> {
-        for section in Section::ALL {
-            let count = self.container.header.entries.iter().filter(|entry| entry.section == section).count();
-            (0..count).try_for_each(|layer| self.container.layer(section, layer).map(drop))?;
-        }
-        Ok(())
+    /// The same stream, with the checksums of all sections checked, so that none is computed twice.
+    pub(super) fn verified(&self) -> Result<OpenStream<'_>, CodecError> {
+        Ok(OpenStream { container: self.container.verified()?, limits: self.limits })
     }
 
     /// The heads of all layers.
@@ -261,6 +257,10 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn decode(&self) -> Result<Decoded, CodecError> {
+        self.verified()?.decode_verified()
+    }
+
+    fn decode_verified(&self) -> Result<Decoded, CodecError> {
         let budget = self.budget();
         self.check_sections()?;
         let coordinates = self.coordinates()?;
