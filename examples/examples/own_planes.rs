@@ -14,7 +14,7 @@ use burn::tensor::{Device, Tensor};
 use light4gs_codec::network::Operation;
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
 use light4gs_codec::{
-    MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, PlaneCoding, decode, info, plane_distributions,
+    MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, PlaneCoding, decode, plane_distributions,
 };
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, first_and_last, linear_from_layer, linear_to_layer, tiny_config, tiny_scene};
@@ -145,7 +145,7 @@ fn main() -> Outcome {
     let [planes, ..] = record.parts();
     println!("planes: {:.0} bits expected, {:.0} in the file", planes.expected, planes.coded);
     assert!((planes.expected / planes.coded - 1.0).abs() < 0.05);
-    let names: Vec<String> = info(&coded.bytes)?.planes.planes().iter().map(|plane| plane.name()).collect();
+    let names: Vec<String> = coded.info.planes.planes().iter().map(|plane| plane.name()).collect();
     assert_eq!(names, ["0.xy", "0.xz", "0.yz", "1.xy", "1.xz", "1.yz"]);
     assert!(maps.iter().map(|map| &map.name).eq(&names), "a map of bits for each plane");
 

@@ -67,7 +67,10 @@
 //! A coding interval must be the same in the encoder and in every decoder. So an executor of this crate evaluates the networks
 //! that give the intervals, in plain float32 arithmetic of a fixed order. The stream holds the networks as
 //! [descriptions](network), so a model may compose its networks freely. The encoder decodes its own bytes and compares
-//! before it returns.
+//! before it returns. It returns all that it knows: the stream, the decoded scene and the bytes of each part ([`Encoded`]).
+//!
+//! [`decode`] reads all streams alike. [`OpenStream`] reads a stream section by section, or all of it once, together with what
+//! [`info`] tells.
 //!
 //! # Limits
 //!
@@ -128,8 +131,8 @@ pub use scene::{
 pub use sh::{ShBytes, ShCoding, ShPrior, ShSource};
 pub use steps::PerGroup;
 pub use stream::{
-    CompressionInput, CompressionReport, Encoded, GaussianLayers, LayerInfo, OpenStream, Profile, SectionInfo,
+    CompressionInput, Compressor, Decoded, Encoded, GaussianLayers, LayerInfo, OpenStream, Profile, SectionInfo,
     StreamDecoder, StreamInfo, WeightPrecisions, decode, decode_with_limits, encode, encode_compressed,
-    encode_compressed_with_limits, encode_planes, encode_sh, info, info_with_limits, plane_distributions,
-    sh_distributions,
+    encode_compressed_with_limits, encode_exactly, encode_planes, encode_sh, info, info_with_limits,
+    plane_distributions, sh_distributions,
 };

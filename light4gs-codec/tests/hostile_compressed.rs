@@ -128,7 +128,7 @@ fn the_largest_planes_of_a_small_stream() {
     let bytes =
         encode_compressed(&scene, &CompressionInput { planes: Some(planes), ..tiny(Profile::Paper).1 }).unwrap();
     drop(scene);
-    let (demand, limits) = (bytes.report.demand, Limits::default());
+    let (demand, limits) = (bytes.verify(&Limits::large()).unwrap(), Limits::default());
     assert!(demand.nanoseconds > limits.nanoseconds / 2 || demand.memory_bytes > limits.memory_bytes / 2, "{demand:?}");
     let bytes = bytes.bytes;
     survive(&bytes, &Limits::default());

@@ -2,8 +2,8 @@
 
 use light4gs_codec::rendering::{TILE, opacity, scale};
 use light4gs_codec::{
-    CodecError, FurtherAttribute, GaussianArrays, Limits, MotionEvaluator, MotionSource, SceneData, StreamInfo,
-    decode_with_limits, info_with_limits,
+    CodecError, Decoded, FurtherAttribute, GaussianArrays, Limits, MotionEvaluator, MotionSource, OpenStream,
+    SceneData, StreamInfo,
 };
 use light4gs_data::Camera;
 
@@ -50,8 +50,7 @@ impl PlayableScene {
     /// As [`light4gs_codec::decode`]; an attribute that neither this crate nor the file explains; a motion that takes
     /// more than eight times the memory of `limits`.
     pub fn decode(bytes: &[u8], limits: &Limits) -> Result<Self, CodecError> {
-        let info = info_with_limits(bytes, limits)?;
-        let scene = decode_with_limits(bytes, limits)?;
+        let Decoded { scene, info, .. } = OpenStream::with_limits(bytes, limits)?.decode()?;
         let memory_bytes = limits.memory_bytes.max(4 * bytes.len() as u64).saturating_mul(SHARES);
         check_memory("memory of the motion", motion_bytes(&scene), memory_bytes)?;
         let evaluator = MotionEvaluator::new(&scene)?;

@@ -62,7 +62,7 @@ use crate::{
 };
 
 const SECTION: &str = Section::Gaussians.name();
-/// A section has at least one byte for so many Gaussians: a count is checked against it before memory is taken.
+/// The most Gaussians for each byte of a section: a count is checked against it before memory is taken.
 const GAUSSIANS_A_BYTE: usize = 8;
 
 /// Bytes that decoding takes for a Gaussian: 56 that stay, neighbors, and the integers of the largest attribute.
@@ -85,17 +85,15 @@ pub struct EncodedAttributes {
     /// `order[new]` is the index in the given arrays of the Gaussian `new` of the decoded ones. Everything else that
     /// belongs to a Gaussian, such as the higher spherical harmonics, must be reordered in the same way.
     pub order: Vec<u32>,
-    /// Bytes of each part.
-    pub sizes: AttributeSizes,
+    /// The attributes with their bytes, in the order of the stream.
+    pub attributes: Vec<AttributeInfo>,
 }
 
-/// Bytes of each part of [`EncodedAttributes::bytes`].
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct AttributeSizes {
-    /// The list of attributes, and the zeros at the end where there are any.
-    pub overhead: usize,
-    /// Names and bytes, in the order of the stream.
-    pub attributes: Vec<(String, usize)>,
+impl EncodedAttributes {
+    /// Bytes of the list of attributes, and of the zeros at the end where there are any.
+    pub fn overhead(&self) -> usize {
+        self.bytes.len() - self.attributes.iter().map(|attribute| attribute.bytes as usize).sum::<usize>()
+    }
 }
 
 /// Codes `N` Gaussians, quantized, without `sh_degree` and `sh_rest`.
@@ -125,27 +123,25 @@ pub(crate) fn encode_layers(
 fn encode_quantized(quantized: Quantized) -> EncodedAttributes {
     let neighbors = quantized.neighbors();
     let mut streams: Vec<Vec<u8>> = Vec::new();
-    let mut infos: Vec<AttributeInfo> = Vec::new();
+    let mut attributes: Vec<AttributeInfo> = Vec::new();
     for attribute in &quantized.attributes {
         let mut writer = Writer::default();
         attribute.write(&quantized, &neighbors, &mut writer);
-        infos.push(attribute.info(writer.bytes.len()));
+        attributes.push(attribute.info(writer.bytes.len()));
         streams.push(writer.bytes);
     }
 
-    let sizes: Vec<_> = infos.iter().map(|info| (info.name.clone(), info.bytes as usize)).collect();
     let mut writer = Writer::default();
-    Head { count: quantized.order.len() as u32, attributes: infos }.write(&mut writer);
+    let head = Head { count: quantized.order.len() as u32, attributes };
+    head.write(&mut writer);
     streams.iter().for_each(|stream| writer.bytes.extend(stream));
     let least = quantized.order.len().div_ceil(GAUSSIANS_A_BYTE);
     writer.bytes.resize(writer.bytes.len().max(least), 0);
-    let overhead = writer.bytes.len() - sizes.iter().map(|(_, bytes)| bytes).sum::<usize>();
-    let sizes = AttributeSizes { overhead, attributes: sizes };
-    EncodedAttributes { bytes: writer.bytes, order: quantized.order, sizes }
+    EncodedAttributes { bytes: writer.bytes, order: quantized.order, attributes: head.attributes }
 }
 
-/// Writes Gaussians whose arrays fit together as float32, without `sh_degree` and `sh_rest`.
-pub(crate) fn write_float32(gaussians: &GaussianArrays, writer: &mut Writer) {
+/// Writes Gaussians whose arrays fit together as float32, without `sh_degree` and `sh_rest`. Returns the list of attributes.
+pub(crate) fn write_float32(gaussians: &GaussianArrays, writer: &mut Writer) -> Vec<AttributeInfo> {
     let attributes = || gaussians.attributes().filter(|attribute| attribute.name != SH_REST);
     let info = |attribute: AttributeValues<'_>| AttributeInfo {
         name: attribute.name.to_owned(),
@@ -154,8 +150,10 @@ pub(crate) fn write_float32(gaussians: &GaussianArrays, writer: &mut Writer) {
         optional: attribute.optional,
         bytes: 4 * attribute.values.len() as u64,
     };
-    Head { count: gaussians.len() as u32, attributes: attributes().map(info).collect() }.write(writer);
+    let head = Head { count: gaussians.len() as u32, attributes: attributes().map(info).collect() };
+    head.write(writer);
     attributes().for_each(|attribute| writer.f32s(attribute.values));
+    head.attributes
 }
 
 /// Reads what [`encode`] writes: Gaussians in Morton order; `sh_degree` is 0 and `sh_rest` empty. Attributes with an

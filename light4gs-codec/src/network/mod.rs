@@ -241,12 +241,13 @@ impl Network {
 
     /// Whether another network has the same inputs, nodes and outputs, whatever their weights are.
     pub fn has_structure_of(&self, other: &Self) -> bool {
-        let bare = |network: &Self| {
-            let mut network = network.clone();
-            network.layers_mut().for_each(|layer| (layer.weight, layer.bias) = (Vec::new(), Vec::new()));
-            network
-        };
-        bare(self) == bare(other)
+        self.clone().without_weights() == other.clone().without_weights()
+    }
+
+    /// The network as its description gives it: without weights and biases.
+    pub(crate) fn without_weights(mut self) -> Self {
+        self.layers_mut().for_each(|layer| (layer.weight, layer.bias) = (Vec::new(), Vec::new()));
+        self
     }
 
     /// The outputs at one place from the inputs there, exactly as a decoder computes them.

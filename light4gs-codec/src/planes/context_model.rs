@@ -110,6 +110,13 @@ impl ContextModelArrays {
         (0..self.plane_priors.len()).map(|plane| self.prior(plane).has_latent()).collect()
     }
 
+    /// Its description: the same without weights, and of the latent only its number of channels.
+    pub(crate) fn into_description(self) -> Self {
+        let latent =
+            self.latent.map(|latent| LatentArrays { tables: Vec::new(), medians: vec![0.0; latent.medians.len()] });
+        Self { latent, networks: self.networks.into_iter().map(Network::without_weights).collect(), ..self }
+    }
+
     /// Refuses an illegal context model, or one beyond the limits.
     pub(crate) fn check(&self, limits: &Limits) -> Result<(), CodecError> {
         self.check_structure(limits)?;

@@ -14,6 +14,7 @@
 //! | `plane_parameters.rs` | scales and means of a row |
 //! | `walk.rs` | the symbols of one plane, in order |
 //! | `coder.rs`, `section.rs` | all planes: encode, decode; their bytes |
+//! | `summary.rs` | what a stream says of its planes besides their values |
 
 mod coder;
 mod coding;
@@ -26,10 +27,12 @@ pub(crate) mod head;
 mod plan;
 mod plane_parameters;
 pub(crate) mod section;
+mod summary;
 mod walk;
 
 pub(crate) use coder::parameters;
 pub use coding::PlaneCoding;
 pub use context_model::{Condition, ContextModelArrays, LatentArrays, PlanePrior, PlaneSource};
 pub(crate) use plane_parameters::bounded_mean;
+pub(crate) use summary::Summary;
 pub(crate) use walk::nearest;

@@ -4,12 +4,13 @@ use super::{
     coder::{self, CodedPlanes},
     head::{Head, SECTION},
     plan::{stream_order, sub_streams},
+    summary::Summary,
 };
 use crate::{
     CodecError, ContextModelArrays, FeaturePlaneArrays, Limits, PerGroup, PlaneCoding,
     budget::Budget,
     bytes::{Reader, Writer},
-    plane_layout::SIZE_MULTIPLE,
+    plane_layout::{PlaneLayout, SIZE_MULTIPLE},
     steps::{LEAST_STEP_IN_STREAM, plane_step},
 };
 
@@ -85,7 +86,7 @@ fn check_steps(steps: &[PerGroup], scales: usize) -> Result<(), CodecError> {
     }
 }
 
-/// Writes planes that [`check`] has accepted; returns them as a decoder gets them.
+/// Writes planes that [`check`] has accepted; returns them as a decoder gets them, and the bytes of each.
 pub(crate) fn write(
     planes: &FeaturePlaneArrays,
     model: &ContextModelArrays,
@@ -93,20 +94,21 @@ pub(crate) fn write(
     latent_symbols: &[Vec<i32>],
     limits: &Limits,
     writer: &mut Writer,
-) -> Result<FeaturePlaneArrays, CodecError> {
-    Head::of_checked(planes).write(writer);
+) -> Result<(FeaturePlaneArrays, Vec<PlaneBytes>), CodecError> {
+    let head = Head::of_checked(planes);
+    head.write(writer);
     writer.varint(steps.len() as u64);
     steps.iter().for_each(|step| writer.f32s(&[step.space_only, step.space_time]));
     let CodedPlanes { sub_streams, decoded } = coder::encode(planes, model, steps, latent_symbols, limits)?;
     sub_streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
     sub_streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
-    Ok(decoded)
+    Ok((decoded, plane_bytes(&sub_streams, model, &head.layout)))
 }
 
 /// The parts of a section.
-pub(crate) struct Parts<'a> {
-    pub(crate) head: Head,
-    pub(crate) steps: Vec<PerGroup>,
+struct Parts<'a> {
+    head: Head,
+    steps: Vec<PerGroup>,
     sub_streams: Vec<&'a [u8]>,
 }
 
@@ -128,34 +130,41 @@ impl<'a> Parts<'a> {
         reader.finish()?;
         Ok(Self { head, steps, sub_streams })
     }
+
+    /// All but the values. `model` may be a description.
+    fn summary(self, model: ContextModelArrays) -> Summary {
+        let Self { head, steps, sub_streams } = self;
+        let bytes = plane_bytes(&sub_streams, &model, &head.layout);
+        Summary { head, bytes, steps, model: Some(model.into_description()) }
+    }
 }
 
+/// Reads the planes, and what the stream says of them besides.
 pub(crate) fn read(
     bytes: &[u8],
-    model: &ContextModelArrays,
+    model: ContextModelArrays,
     budget: &Budget,
-) -> Result<FeaturePlaneArrays, CodecError> {
-    let Parts { head, steps, sub_streams } = Parts::read(bytes, model, &budget.limits)?;
-    coder::decode(&head.layout, model, &steps, &sub_streams, budget)
+) -> Result<(FeaturePlaneArrays, Summary), CodecError> {
+    let parts = Parts::read(bytes, &model, &budget.limits)?;
+    let planes = coder::decode(&parts.head.layout, &model, &parts.steps, &parts.sub_streams, budget)?;
+    Ok((planes, parts.summary(model)))
 }
 
-/// Head, steps and the bytes of every plane, without decoding. The weights of the model are not needed.
-pub(crate) fn plane_bytes<'a>(
-    bytes: &'a [u8],
-    model: &ContextModelArrays,
-    limits: &Limits,
-) -> Result<(Parts<'a>, Vec<PlaneBytes>), CodecError> {
-    let parts = Parts::read(bytes, model, limits)?;
-    let mut planes: Vec<_> = stream_order(model, &parts.head.layout)
-        .into_iter()
-        .map(|(plane, first)| {
-            let prior = model.prior(plane);
-            let mut lengths = parts.sub_streams[first..].iter().map(|stream| stream.len() as u64);
-            let mut part = |present: bool| if present { lengths.next().unwrap_or(0) } else { 0 };
-            let (latent, anchors) = (part(prior.has_latent()), part(prior.has_anchors()));
-            PlaneBytes { plane, latent, anchors, others: part(true) }
-        })
-        .collect();
+/// What the stream says of the planes, without decoding. The weights of the model are not needed.
+pub(crate) fn read_summary(bytes: &[u8], model: ContextModelArrays, limits: &Limits) -> Result<Summary, CodecError> {
+    Ok(Parts::read(bytes, &model, limits)?.summary(model))
+}
+
+/// The bytes of each plane, in the order of the planes, from the sub-streams in the order of the stream.
+fn plane_bytes(sub_streams: &[impl AsRef<[u8]>], model: &ContextModelArrays, layout: &PlaneLayout) -> Vec<PlaneBytes> {
+    let of_plane = |(plane, first): (usize, usize)| {
+        let prior = model.prior(plane);
+        let mut lengths = sub_streams[first..].iter().map(|stream| stream.as_ref().len() as u64);
+        let mut part = |present: bool| if present { lengths.next().unwrap_or(0) } else { 0 };
+        let (latent, anchors) = (part(prior.has_latent()), part(prior.has_anchors()));
+        PlaneBytes { plane, latent, anchors, others: part(true) }
+    };
+    let mut planes: Vec<_> = stream_order(model, layout).into_iter().map(of_plane).collect();
     planes.sort_by_key(|plane| plane.plane);
-    Ok((parts, planes))
+    planes
 }

@@ -148,6 +148,25 @@ impl MotionOutput {
 }
 
 impl MotionArrays {
+    /// Its description: the same without weights and without the values of tensors.
+    pub(crate) fn description(&self) -> Self {
+        let bare = |motion: &MotionNetwork| MotionNetwork {
+            network: motion.network.clone().without_weights(),
+            sources: motion.sources.clone(),
+            outputs: motion.outputs.clone(),
+        };
+        let tensor = |tensor: &NamedTensor| NamedTensor {
+            name: tensor.name.clone(),
+            shape: tensor.shape.clone(),
+            values: Vec::new(),
+        };
+        Self {
+            kind: self.kind.clone(),
+            network: self.network.as_ref().map(bare),
+            tensors: self.tensors.iter().map(tensor).collect(),
+        }
+    }
+
     /// Whether the meaning of an attribute is known: either the network reads it, or there is no network, and then only
     /// a program that knows the kind can show the scene.
     fn knows(&self, attribute: &str) -> bool {

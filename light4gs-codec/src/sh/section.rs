@@ -38,7 +38,7 @@ impl Head {
         Ok(head)
     }
 
-    fn of(gaussians: &GaussianArrays) -> Self {
+    pub(crate) fn of(gaussians: &GaussianArrays) -> Self {
         Self { count: gaussians.len() as u32, degree: gaussians.sh_degree }
     }
 

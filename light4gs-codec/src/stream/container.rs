@@ -79,6 +79,18 @@ impl Prelude {
 }
 
 impl Prelude {
+    /// The bytes that its checksum covers.
+    fn covered(&self) -> Vec<u8> {
+        let mut writer = Writer::default();
+        writer.bytes.extend_from_slice(&MAGIC);
+        writer.u16(self.version);
+        writer.u16(self.flags);
+        writer.u32(self.section_count);
+        writer.u32(self.meta_bytes);
+        writer.u64(self.file_bytes);
+        writer.bytes
+    }
+
     /// Bytes before the first section.
     pub(crate) fn header_bytes(&self) -> u64 {
         PRELUDE as u64 + u64::from(self.meta_bytes) + u64::from(self.section_count) * ENTRY as u64
@@ -124,19 +136,19 @@ impl Header {
         self.entries.iter().filter(|entry| entry.section == Section::Gaussians).count()
     }
 
-    /// Which entry has the number `layer` among those of a section.
+    /// The entry of a layer of a section.
     pub(crate) fn entry(&self, section: Section, layer: usize) -> Result<&Entry, CodecError> {
         let mut entries = self.entries.iter().filter(|entry| entry.section == section);
         entries.nth(layer).ok_or(CodecError::MissingSection { section: section.name() })
     }
 
-    /// Bytes from the beginning of the stream after which nothing is missing of what all layers share.
+    /// Bytes from the beginning of the stream to the end of what all layers share.
     pub(crate) fn shared_bytes(&self) -> u64 {
         let shared = self.entries.iter().filter(|entry| !entry.section.is_layered());
         shared.map(Entry::end).fold(self.prelude.header_bytes(), u64::max)
     }
 
-    /// Bytes from the beginning of the stream after which nothing is missing of a layer, and of what all layers share.
+    /// Bytes from the beginning of the stream to the end of a layer and of what all layers share.
     pub(crate) fn layer_bytes(&self, layer: usize) -> u64 {
         let of_layer = |section| self.entry(section, layer).map_or(0, Entry::end);
         self.shared_bytes().max(of_layer(Section::Gaussians)).max(of_layer(Section::Sh))
@@ -147,6 +159,16 @@ impl Entry {
     /// Where the section ends in the stream.
     pub(crate) fn end(&self) -> u64 {
         self.offset + self.bytes
+    }
+
+    /// Writes its row of the table.
+    fn write(&self, writer: &mut Writer) {
+        let (section, number) = self.kind.place();
+        writer.u16(section.id());
+        writer.u8(number);
+        writer.u8(self.encoding.number());
+        writer.u32(self.crc);
+        writer.u64(self.bytes);
     }
 }
 
@@ -184,6 +206,14 @@ impl<'a> Container<'a> {
         Ok(Self { bytes, header: Cow::Owned(Header::read(bytes, prelude, limits)?), verified: false })
     }
 
+    /// The same, with the checksums of all sections checked.
+    pub(crate) fn verified(&self) -> Result<Container<'_>, CodecError> {
+        for entry in &self.header.entries {
+            self.payload(entry)?;
+        }
+        Ok(Container::beginning(self.bytes, &self.header))
+    }
+
     /// The kind, encoding and bytes of a section; the bytes are checked against their checksum.
     pub(crate) fn section(&self, section: Section) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
         self.layer(section, 0)
@@ -192,17 +222,22 @@ impl<'a> Container<'a> {
     /// As [`Container::section`], for one of the layers.
     pub(crate) fn layer(&self, section: Section, layer: usize) -> Result<(Kind, Encoding, &'a [u8]), CodecError> {
         let entry = self.header.entry(section, layer)?;
+        Ok((entry.kind, entry.encoding, self.payload(entry)?))
+    }
+
+    /// The bytes of an entry of the table, checked against their checksum.
+    fn payload(&self, entry: &Entry) -> Result<&'a [u8], CodecError> {
         let needed = entry.end();
         let available = self.bytes.len() as u64;
         if needed > available {
-            let field = "the section".into();
-            return Err(CodecError::Truncated { section: section.name(), field, needed, available });
+            let (section, field) = (entry.section.name(), "the section".into());
+            return Err(CodecError::Truncated { section, field, needed, available });
         }
         let payload = &self.bytes[entry.offset as usize..needed as usize];
         if !self.verified {
             entry.check(crc32c::crc32c(payload))?;
         }
-        Ok((entry.kind, entry.encoding, payload))
+        Ok(payload)
     }
 }
 
@@ -290,34 +325,46 @@ pub(crate) struct NewSection {
     pub(crate) payload: Vec<u8>,
 }
 
-/// A stream of these sections, in their order.
-pub(crate) fn write(meta: &SceneMeta, sections: &[NewSection], limits: &Limits) -> Result<Vec<u8>, CodecError> {
+impl NewSection {
+    /// Its entry in the table, where it begins at `offset`.
+    fn entry(&self, offset: u64) -> Entry {
+        let Self { kind, encoding, payload } = self;
+        let (section, crc, bytes) = (kind.place().0, crc32c::crc32c(payload), payload.len() as u64);
+        Entry { section, kind: *kind, encoding: *encoding, crc, offset, bytes }
+    }
+}
+
+/// A stream of these sections, in their order, and its header.
+pub(crate) fn write(
+    meta: &SceneMeta,
+    sections: &[&NewSection],
+    limits: &Limits,
+) -> Result<(Vec<u8>, Header), CodecError> {
     let mut writer = Writer::default();
     writer.bytes.resize(PRELUDE, 0);
     meta::write(meta, &mut writer);
     let meta_bytes = writer.bytes.len() - PRELUDE;
     at_most("meta", "length", meta_bytes as u64, limits.meta_bytes)?;
-    for NewSection { kind, encoding, payload } in sections {
-        let (section, number) = kind.place();
-        writer.u16(section.id());
-        writer.u8(number);
-        writer.u8(encoding.number());
-        writer.u32(crc32c::crc32c(payload));
-        writer.u64(payload.len() as u64);
+    let header_bytes = writer.bytes.len() + sections.len() * ENTRY;
+    let mut entries: Vec<Entry> = Vec::new();
+    for section in sections {
+        let offset = entries.last().map_or(header_bytes as u64, Entry::end);
+        entries.push(section.entry(offset));
     }
-    let header_bytes = writer.bytes.len();
+    entries.iter().for_each(|entry| entry.write(&mut writer));
     sections.iter().for_each(|section| writer.bytes.extend_from_slice(&section.payload));
     let mut bytes = writer.bytes;
 
-    let mut prelude = Writer::default();
-    prelude.bytes.extend_from_slice(&MAGIC);
-    prelude.u16(VERSION);
-    prelude.u16(0); // flags
-    prelude.u32(sections.len() as u32);
-    prelude.u32(meta_bytes as u32);
-    prelude.u64(bytes.len() as u64);
-    bytes[..PRELUDE_COVERED].copy_from_slice(&prelude.bytes);
-    let crc = header_checksum(&bytes[..header_bytes]);
-    bytes[PRELUDE_COVERED..PRELUDE].copy_from_slice(&crc.to_le_bytes());
-    Ok(bytes)
+    let mut prelude = Prelude {
+        version: VERSION,
+        flags: 0,
+        section_count: sections.len() as u32,
+        meta_bytes: meta_bytes as u32,
+        file_bytes: bytes.len() as u64,
+        crc: 0,
+    };
+    bytes[..PRELUDE_COVERED].copy_from_slice(&prelude.covered());
+    prelude.crc = header_checksum(&bytes[..header_bytes]);
+    bytes[PRELUDE_COVERED..PRELUDE].copy_from_slice(&prelude.crc.to_le_bytes());
+    Ok((bytes, Header { prelude, meta: meta.clone(), entries }))
 }

@@ -50,9 +50,9 @@ pub struct StreamDecoder {
     decoded: usize,
     heads: LayerHeads,
     first_coding: Option<FirstCoding>,
-    /// What the decoded parts have asked for.
+    /// Memory and time of what has been decoded.
     spent: Demand,
-    /// The next part asked for more than the bytes so far allow; it is tried again when all bytes are there.
+    /// Whether the next part asks for more memory or time than the bytes so far allow.
     waits: bool,
     failed: bool,
 }

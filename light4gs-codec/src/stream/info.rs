@@ -4,6 +4,7 @@ use super::{
     OpenStream,
     container::{Entry, Header},
     input::Profile,
+    layers::LayerHeads,
 };
 use crate::{
     CodecError, ContextModelArrays, Limits, MotionArrays, PerGroup, PlaneBytes, SceneMeta,
@@ -12,7 +13,7 @@ use crate::{
         Reader, Section,
         sections::{Encoding, Kind},
     },
-    motion::section,
+    motion,
     plane_layout::PlaneLayout,
     planes,
 };
@@ -98,6 +99,36 @@ impl SectionInfo {
 }
 
 impl StreamInfo {
+    /// Puts together what an encoder, a decoder, or a reader of descriptions knows. `motion` is a description.
+    pub(super) fn new(header: &Header, heads: LayerHeads, planes: planes::Summary, motion: MotionArrays) -> Self {
+        let Header { prelude, meta, .. } = header;
+        let planes::Summary { head, bytes: plane_bytes, steps: plane_steps, model: context_model } = planes;
+        let layer = |(layer, &gaussians): (usize, &u32)| {
+            let needed = (0..=layer).map(|layer| header.layer_bytes(layer));
+            LayerInfo { gaussians, bytes_to_show: needed.max().unwrap_or(0) }
+        };
+        Self {
+            version: prelude.version,
+            flags: prelude.flags,
+            profile: header.profile(),
+            bytes: prelude.file_bytes,
+            header_bytes: prelude.header_bytes(),
+            meta: meta.clone(),
+            sections: header.sections(),
+            layers: heads.counts.iter().enumerate().map(layer).collect(),
+            // `LayerHeads` has compared the sum with a limit.
+            gaussian_count: heads.counts.iter().sum(),
+            attributes: heads.attributes,
+            sh_degree: heads.degree,
+            plane_channels: head.channels,
+            planes: head.layout,
+            plane_bytes,
+            plane_steps,
+            context_model,
+            motion,
+        }
+    }
+
     /// Bytes from the beginning of the stream that a player needs for the first image.
     pub fn bytes_to_first_image(&self) -> u64 {
         self.layers.first().map_or(self.bytes, |layer| layer.bytes_to_show)
@@ -117,6 +148,19 @@ impl Header {
         };
         self.entries.iter().map(section).collect()
     }
+
+    /// The profile of a compressed stream; `None` where nothing is compressed.
+    fn profile(&self) -> Option<Profile> {
+        let compact = |entry: &Entry| entry.section == Section::Gaussians && entry.encoding == Encoding::Quantized;
+        if self.entries.iter().any(compact) {
+            return Some(Profile::Compact);
+        }
+        let explicit = [Kind::ShExplicit, Kind::FeaturePlanesExplicit];
+        let coded = |entry: &Entry| {
+            matches!(entry.section, Section::Sh | Section::FeaturePlanes) && !explicit.contains(&entry.kind)
+        };
+        self.entries.iter().any(coded).then_some(Profile::Paper)
+    }
 }
 
 /// Summarizes a stream: header, meta, counts, and the size of every section.
@@ -134,55 +178,20 @@ pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
 /// # Errors
 /// As [`info`].
 pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, CodecError> {
-    let stream = OpenStream::with_limits(bytes, limits)?;
-    stream.check_sums()?;
-    let heads = stream.heads()?;
-    let container = &stream.container;
-    let limits = limits.for_stream(bytes.len());
+    let opened = OpenStream::with_limits(bytes, limits)?;
+    let stream = opened.verified()?;
+    let (heads, limits) = (stream.heads()?, limits.for_stream(bytes.len()));
     let open = |section: Section| {
-        let (kind, encoding, payload) = container.section(section)?;
-        Ok::<_, CodecError>((kind, encoding, Reader::new(section.name(), payload)))
+        let (kind, _, payload) = stream.container.section(section)?;
+        Ok::<_, CodecError>((kind, Reader::new(section.name(), payload)))
     };
-    let (gaussian_encoding, sh_kind) = (open(Section::Gaussians)?.1, open(Section::Sh)?.0);
-    let motion = section::read_description(&mut open(Section::Motion)?.2, &limits)?;
-    let (plane_kind, _, mut reader) = open(Section::FeaturePlanes)?;
-    let (mut plane_bytes, mut plane_steps, mut context_model) = (Vec::new(), Vec::new(), None);
-    let head = if plane_kind == Kind::FeaturePlanesExplicit {
-        planes::head::Head::read(&mut reader, &limits)?
+    let motion = motion::section::read_description(&mut open(Section::Motion)?.1, &limits)?;
+    let (kind, mut reader) = open(Section::FeaturePlanes)?;
+    let planes = if kind == Kind::FeaturePlanesExplicit {
+        planes::Summary::explicit(planes::head::Head::read(&mut reader, &limits)?)
     } else {
-        let model = planes::context_section::read_description(&mut open(Section::ContextModel)?.2, &limits)?;
-        let (parts, bytes) = planes::section::plane_bytes(reader.rest(), &model, &limits)?;
-        (plane_bytes, plane_steps, context_model) = (bytes, parts.steps, Some(model));
-        parts.head
+        let model = planes::context_section::read_description(&mut open(Section::ContextModel)?.1, &limits)?;
+        planes::section::read_summary(reader.rest(), model, &limits)?
     };
-    let compact = gaussian_encoding == Encoding::Quantized;
-    let coded = compact || plane_kind != Kind::FeaturePlanesExplicit || sh_kind != Kind::ShExplicit;
-    let profile = if compact { Profile::Compact } else { Profile::Paper };
-
-    let Header { prelude, meta, .. } = &*container.header;
-    let mut bytes_to_show = 0;
-    let layers = heads.counts.iter().enumerate().map(|(layer, &gaussians)| {
-        bytes_to_show = container.header.layer_bytes(layer).max(bytes_to_show);
-        LayerInfo { gaussians, bytes_to_show }
-    });
-    Ok(StreamInfo {
-        version: prelude.version,
-        flags: prelude.flags,
-        profile: coded.then_some(profile),
-        bytes: prelude.file_bytes,
-        header_bytes: prelude.header_bytes(),
-        meta: meta.clone(),
-        sections: container.header.sections(),
-        layers: layers.collect(),
-        // `LayerHeads` has compared the sum with a limit.
-        gaussian_count: heads.counts.iter().sum(),
-        attributes: heads.attributes,
-        sh_degree: heads.degree,
-        plane_channels: head.channels,
-        planes: head.layout,
-        plane_bytes,
-        plane_steps,
-        context_model,
-        motion,
-    })
+    Ok(StreamInfo::new(&stream.container.header, heads, planes, motion))
 }

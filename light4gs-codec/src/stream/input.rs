@@ -38,11 +38,11 @@ pub struct CompressionInput {
     pub planes: Option<PlaneCoding>,
     /// The coding of the spherical harmonics beyond degree 0.
     pub sh: ShCoding,
-    /// How finely the other attributes of the Gaussians are quantized, in the compact profile.
+    /// The steps of the other attributes of the Gaussians, in the compact profile.
     pub attributes: AttributeSteps,
-    /// How finely weights are quantized, in the compact profile.
+    /// The precision of weights, in the compact profile.
     pub weights: WeightPrecisions,
-    /// Number of layers of Gaussians, for files that are shown while they come.
+    /// The layers into which the Gaussians are divided, for files that are shown while they come.
     pub layers: GaussianLayers,
 }
 
@@ -62,12 +62,22 @@ impl CompressionInput {
         if let Some(coding) = planes {
             planes::section::check(&scene.feature_planes, coding, limits)?;
         }
-        steps::sh_step(sh.step())?;
-        sh.check(scene.gaussians.sh_degree, scene.feature_planes.features(), limits)
+        check_sh(scene, sh, limits)
+    }
+
+    /// A precision of weights, where the profile quantizes weights.
+    pub(super) fn precision(&self, precision: WeightPrecision) -> Option<WeightPrecision> {
+        (self.profile == Profile::Compact).then_some(precision)
     }
 }
 
-/// How finely the weights of each kind of network are quantized.
+/// Refuses a coding of the harmonics that contradicts itself or the scene.
+pub(super) fn check_sh(scene: &SceneData, sh: &ShCoding, limits: &Limits) -> Result<(), CodecError> {
+    steps::sh_step(sh.step())?;
+    sh.check(scene.gaussians.sh_degree, scene.feature_planes.features(), limits)
+}
+
+/// The precision of the weights of each kind of network.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WeightPrecisions {
     /// Those of the motion, whose errors change the image.

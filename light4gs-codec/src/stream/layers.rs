@@ -8,9 +8,9 @@ use crate::{
     sh,
 };
 
-/// Into how many layers the encoder divides the Gaussians, the most significant ones first.
+/// The layers into which the encoder divides the Gaussians, the most significant ones first.
 ///
-/// Each layer holds twice as many Gaussians as the one before, and is decoded without those after it. In the file, what
+/// Each layer holds twice the number of Gaussians of the one before, and is decoded without those after it. In the file, what
 /// all Gaussians share comes first, then layer after layer: [`StreamDecoder`](crate::StreamDecoder) shows the scene while the
 /// file comes. One layer is a file whose Gaussians come all at once. Decoded, a file of several layers has the same
 /// Gaussians to the bit, layer after layer in place of one order; it takes a few percent more bytes.
@@ -25,8 +25,8 @@ use crate::{
 pub struct GaussianLayers {
     /// Number of layers, 1 to [`GaussianLayers::MOST`].
     pub count: u32,
-    /// How much each Gaussian matters for the images, `[N]`; the largest come first. Without these it is opacity times
-    /// the product of the two larger scales.
+    /// The significance of each Gaussian for the images, `[N]`; the largest come first. `None` takes opacity times the product
+    /// of the two larger scales.
     pub significance: Option<Vec<f32>>,
 }
 
@@ -37,15 +37,15 @@ impl Default for GaussianLayers {
 }
 
 impl GaussianLayers {
-    /// The most layers that the encoder makes: the first one of so many has one of 255 Gaussians.
+    /// The most layers that the encoder makes. The first of eight layers has 1/255 of the Gaussians.
     pub const MOST: u32 = 8;
 
-    /// So many layers.
+    /// A number of layers, divided by the built-in significance.
     pub fn new(count: u32) -> Self {
         Self { count, significance: None }
     }
 
-    /// How many of `gaussians` each layer has.
+    /// The number of Gaussians of each layer, for a number of `gaussians` in all.
     pub fn sizes(&self, gaussians: usize) -> Vec<usize> {
         let count = self.count.clamp(1, Self::MOST);
         let all = (1_u64 << count) - 1;

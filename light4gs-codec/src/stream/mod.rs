@@ -5,12 +5,14 @@
 //! | `container.rs` | header and table |
 //! | `meta.rs`, `scene_coordinates.rs` | the simple sections; the others have modules of their own |
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and the compressor |
+//! | `encoded.rs` | what an encoder makes: the stream, and all that is known of it |
 //! | `layers.rs` | layers of Gaussians |
 //! | `open.rs`, `incremental.rs` | decoding section by section; decoding while the bytes come |
 //! | `info.rs` | a summary without decoding |
 
 mod compressor;
 pub(crate) mod container;
+mod encoded;
 mod incremental;
 mod info;
 mod input;
@@ -20,18 +22,20 @@ mod open;
 mod parts;
 mod scene_coordinates;
 
-pub use compressor::{CompressionReport, Encoded, encode_compressed, encode_compressed_with_limits};
+pub use compressor::{Compressor, encode_compressed, encode_compressed_with_limits};
+pub use encoded::Encoded;
 pub use incremental::StreamDecoder;
 pub use info::{LayerInfo, SectionInfo, StreamInfo, info, info_with_limits};
 pub use input::{CompressionInput, Profile, WeightPrecisions};
 pub use layers::GaussianLayers;
-pub use open::OpenStream;
+pub use open::{Decoded, OpenStream};
 pub use parts::{encode_planes, encode_sh, plane_distributions, sh_distributions};
 
 use container::NewSection;
+use layers::LayerHeads;
 
 use crate::{
-    CodecError, GaussianArrays, Limits, SceneData, attributes,
+    CodecError, GaussianArrays, Limits, SceneData, ShBytes, attributes,
     bytes::{
         Writer,
         sections::{Encoding, Kind},
@@ -47,28 +51,45 @@ use crate::{
 /// An array whose length disagrees with the others, a NaN or an infinity, a number beyond [`Limits::large`]; the
 /// message names the section and the field.
 pub fn encode(scene: &SceneData) -> Result<Vec<u8>, CodecError> {
+    Ok(encode_exactly(scene)?.bytes)
+}
+
+/// As [`encode`], with all that is known of the stream.
+///
+/// # Errors
+/// As [`encode`].
+pub fn encode_exactly(scene: &SceneData) -> Result<Encoded, CodecError> {
     let limits = Limits::large();
     check(scene, &limits)?;
-    let section = |kind: Kind, write: &dyn Fn(&mut Writer)| {
-        let mut writer = Writer::default();
-        write(&mut writer);
-        NewSection { kind, encoding: Encoding::Float32, payload: writer.bytes }
+    let SceneData { gaussians, coordinates, feature_planes, motion, .. } = scene;
+    let mut sections = Vec::new();
+    let mut section = |kind: Kind, writer: Writer| {
+        sections.push(NewSection { kind, encoding: Encoding::Float32, payload: writer.bytes });
     };
-    let mut motion_writer = Writer::default();
-    motion::section::write(&scene.motion, None, &mut motion_writer)?;
-    let sections = [
-        section(Kind::GaussiansExplicit, &|writer| attributes::write_float32(&scene.gaussians, writer)),
-        section(Kind::ShExplicit, &|writer| sh::section::write_explicit(&scene.gaussians, writer)),
-        section(scene_coordinates::kind(&scene.coordinates), &|writer| {
-            scene_coordinates::write(&scene.coordinates, writer)
-        }),
-        section(Kind::MotionDescription, &|writer| writer.bytes.extend_from_slice(&motion_writer.bytes)),
-        section(Kind::FeaturePlanesExplicit, &|writer| planes::explicit::write(&scene.feature_planes, writer)),
-    ];
-    let bytes = container::write(&scene.meta, &sections, &limits)?;
-    let decoded = decode_with_limits(&bytes, &limits)?;
-    fields::check_same_bits(scene, &decoded)?;
-    Ok(bytes)
+    let mut writer = Writer::default();
+    let attributes = attributes::write_float32(gaussians, &mut writer);
+    section(Kind::GaussiansExplicit, writer);
+    let mut writer = Writer::default();
+    sh::section::write_explicit(gaussians, &mut writer);
+    section(Kind::ShExplicit, writer);
+    let mut writer = Writer::default();
+    scene_coordinates::write(coordinates, &mut writer);
+    section(scene_coordinates::kind(coordinates), writer);
+    let mut writer = Writer::default();
+    motion::section::write(motion, None, &mut writer)?;
+    section(Kind::MotionDescription, writer);
+    let mut writer = Writer::default();
+    planes::explicit::write(feature_planes, &mut writer);
+    section(Kind::FeaturePlanesExplicit, writer);
+
+    let mut heads = LayerHeads::default();
+    let head = attributes::Head { count: gaussians.len() as u32, attributes };
+    heads.add(head, sh::section::Head::of(gaussians), limits.gaussians)?;
+    let planes = planes::Summary::of_explicit(feature_planes)?;
+    let sections: Vec<_> = sections.iter().collect();
+    let encoded = Encoded::new(&sections, scene.clone(), (heads, planes), ShBytes::default(), &limits)?;
+    encoded.verify(&limits)?;
+    Ok(encoded)
 }
 
 /// Turns a `.l4gs` stream into the scene that it holds.
@@ -85,7 +106,7 @@ pub fn decode(bytes: &[u8]) -> Result<SceneData, CodecError> {
 /// # Errors
 /// As [`decode`].
 pub fn decode_with_limits(bytes: &[u8], limits: &Limits) -> Result<SceneData, CodecError> {
-    OpenStream::with_limits(bytes, limits)?.scene()
+    Ok(OpenStream::with_limits(bytes, limits)?.decode()?.scene)
 }
 
 /// Refuses a further layer of Gaussians that contradicts itself. [`check`] has accepted the scene with the first one.

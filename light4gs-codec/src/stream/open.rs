@@ -3,6 +3,7 @@
 use super::{
     check,
     container::{Container, Header},
+    info::StreamInfo,
     layers::LayerHeads,
     scene_coordinates,
 };
@@ -31,6 +32,17 @@ use crate::{
 pub struct OpenStream<'a> {
     pub(super) container: Container<'a>,
     limits: Limits,
+}
+
+/// A whole stream, read once.
+#[derive(Clone, Debug)]
+pub struct Decoded {
+    /// The scene.
+    pub scene: SceneData,
+    /// What [`crate::info`] says of the stream.
+    pub info: StreamInfo,
+    /// What a reader must allow.
+    pub demand: Demand,
 }
 
 impl<'a> OpenStream<'a> {
@@ -74,12 +86,12 @@ impl<'a> OpenStream<'a> {
     }
 
     fn gaussians_within(&self, budget: &Budget) -> Result<GaussianArrays, CodecError> {
+        self.heads()?;
         concatenated(self.gaussian_layers_within(budget)?, budget)
     }
 
-    /// The Gaussians of every layer, without their harmonics.
+    /// The Gaussians of every layer, without their harmonics. [`OpenStream::heads`] has accepted the heads.
     fn gaussian_layers_within(&self, budget: &Budget) -> Result<Vec<GaussianArrays>, CodecError> {
-        self.heads()?;
         parallel::map(self.layers().max(1), |layer| self.layer_of_gaussians_within(layer, budget)).into_iter().collect()
     }
 
@@ -97,13 +109,9 @@ impl<'a> OpenStream<'a> {
         self.container.header.layers()
     }
 
-    /// Refuses a section that has not the checksum of the table.
-    pub(super) fn check_sums(&self) -> Result<(), CodecError> {
-        for section in Section::ALL {
-            let count = self.container.header.entries.iter().filter(|entry| entry.section == section).count();
-            (0..count).try_for_each(|layer| self.container.layer(section, layer).map(drop))?;
-        }
-        Ok(())
+    /// The same stream, with the checksums of all sections checked, so that none is computed twice.
+    pub(super) fn verified(&self) -> Result<OpenStream<'_>, CodecError> {
+        Ok(OpenStream { container: self.container.verified()?, limits: self.limits })
     }
 
     /// The heads of all layers.
@@ -152,17 +160,19 @@ impl<'a> OpenStream<'a> {
     /// # Errors
     /// As [`crate::decode`].
     pub fn feature_planes(&self) -> Result<FeaturePlaneArrays, CodecError> {
-        self.feature_planes_within(&self.budget())
+        Ok(self.feature_planes_within(&self.budget())?.0)
     }
 
-    fn feature_planes_within(&self, budget: &Budget) -> Result<FeaturePlaneArrays, CodecError> {
+    fn feature_planes_within(&self, budget: &Budget) -> Result<(FeaturePlaneArrays, planes::Summary), CodecError> {
         let (kind, _, payload) = self.container.section(Section::FeaturePlanes)?;
         if kind == Kind::FeaturePlanesExplicit {
-            return planes::explicit::read(payload, budget);
+            let planes = planes::explicit::read(payload, budget)?;
+            let summary = planes::Summary::of_explicit(&planes)?;
+            return Ok((planes, summary));
         }
         let (_, encoding, model) = self.container.section(Section::ContextModel)?;
         let model = planes::context_section::read(model, encoding, budget)?;
-        planes::section::read(payload, &model, budget)
+        planes::section::read(payload, model, budget)
     }
 
     /// Whether [`OpenStream::sh`] needs the planes.
@@ -241,40 +251,42 @@ impl<'a> OpenStream<'a> {
         Ok(Harmonics { degree: parts.head.degree, rest, coding: parts.into_coding() })
     }
 
-    /// The whole scene. Sections that do not depend on each other are decoded at the same time where there are threads.
+    /// The whole scene, and all that the stream says of it. Sections that do not depend on each other are decoded at the same
+    /// time where there are threads.
     ///
     /// # Errors
     /// As [`crate::decode`].
-    pub fn scene(&self) -> Result<SceneData, CodecError> {
-        self.scene_and_demand().map(|(scene, _)| scene)
+    pub fn decode(&self) -> Result<Decoded, CodecError> {
+        self.verified()?.decode_verified()
     }
 
-    /// The whole scene, and its cost.
-    pub(crate) fn scene_and_demand(&self) -> Result<(SceneData, Demand), CodecError> {
+    fn decode_verified(&self) -> Result<Decoded, CodecError> {
         let budget = self.budget();
         self.check_sections()?;
         let coordinates = self.coordinates()?;
         let coupled = self.sh_needs_feature_planes()?;
-        let (layers, feature_planes) = parallel::join(
+        let (gaussians, feature_planes) = parallel::join(
             || {
+                let heads = self.heads()?;
                 let layers = self.gaussian_layers_within(&budget)?;
                 if coupled {
-                    return Ok(layers);
+                    return Ok((heads, layers));
                 }
-                self.sh_of_layers_within(layers, &coordinates, &FeaturePlaneArrays::default(), &budget)
+                let planes = FeaturePlaneArrays::default();
+                Ok((heads, self.sh_of_layers_within(layers, &coordinates, &planes, &budget)?))
             },
             || self.feature_planes_within(&budget),
         );
-        let (mut layers, feature_planes) = (layers?, feature_planes?);
+        let ((heads, mut layers), (feature_planes, planes)) = (gaussians?, feature_planes?);
         if coupled {
             layers = self.sh_of_layers_within(layers, &coordinates, &feature_planes, &budget)?;
         }
         let gaussians = concatenated(layers, &budget)?;
         let motion = self.motion_within(&budget)?;
-        let meta = self.meta().clone();
-        let scene = SceneData { meta, gaussians, coordinates, feature_planes, motion };
+        let info = StreamInfo::new(&self.container.header, heads, planes, motion.description());
+        let scene = SceneData { meta: info.meta.clone(), gaussians, coordinates, feature_planes, motion };
         check(&scene, &self.limits)?;
-        Ok((scene, budget.demand()))
+        Ok(Decoded { scene, info, demand: budget.demand() })
     }
 
     /// The scene without its Gaussians: what all layers share.
@@ -284,7 +296,7 @@ impl<'a> OpenStream<'a> {
             meta: self.meta().clone(),
             gaussians: GaussianArrays::default(),
             coordinates: self.coordinates()?,
-            feature_planes: self.feature_planes_within(budget)?,
+            feature_planes: self.feature_planes_within(budget)?.0,
             motion: self.motion_within(budget)?,
         })
     }
@@ -357,11 +369,11 @@ mod tests {
             let path = entry.expect("an entry").path();
             let bytes = std::fs::read(&path).expect("a file");
             let stream = OpenStream::with_limits(&bytes, &Limits::large()).expect("a stream");
-            let decode = || pool.install(|| (Instant::now(), stream.scene_and_demand(), Instant::now()));
+            let decode = || pool.install(|| (Instant::now(), stream.decode(), Instant::now()));
             let runs: Vec<_> = (0..3).map(|_| decode()).collect();
             let took = runs.iter().map(|(begin, _, end)| *end - *begin).min().expect("three runs").as_secs_f64() * 1e3;
             match &runs[0].1 {
-                Ok((scene, demand)) => {
+                Ok(Decoded { scene, demand, .. }) => {
                     let (asked, mib) = (demand.nanoseconds as f64 / 1e6, demand.memory_bytes >> 20);
                     println!(
                         "{:5.2} asked {asked:7.1} ms took {took:7.1} ms, {mib} MiB, {} bytes, {} Gaussians, {} channels of {} planes: {}",

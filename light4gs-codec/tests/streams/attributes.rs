@@ -76,9 +76,6 @@ fn round_trip(given: &GaussianArrays, steps: &AttributeSteps) -> Vec<u8> {
             }
         }
     }
-    let sizes = encoded.sizes;
-    let coded: usize = sizes.attributes.iter().map(|(_, bytes)| bytes).sum();
-    assert_eq!(sizes.overhead + coded, encoded.bytes.len());
     encoded.bytes
 }
 
@@ -157,9 +154,9 @@ fn a_further_attribute_changes_no_other_stream() {
     let mut given = cloud(300);
     given.further = vec![further("lifetime", 2, 300)];
     let with = attributes::encode(&given, &steps).unwrap();
-    assert_eq!(with.sizes.attributes[..5], without.sizes.attributes);
-    let (begin, length) = (without.sizes.overhead, without.bytes.len() - without.sizes.overhead);
-    assert_eq!(with.bytes[with.sizes.overhead..][..length], without.bytes[begin..]);
+    assert_eq!(with.attributes[..5], without.attributes);
+    let (begin, length) = (without.overhead(), without.bytes.len() - without.overhead());
+    assert_eq!(with.bytes[with.overhead()..][..length], without.bytes[begin..]);
 }
 
 /// A row of the list in a section: name, width, coder with the mark that it may be left out, bytes of the stream.
@@ -170,7 +167,7 @@ fn row(name: &[u8], width: &[u8], coder: u8, bytes: &[u8]) -> Vec<u8> {
 /// Ten Gaussians with these rows in place of those of the further attributes, and these bytes after all others.
 fn forged(rows: &[Vec<u8>], behind: &[u8]) -> Result<GaussianArrays, String> {
     let encoded = attributes::encode(&cloud(10), &AttributeSteps::default()).unwrap();
-    let (head, streams) = encoded.bytes.split_at(encoded.sizes.overhead);
+    let (head, streams) = encoded.bytes.split_at(encoded.overhead());
     assert_eq!(head[4], 5);
     let bytes = [&head[..4], &[5 + rows.len() as u8], &head[5..], &rows.concat(), streams, behind].concat();
     attributes::decode(&bytes, &Limits::default()).map_err(|error| error.to_string())
@@ -340,15 +337,16 @@ fn measured_on_trained_scenes() {
         };
         let encode = fastest(&|| drop(attributes::encode(&given, &steps).unwrap()));
         let decode = fastest(&|| drop(attributes::decode(&bytes, &Limits::default()).unwrap()));
-        let sizes = attributes::encode(&given, &steps).unwrap().sizes;
+        let encoded = attributes::encode(&given, &steps).unwrap();
         let a_gaussian = |bytes: usize| bytes as f64 / given.len() as f64;
-        let parts = sizes.attributes.iter().map(|(name, bytes)| format!("{name} {:.2}", a_gaussian(*bytes)));
+        let parts =
+            encoded.attributes.iter().map(|part| format!("{} {:.2}", part.name, a_gaussian(part.bytes as usize)));
         println!(
             "{path}: {} Gaussians, {:.2} bytes each: {}; overhead {} bytes; encode {encode:.1?}, decode {decode:.1?}",
             given.len(),
             a_gaussian(bytes.len()),
             parts.collect::<Vec<_>>().join(", "),
-            sizes.overhead,
+            encoded.overhead(),
         );
     }
 }

@@ -20,11 +20,11 @@ use proptest::prelude::*;
 fn round_trip(scene: &SceneData, input: &CompressionInput) -> Encoded {
     let encoded = encode_compressed(scene, input).unwrap();
     assert_eq!(decode(&encoded.bytes).unwrap(), encoded.decoded);
-    let sections: u64 = encoded.report.sections.iter().map(|section| section.3).sum();
-    assert_eq!(encoded.report.header_bytes + sections, encoded.bytes.len() as u64);
     let info = info(&encoded.bytes).unwrap();
+    assert_eq!(info, encoded.info);
+    let sections: u64 = info.sections.iter().map(|section| section.bytes).sum();
+    assert_eq!(info.header_bytes + sections, encoded.bytes.len() as u64);
     assert_eq!((info.version, info.profile), (1, Some(input.profile)));
-    assert_eq!(info.plane_bytes, encoded.report.planes);
     assert_eq!(info.gaussian_count as usize, scene.gaussians.len());
     assert_eq!(info.planes, scene.feature_planes.layout().unwrap());
     encoded
@@ -64,7 +64,7 @@ fn every_combination_of_parts() {
             continue;
         }
         let encoded = round_trip(&scene, &input(&scene, Profile::Paper, compact_shape(4, parts)));
-        for bytes in &encoded.report.planes {
+        for bytes in &encoded.info.plane_bytes {
             let low = bytes.plane < 6 || !inter_scale;
             let space_time = [2, 4, 5].contains(&(bytes.plane % 6));
             assert_eq!(bytes.anchors > 0, checkerboard && low, "{parts:?} {bytes:?}");
@@ -89,7 +89,7 @@ fn a_description_is_short() {
     };
     let weights: u64 = model.networks.iter().map(stored).sum();
     // Besides the description there are the latent's medians and its tables, some 20 bytes each.
-    let description = encoded.report.sections[5].3 - 4 * weights;
+    let description = encoded.info.sections[5].bytes - 4 * weights;
     assert!(description < 200, "{description} bytes");
 }
 
@@ -165,7 +165,7 @@ fn a_composition_of_ones_own() {
         for (given, decoded) in scene.feature_planes.planes.iter().zip(&encoded.decoded.feature_planes.planes) {
             assert!(largest_error(&given.values, &decoded.values) <= 0.0501);
         }
-        let has_latent: Vec<_> = encoded.report.planes.iter().map(|plane| plane.latent > 0).collect();
+        let has_latent: Vec<_> = encoded.info.plane_bytes.iter().map(|plane| plane.latent > 0).collect();
         assert_eq!(has_latent[..6], [false; 6]);
         assert_eq!(has_latent[6..], [true, true, true, true, true, false]);
     }
@@ -282,7 +282,7 @@ fn harmonics_under_networks() {
                     let decoded = &encoded.decoded.gaussians.sh_rest;
                     assert!(largest_error(&scene.gaussians.sh_rest, decoded) <= 0.01001);
                 }
-                assert_eq!(encoded.report.sections[1].1, Kind::ShNetworks);
+                assert_eq!(encoded.info.sections[1].kind, Kind::ShNetworks);
             }
         }
     }
@@ -304,7 +304,7 @@ fn harmonics_are_predicted_from_neighbors() {
     let sh = ShCoding::Channels { step: 0.02 };
     let encoded =
         round_trip(&scene, &CompressionInput { sh, ..input(&scene, Profile::Compact, compact_shape(4, ALL_PARTS)) });
-    let bits = 8.0 * encoded.report.sh.degrees[0] as f64 / scene.gaussians.sh_rest.len() as f64;
+    let bits = 8.0 * encoded.sh.degrees[0] as f64 / scene.gaussians.sh_rest.len() as f64;
     assert!(bits < 0.6 * 100_f64.log2(), "{bits} bits a number");
     assert!(bits > 0.5, "{bits} bits a number");
 }
@@ -334,7 +334,7 @@ fn the_coded_bits_are_those_of_the_distributions() {
     let encoded = round_trip(&scene, &input);
     let planes = input.planes.as_ref().unwrap();
     let bytes = encode_planes(&scene.feature_planes, planes).unwrap();
-    assert_eq!(bytes.len() as u64, encoded.report.sections[4].3);
+    assert_eq!(bytes.len() as u64, encoded.info.sections[4].bytes);
     for (index, plane) in encoded.decoded.feature_planes.planes.iter().enumerate() {
         let Distributions { scales, means } =
             plane_distributions(&encoded.decoded.feature_planes, planes, index).unwrap();
@@ -345,7 +345,7 @@ fn the_coded_bits_are_those_of_the_distributions() {
             let scale = f64::from(scale.max(0.11));
             ideal -= (upper_tail((distance - 0.5) / scale) - upper_tail((distance + 0.5) / scale)).max(2e-9).log2();
         }
-        let sizes = encoded.report.planes[index];
+        let sizes = encoded.info.plane_bytes[index];
         let coded = 8.0 * (sizes.anchors + sizes.others) as f64;
         assert!((coded / ideal - 1.0).abs() < 0.01, "plane {index}: {coded} bits, ideal {ideal}");
     }

@@ -266,7 +266,7 @@ fn what_only_the_whole_may_ask_for_waits_for_the_whole() {
 fn demand_is_that_of_the_whole() {
     for (scene, input) in inputs() {
         let coded = encode_compressed(&scene, &input).unwrap();
-        let Demand { memory_bytes, nanoseconds } = coded.report.demand;
+        let Demand { memory_bytes, nanoseconds } = coded.verify(&Limits::large()).unwrap();
         let answer = |memory_bytes, nanoseconds| {
             let limits = Limits { memory_bytes, nanoseconds, ..Limits::default() };
             let mut decoder = StreamDecoder::with_limits(&limits);

@@ -15,7 +15,7 @@ fn the_papers_planes_under_either_architecture() {
         let coupled = CompressionInput { sh: sh_networks(ShKind::Everything, 3, features), ..tables.clone() };
         for (sh, input) in [("tables", tables), ("networks", coupled)] {
             let encoded = encode_compressed(&scene, &input).unwrap();
-            let (demand, limits) = (encoded.report.demand, Limits::default());
+            let (demand, limits) = (encoded.verify(&Limits::large()).unwrap(), Limits::default());
             println!("{name}, {sh}: {} bytes, {demand:?}", encoded.bytes.len());
             if let Ok(folder) = std::env::var("LIGHT4GS_STREAMS") {
                 std::fs::write(format!("{folder}/{name}-{sh}.l4gs"), &encoded.bytes).unwrap();

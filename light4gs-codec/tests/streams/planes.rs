@@ -92,11 +92,11 @@ fn any_set_of_planes_is_coded_under_a_context_model() {
                 // A latent for planes that no other part of the model predicts.
                 let layout = scene.feature_planes.layout().unwrap();
                 let alone = layout.one_scale_below(index).is_none() && layout.over_time(index).is_none();
-                assert_eq!(encoded.report.planes[index].latent > 0, alone, "{name}, plane {}", given.shape().name());
+                assert_eq!(encoded.info.plane_bytes[index].latent > 0, alone, "{name}, plane {}", given.shape().name());
             }
             let info = info(&encoded.bytes).unwrap();
             assert_eq!(info.planes, scene.feature_planes.layout().unwrap(), "{name}");
-            assert_eq!(info.plane_bytes, encoded.report.planes, "{name}");
+            assert_eq!(info, encoded.info, "{name}");
         }
     }
 }

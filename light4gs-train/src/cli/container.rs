@@ -7,9 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use light4gs_codec::attributes::AttributeInfo;
 use light4gs_codec::plane_layout::PlaneShape;
-use light4gs_codec::{
-    LayerInfo, Limits, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits,
-};
+use light4gs_codec::{LayerInfo, SceneData, SceneMeta, StreamInfo, read_file_with_limits, read_info_with_limits};
 use light4gs_data::{Scene, write_atomically};
 use light4gs_model::DeformationField;
 use light4gs_model::attributes::BUILT_IN;
@@ -150,7 +148,7 @@ pub(super) fn code_to_file<F: DeformationField, E: EntropyModels>(
         Ok(())
     })?;
     write_atomically(out, |file| file.write_all(&coded.bytes))?;
-    print_info(&read_info_with_limits(out, &Limits::large())?, json)?;
+    print_info(&coded.info, json)?;
     Ok(coded)
 }
 

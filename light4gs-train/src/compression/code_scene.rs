@@ -5,14 +5,14 @@ use std::time::Instant;
 
 use burn::module::Module;
 use burn::tensor::Device;
-use light4gs_codec::{Kind, PlaneBytes, Profile, SceneData};
+use light4gs_codec::{Encoded, Kind, PlaneBytes, Profile, SceneData, StreamInfo};
 use light4gs_data::{Frame, Scene};
+use light4gs_model::attributes::SH_REST;
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, PlaneEntropy, Splatter};
 use serde::{Deserialize, Serialize};
 
-use super::attribute_bits::written_attribute_bits;
 use super::{
-    BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EncodedScene, EntropyModels, MissedQuality,
+    AttributeRecord, BitEstimate, BitMap, Compression, CompressionOf, ConfiguredModels, EntropyModels, MissedQuality,
     SearchImages, ShModel, encode, fit, mean_psnr, measured_views, plane_and_sh_step_search,
 };
 use crate::config::{CompressionConfig, Config, FileProfile};
@@ -48,17 +48,6 @@ pub struct CodingRecord {
     /// The wished quality, if the file does not have it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub missed_quality: Option<MissedQuality>,
-}
-
-/// How an attribute was coded.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct AttributeRecord {
-    /// Its name in the table of attributes.
-    pub name: String,
-    /// Bits that the model of the training expects.
-    pub estimated_bits: f64,
-    /// Bits in the file.
-    pub coded_bits: f64,
 }
 
 /// A part of a file with trained models: the expected and the written bits.
@@ -148,8 +137,19 @@ pub struct TrainedScene<'a, F: DeformationField = BuiltInField, E: EntropyModels
 pub struct CodedScene {
     /// The file.
     pub bytes: Vec<u8>,
+    /// The scene that a decoder gets from it, bit for bit.
+    pub decoded: SceneData,
+    /// What the file holds.
+    pub info: StreamInfo,
     /// How it was coded, and the bit maps of its planes; `None` in the `float32` profile.
     pub coding: Option<(CodingRecord, Vec<BitMap>)>,
+}
+
+impl CodedScene {
+    fn new(file: Encoded, coding: Option<(CodingRecord, Vec<BitMap>)>) -> Self {
+        let Encoded { bytes, decoded, info, .. } = file;
+        Self { bytes, decoded, info, coding }
+    }
 }
 
 /// Encodes a trained scene in the profile of its configuration. If the scene was trained without entropy models, they
@@ -161,81 +161,100 @@ pub fn code_scene<F: DeformationField, E: EntropyModels>(
     trained: &TrainedScene<F, E>,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
 ) -> Result<CodedScene, TrainError> {
-    let TrainedScene { scene, config, data: dataset, device, .. } = trained;
-    let meta = scene_meta(config, dataset);
-    let settings = &config.compression;
-    let data = scene.to_arrays(meta.clone())?;
-    let Some(profile) = settings.profile.coded() else {
-        return Ok(CodedScene { bytes: light4gs_codec::encode(&data)?, coding: None });
+    let TrainedScene { scene, config, data: dataset, .. } = trained;
+    let data = scene.to_arrays(scene_meta(config, dataset))?;
+    let Some(profile) = config.compression.profile.coded() else {
+        return Ok(CodedScene::new(light4gs_codec::encode_exactly(&data)?, None));
     };
-    let views = search_views(dataset);
-    let inner = (*device).clone().inner();
-    // A field that cannot be decoded is refused here, before anything is fitted.
-    DynamicScene::<F>::from_arrays(&data, &inner)?;
-    let render = |data: &SceneData| render_views::<F>(data, &views, &inner);
-    let psnr = |data: &SceneData| match trained.images {
-        Some(images) => mean_psnr::<F>(data, measured_views(dataset), images, &inner),
-        None => Err(TrainError::Input(
-            "compression.target_db needs the images of a dataset, and this scene has none; give --target-bytes".into(),
-        )),
+    let (views, device) = (search_views(dataset), trained.device.clone().inner());
+    let render = |data: &SceneData| {
+        let scene = DynamicScene::<F>::from_arrays(data, &device).expect("arrays that came from a model make one");
+        render_views(&scene, data, &views)
     };
-    let images = match (searches(settings, trained.compression) && profile == Profile::Compact, trained.images) {
-        (false, _) => None,
-        (true, Some(images)) => {
-            let error = mean_squared_error(&render(&data), &views, images)?;
-            Some(SearchImages { render: &render, error, psnr: &psnr })
-        }
-        (true, None) => Some(SearchImages { render: &render, error: 10f64.powf(-ASSUMED_PSNR / 10.0), psnr: &psnr }),
-    };
-    let (compression, fit_seconds, settings) = match (trained.compression, &images) {
-        (Some(compression), _) => (compression.clone(), None, settings.clone()),
-        (None, images) => {
-            let mut config = (*config).clone();
-            if let Some(images) = images {
-                plane_and_sh_step_search::search(&data, &mut config.compression, images);
-            }
-            let begin = Instant::now();
-            let compression = fit(trained.models, scene, &config, device, progress)?;
-            (compression, Some(begin.elapsed().as_secs_f64()), config.compression)
-        }
-    };
-    let settings = &settings;
-    let begin = Instant::now();
-    let encoded = encode(scene, &compression, meta, settings, profile, images, device)?;
-    let sizes = &encoded.coded.report;
-    let plane_bytes: u64 = sizes.planes.iter().map(|plane| plane.total()).sum();
-    let sh_bytes: u64 = sizes.sh.degrees.iter().sum();
-    let gaussians = sizes.sections.iter().filter(|(_, kind, ..)| *kind == Kind::GaussiansExplicit);
-    let gaussian_bytes: u64 = gaussians.map(|(.., bytes)| bytes).sum();
-    // Spherical harmonics that are coded as other attributes are among these, unless training had a model for them, which
-    // says nothing about this coding.
-    let (sh_bytes, with_sh) = match sizes.sections.iter().any(|(_, kind, ..)| *kind == Kind::ShChannels) {
-        true if compression.sh.is_some() => (0, 0),
-        true => (0, sh_bytes),
-        false => (sh_bytes, 0),
-    };
-    // Only this profile quantizes attributes.
-    let models_attributes = profile == Profile::Compact && compression.learned_attributes().is_some();
-    let attribute_bytes = if models_attributes { gaussian_bytes + with_sh } else { 0 };
-    let mut estimate = encoded.coded.estimate;
-    if !models_attributes {
-        estimate.attributes = 0.0;
+    let psnr = |data: &SceneData| trained.measured_psnr(data, &device);
+    let mut images = None;
+    if profile == Profile::Compact && searches(&config.compression, trained.compression) {
+        let exact = render_views(&decodable::<F>(&data, &device)?, &data, &views);
+        let error = trained.squared_error(&exact, &views)?;
+        images = Some(SearchImages { render: &render, exact, error, psnr: &psnr });
     }
+    let Models { compression, settings, fit_seconds } = match trained.compression {
+        Some(compression) => Models::of_training(compression, config),
+        None => trained.fit_models(&data, images.as_ref(), progress)?,
+    };
+    let begin = Instant::now();
+    let encoded = encode(scene, &data, &compression, &settings, profile, images, trained.device)?;
+    let encode_seconds = begin.elapsed().as_secs_f64();
     let record = CodingRecord {
         profile: settings.profile,
         fit_seconds,
-        encode_seconds: begin.elapsed().as_secs_f64(),
-        estimated_bits: estimate,
-        coded_bits: BitEstimate {
-            planes: 8.0 * plane_bytes as f64,
-            sh: 8.0 * sh_bytes as f64,
-            attributes: 8.0 * attribute_bytes as f64,
-        },
-        attributes: if models_attributes { attribute_records(&encoded)? } else { Vec::new() },
-        planes: plane_records(&encoded, &compression),
-        missed_quality: encoded.coded.missed,
+        encode_seconds,
+        estimated_bits: encoded.estimate,
+        coded_bits: coded_bits(&encoded.file, &compression, profile),
+        attributes: encoded.attributes,
+        planes: plane_records(&encoded.file, &compression),
+        missed_quality: encoded.missed,
     };
-    Ok(CodedScene { bytes: encoded.bytes, coding: Some((record, encoded.coded.bit_maps)) })
+    Ok(CodedScene::new(encoded.file, Some((record, encoded.bit_maps))))
+}
+
+/// Entropy models of a scene, and the settings with which they code it.
+struct Models<E: EntropyModels> {
+    compression: CompressionOf<E>,
+    settings: CompressionConfig,
+    /// Seconds of fitting, if they were not trained with the scene.
+    fit_seconds: Option<f64>,
+}
+
+impl<E: EntropyModels> Models<E> {
+    fn of_training(compression: &CompressionOf<E>, config: &Config) -> Self {
+        Self { compression: compression.clone(), settings: config.compression.clone(), fit_seconds: None }
+    }
+}
+
+impl<F: DeformationField, E: EntropyModels> TrainedScene<'_, F, E> {
+    /// Fits models to the scene, whose arrays are `data`; with images, it searches the steps of planes and harmonics first.
+    fn fit_models(
+        &self,
+        data: &SceneData,
+        images: Option<&SearchImages>,
+        progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
+    ) -> Result<Models<E>, TrainError> {
+        let mut config = self.config.clone();
+        match images {
+            Some(images) => plane_and_sh_step_search::search(data, &mut config.compression, images),
+            // Where there are images, this was checked before.
+            None => drop(decodable::<F>(data, &self.device.clone().inner())?),
+        }
+        let begin = Instant::now();
+        let compression = fit(self.models, self.scene, &config, self.device, progress)?;
+        let fit_seconds = Some(begin.elapsed().as_secs_f64());
+        Ok(Models { compression, settings: config.compression, fit_seconds })
+    }
+
+    /// Mean squared error of rendered views; without true images, that of [`ASSUMED_PSNR`].
+    fn squared_error(&self, rendered: &[f32], views: &[&Frame]) -> Result<f64, TrainError> {
+        match self.images {
+            Some(images) => mean_squared_error(rendered, views, images),
+            None => Ok(10f64.powf(-ASSUMED_PSNR / 10.0)),
+        }
+    }
+
+    /// The PSNR of a decoded scene by which `compression.target_db` is reached, dB.
+    fn measured_psnr(&self, decoded: &SceneData, device: &Device) -> Result<f64, TrainError> {
+        let Some(images) = self.images else {
+            return Err(TrainError::Input(
+                "compression.target_db needs the images of a dataset, and this scene has none; give --target-bytes"
+                    .into(),
+            ));
+        };
+        mean_psnr::<F>(decoded, measured_views(self.data), images, device)
+    }
+}
+
+/// The scene that a decoder makes of arrays. A field that cannot be decoded is refused here, before anything is fitted.
+fn decodable<F: DeformationField>(data: &SceneData, device: &Device) -> Result<DynamicScene<F>, TrainError> {
+    Ok(DynamicScene::from_arrays(data, device)?)
 }
 
 /// Whether the search for steps needs renderings. Steps of planes and harmonics can change only before models are
@@ -247,22 +266,35 @@ fn searches<C: PlaneEntropy, S: ShModel>(settings: &CompressionConfig, trained: 
     wished || (settings.attributes.search_tolerance > 0.0 && !learned) || (trained.is_none() && fitted)
 }
 
-/// Expected and written bits of each attribute with a model.
-fn attribute_records(encoded: &EncodedScene) -> Result<Vec<AttributeRecord>, TrainError> {
-    let written = written_attribute_bits(&encoded.bytes, &encoded.coded.report)?;
-    let record = |(name, bits): &(String, f64)| AttributeRecord {
-        name: name.clone(),
-        estimated_bits: *bits,
-        coded_bits: written(name),
+/// The bits in a file, without models and tables. Attributes count where they have a trained model.
+fn coded_bits<C: PlaneEntropy, S: ShModel>(
+    file: &Encoded,
+    compression: &Compression<C, S>,
+    profile: Profile,
+) -> BitEstimate {
+    let planes: u64 = file.info.plane_bytes.iter().map(PlaneBytes::total).sum();
+    let gaussians = file.info.sections.iter().filter(|section| section.kind == Kind::GaussiansExplicit);
+    let gaussians: u64 = gaussians.map(|section| section.bytes).sum();
+    let harmonics = file.attribute_bytes(&SH_REST.name);
+    // Spherical harmonics that are coded as other attributes are among these, unless training had a model for them, which
+    // says nothing about this coding.
+    let (sh, with_sh) = match (file.sh_is_an_attribute(), compression.sh.is_some()) {
+        (true, true) => (0, 0),
+        (true, false) => (0, harmonics),
+        (false, _) => (harmonics, 0),
     };
-    Ok(encoded.coded.attributes.iter().map(record).collect())
+    // Only this profile quantizes attributes.
+    let models_attributes = profile == Profile::Compact && compression.learned_attributes().is_some();
+    let attributes = if models_attributes { gaussians + with_sh } else { 0 };
+    let bits = |bytes: u64| 8.0 * bytes as f64;
+    BitEstimate { planes: bits(planes), sh: bits(sh), attributes: bits(attributes) }
 }
 
-fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Compression<C, S>) -> Vec<PlaneRecord> {
+fn plane_records<C: Module, S: Module>(file: &Encoded, compression: &Compression<C, S>) -> Vec<PlaneRecord> {
     let Some(models) = &compression.planes else { return Vec::new() };
     let steps = models.quantization.steps_without_gradient().values();
     let record = |bytes: &PlaneBytes| {
-        let plane = &encoded.decoded.feature_planes.planes[bytes.plane];
+        let plane = &file.decoded.feature_planes.planes[bytes.plane];
         PlaneRecord {
             name: plane.shape().name(),
             step: steps[bytes.plane],
@@ -271,7 +303,7 @@ fn plane_records<C: Module, S: Module>(encoded: &EncodedScene, compression: &Com
             value_bytes: bytes.anchors + bytes.others,
         }
     };
-    encoded.coded.report.planes.iter().map(record).collect()
+    file.info.plane_bytes.iter().map(record).collect()
 }
 
 fn search_views(data: &Scene) -> Vec<&Frame> {
@@ -279,9 +311,8 @@ fn search_views(data: &Scene) -> Vec<&Frame> {
     data.train.iter().step_by(stride).collect()
 }
 
-/// Pixel values of all views, clamped to [0, 1].
-fn render_views<F: DeformationField>(data: &SceneData, views: &[&Frame], device: &Device) -> Vec<f32> {
-    let scene = DynamicScene::<F>::from_arrays(data, device).expect("arrays that came from a model make one");
+/// Pixel values of all views of a scene, whose arrays are `data`, clamped to [0, 1].
+fn render_views<F: DeformationField>(scene: &DynamicScene<F>, data: &SceneData, views: &[&Frame]) -> Vec<f32> {
     let splatter = Splatter::new(data.meta.background, usize::from(data.gaussians.sh_degree));
     let image = |frame: &&Frame| {
         let image = splatter.render(scene.at(frame.time), &frame.camera, None).image;

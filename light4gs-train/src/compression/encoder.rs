@@ -4,39 +4,28 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{
-    CodecError, CompressionInput, CompressionReport, Encoded, GaussianArrays, GaussianLayers, PlaneCoding, Profile,
-    SceneData, SceneMeta, ShCoding, WeightPrecisions, checks, encode_compressed, sh_rest_coefficients,
+    CodecError, CompressionInput, Compressor, Encoded, GaussianArrays, GaussianLayers, Limits, PlaneCoding, Profile,
+    SceneData, SceneMeta, ShCoding, WeightPrecisions, checks, sh_rest_coefficients,
 };
 use light4gs_model::attributes::SH_REST;
 use light4gs_model::{DeformationField, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, counted_sh_coding};
 use serde::{Deserialize, Serialize};
 
 use super::rate::{known, plane_tensors};
-use super::step_factor::{encode_to_quality, encode_to_size};
-use super::{Compression, MissedQuality, ShModel, attribute_step_search};
+use super::step_factor::{ScaledFile, encode_to_quality, encode_to_size};
+use super::{AttributeRecord, Compression, MissedQuality, ShModel, attribute_step_search};
 use crate::config::CompressionConfig;
 use crate::error::TrainError;
 
-/// A file in memory.
+/// A file in memory, and the bits that the entropy models expected.
 #[derive(Clone, Debug)]
 pub struct EncodedScene {
-    /// The file.
-    pub bytes: Vec<u8>,
-    /// The scene that a decoder gets from it, bit for bit.
-    pub decoded: SceneData,
-    /// The bytes of each part, and the expected bits.
-    pub coded: CodedSizes,
-}
-
-/// Bytes by part, and the bits that the entropy models expected.
-#[derive(Clone, Debug)]
-pub struct CodedSizes {
-    /// The written bytes.
-    pub report: CompressionReport,
+    /// The file, the scene that a decoder gets from it, and the bytes of each part. It has been verified.
+    pub file: Encoded,
     /// The bits that the models of the training expect for the decoded scene.
     pub estimate: BitEstimate,
-    /// The expected bits of each attribute with a model, by its name; those of [`BitEstimate::attributes`].
-    pub attributes: Vec<(String, f64)>,
+    /// Expected and written bits of each attribute with a learned step, if the profile quantizes attributes.
+    pub attributes: Vec<AttributeRecord>,
     /// The expected bits of every place of every plane.
     pub bit_maps: Vec<BitMap>,
     /// The wished quality, if the file does not have it.
@@ -85,17 +74,23 @@ pub struct BitEstimate {
 pub struct SearchImages<'a> {
     /// Renders some training views of a scene, as pixel values.
     pub render: &'a dyn Fn(&SceneData) -> Vec<f32>,
-    /// Mean squared error of these, for the unquantized scene.
+    /// These pixel values for the unquantized scene.
+    pub exact: Vec<f32>,
+    /// Mean squared error of [`SearchImages::exact`].
     pub error: f64,
     /// The PSNR by which `compression.target_db` is reached, dB.
     pub psnr: &'a dyn Fn(&SceneData) -> Result<f64, TrainError>,
 }
 
-/// Encodes a scene in a profile. Before this returns, everything that was coded is decoded again and compared.
+/// Encodes a scene in a profile; `data` is the scene as plain arrays. Before this returns, everything that was coded is
+/// decoded again and compared.
+///
+/// # Errors
+/// What the codec refuses; an image that cannot be read; a file that cannot be as small as `compression.target_bytes`.
 pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
+    data: &SceneData,
     compression: &Compression<C, S>,
-    meta: SceneMeta,
     config: &CompressionConfig,
     profile: Profile,
     images: Option<SearchImages>,
@@ -103,50 +98,53 @@ pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 ) -> Result<EncodedScene, TrainError> {
     let (scene, device) = (&scene.valid(), &device.clone().inner());
     let compression = &mut compression.valid();
-    let data = scene.to_arrays(meta)?;
-    let mut input = compression_input(compression, scene, &data, config, profile)?;
-    if let (Some(images), Profile::Compact, None) = (&images, input.profile, compression.learned_attributes())
+    let mut input = compression_input(compression, scene, data, config, profile)?;
+    if let (Some(images), Profile::Compact, None) = (&images, profile, compression.learned_attributes())
         && config.attributes.search_tolerance > 0.0
     {
         let tolerance = config.attributes.search_tolerance;
         // The search tries much finer steps than the given ones. Values that are too large for these, as in a training
         // that has diverged, may still fit the given steps.
-        let found = attribute_step_search::search(&data, &input.attributes, tolerance, images.error, images.render);
+        let found = attribute_step_search::search(data, &input.attributes, tolerance, images.error, images.render);
         input.attributes = found.unwrap_or(input.attributes);
     }
-    let mut missed = None;
-    let file = match (config.target_bytes, config.target_db, images) {
-        (1.., ..) => Some(encode_to_size(&data, &input, config.target_bytes)?),
-        (0, target, Some(images)) if target > 0.0 => {
-            let file;
-            (file, missed) = encode_to_quality(&data, &input, target, images.psnr)?;
-            Some(file)
-        }
-        _ => None,
+    let (file, missed) = wished_file(data, &input, config, images)?;
+    file.encoded.verify(&Limits::large())?;
+    if let Some(models) = &mut compression.attributes {
+        models.scale_steps(file.factor);
+    }
+    let ScaledFile { encoded: file, sh, .. } = file;
+    let decoded = DynamicScene::<F>::from_arrays(&file.decoded, device)?;
+    let attributes = match profile {
+        Profile::Compact => compression.attribute_records(&file, &decoded.gaussians),
+        Profile::Paper => Vec::new(),
     };
-    let encoded = match file {
-        None => encode_compressed(&data, &input)?,
-        Some(file) => {
-            if let Some(models) = &mut compression.attributes {
-                models.scale_steps(file.factor);
-            }
-            input = file.input;
-            file.encoded
-        }
-    };
-    let decoded = DynamicScene::<F>::from_arrays(&encoded.decoded, device)?;
-    let attributes = compression.expected_attribute_bits(&decoded);
     let estimate = BitEstimate {
         planes: compression.plane_bits(&decoded),
-        sh: compression.sh_bits(&decoded, &encoded.decoded.gaussians, &input.sh),
-        attributes: attributes.iter().map(|(_, bits)| bits).sum(),
+        sh: compression.sh_bits(&decoded, &file.decoded.gaussians, &sh),
+        attributes: attributes.iter().map(|attribute| attribute.estimated_bits).sum(),
     };
-    let bit_maps = compression.bit_maps(&encoded.decoded, device)?;
-    let coded = CodedSizes { report: encoded.report, estimate, attributes, bit_maps, missed };
-    Ok(EncodedScene { bytes: encoded.bytes, decoded: encoded.decoded, coded })
+    let bit_maps = compression.bit_maps(&decoded);
+    Ok(EncodedScene { file, estimate, attributes, bit_maps, missed })
 }
 
-/// A scene's file as it stands, with the steps that training has learned so far. No step is searched for.
+/// The file of the size or the quality that the configuration wishes; without a wish, that of the given steps.
+fn wished_file(
+    data: &SceneData,
+    input: &CompressionInput,
+    config: &CompressionConfig,
+    images: Option<SearchImages>,
+) -> Result<(ScaledFile, Option<MissedQuality>), TrainError> {
+    let compressor = Compressor::new(data, input)?;
+    match (config.target_bytes, config.target_db, images) {
+        (target @ 1.., ..) => Ok((encode_to_size(&compressor, input, target)?, None)),
+        (0, target, Some(images)) if target > 0.0 => encode_to_quality(&compressor, input, target, images.psnr),
+        _ => Ok((ScaledFile::unscaled(&compressor, input)?, None)),
+    }
+}
+
+/// A scene's file as it stands, with the steps that training has learned so far. No step is searched for, and the file is
+/// not verified: it is measured, not kept.
 ///
 /// # Errors
 /// What the codec refuses.
@@ -159,7 +157,12 @@ pub fn encoded_so_far<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let (scene, compression) = (&scene.valid(), &mut compression.valid());
     let data = scene.to_arrays(meta)?;
     let input = compression_input(compression, scene, &data, config, Profile::Compact)?;
-    Ok(encode_compressed(&data, &input)?)
+    Ok(unverified(&data, &input)?)
+}
+
+/// The file of an input, which is not decoded again.
+fn unverified(data: &SceneData, input: &CompressionInput) -> Result<Encoded, CodecError> {
+    Compressor::new(data, input)?.encode(&input.attributes, &input.sh)
 }
 
 /// Rounds in which [`freeze_planes`] looks for planes that no longer change.
@@ -193,7 +196,7 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     let mut first = None;
     for _ in 0..FREEZING_ROUNDS {
         let input = compression_input(compression, &scene, &data, config, Profile::Compact)?;
-        let decoded = encode_compressed(&data, &input)?.decoded.feature_planes;
+        let decoded = unverified(&data, &input)?.decoded.feature_planes;
         if decoded == data.feature_planes {
             first = None;
             break;
@@ -297,9 +300,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 
     /// The bit maps of a decoded scene's planes.
-    fn bit_maps(&self, decoded: &SceneData, device: &Device) -> Result<Vec<BitMap>, TrainError> {
-        let Some(models) = &self.planes else { return Ok(Vec::new()) };
-        let planes = FeaturePlanes::from_arrays(&decoded.feature_planes, device)?.tensors();
+    fn bit_maps<F: DeformationField>(&self, decoded: &DynamicScene<F>) -> Vec<BitMap> {
+        let Some(models) = &self.planes else { return Vec::new() };
+        let planes = plane_tensors(decoded);
         let all: Vec<usize> = (0..planes.len()).collect();
         let steps = models.quantization.steps_without_gradient();
         let maps = models.context.bit_map(&planes, &steps, &all, Latent::Rounded);
@@ -312,7 +315,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
                 bits: map.into_data().iter().collect(),
             }
         };
-        Ok(maps.into_iter().enumerate().map(map).collect())
+        maps.into_iter().enumerate().map(map).collect()
     }
 }
 

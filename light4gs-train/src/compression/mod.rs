@@ -22,12 +22,10 @@ mod quality;
 mod rate;
 mod step_factor;
 
-pub use code_scene::{
-    ASSUMED_PSNR, AttributeRecord, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene,
-};
+pub use attribute_bits::AttributeRecord;
+pub use code_scene::{ASSUMED_PSNR, CodedPart, CodedScene, CodingRecord, PlaneRecord, TrainedScene, code_scene};
 pub use encoder::{
-    BitEstimate, BitMap, CodedSizes, EncodedScene, SearchImages, compression_input, encode, encoded_so_far,
-    freeze_planes,
+    BitEstimate, BitMap, EncodedScene, SearchImages, compression_input, encode, encoded_so_far, freeze_planes,
 };
 pub use fit::fit;
 pub use models::{ConfiguredModels, EntropyModels, ShModel, context_model};

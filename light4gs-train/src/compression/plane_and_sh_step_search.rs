@@ -20,11 +20,11 @@ const MARGIN: f64 = 0.9;
 /// Sets the steps of planes and harmonics to values that cost at most about their `search_tolerance` each, in dB on the
 /// images; 0 leaves them unchanged.
 pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images: &SearchImages) {
-    let exact = (images.render)(scene);
+    let exact = &images.exact;
     let budget = |tolerance: f64| images.error * (10f64.powf(tolerance / 10.0) - 1.0);
     let distortion = |scene: &SceneData| {
         let rendered = (images.render)(scene);
-        let sum: f64 = rendered.iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
+        let sum: f64 = rendered.iter().zip(exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         sum / exact.len().max(1) as f64
     };
     if settings.steps.search_tolerance > 0.0 && !scene.feature_planes.planes.is_empty() {
@@ -97,7 +97,8 @@ mod tests {
     fn found(tolerance: f64, error: f64) -> CompressionConfig {
         let mut settings = CompressionConfig::default();
         (settings.steps.search_tolerance, settings.sh.search_tolerance) = (tolerance, tolerance);
-        search(&scene(), &mut settings, &SearchImages { render: &render, error, psnr: &|_| Ok(0.0) });
+        let images = SearchImages { render: &render, exact: render(&scene()), error, psnr: &|_| Ok(0.0) };
+        search(&scene(), &mut settings, &images);
         settings
     }
 

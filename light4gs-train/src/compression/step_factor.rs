@@ -5,7 +5,7 @@
 
 use std::fmt;
 
-use light4gs_codec::{CodecError, CompressionInput, Encoded, SceneData, ShCoding, checks, encode_compressed};
+use light4gs_codec::{CodecError, CompressionInput, Compressor, Encoded, SceneData, ShCoding, checks};
 use serde::{Deserialize, Serialize};
 
 use crate::error::TrainError;
@@ -42,17 +42,37 @@ impl fmt::Display for MissedQuality {
     }
 }
 
-/// A file, and how it was made.
+/// A file, and how it was made. It has not been verified.
 pub(super) struct ScaledFile {
     /// By how much steps are coarser than the given ones.
     pub(super) factor: f32,
-    /// The input with these steps.
-    pub(super) input: CompressionInput,
+    /// The coding of the harmonics with these steps.
+    pub(super) sh: ShCoding,
     /// The file.
     pub(super) encoded: Encoded,
 }
 
 impl ScaledFile {
+    /// The file with the given steps.
+    ///
+    /// # Errors
+    /// What the codec refuses.
+    pub(super) fn unscaled(compressor: &Compressor, given: &CompressionInput) -> Result<Self, CodecError> {
+        let encoded = compressor.encode(&given.attributes, &given.sh)?;
+        Ok(Self { factor: 1.0, sh: given.sh.clone(), encoded })
+    }
+
+    /// The file with steps that are coarser by a factor. Planes stay as they are: their models know their steps.
+    fn scaled(compressor: &Compressor, given: &CompressionInput, factor: f32) -> Result<Self, CodecError> {
+        let steps = given.attributes.iter().map(|(name, step)| (name.to_owned(), step * factor));
+        let steps = steps.fold(given.attributes.clone(), |all, (name, step)| all.with(&name, step)).clamped();
+        let sh = match &given.sh {
+            ShCoding::Channels { step } => ShCoding::Channels { step: checks::nearest_sh_step(step * factor) },
+            coding => coding.clone(),
+        };
+        Ok(Self { factor, encoded: compressor.encode(&steps, &sh)?, sh })
+    }
+
     fn bytes(&self) -> usize {
         self.encoded.bytes.len()
     }
@@ -71,18 +91,18 @@ enum Verdict {
 /// # Errors
 /// What the codec refuses, and a scene that takes more bytes even with the coarsest steps.
 pub(super) fn encode_to_size(
-    data: &SceneData,
+    compressor: &Compressor,
     given: &CompressionInput,
     target: usize,
 ) -> Result<ScaledFile, TrainError> {
-    let found = bisect(data, given, |file| {
+    let found = bisect(compressor, given, |file| {
         Ok(match file.bytes() <= target {
             true => Verdict::Fits { coarser: false, well: file.bytes() as f64 >= FILLED * target as f64 },
             false => Verdict::Misses { coarser: true },
         })
     })?;
     found.ok_or(()).or_else(|()| {
-        let smallest = scaled(data, given, COARSEST)?;
+        let smallest = ScaledFile::scaled(compressor, given, COARSEST)?;
         match smallest.bytes() {
             bytes if bytes <= target => Ok(smallest),
             bytes => Err(TrainError::Input(format!(
@@ -99,12 +119,12 @@ pub(super) fn encode_to_size(
 /// # Errors
 /// What the codec refuses, and what `psnr` returns.
 pub(super) fn encode_to_quality(
-    data: &SceneData,
+    compressor: &Compressor,
     given: &CompressionInput,
     target: f64,
     psnr: &dyn Fn(&SceneData) -> Result<f64, TrainError>,
 ) -> Result<(ScaledFile, Option<MissedQuality>), TrainError> {
-    let found = bisect(data, given, |file| {
+    let found = bisect(compressor, given, |file| {
         let above = psnr(&file.encoded.decoded)? - target;
         Ok(match above >= 0.0 {
             true => Verdict::Fits { coarser: true, well: above <= ABOVE },
@@ -114,14 +134,14 @@ pub(super) fn encode_to_quality(
     if let Some(file) = found {
         return Ok((file, None));
     }
-    let best = scaled(data, given, FINEST)?;
+    let best = ScaledFile::scaled(compressor, given, FINEST)?;
     let reached = psnr(&best.encoded.decoded)?;
     Ok((best, (reached < target).then_some(MissedQuality { wished: target, reached })))
 }
 
 /// Halves the range of factors until a file fits well. Returns the last that fits.
 fn bisect(
-    data: &SceneData,
+    compressor: &Compressor,
     given: &CompressionInput,
     judge: impl Fn(&ScaledFile) -> Result<Verdict, TrainError>,
 ) -> Result<Option<ScaledFile>, TrainError> {
@@ -129,7 +149,7 @@ fn bisect(
     let (mut fine, mut coarse) = (FINEST.ln(), COARSEST.ln());
     let mut at = 0.0_f32;
     for _ in 0..TRIES {
-        let coarser = match scaled(data, given, at.exp()) {
+        let coarser = match ScaledFile::scaled(compressor, given, at.exp()) {
             Ok(file) => match judge(&file)? {
                 Verdict::Fits { coarser, well } => {
                     found = Some(file);
@@ -150,21 +170,10 @@ fn bisect(
     Ok(found)
 }
 
-/// The file with steps that are coarser by a factor. Planes stay as they are: their models know their steps.
-fn scaled(data: &SceneData, given: &CompressionInput, factor: f32) -> Result<ScaledFile, CodecError> {
-    let mut input = given.clone();
-    let steps = given.attributes.iter().map(|(name, step)| (name.to_owned(), step * factor));
-    input.attributes = steps.fold(given.attributes.clone(), |all, (name, step)| all.with(&name, step)).clamped();
-    if let ShCoding::Channels { step } = &mut input.sh {
-        *step = checks::nearest_sh_step(*step * factor);
-    }
-    Ok(ScaledFile { factor, encoded: encode_compressed(data, &input)?, input })
-}
-
 #[cfg(test)]
 mod tests {
     use light4gs_codec::attributes::AttributeSteps;
-    use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
+    use light4gs_codec::{GaussianLayers, Limits, Profile, WeightPrecisions, encode_compressed};
 
     use super::*;
     use crate::compression::attribute_step_search::tests::scene;
@@ -180,11 +189,24 @@ mod tests {
         }
     }
 
+    fn given() -> Encoded {
+        encode_compressed(&scene(), &input()).unwrap()
+    }
+
+    fn to_size(target: usize) -> Result<ScaledFile, TrainError> {
+        encode_to_size(&Compressor::new(&scene(), &input()).unwrap(), &input(), target)
+    }
+
+    fn to_quality(target: f64) -> (ScaledFile, Option<MissedQuality>) {
+        encode_to_quality(&Compressor::new(&scene(), &input()).unwrap(), &input(), target, &quality).unwrap()
+    }
+
     #[test]
     fn a_file_fills_the_bytes_that_it_may_have() {
-        let given = encode_compressed(&scene(), &input()).unwrap().bytes.len();
+        let given = given().bytes.len();
         for target in [given, given * 2 / 3, given * 5 / 4] {
-            let file = encode_to_size(&scene(), &input(), target).unwrap();
+            let file = to_size(target).unwrap();
+            file.encoded.verify(&Limits::large()).unwrap();
             let bytes = file.bytes();
             assert!(bytes <= target && bytes as f64 >= 0.95 * target as f64, "{bytes} of {target}");
             assert_eq!(file.factor > 1.0, target < given, "{target}");
@@ -193,7 +215,7 @@ mod tests {
 
     #[test]
     fn too_few_bytes_are_refused() {
-        let problem = encode_to_size(&scene(), &input(), 300).err().unwrap().to_string();
+        let problem = to_size(300).err().unwrap().to_string();
         assert!(problem.contains("compression.target_bytes is 300, but this scene takes"), "{problem}");
     }
 
@@ -207,8 +229,8 @@ mod tests {
 
     #[test]
     fn a_file_is_as_good_as_it_must_be_and_no_larger() {
-        let at = |target| encode_to_quality(&scene(), &input(), target, &quality).unwrap().0;
-        let given = encode_compressed(&scene(), &input()).unwrap();
+        let at = |target| to_quality(target).0;
+        let given = given();
         let reached = quality(&given.decoded).unwrap();
         for target in [reached - 6.0, reached, reached + 3.0] {
             let file = at(target);
@@ -220,7 +242,7 @@ mod tests {
 
     #[test]
     fn too_much_quality_is_missed_by_the_best_file() {
-        let (file, missed) = encode_to_quality(&scene(), &input(), 120.0, &quality).unwrap();
+        let (file, missed) = to_quality(120.0);
         let missed = missed.unwrap();
         assert_eq!((missed.wished, missed.reached), (120.0, quality(&file.encoded.decoded).unwrap()));
         assert_eq!(file.factor, FINEST);

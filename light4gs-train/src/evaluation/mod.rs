@@ -6,7 +6,7 @@ use std::path::Path;
 use std::time::Instant;
 
 use burn::tensor::Device;
-use light4gs_codec::{Limits, SceneData, SectionInfo, StreamInfo};
+use light4gs_codec::{Decoded, Limits, OpenStream, SceneData, SectionInfo, StreamInfo, read_file_and};
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
 use serde::Serialize;
@@ -118,9 +118,9 @@ impl<F: DeformationField> DecodedScene<F> {
     /// [`Limits::large`].
     pub fn open_with_limits(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
-        let data = light4gs_codec::read_file_with_limits(path, limits)?;
+        let decode = |bytes: &[u8]| OpenStream::with_limits(bytes, limits)?.decode();
+        let Decoded { scene: data, info, .. } = read_file_and(path, limits, decode)?;
         let decode_seconds = begin.elapsed().as_secs_f64();
-        let info = light4gs_codec::read_info_with_limits(path, limits)?;
         let model = DynamicScene::from_arrays(&data, device)?;
         Ok(Self { model, data, info, decode_seconds, device: device.clone() })
     }

@@ -1,21 +1,21 @@
 //! Room for the lists of splats in the cells of an image: what a GPU would have to tell before the host can go on.
 //!
-//! A step tells how many there were when it reads its loss, so the next step reserves somewhat more and waits for nothing. The
-//! rare step whose lists did not fit is computed again.
+//! A step tells the number of splats when it reads its loss, so the next step reserves somewhat more and waits for nothing. A
+//! step is computed again if its lists did not fit, which is rare.
 
 use light4gs_model::Splatter;
 
-/// Of what a step needed, the next has so much room: views differ, and Gaussians become more.
+/// Room of a step, divided by what the step before needed: views differ, and Gaussians become more.
 const MARGIN: f64 = 1.5;
 /// Room falls by this factor a step, at most, where less is needed.
 const SHRINKING: f64 = 0.99;
 
-/// How many intersections the images of a step have room for.
+/// The number of intersections for which the images of a step have room.
 #[derive(Debug)]
 pub(super) struct ListRoom {
     /// Whether the device is one for whose answers the host waits. Others have room for all.
     waits: bool,
-    /// `None` before the first step: its images read how many there are.
+    /// `None` before the first step: its images read the number.
     room: Option<usize>,
 }
 
@@ -34,8 +34,8 @@ impl ListRoom {
         self.room.map_or(splatter, |room| splatter.with_room_for(room))
     }
 
-    /// Learns how many intersections the views of a step had. Returns whether all had room; if not, the step must be computed
-    /// again.
+    /// Learns the number of intersections of each view of a step. Returns whether all had room; if not, the step must be
+    /// computed again.
     pub(super) fn learn(&mut self, intersections: &[usize]) -> bool {
         let most = intersections.iter().copied().max().unwrap_or(0);
         let fitted = self.room.is_none_or(|room| most <= room);

@@ -8,8 +8,9 @@
 //! - `list_room`: room for the splats of an image, so that a GPU is not waited for
 //! - `learning_rates`: the rate of each parameter group
 //! - `rate`: quantization noise, and the rate in the loss
-//! - `rate_correction`: the expected bits of attributes follow those that the coder writes
-//! - `rate_steering`: the weight of the rate, where the file shall have a certain size or quality
+//! - `file_so_far`: the file as it stands, encoded for what follows it:
+//!   - `rate_correction`: the expected bits of attributes follow those that the coder writes
+//!   - `rate_steering`: the weight of the rate, where the file shall have a certain size or quality
 //! - `pruning`: pruning by significance
 //!
 //! The parts that a researcher may want to replace are traits: [`Loss`], [`FrameSampler`], [`Regularizer`],
@@ -17,6 +18,7 @@
 
 mod background;
 mod builder;
+mod file_so_far;
 mod guided_sampling;
 mod learning_rates;
 mod list_room;
@@ -262,8 +264,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let mut report = self.optimize(stage, iteration)?;
         self.control_density(stage, iteration);
         if stage == Stage::Fine {
-            self.correct_expected_bits(iteration);
-            self.steer_rate(iteration)?;
+            self.follow_file(iteration)?;
         }
         if stage == Stage::Fine && self.config.train.guided_sampling.is_due(iteration) {
             self.sample_guided(iteration)?;

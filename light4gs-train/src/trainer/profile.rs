@@ -49,7 +49,7 @@ fn processor_time() -> Option<f64> {
     None
 }
 
-/// The share of the work that only one thread does, by Amdahl's law: so many of the threads are busy in the mean.
+/// The share of the work that only one thread does, by Amdahl's law, if `busy` of the threads are busy in the mean.
 fn serial_share(busy: f64, threads: usize) -> f64 {
     let parallel = 1.0 / threads as f64;
     ((1.0 / busy - parallel) / (1.0 - parallel)).clamp(0.0, 1.0)

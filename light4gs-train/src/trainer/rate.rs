@@ -24,12 +24,12 @@ pub(super) struct RateTerm {
     value: Tensor<1>,
     /// With respect to the noisy scene's parameters and those of the entropy models.
     gradients: GradientSums,
-    /// With respect to the planes' steps, by plane, but for what comes through the noise.
+    /// With respect to the step of each plane, without the part through the noise.
     steps: Vec<Option<Tensor<1>>>,
 }
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// The scene roughly as it will be decoded, from the iteration on at which the rate counts.
+    /// The scene roughly as it will be decoded; `None` before `compression.rate.from`.
     pub(super) fn quantization_noise(
         &mut self,
         stage: Stage,
@@ -79,7 +79,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         iteration >= from && self.density.is_over(Stage::Fine, iteration - 1)
     }
 
-    /// Begins to look at the noisy positions, where the rate is due and has one of theirs.
+    /// Begins to look at the noisy positions, where the rate is due and counts their bits.
     pub(super) fn begin_places(&self, noisy: &NoisyScene<F>, iteration: usize) -> Option<Pending<GaussianPlaces>> {
         let due = iteration.is_multiple_of(self.config.compression.rate.interval);
         let attributes = self.state.compression.as_ref()?.attributes.as_ref()?;
@@ -90,7 +90,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         })
     }
 
-    /// The rate with its gradients, in the iterations in which it is due. It needs no view.
+    /// The rate with its gradients; `None` in an iteration without. It needs no view.
     pub(super) fn rate(
         &self,
         noisy: &NoisyScene<F>,

@@ -1,19 +1,19 @@
 //! The bits that are expected of each attribute follow those that the coder writes.
 
+use light4gs_codec::Encoded;
 use light4gs_model::DeformationField;
 
 use super::Trainer;
 use crate::compression::EntropyModels;
-use crate::dataset::scene_meta;
 
-/// The fine stage has so many iterations between two corrections that there would be this many of them in all of it. The
-/// last iteration has none: nothing is trained after it.
+/// Corrections per fine stage: the period is its iterations divided by this. The last iteration has none, since nothing is
+/// trained after it.
 pub(crate) const CORRECTIONS: usize = 12;
-/// Further ones in the last of these periods, each after half of what is left. The bits of few symbols, as those of opacity,
+/// Further corrections in the last period, each after half of what is left. The bits of few symbols, as those of opacity,
 /// drift by up to 4 % in a whole period, and a file has to be as large as training expects.
 const LAST_CORRECTIONS: u32 = 3;
 
-/// Whether a correction is due after an iteration of a fine stage with so many.
+/// Whether a correction is due after an iteration of a fine stage, `iterations` long.
 pub(crate) fn is_due(iteration: usize, iterations: usize) -> bool {
     let period = (iterations / CORRECTIONS).max(1);
     let left = iterations.saturating_sub(iteration);
@@ -22,18 +22,19 @@ pub(crate) fn is_due(iteration: usize, iterations: usize) -> bool {
 }
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// Corrects the expected bits, if that is due: from the end of densification on.
-    pub(super) fn correct_expected_bits(&mut self, iteration: usize) {
-        if !is_due(iteration, self.config.train.fine_iterations) || !self.gaussian_rate_is_active(iteration) {
-            return;
+    /// Whether a correction is due: from the end of densification on, where attributes have a model.
+    pub(super) fn correction_is_due(&self, iteration: usize) -> bool {
+        let models_attributes = self.state.compression.as_ref().is_some_and(|models| models.attributes.is_some());
+        models_attributes
+            && is_due(iteration, self.config.train.fine_iterations)
+            && self.gaussian_rate_is_active(iteration)
+    }
+
+    /// Corrects the expected bits by those in the scene's file.
+    pub(super) fn correct_expected_bits(&mut self, file: &Encoded) {
+        if let Some(compression) = &mut self.state.compression {
+            compression.correct_expected_bits(file, &self.device);
         }
-        let meta = scene_meta(&self.config, &self.data);
-        let Some(compression) = self.state.compression.as_mut().filter(|models| models.attributes.is_some()) else {
-            return;
-        };
-        // A scene that cannot be coded has diverged, and the trainer says so.
-        let _ = compression.correct_expected_bits(&self.state.scene, meta, &self.config.compression);
-        self.profile.lap("size of the file");
     }
 }
 

@@ -4,13 +4,12 @@ use light4gs_codec::Encoded;
 use light4gs_model::DeformationField;
 
 use super::Trainer;
-use crate::compression::{EntropyModels, encoded_so_far, mean_psnr, measured_views};
-use crate::dataset::scene_meta;
+use crate::compression::{EntropyModels, mean_psnr, measured_views};
 use crate::error::TrainError;
 
-/// The fine stage has so many iterations between two corrections that there would be this many of them in all of it.
+/// Corrections per fine stage.
 const CORRECTIONS: usize = 64;
-/// A correction multiplies the weight by the ratio of the bytes, to this power. Bytes go about as the fourth root of the
+/// A correction multiplies the weight by (bytes / wished bytes) to this power. Bytes go about as the fourth root of the
 /// weight, once the scene has followed it, which takes several corrections.
 const POWER: f64 = 0.7;
 /// A correction multiplies the weight by this for each dB above the wished PSNR. A dB is a factor of 20 to 50 in the
@@ -21,49 +20,50 @@ const STEERED_BY_QUALITY: f64 = 0.4;
 /// The weight becomes smaller than the configured one in this last share only: until then a scene that is not good enough
 /// may still become so.
 const RELIEVED: f64 = 0.15;
-/// Up to twice as many views are all measured: of a few, chosen ones may be some tenths of a dB better or worse than all.
+/// Every n-th view is measured, n = views / this, rounded down: a few views may be some tenths of a dB better or worse than all.
 const VIEWS: usize = 100;
 /// The weight stays within this factor of the configured one, up and down.
 const MOST: f64 = 100.0;
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// Corrects the weight of the rate, if that is due: from the end of densification on.
+    /// Whether the weight is to be corrected: from the end of densification on, where a size or a quality is wished.
+    pub(super) fn steering_is_due(&self, iteration: usize) -> bool {
+        let settings = &self.config.compression;
+        let interval = (self.config.train.fine_iterations / CORRECTIONS).max(1);
+        let steered = match settings.target_db > 0.0 {
+            true => self.share_left(iteration) <= STEERED_BY_QUALITY,
+            false => settings.target_bytes > 0,
+        };
+        steered && iteration.is_multiple_of(interval) && self.gaussian_rate_is_active(iteration)
+    }
+
+    /// Corrects the weight of the rate by the size or the quality of the scene's file.
     ///
     /// # Errors
     /// A test image that cannot be read.
-    pub(super) fn steer_rate(&mut self, iteration: usize) -> Result<(), TrainError> {
-        let iterations = self.config.train.fine_iterations;
-        let interval = (iterations / CORRECTIONS).max(1);
+    pub(super) fn steer_rate(&mut self, file: &Encoded, iteration: usize) -> Result<(), TrainError> {
         let settings = &self.config.compression;
-        let steered = settings.target_bytes > 0 || settings.target_db > 0.0;
-        if !steered || !iteration.is_multiple_of(interval) || !self.gaussian_rate_is_active(iteration) {
-            return Ok(());
-        }
-        let left = 1.0 - iteration as f64 / iterations as f64;
-        if settings.target_db > 0.0 && left > STEERED_BY_QUALITY {
-            return Ok(());
-        }
-        let least = if settings.target_db > 0.0 && left > RELIEVED { 1.0 } else { 1.0 / MOST };
-        let Some(compression) = &self.state.compression else { return Ok(()) };
-        let meta = scene_meta(&self.config, &self.data);
-        // A scene that cannot be coded has diverged, and the trainer says so.
-        let Ok(encoded) = encoded_so_far(&self.state.scene, compression, meta, settings) else { return Ok(()) };
+        let relieved = settings.target_db <= 0.0 || self.share_left(iteration) <= RELIEVED;
+        let least = if relieved { 1.0 / MOST } else { 1.0 };
         let factor = match settings.target_bytes {
-            0 => FACTOR_OF_A_DECIBEL.powf(self.psnr_of(&encoded)? - settings.target_db),
-            target => (self.expected_bytes(&encoded, iteration) / target as f64).powf(POWER),
+            0 => FACTOR_OF_A_DECIBEL.powf(self.psnr_of(file)? - settings.target_db),
+            target => (self.expected_bytes(file, iteration) / target as f64).powf(POWER),
         };
         let weight = &mut self.state.rate_weight;
         *weight = (*weight * factor).clamp(least, MOST);
-        self.profile.lap("size of the file");
         Ok(())
     }
 
+    /// The share of the fine stage after an iteration.
+    fn share_left(&self, iteration: usize) -> f64 {
+        1.0 - iteration as f64 / self.config.train.fine_iterations as f64
+    }
+
     /// Bytes of the file after all passes of pruning that are to come.
-    fn expected_bytes(&self, encoded: &Encoded, iteration: usize) -> f64 {
-        let report = &encoded.report;
-        let [mut gaussians, mut others] = [0, report.header_bytes];
-        for (name, .., bytes) in &report.sections {
-            *(if matches!(*name, "gaussians" | "sh") { &mut gaussians } else { &mut others }) += bytes;
+    fn expected_bytes(&self, file: &Encoded, iteration: usize) -> f64 {
+        let [mut gaussians, mut others] = [0, file.info.header_bytes];
+        for section in &file.info.sections {
+            *(if matches!(section.name, "gaussians" | "sh") { &mut gaussians } else { &mut others }) += section.bytes;
         }
         let prune = &self.config.train.prune;
         let passes = prune.iterations.iter().filter(|pass| **pass > iteration).count();
@@ -71,9 +71,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 
     /// PSNR of the decoded file on some of the views by which it will be measured, dB.
-    fn psnr_of(&self, encoded: &Encoded) -> Result<f64, TrainError> {
+    fn psnr_of(&self, file: &Encoded) -> Result<f64, TrainError> {
         let views = measured_views(&self.data);
         let views = views.iter().step_by((views.len() / VIEWS).max(1));
-        mean_psnr::<F>(&encoded.decoded, views, &*self.images, &self.device.clone().inner())
+        mean_psnr::<F>(&file.decoded, views, &*self.images, &self.device.clone().inner())
     }
 }

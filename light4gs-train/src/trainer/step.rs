@@ -120,8 +120,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(Differentiated { views, gradients, loss })
     }
 
-    /// Starts to decode the images of later iterations in the background. Each call is for as many images as one
-    /// iteration uses; those of earlier iterations are there already.
+    /// Starts to decode the images of one later iteration in the background. Those of earlier iterations are there already.
     fn prefetch(&mut self, stage: Stage, iteration: usize) -> Result<(), TrainError> {
         let indices = self.batch(stage, iteration + PREFETCHED_ITERATIONS)?;
         let frames: Vec<Frame> = indices.into_iter().map(|frame| self.data.train[frame].clone()).collect();

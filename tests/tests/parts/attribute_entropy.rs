@@ -75,10 +75,8 @@ fn the_estimate_is_near_the_bytes_of_the_codec() {
         assert!((bits / coded - 1.0).abs() < 0.03, "{name}: {bits} expected, {coded} coded");
         let each = values_of(&model.bits_of_each(gaussians.tensors()));
         assert!((each.iter().map(|bits| f64::from(*bits)).sum::<f64>() / bits - 1.0).abs() < 1e-5, "{name}: {each:?}");
-        for ((attribute, bits), (coded_name, bytes)) in
-            model.attributes().iter().zip(each).zip(encoded.sizes.attributes)
-        {
-            let (bits, coded) = (f64::from(bits), 8.0 * bytes as f64);
+        for ((attribute, bits), written) in model.attributes().iter().zip(each).zip(encoded.attributes) {
+            let (bits, coded, coded_name) = (f64::from(bits), 8.0 * written.bytes as f64, written.name);
             assert_eq!(attribute.name, coded_name);
             // Positions are counted by the coder itself: nothing but the grid, 17 bytes, is missing.
             let near = if coded_name == "means" {

@@ -2,7 +2,7 @@
 //! scenes into files and back.
 
 use burn::tensor::{Device, Distribution, Tensor};
-use light4gs_codec::{Kind, PlaneCoding, Profile, SceneMeta, decode, plane_distributions};
+use light4gs_codec::{PlaneCoding, SceneMeta, decode, plane_distributions};
 use light4gs_data::PointCloud;
 use light4gs_model::{
     ContextModel, ContextModelConfig, ContextPart, DynamicScene, FeaturePlanes, Latent, PlaneEntropy, PlaneSteps,
@@ -10,16 +10,20 @@ use light4gs_model::{
 };
 use light4gs_tests::golden::{assert_close_relative, devices, values_of};
 use light4gs_tests::planes::plane_sets;
-use light4gs_train::compression::{Compression, ConfiguredModels, encode, freeze_planes};
+use light4gs_train::compression::{
+    AttributeRecord, Compression, ConfiguredModels, EncodedScene, encode, encoded_so_far, freeze_planes,
+};
 use light4gs_train::config::Config;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
 const CHANNELS: usize = 4;
 
-/// The profile of a configuration that codes something.
-fn profile(config: &Config) -> Profile {
-    config.compression.profile.coded().unwrap()
+/// A scene's file in the profile of a configuration, which codes something.
+fn coded(scene: &DynamicScene, compression: &Compression, config: &Config, device: &Device) -> EncodedScene {
+    let data = scene.to_arrays(SceneMeta::default()).unwrap();
+    let profile = config.compression.profile.coded().unwrap();
+    encode(scene, &data, compression, &config.compression, profile, None, device).unwrap()
 }
 
 /// The whole model, and the models that each lack one part.
@@ -158,26 +162,24 @@ fn every_configuration_makes_a_file_that_decodes() {
         let scene = scene(&config, &device);
         let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         compression.start_from(scene.planes());
-        let encoded =
-            encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
-                .unwrap();
-        let decoded = decode(&encoded.bytes).unwrap();
-        assert_eq!(decoded, encoded.decoded, "{overrides:?}");
+        let EncodedScene { file, estimate, .. } = coded(&scene, &compression, &config, &device);
+        let decoded = decode(&file.bytes).unwrap();
+        assert_eq!(decoded, file.decoded, "{overrides:?}");
         assert_eq!(decoded.gaussians.len(), scene.gaussians.len());
-        let coded = encoded.coded;
-        let bytes: u64 = coded.report.planes.iter().map(|plane| plane.total()).sum();
-        let (expected, found) = (coded.estimate.planes, 8.0 * bytes as f64);
+        let planes = &file.info.plane_bytes;
+        let bytes: u64 = planes.iter().map(|plane| plane.total()).sum();
+        let (expected, found) = (estimate.planes, 8.0 * bytes as f64);
         // The bytes that the sub-streams of a plane lose to whole words at their ends, and quantized weights.
-        let slack = 60.0 * coded.report.planes.len() as f64 + 0.002 * found;
+        let slack = 60.0 * planes.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() < slack, "{overrides:?}: {expected} bits, {found} in the file");
-        if coded.report.sections.iter().any(|(_, kind, ..)| *kind == Kind::ShChannels) {
+        if file.sh_is_an_attribute() {
             // Coded adaptively, without the model.
-            assert_eq!(coded.estimate.sh, 0.0, "{overrides:?}");
+            assert_eq!(estimate.sh, 0.0, "{overrides:?}");
             continue;
         }
-        let sh_bytes: u64 = coded.report.sh.degrees.iter().sum();
-        let (expected, found) = (coded.estimate.sh, 8.0 * sh_bytes as f64);
-        let slack = 60.0 * coded.report.sh.degrees.len() as f64 + 0.002 * found;
+        let sh_bytes: u64 = file.sh.degrees.iter().sum();
+        let (expected, found) = (estimate.sh, 8.0 * sh_bytes as f64);
+        let slack = 60.0 * file.sh.degrees.len() as f64 + 0.002 * found;
         assert!((expected - found).abs() <= slack, "{overrides:?}: {expected} bits of harmonics, {found} in the file");
     }
 }
@@ -191,22 +193,17 @@ fn corrected_bits_are_those_that_are_written() {
     let scene = scene(&config, &device);
     let mut compression = Compression::of_run(&ConfiguredModels, &config, &scene, &device).unwrap().unwrap();
     compression.start_attributes_from(&scene.gaussians);
-    let settings = &config.compression;
-    let coded = |compression: &_| {
-        let encoded =
-            encode(&scene, compression, SceneMeta::default(), settings, profile(&config), None, &device).unwrap();
-        let written = light4gs_codec::info(&encoded.bytes).unwrap().attributes;
-        let expected = encoded.coded.attributes;
-        let ratio = |(name, expected): &(String, f64)| {
-            let written = written.iter().find(|attribute| attribute.name == *name)?.bytes;
-            Some(expected / (8.0 * written as f64))
-        };
-        expected.iter().filter_map(ratio).collect::<Vec<f64>>()
+    let ratios = |compression: &_| {
+        let EncodedScene { file, attributes, .. } = coded(&scene, compression, &config, &device);
+        let in_file = |record: &&AttributeRecord| file.info.attributes.iter().any(|found| found.name == record.name);
+        let ratio = |record: &AttributeRecord| record.estimated_bits / record.coded_bits;
+        attributes.iter().filter(in_file).map(ratio).collect::<Vec<f64>>()
     };
-    let before = coded(&compression);
+    let before = ratios(&compression);
     assert!(before.iter().any(|ratio| (ratio - 1.0).abs() > 0.02), "{before:?}");
-    compression.correct_expected_bits(&scene, SceneMeta::default(), settings).unwrap();
-    let after = coded(&compression);
+    let so_far = encoded_so_far(&scene, &compression, SceneMeta::default(), &config.compression).unwrap();
+    compression.correct_expected_bits(&so_far, &device);
+    let after = ratios(&compression);
     // What a factor of more than 2 would have to mend, and positions, which are counted already.
     let within = |(before, after): (&f64, &f64)| *before > 1.9 || *before < 0.55 || (after - 1.0).abs() < 0.01;
     assert!(before.iter().zip(&after).skip(1).all(within), "{before:?}, corrected {after:?}");
@@ -234,10 +231,8 @@ fn frozen_planes_are_those_of_the_file() {
             freeze_planes(&scene, &compression, &config.compression, &device).unwrap().unwrap();
         let frozen = scene.planes().unwrap().to_arrays();
         assert_ne!(frozen, before, "{name}");
-        let file =
-            encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
-                .unwrap();
-        assert_eq!(file.decoded.feature_planes, frozen, "{name}");
+        let encoded = coded(&scene, &compression, &config, &device);
+        assert_eq!(encoded.file.decoded.feature_planes, frozen, "{name}");
     }
 }
 
@@ -283,8 +278,6 @@ fn a_scene_without_gaussians_is_a_file_too() {
     empty.gaussians = light4gs_codec::GaussianArrays { sh_degree: 3, ..Default::default() };
     let scene: DynamicScene = DynamicScene::from_arrays(&empty, &device).unwrap();
     let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
-    let encoded =
-        encode(&scene, &compression, SceneMeta::default(), &config.compression, profile(&config), None, &device)
-            .unwrap();
-    assert!(decode(&encoded.bytes).unwrap().gaussians.is_empty());
+    let encoded = coded(&scene, &compression, &config, &device);
+    assert!(decode(&encoded.file.bytes).unwrap().gaussians.is_empty());
 }

@@ -7,7 +7,7 @@ use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use light4gs_codec::{GaussianArrays, SceneMeta, read_info};
+use light4gs_codec::{GaussianArrays, Limits, SceneMeta, info, read_file_and};
 use light4gs_data::{
     DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb, write_ply_zip,
 };
@@ -110,9 +110,8 @@ impl Export {
 
     fn write_page(&self, html: &Path) -> Result<(), TrainError> {
         check_output(html, &self.file)?;
-        let name = read_info(&self.file)?.meta.name;
-        let io = |source| DataError::Io { action: "read", path: self.file.clone(), source };
-        let scene = std::fs::read(&self.file).map_err(io)?;
+        let limits = Limits::default();
+        let (name, scene) = read_file_and(&self.file, &limits, |bytes| Ok((info(bytes)?.meta.name, bytes.to_vec())))?;
         let cameras = dataset_cameras(&self.file, self.scene.as_deref(), MOST_CAMERAS)?;
         let title = if name.is_empty() { "Scene" } else { &name };
         let page = page(title, Content::Embedded { scene: &scene, cameras: &cameras }, None);

@@ -71,9 +71,9 @@ fn write_golden_nodes() {
         let scene = scene(&config, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();
         let profile = config.compression.profile.coded().unwrap();
-        let meta = SceneMeta { name: name.into(), ..SceneMeta::default() };
-        let encoded = encode(&scene, &compression, meta, &config.compression, profile, None, &device).unwrap();
-        std::fs::write(format!("{FOLDER}/{name}.l4gs"), encoded.bytes).unwrap();
+        let data = scene.to_arrays(SceneMeta { name: name.into(), ..SceneMeta::default() }).unwrap();
+        let encoded = encode(&scene, &data, &compression, &config.compression, profile, None, &device).unwrap();
+        std::fs::write(format!("{FOLDER}/{name}.l4gs"), encoded.file.bytes).unwrap();
     }
 }
 
