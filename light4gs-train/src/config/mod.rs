@@ -37,8 +37,7 @@ use crate::keys::Bounds::{Device, Whole};
 use crate::keys::{MOST_INTEGER, keys};
 use layering::layers;
 
-pub use crate::keys::{Bounds, Key, UnknownChoice};
-pub(crate) use attributes::AttributeRate;
+pub use crate::keys::{Bounds, ByName, Key, UnknownChoice};
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
     ShConfig, ShModel, StepsConfig, WeightsConfig,

@@ -155,10 +155,10 @@ fn parse(text: &str, origin: &Origin) -> Result<(Table, Option<String>), ConfigE
     Ok((layer, extends))
 }
 
-/// Merges the layers, the lowest first. The result must fit the structs after every layer, so that an error names the
-/// layer that causes it.
+/// Merges the layers over the defaults, the lowest first. The result must fit the structs after every layer, so that an
+/// error names the layer that causes it.
 fn build(layers: Vec<(Origin, Table)>) -> Result<Config, ConfigError> {
-    let mut merged = Table::new();
+    let mut merged = schema::defaults();
     let mut config = Config::default();
     for (origin, layer) in layers {
         merge(&mut merged, layer);
