@@ -86,8 +86,7 @@ pub struct AttributeRate {
     pub initial: f64,
     /// At the end of the schedule; none where it stays the same.
     pub last: Option<f64>,
-    /// Whether it is learned in world units, so that its rate is multiplied by the scene's extent where the
-    /// configuration says so.
+    /// Whether it is learned in world units, so that its rate is multiplied by the scene's extent.
     pub by_extent: bool,
 }
 
