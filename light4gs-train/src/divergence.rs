@@ -1,16 +1,15 @@
 //! Signs that a training has failed: numbers that are no longer finite, and renderings no better than an empty image.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::fmt;
 use std::path::PathBuf;
 
 use burn::module::{Module, Param};
 use burn::tensor::Tensor;
-use light4gs_model::Attribute;
-use light4gs_model::attributes::{BUILT_IN, attribute_of_path};
+use light4gs_model::attributes::{MEANS, attribute_of_path};
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
 
-use crate::config::{AttributeRate, Config};
+use crate::config::Config;
 use crate::optimization::parameters::{COMPRESSION, ParameterGroup};
 use crate::stage::Stage;
 
@@ -35,7 +34,7 @@ pub struct Divergence {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Remedy {
     /// The key.
-    pub key: &'static str,
+    pub key: String,
     /// A value for it.
     pub value: f64,
 }
@@ -86,19 +85,28 @@ impl fmt::Display for Divergence {
     }
 }
 
-/// The learning rate of an attribute: its key and its value, where it has a key.
-fn attribute_rate(attribute: &Attribute, config: &Config) -> Option<(&'static str, f64)> {
-    AttributeRate::of(attribute, &config.train.learning_rate)?.key
+/// The key of an attribute's learning rate at the first step.
+fn attribute_key(name: &str) -> String {
+    format!("train.learning_rate.attributes_init.{name}")
 }
 
-/// The learning rate of a parameter: its key and its value. `None` for an attribute whose rate is not a key.
-fn learning_rate(path: &str, config: &Config) -> Option<(&'static str, f64)> {
+/// The learning rates of attributes that the configuration has: their keys and values.
+fn attribute_rates(config: &Config) -> impl Iterator<Item = (String, f64)> {
+    let rates = &config.train.learning_rate;
+    let last = rates.attributes_final.iter();
+    let last = last.map(|(name, rate)| (format!("train.learning_rate.attributes_final.{name}"), rate));
+    rates.attributes_init.iter().map(|(name, rate)| (attribute_key(name), rate)).chain(last)
+}
+
+/// The learning rate of a parameter: its key and its value. `None` for an attribute that the configuration does not name.
+fn learning_rate(path: &str, config: &Config) -> Option<(String, f64)> {
     let group = ParameterGroup::of(path)?;
     if group == ParameterGroup::Attribute {
         let name = attribute_of_path(path)?;
-        return attribute_rate(BUILT_IN.iter().find(|attribute| attribute.name == name)?, config);
+        return Some((attribute_key(name), config.train.learning_rate.attributes_init.of(name)?));
     }
-    group_rates(config).into_iter().find(|(other, ..)| *other == group).map(|(_, key, value)| (key, value))
+    let of_group = group_rates(config).into_iter().find(|(other, ..)| *other == group);
+    of_group.map(|(_, key, value)| (key.to_owned(), value))
 }
 
 /// The learning rates of all groups except the attributes: their keys and values.
@@ -116,10 +124,9 @@ fn group_rates(config: &Config) -> [(ParameterGroup, &'static str, f64); 5] {
 
 /// What else can make a training diverge: the rates at the end, and the weights of terms of the loss other than the
 /// images'.
-fn other_keys(config: &Config) -> [(&'static str, f64); 7] {
+fn other_keys(config: &Config) -> [(&'static str, f64); 6] {
     let (rates, weights) = (&config.train.learning_rate, &config.train.regularizer);
     [
-        ("train.learning_rate.means_final", rates.means_final),
         ("train.learning_rate.planes_final", rates.planes_final),
         ("train.learning_rate.deformation_final", rates.deformation_final),
         ("train.regularizer.plane_smoothness", weights.plane_smoothness.into()),
@@ -135,16 +142,20 @@ const SUSPICIOUS: f64 = 12.0;
 /// Of the learning rates and the weights of the loss, the one that is furthest above its default, with that default.
 /// `None` if all are near their defaults.
 pub(super) fn unusual_key(config: &Config) -> Option<Remedy> {
-    let keys = |config: &Config| -> Vec<(&'static str, f64)> {
-        let attributes = BUILT_IN.iter().filter_map(|attribute| attribute_rate(attribute, config));
+    let keys = |config: &Config| -> Vec<(String, f64)> {
         let groups = group_rates(config).map(|(_, key, value)| (key, value));
-        attributes.chain(groups).chain(other_keys(config)).collect()
+        let others = groups.into_iter().chain(other_keys(config)).map(|(key, value)| (key.to_owned(), value));
+        attribute_rates(config).chain(others).collect()
     };
-    // In place of a default of 0, a small weight.
-    let usual = keys(&Config::default()).into_iter().map(|(_, value)| if value > 0.0 { value } else { 0.1 });
-    let ratios = keys(config).into_iter().zip(usual).map(|((key, value), usual)| (key, usual, value / usual));
-    let (key, value, ratio) = ratios.max_by(|a, b| a.2.total_cmp(&b.2))?;
-    (ratio > SUSPICIOUS).then_some(Remedy { key, value })
+    let usual: BTreeMap<String, f64> = keys(&Config::default()).into_iter().collect();
+    let ratio = |(key, value): (String, f64)| {
+        let usual = *usual.get(&key)?;
+        // In place of a default of 0, a small weight.
+        let ratio = value / if usual > 0.0 { usual } else { 0.1 };
+        Some((Remedy { key, value: usual }, ratio))
+    };
+    let (remedy, ratio) = keys(config).into_iter().filter_map(ratio).max_by(|a, b| a.1.total_cmp(&b.1))?;
+    (ratio > SUSPICIOUS).then_some(remedy)
 }
 
 /// What to change so that the training does not diverge again: an unusual key, or else the learning rate of what is not
@@ -157,8 +168,8 @@ pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
         NotFinite::Parameter { name, .. } => learning_rate(path_of(name), config),
         NotFinite::Loss(_) => None,
     };
-    let rates = &config.train.learning_rate;
-    let (key, value) = rate.unwrap_or(("train.learning_rate.means_init", rates.means_init));
+    let means = || (attribute_key(&MEANS.name), config.train.learning_rate.of(MEANS).initial);
+    let (key, value) = rate.unwrap_or_else(means);
     Remedy { key, value: value / 10.0 }
 }
 
@@ -295,9 +306,9 @@ mod tests {
         let found = not_finite_parameter(&scene, "scene").unwrap();
         let name = "scene.gaussians.means".to_owned();
         assert_eq!(found, NotFinite::Parameter { name, index: 1, value: f32::INFINITY });
-        assert_eq!(remedy(&found, &config).to_string(), "train.learning_rate.means_init=1.6e-5");
-        config.train.learning_rate.opacity *= 100.0;
-        assert_eq!(remedy(&found, &config).to_string(), "train.learning_rate.opacity=5e-2");
+        assert_eq!(remedy(&found, &config).to_string(), "train.learning_rate.attributes_init.means=1.6e-5");
+        config.train.learning_rate.attributes_init.set("opacity_logits", 5.0);
+        assert_eq!(remedy(&found, &config).to_string(), "train.learning_rate.attributes_init.opacity_logits=5e-2");
     }
 
     #[test]

@@ -37,8 +37,8 @@ pub struct Attribute {
     pub start: Start,
     /// The function from the trained numbers to those that are used.
     pub activation: Activation,
-    /// Its learning rate. A key is relative to `train.learning_rate`.
-    pub learning_rate: Setting,
+    /// How fast it is learned, unless the training's configuration names it.
+    pub learning_rate: AttributeRate,
     /// How a file stores it.
     pub coding: Coding,
     /// Whether it always keeps its canonical value: [`DynamicScene::at`](crate::DynamicScene::at) then ignores the
@@ -79,24 +79,34 @@ pub enum Activation {
     Sigmoid,
 }
 
-/// A number that belongs to an attribute.
+/// The learning rate of an attribute over a stage.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Setting {
-    /// The value of this key of a table in the training's configuration.
-    Key(&'static str),
-    /// This one.
-    Number(f64),
+pub struct AttributeRate {
+    /// At the first step.
+    pub initial: f64,
+    /// At the end of the schedule; none where it stays the same.
+    pub last: Option<f64>,
+    /// Whether it is learned in world units, so that its rate is multiplied by the scene's extent.
+    pub by_extent: bool,
 }
 
 /// How a file stores an attribute.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coding {
-    /// In multiples of a step, where the file is quantized. A key is relative to `compression.attributes`.
-    Quantized(Setting),
+    /// In multiples of this step, where the file is quantized, unless the training's configuration names the attribute.
+    /// That of the positions is a share of the typical Gaussian's size.
+    Quantized(f64),
     /// As float32, whatever else is quantized.
     Float32,
     /// In a section of its own, with an entropy model of its own: the spherical harmonics beyond degree 0.
     Harmonics,
+}
+
+impl AttributeRate {
+    /// The same rate at all steps, whatever the scene's extent.
+    pub const fn constant(rate: f64) -> Self {
+        Self { initial: rate, last: None, by_extent: false }
+    }
 }
 
 impl Activation {
@@ -138,8 +148,8 @@ pub static BUILT_IN: [Attribute; 6] = [
         ("means", Width::Fixed(3)),
         Start::Cloud(|cloud, _| cloud.positions.concat()),
         Activation::Identity,
-        "means",
-        Coding::Quantized(Setting::Key("means")),
+        AttributeRate { initial: 1.6e-4, last: Some(1.6e-6), by_extent: true },
+        Coding::Quantized(0.05),
     ),
     built_in(
         ("log_scales", Width::Fixed(3)),
@@ -148,15 +158,15 @@ pub static BUILT_IN: [Attribute; 6] = [
             cloud.mean_squared_distances().iter().flat_map(|squared| [0.5 * squared.ln(); 3]).collect()
         }),
         Activation::Exponential,
-        "scale",
-        Coding::Quantized(Setting::Key("log_scales")),
+        AttributeRate::constant(0.005),
+        Coding::Quantized(0.1),
     ),
     built_in(
         ("quats", Width::Fixed(4)),
         Start::Row(Cow::Borrowed(&[1.0, 0.0, 0.0, 0.0])),
         Activation::Identity,
-        "rotation",
-        Coding::Quantized(Setting::Key("quats")),
+        AttributeRate::constant(0.001),
+        Coding::Quantized(0.02),
     ),
     built_in(
         ("opacity_logits", Width::Fixed(1)),
@@ -165,17 +175,24 @@ pub static BUILT_IN: [Attribute; 6] = [
             vec![logit; cloud.positions.len()]
         }),
         Activation::Sigmoid,
-        "opacity",
-        Coding::Quantized(Setting::Key("opacity_logits")),
+        AttributeRate::constant(0.05),
+        Coding::Quantized(0.4),
     ),
     built_in(
         ("sh_dc", Width::Fixed(3)),
         Start::Cloud(|cloud, _| cloud.sh_dc().concat()),
         Activation::Identity,
-        "sh_dc",
-        Coding::Quantized(Setting::Key("sh_dc")),
+        AttributeRate::constant(2.5e-3),
+        Coding::Quantized(0.04),
     ),
-    built_in(("sh_rest", Width::HigherHarmonics), Start::Zeros, Activation::Identity, "sh_rest", Coding::Harmonics),
+    built_in(
+        ("sh_rest", Width::HigherHarmonics),
+        Start::Zeros,
+        Activation::Identity,
+        // A twentieth of that of `sh_dc`.
+        AttributeRate::constant(1.25e-4),
+        Coding::Harmonics,
+    ),
 ];
 
 /// A row of the table.
@@ -183,10 +200,10 @@ const fn built_in(
     (name, width): (&'static str, Width),
     start: Start,
     activation: Activation,
-    learning_rate: &'static str,
+    learning_rate: AttributeRate,
     coding: Coding,
 ) -> Attribute {
-    let (name, learning_rate) = (Cow::Borrowed(name), Setting::Key(learning_rate));
+    let name = Cow::Borrowed(name);
     Attribute { name, width, start, activation, learning_rate, coding, constant: false, optional: false }
 }
 
@@ -232,7 +249,7 @@ impl Attribute {
             width: Width::Fixed(width),
             start: Start::Zeros,
             activation: Activation::Identity,
-            learning_rate: Setting::Number(DEFAULT_LEARNING_RATE),
+            learning_rate: AttributeRate::constant(DEFAULT_LEARNING_RATE),
             coding: Coding::Float32,
             constant: false,
             optional: false,
@@ -249,14 +266,14 @@ impl Attribute {
         Self { start: Start::Cloud(start), ..self }
     }
 
-    /// With this learning rate. It decays like those of colors, opacities, scales and rotations.
+    /// With this learning rate at all steps.
     pub fn with_learning_rate(self, rate: f64) -> Self {
-        Self { learning_rate: Setting::Number(rate), ..self }
+        Self { learning_rate: AttributeRate::constant(rate), ..self }
     }
 
     /// Stored in multiples of a step where the file is quantized.
     pub fn with_step(self, step: f64) -> Self {
-        Self { coding: Coding::Quantized(Setting::Number(step)), ..self }
+        Self { coding: Coding::Quantized(step), ..self }
     }
 
     /// With an activation, which [`GaussianTensors::activated`](crate::GaussianTensors::activated) applies.
@@ -307,8 +324,11 @@ mod tests {
     fn the_codec_has_the_same_table() {
         let steps = AttributeSteps::default();
         for attribute in &BUILT_IN {
-            let quantized = matches!(attribute.coding, Coding::Quantized(Setting::Key(key)) if key == attribute.name);
-            assert_eq!(steps.of(&attribute.name).is_some(), quantized, "{}", attribute.name);
+            let step = match attribute.coding {
+                Coding::Quantized(step) => Some(step as f32),
+                Coding::Float32 | Coding::Harmonics => None,
+            };
+            assert_eq!(steps.of(&attribute.name), step, "{}", attribute.name);
         }
         assert_eq!(steps.iter().count(), BUILT_IN.len() - 1);
         let arrays = light4gs_codec::GaussianArrays { sh_degree: 2, ..Default::default() };

@@ -282,7 +282,7 @@ impl Gaussians {
     }
 
     /// The attributes of every Gaussian: [`BUILT_IN`], then the further ones.
-    pub fn attributes(&self) -> impl Iterator<Item = &Attribute> {
+    pub fn attributes(&self) -> impl Iterator<Item = &Attribute> + Clone {
         BUILT_IN.iter().chain(self.further.attributes())
     }
 

@@ -22,7 +22,7 @@ use super::output::{say, say_json, tell};
 use super::train::{coding_table, sections_table};
 use super::wishes::{bytes, decibels};
 use crate::compression::{CodedScene, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
-use crate::config::{Config, DeviceName};
+use crate::config::{Config, DeviceName, Overrides};
 use crate::dataset::{image_store, load_options};
 use crate::device;
 use crate::error::TrainError;
@@ -86,14 +86,12 @@ impl Encode {
         };
         // A file follows one wish: that of the command in place of the run's.
         let (bytes, quality) = (self.target_bytes.unwrap_or(0), self.target_db.unwrap_or(0.0));
-        let mut overrides = Vec::new();
+        let mut changed = config.clone();
         if bytes > 0 || quality > 0.0 {
-            overrides.push(format!("compression.target_bytes={bytes}"));
-            overrides.push(format!("compression.target_db={quality:?}"));
+            (changed.compression.target_bytes, changed.compression.target_db) = (bytes, quality);
         }
-        overrides.extend(self.layers.map(|count| format!("compression.layers={count}")));
-        overrides.extend(self.overrides);
-        let changed = Config::load_text_with(&config.to_toml(), "the run's configuration", &overrides)?;
+        changed.compression.layers = self.layers.unwrap_or(config.compression.layers);
+        let changed = changed.with(&Overrides::parse(&self.overrides)?)?;
         if (Config { compression: config.compression.clone(), ..changed.clone() }) != config {
             return Err(TrainError::Input("`encode --set` changes keys below `compression` only".into()));
         }

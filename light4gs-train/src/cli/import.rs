@@ -58,9 +58,8 @@ pub(super) struct Import {
 
 impl Import {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let mut overrides = self.overrides.clone();
-        overrides.extend(self.device.map(|device| format!("device={device}")));
-        let config = Config::load(&self.config, &overrides)?;
+        let mut config = Config::load(&self.config, &self.overrides)?;
+        config.device = self.device.unwrap_or(config.device);
         match self.from {
             Source::FourDGaussians => self.import_reference(&config),
             Source::Ply => self.import_still(config),

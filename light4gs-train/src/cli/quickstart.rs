@@ -26,7 +26,7 @@ pub(super) struct Quickstart {
 
 impl Quickstart {
     pub(super) fn run(self) -> Result<(), TrainError> {
-        let config = Config::load("quickstart", &[format!("device={}", self.device)])?;
+        let config = Config { device: self.device, ..Config::from_preset("quickstart")? };
         let mut scene = self.out.clone().into_os_string();
         scene.push("-scene");
         let scene = PathBuf::from(scene);

@@ -13,7 +13,7 @@ use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
 use super::wishes::Wishes;
 use crate::compression::{CodedPart, CodingRecord};
-use crate::config::{Config, DeviceName};
+use crate::config::{Config, DeviceName, Overrides};
 use crate::dataset::{image_store, load_options};
 use crate::device::{self, describe};
 use crate::error::TrainError;
@@ -213,7 +213,7 @@ impl Resume {
         stop_flag();
         let (mut folder, record, found) = RunFolder::open(&self.run)?;
         folder.lock()?;
-        let mut config = Config::load_text_with(&found.to_toml(), "the run's configuration", &self.overrides)?;
+        let mut config = found.with(&Overrides::parse(&self.overrides)?)?;
         let changed = config.clone();
         config.device = self.device.unwrap_or(config.device);
         check_inputs(&config, record.dataset()?)?;

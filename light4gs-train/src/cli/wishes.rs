@@ -1,12 +1,12 @@
-//! `--pixels`, `--minutes`, `--target-bytes` and `--target-db`: what a user wishes, as keys of the configuration.
+//! `--pixels`, `--minutes`, `--target-bytes` and `--target-db`: what a user wishes, as changes of the configuration.
 
 use std::path::Path;
 
 use clap::Args;
-use light4gs_data::Scene;
+use light4gs_data::{Camera, Scene};
 
 use super::output::tell;
-use crate::config::Config;
+use crate::config::{Config, Overrides};
 use crate::dataset::load_options;
 use crate::error::TrainError;
 use crate::pace::Pace;
@@ -51,24 +51,20 @@ impl Wishes {
         quiet: bool,
     ) -> Result<Config, TrainError> {
         let mut config = Config::load(preset, overrides)?;
-        let mut wishes = Vec::new();
-        let with = |wishes: &[String]| Config::load(preset, &[wishes, overrides].concat());
+        let by_hand = Overrides::parse(overrides)?;
         if let Some(pixels) = self.pixels.or(config.data.resolution.filter(|_| automatic)) {
             // Without overrides, which may name a number of Gaussians that is meant for this size.
             let presets = Config::load(preset, &[])?;
-            let data = Scene::open(scene, &load_options(&config))?;
-            let longest = data.train.iter().map(|frame| frame.source_width.max(frame.source_height)).max().unwrap_or(0);
-            wishes = presets.for_pixels(pixels, longest.max(1));
-            config = with(&wishes)?;
+            let longest = longest_side(&Scene::open(scene, &load_options(&config))?);
+            config = presets.for_pixels(pixels, longest).with(&by_hand)?;
         }
         if let Some(bytes) = self.target_bytes {
-            wishes.extend(config.for_target_bytes(bytes));
-            config = with(&wishes)?;
+            config = config.for_target_bytes(bytes, &by_hand);
         }
         if let Some(quality) = self.target_db {
-            wishes.extend(config.for_target_db(quality));
-            config = with(&wishes)?;
+            config = config.for_target_db(quality, &by_hand);
         }
+        config.validate()?;
         let estimated = !quiet && config.train.coarse_iterations + config.train.fine_iterations >= FEWEST_ESTIMATED;
         if self.minutes.is_none() && !estimated {
             return Ok(config);
@@ -78,42 +74,56 @@ impl Wishes {
         let camera = data.train.first().map(|frame| frame.camera);
         let pace = Pace::measure(&config, data)?;
         if let Some(minutes) = self.minutes {
-            let scaled = |factor: f64| with(&[&wishes[..], &config.for_schedule(factor)].concat());
-            let minutes_of = |factor: f64| Ok::<_, TrainError>(pace.training_seconds(&scaled(factor)?) / 60.0);
-            let [least, most] = [minutes_of(SHORTEST)?, minutes_of(LONGEST)?];
-            if !(least..=most).contains(&minutes) {
-                return Err(TrainError::Input(format!(
-                    "--minutes {minutes}: this scene takes {least:.1} to {most:.0} minutes on this machine; give a number \
-                     between them, or another --pixels"
-                )));
-            }
-            // Not in proportion: in a short schedule there is no time for as many Gaussians. So it is
-            // bisected, in the logarithm, until the factor is known to a thousandth.
-            let [mut below, mut above] = [SHORTEST, LONGEST];
-            while above / below > 1.001 {
-                let middle = (below * above).sqrt();
-                if minutes_of(middle)? < minutes {
-                    below = middle;
-                } else {
-                    above = middle;
-                }
-            }
-            config = scaled(below)?;
+            config = in_minutes(minutes, &pace, |factor| config.for_schedule(factor, &by_hand))?;
+            config.validate()?;
         }
         if !quiet && let Some(camera) = camera {
-            let Config { train, .. } = &config;
-            tell(format_args!(
-                "{}×{} pixels, at most {} Gaussians, {} + {} iterations: about {:.1} minutes of training on this machine",
-                camera.width,
-                camera.height,
-                pace.most_gaussians(&config),
-                train.coarse_iterations,
-                train.fine_iterations,
-                pace.training_seconds(&config) / 60.0
-            ));
+            announce(&config, &camera, &pace);
         }
         Ok(config)
     }
+}
+
+/// The longer side of the largest training image in its file, pixels.
+fn longest_side(data: &Scene) -> u32 {
+    data.train.iter().map(|frame| frame.source_width.max(frame.source_height)).max().unwrap_or(0).max(1)
+}
+
+/// Of the schedules that `scaled` gives for a factor, the one whose training takes this many minutes.
+fn in_minutes(minutes: f64, pace: &Pace, scaled: impl Fn(f64) -> Config) -> Result<Config, TrainError> {
+    let minutes_of = |factor: f64| pace.training_seconds(&scaled(factor)) / 60.0;
+    let [least, most] = [SHORTEST, LONGEST].map(minutes_of);
+    if !(least..=most).contains(&minutes) {
+        return Err(TrainError::Input(format!(
+            "--minutes {minutes}: this scene takes {least:.1} to {most:.0} minutes on this machine; give a number \
+             between them, or another --pixels"
+        )));
+    }
+    // Not in proportion: in a short schedule there is no time for as many Gaussians. So it is bisected, in the
+    // logarithm, until the factor is known to a thousandth.
+    let [mut below, mut above] = [SHORTEST, LONGEST];
+    while above / below > 1.001 {
+        let middle = (below * above).sqrt();
+        if minutes_of(middle) < minutes {
+            below = middle;
+        } else {
+            above = middle;
+        }
+    }
+    Ok(scaled(below))
+}
+
+/// Says how large the training is and how long it will take.
+fn announce(config: &Config, camera: &Camera, pace: &Pace) {
+    tell(format_args!(
+        "{}×{} pixels, at most {} Gaussians, {} + {} iterations: about {:.1} minutes of training on this machine",
+        camera.width,
+        camera.height,
+        pace.most_gaussians(config),
+        config.train.coarse_iterations,
+        config.train.fine_iterations,
+        pace.training_seconds(config) / 60.0
+    ));
 }
 
 /// A number of bytes, with `k` for thousands or `M` for millions.

@@ -222,7 +222,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     if let Some(models) = &mut compression.planes {
         models.context.base_mut().update_quantiles();
     }
-    let mut attributes = config.attributes.steps_of(scene.gaussians.attributes());
+    let mut attributes = config.attributes.steps_of(scene.gaussians.attributes())?;
     if let Some(models) = compression.learned_attributes() {
         attributes = models.steps(attributes, &data.gaussians.log_scales);
     }

@@ -145,14 +145,12 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
 /// The attributes of Gaussians whose steps are learned: those that are quantized, and show in an image. Spherical
 /// harmonics are among them unless they have a model of their own.
 fn coded_attributes(config: &Config, gaussians: &Gaussians, sh_has_model: bool) -> Vec<CodedAttribute> {
-    let steps = config.compression.attributes.steps_of(gaussians.attributes());
     let coded = |attribute: &Attribute| {
         let width = attribute.width.of(gaussians.sh_degree());
         let step = match attribute.coding {
             Coding::Harmonics if sh_has_model || width == 0 => None,
             Coding::Harmonics => Some(config.compression.sh.step as f32),
-            Coding::Quantized(_) => steps.of(&attribute.name),
-            Coding::Float32 => None,
+            Coding::Quantized(_) | Coding::Float32 => config.compression.attributes.step(attribute),
         };
         step.map(|step| CodedAttribute { name: attribute.name.to_string(), width, step })
     };

@@ -1,12 +1,12 @@
 //! `[compression]`: how the scene is compressed (paper III-C to III-E).
 
-use light4gs_codec::attributes::AttributeSteps;
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
 use light4gs_model::{AdaptiveQuantizationConfig, ContextPart, ShKind};
 
+use super::attributes::{built_in, step_of};
 use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
-use crate::keys::{DECIBELS, ITERATION, RATE, STEP, WEIGHT, choice, keys, named};
+use crate::keys::{ByName, DECIBELS, ITERATION, RATE, STEP, WEIGHT, choice, keys, named};
 
 keys! {
     /// The form of the file, and what is trained to make it small (paper III-C to III-E,
@@ -199,35 +199,16 @@ named! {
 keys! {
     /// Quantization of the attributes other than the spherical harmonics beyond degree 0.
     pub struct AttributesConfig {
-        /// Step of the positions, as a share of a typical Gaussian's size. This key and the next four apply in the
-        /// `compact` profile only. The search starts from them.
-        means: f32 = step("means"); STEP, "ours", "of the size of the typical Gaussian";
-        /// Step of the scales' logarithms.
-        log_scales: f32 = step("log_scales"); STEP, "ours";
-        /// Step of the quaternions' components.
-        quats: f32 = step("quats"); STEP, "ours";
-        /// Step of the opacity logits.
-        opacity_logits: f32 = step("opacity_logits"); STEP, "ours";
-        /// Step of the constant colors.
-        sh_dc: f32 = step("sh_dc"); STEP, "ours";
+        /// Steps by the attributes' names, in the `compact` profile. That of `means` is a share of the typical Gaussian's
+        /// size, the others are in units of the trained numbers. Further attributes, such as `stillness` of control nodes
+        /// or one of a field of your own, can be named beside these; otherwise they have the steps that the field gives
+        /// them. The search starts from them.
+        steps: ByName = built_in(step_of);
+            Bounds::ByName(&STEP), "ours", "means: of the size of the typical Gaussian";
         /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.
         /// 0: the steps are used as they are.
         search_tolerance: f64 = 0.05; DECIBELS, "ours", "dB of training PSNR";
     }
-}
-
-impl AttributesConfig {
-    /// The steps in the codec's type, by the names of the attributes. The keys have the same names.
-    pub fn steps(&self) -> AttributeSteps {
-        let Self { means, log_scales, quats, opacity_logits, sh_dc, search_tolerance: _ } = *self;
-        let steps = AttributeSteps::default().with("means", means).with("log_scales", log_scales);
-        steps.with("quats", quats).with("opacity_logits", opacity_logits).with("sh_dc", sh_dc)
-    }
-}
-
-/// The codec's default step of an attribute.
-fn step(attribute: &str) -> f32 {
-    AttributeSteps::default().of(attribute).unwrap_or(1.0)
 }
 
 /// The most bits that a weight may have.

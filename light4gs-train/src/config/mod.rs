@@ -37,8 +37,7 @@ use crate::keys::Bounds::{Device, Whole};
 use crate::keys::{MOST_INTEGER, keys};
 use layering::layers;
 
-pub use crate::keys::{Bounds, Key, UnknownChoice};
-pub(crate) use attributes::AttributeRate;
+pub use crate::keys::{Bounds, ByName, Key, UnknownChoice};
 pub use compression::{
     AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
     ShConfig, ShModel, StepsConfig, WeightsConfig,
@@ -47,6 +46,7 @@ pub use data::DataConfig;
 pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
 pub use error::{ConfigError, Origin, Problem};
 pub use eval::{EvalConfig, EvalSplit};
+pub use layering::Overrides;
 pub use layering::presets::preset_names;
 pub use model::{CoordinatesTable, DeformationTable, FieldKind, HexPlaneTable, ModelConfig};
 pub use train::{CoarseToFineConfig, LearningRates, RegularizerConfig, TrainConfig};
@@ -107,8 +107,8 @@ impl Config {
         layout.preset().ok_or_else(|| ConfigError::NoPreset { layout: layout.name() })
     }
 
-    /// What a command line gives: a preset's name or a file's path, and overrides such as
-    /// `train.fine_iterations=200`, each one a line of TOML (a bare word is taken as a string).
+    /// What a command line gives: a preset's name or a file's path, and overrides as [`Overrides::parse`] takes them,
+    /// such as `train.fine_iterations=200`.
     ///
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
     /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a
@@ -121,12 +121,15 @@ impl Config {
 
     /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, ConfigError> {
-        layers::resolve_text(text, origin, &[])
+        layers::resolve_text(text, origin)
     }
 
-    /// Reads a configuration from text and lays overrides on top, as [`Config::load`] does. `origin` names the text.
-    pub fn load_text_with(text: &str, origin: &str, overrides: &[String]) -> Result<Self, ConfigError> {
-        layers::resolve_text(text, origin, overrides)
+    /// This configuration with overrides laid over it, validated.
+    ///
+    /// # Errors
+    /// A value that does not fit into its field, values out of range.
+    pub fn with(&self, overrides: &Overrides) -> Result<Self, ConfigError> {
+        layers::lay_over(self, overrides)
     }
 
     /// The whole configuration, every key written out. Reading it back gives an equal configuration.

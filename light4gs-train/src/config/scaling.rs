@@ -1,8 +1,10 @@
-//! A configuration for other images, another length of training or a file of a certain size, as changes of its keys.
+//! A configuration for other images, another length of training or a file of a certain size: methods that change its
+//! values.
 //!
-//! The changes are overrides as [`Config::load`] takes them, so that what a user sets by hand, laid on top, wins.
+//! What a user sets by hand wins. So either the overrides are laid over the result, or the method gets them and leaves
+//! their keys alone.
 
-use super::Config;
+use super::{Config, Overrides};
 use crate::density::gaussians_for_images;
 
 /// Bytes for each Gaussian that may be trained, with which a file has the next two values on the measured hull
@@ -17,92 +19,129 @@ const PRUNED_BOUNDS: [f64; 2] = [0.1, 0.6];
 impl Config {
     /// For images whose longer side has `pixels` pixels in place of those of this configuration: the resolution, and more
     /// or fewer Gaussians. `longest` is the longer side of the images in their files; they are never enlarged.
-    pub fn for_pixels(&self, pixels: u32, longest: u32) -> Vec<String> {
+    ///
+    /// The numbers of Gaussians must be those that are meant for this configuration's resolution, and so without a
+    /// user's overrides: [`Config::with`] lays them over the result.
+    pub fn for_pixels(&self, pixels: u32, longest: u32) -> Self {
+        let mut config = self.clone();
         let before = f64::from(self.data.resolution.unwrap_or(longest));
         let ratio = f64::from(pixels.min(longest)) / before;
-        let train = &self.train;
-        let scaled = |count| gaussians_for_images(count, ratio);
-        vec![
-            format!("data.resolution={pixels}"),
-            format!("train.densify.adaptive.max_gaussians={}", scaled(train.densify.strategies.adaptive.max_gaussians)),
-            format!("train.guided_sampling.count={}", scaled(train.guided_sampling.count)),
-        ]
+        config.data.resolution = Some(pixels);
+        let Self { train, .. } = &mut config;
+        for count in [&mut train.densify.strategies.adaptive.max_gaussians, &mut train.guided_sampling.count] {
+            *count = gaussians_for_images(*count, ratio);
+        }
+        config
     }
 
     /// For a file of at most `bytes`: how many Gaussians stay, and what a byte weighs at first. The trainer corrects the
-    /// weight as it goes.
-    pub fn for_target_bytes(&self, bytes: usize) -> Vec<String> {
-        let Self { train, compression, .. } = self;
-        let most = train.densify.strategies.adaptive.max_gaussians.max(1);
-        let ratio = bytes as f64 / most as f64 / BYTES_A_GAUSSIAN;
-        let mut wishes = vec![format!("compression.target_bytes={bytes}")];
-        wishes.extend(self.with_a_rate());
+    /// weight as it goes. Keys that are set `by_hand` stay as they are.
+    pub fn for_target_bytes(&self, bytes: usize, by_hand: &Overrides) -> Self {
+        let mut config = self.with_a_rate(by_hand);
+        let Self { train, compression, .. } = &mut config;
+        by_hand.unless_set("compression.target_bytes", &mut compression.target_bytes, bytes);
         if compression.rate.attributes {
+            let most = train.densify.strategies.adaptive.max_gaussians.max(1);
+            let ratio = bytes as f64 / most as f64 / BYTES_A_GAUSSIAN;
             let [least, largest] = PRUNED_BOUNDS;
             let pruned = (PRUNED.0 + PRUNED.1 * ratio.ln()).clamp(least, largest);
             let weight = (MEGABYTE.0 * ratio.powf(MEGABYTE.1)).clamp(1e-4, 1.0);
-            wishes.push(format!("compression.rate.attribute_lambda={weight:.5}"));
+            let lambda = &mut compression.rate.attribute_lambda;
+            by_hand.unless_set("compression.rate.attribute_lambda", lambda, rounded(weight, 1e5));
             // A short schedule of one's own may have left pruning, which is off, behind its end.
             if train.prune.iterations.iter().all(|pass| *pass <= train.fine_iterations) {
-                wishes.push(format!("train.prune.fraction={pruned:.3}"));
+                by_hand.unless_set("train.prune.fraction", &mut train.prune.fraction, rounded(pruned, 1e3));
             }
         }
-        wishes
+        config
     }
 
-    /// For a file with this PSNR on the test views, dB. The trainer corrects the weight of the rate as it goes.
-    pub fn for_target_db(&self, quality: f64) -> Vec<String> {
-        let wish = format!("compression.target_db={quality:?}");
-        std::iter::once(wish).chain(self.with_a_rate()).collect()
+    /// For a file with this PSNR on the test views, dB. The trainer corrects the weight of the rate as it goes. Keys that
+    /// are set `by_hand` stay as they are.
+    pub fn for_target_db(&self, quality: f64, by_hand: &Overrides) -> Self {
+        let mut config = self.with_a_rate(by_hand);
+        by_hand.unless_set("compression.target_db", &mut config.compression.target_db, quality);
+        config
     }
 
     /// Without a rate in the loss, there is no weight that could follow a wish.
-    fn with_a_rate(&self) -> Option<String> {
-        (self.compression.rate.lambda <= 0.0).then(|| "compression.rate.lambda=0.007".to_owned())
+    fn with_a_rate(&self, by_hand: &Overrides) -> Self {
+        let mut config = self.clone();
+        let lambda = &mut config.compression.rate.lambda;
+        if *lambda <= 0.0 {
+            by_hand.unless_set("compression.rate.lambda", lambda, 0.007);
+        }
+        config
     }
 
-    /// The same schedule `factor` times as long: every key that counts iterations of a stage. 0 stays 0, "never".
-    pub fn for_schedule(&self, factor: f64) -> Vec<String> {
-        let Self { train, compression, .. } = self;
-        let adaptive = &train.densify.strategies.adaptive;
-        let one = [
-            ("train.coarse_iterations", train.coarse_iterations),
-            ("train.fine_iterations", train.fine_iterations),
-            ("train.sh_degree_interval", train.sh_degree_interval),
-            ("train.photometric.l2_until", train.losses.photometric.l2_until),
-            ("train.learning_rate.schedule_steps", train.learning_rate.schedule_steps.unwrap_or(0)),
-            ("train.densify.adaptive.from", adaptive.from),
-            ("train.densify.adaptive.until", adaptive.until),
-            ("train.densify.adaptive.prune_from", adaptive.prune_from),
-            ("train.densify.adaptive.opacity_reset_interval", adaptive.opacity_reset_interval),
-            ("compression.rate.from", compression.rate.from),
-            ("compression.rate.planes_until", compression.rate.planes_until),
-            ("compression.steps.adaptive_from", compression.steps.adaptive_from),
-        ];
+    /// The same schedule `factor` times as long: every key that counts iterations of a stage. 0 stays 0, "never". Keys
+    /// that are set `by_hand` stay as they are.
+    pub fn for_schedule(&self, factor: f64, by_hand: &Overrides) -> Self {
         let scaled = |iterations: usize| match iterations {
             0 => 0,
             _ => ((iterations as f64 * factor).round() as usize).max(1),
         };
         // Pruning stays after densification, whatever is rounded.
-        let after = scaled(train.densify.chosen().end()) + 1;
-        let passes: Vec<usize> = train.prune.iterations.iter().map(|&pass| scaled(pass).max(after)).collect();
-        let guided: Vec<usize> = train.guided_sampling.iterations.iter().map(|&pass| scaled(pass)).collect();
-        let several = [("train.prune.iterations", passes), ("train.guided_sampling.iterations", guided)];
-        let one = one.into_iter().map(|(key, value)| format!("{key}={}", scaled(value)));
-        one.chain(several.into_iter().map(|(key, values)| format!("{key}={values:?}"))).collect()
+        let after = scaled(self.train.densify.chosen().end()) + 1;
+        let mut config = self.clone();
+        for (key, iterations) in config.schedule() {
+            let longer = scaled(*iterations);
+            by_hand.unless_set(key, iterations, longer);
+        }
+        let Self { train, .. } = &mut config;
+        let passes = train.prune.iterations.iter().map(|&pass| scaled(pass).max(after)).collect();
+        by_hand.unless_set("train.prune.iterations", &mut train.prune.iterations, passes);
+        let guided = train.guided_sampling.iterations.iter().map(|&pass| scaled(pass)).collect();
+        by_hand.unless_set("train.guided_sampling.iterations", &mut train.guided_sampling.iterations, guided);
+        let steps = train.learning_rate.schedule_steps.map(scaled);
+        by_hand.unless_set("train.learning_rate.schedule_steps", &mut train.learning_rate.schedule_steps, steps);
+        config
+    }
+
+    /// The keys that count iterations of a stage, with their values.
+    fn schedule(&mut self) -> [(&'static str, &mut usize); 11] {
+        let Self { train, compression, .. } = self;
+        let adaptive = &mut train.densify.strategies.adaptive;
+        [
+            ("train.coarse_iterations", &mut train.coarse_iterations),
+            ("train.fine_iterations", &mut train.fine_iterations),
+            ("train.sh_degree_interval", &mut train.sh_degree_interval),
+            ("train.photometric.l2_until", &mut train.losses.photometric.l2_until),
+            ("train.densify.adaptive.from", &mut adaptive.from),
+            ("train.densify.adaptive.until", &mut adaptive.until),
+            ("train.densify.adaptive.prune_from", &mut adaptive.prune_from),
+            ("train.densify.adaptive.opacity_reset_interval", &mut adaptive.opacity_reset_interval),
+            ("compression.rate.from", &mut compression.rate.from),
+            ("compression.rate.planes_until", &mut compression.rate.planes_until),
+            ("compression.steps.adaptive_from", &mut compression.steps.adaptive_from),
+        ]
+    }
+}
+
+/// A multiple of a fraction, as a person would write it.
+fn rounded(value: f64, parts: f64) -> f64 {
+    (value * parts).round() / parts
+}
+
+impl Overrides {
+    /// Sets a value, unless its key is set by hand.
+    fn unless_set<T>(&self, key: &str, place: &mut T, value: T) {
+        if !self.has(key) {
+            *place = value;
+        }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::preset_names;
+    use crate::config::{KEYS, preset_names};
 
     #[test]
     fn a_schedule_of_the_same_length_changes_nothing() {
         for preset in ["hypernerf-cpu", "nerfds-cpu", "dnerf-lego-cpu+nodes+medium", "dnerf", "quickstart"] {
             let config = Config::load(preset, &[]).unwrap();
-            assert_eq!(Config::load(preset, &config.for_schedule(1.0)).unwrap(), config, "{preset}");
+            assert_eq!(config.for_schedule(1.0, &Overrides::default()), config, "{preset}");
         }
     }
 
@@ -112,7 +151,8 @@ mod tests {
         for preset in preset_names() {
             let Ok(config) = Config::load(preset, &[]) else { continue };
             for factor in [0.01, 0.33, 7.1] {
-                let longer = Config::load(preset, &config.for_schedule(factor)).unwrap();
+                let longer = config.for_schedule(factor, &Overrides::default());
+                longer.validate().unwrap();
                 let expected = (config.train.fine_iterations as f64 * factor).round() as usize;
                 assert_eq!(longer.train.fine_iterations, expected, "{preset}");
             }
@@ -123,7 +163,8 @@ mod tests {
     fn gaussians_follow_the_images() {
         let config = Config::load("hypernerf-cpu", &["data.resolution=200".into()]).unwrap();
         let most = |pixels, longest| {
-            let config = Config::load("hypernerf-cpu", &config.for_pixels(pixels, longest)).unwrap();
+            let config = config.for_pixels(pixels, longest);
+            config.validate().unwrap();
             (config.data.resolution, config.train.densify.strategies.adaptive.max_gaussians)
         };
         let before = config.train.densify.strategies.adaptive.max_gaussians;
@@ -138,7 +179,8 @@ mod tests {
     fn fewer_bytes_are_fewer_gaussians_and_a_dearer_byte() {
         let config = Config::load("dnerf-cpu+nodes", &[]).unwrap();
         let at = |bytes| {
-            let config = Config::load("dnerf-cpu+nodes", &config.for_target_bytes(bytes)).unwrap();
+            let config = config.for_target_bytes(bytes, &Overrides::default());
+            config.validate().unwrap();
             assert_eq!(config.compression.target_bytes, bytes);
             assert!(config.compression.rate.lambda > 0.0);
             (config.train.prune.fraction, config.compression.rate.attribute_lambda)
@@ -152,12 +194,39 @@ mod tests {
 
     #[test]
     fn what_is_set_by_hand_wins() {
-        let config = Config::load("hypernerf-cpu", &[]).unwrap();
-        let mut overrides = [config.for_pixels(960, 960), config.for_schedule(2.0)].concat();
-        overrides.extend(["train.fine_iterations=10000".into(), "train.densify.adaptive.max_gaussians=70".into()]);
-        let changed = Config::load("hypernerf-cpu", &overrides).unwrap();
+        let preset = Config::load("hypernerf-cpu", &[]).unwrap();
+        let by_hand = ["train.fine_iterations=10000", "train = { densify = { adaptive = { max_gaussians = 70 } } }"];
+        let by_hand = Overrides::parse(&by_hand.map(str::to_owned)).unwrap();
+        let changed = preset.for_pixels(960, 960).with(&by_hand).unwrap().for_schedule(2.0, &by_hand);
         assert_eq!(changed.train.fine_iterations, 10000);
         assert_eq!(changed.train.densify.strategies.adaptive.max_gaussians, 70);
-        assert_eq!(changed.train.coarse_iterations, 2 * config.train.coarse_iterations);
+        assert_eq!(changed.train.coarse_iterations, 2 * preset.train.coarse_iterations);
+        assert_eq!(changed.data.resolution, Some(960));
+    }
+
+    /// The keys' names are those of the values, and a wish leaves each alone that is set by hand.
+    #[test]
+    fn every_key_that_a_wish_changes_can_be_set_by_hand() {
+        let presets = "hypernerf-cpu+nodes+medium";
+        let free = Overrides::default();
+        let wished = |config: &Config, by_hand: &Overrides| {
+            let config = config.for_target_bytes(20_000, by_hand).for_schedule(3.0, by_hand);
+            config.for_target_db(25.0, by_hand)
+        };
+        let values = |config: &Config| {
+            let table = toml::Value::try_from(config).unwrap();
+            let value = |path: &str| path.split('.').fold(&table, |table, name| &table[name]).clone();
+            KEYS.iter().map(|key| (key.path.clone(), value(&key.path))).collect::<Vec<_>>()
+        };
+        let preset = Config::load(presets, &["compression.rate.lambda=0".to_owned()]).unwrap();
+        let changed = values(&wished(&preset, &free));
+        let changed: Vec<_> =
+            values(&preset).into_iter().zip(changed).filter(|(before, after)| before != after).collect();
+        assert!(changed.len() > 10, "{changed:?}");
+        for ((key, before), _) in changed {
+            let by_hand = Overrides::parse(&[format!("{key}={before}")]).unwrap();
+            let kept = values(&wished(&preset, &by_hand));
+            assert!(kept.contains(&(key.clone(), before)), "{key}");
+        }
     }
 }

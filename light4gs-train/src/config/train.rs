@@ -3,9 +3,10 @@
 use light4gs_data::Camera;
 use light4gs_model::regularizer::PlaneRegularizer;
 
+use super::attributes::built_in;
 use crate::density::{DensifyConfig, GuidedSamplingConfig, PruneConfig};
-use crate::keys::Bounds::{Kind, Number, Whole};
-use crate::keys::{INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, WEIGHT, keys, optional};
+use crate::keys::Bounds::{self, Kind, Whole};
+use crate::keys::{ByName, INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, WEIGHT, keys, optional};
 use crate::loss::{LossKind, Losses};
 use crate::sampling::{SamplerKind, Samplers};
 use crate::stage::Stage;
@@ -115,10 +116,6 @@ keys! {
     /// Adam's rates. A pair of `init` and `final` decays exponentially; those of positions, deformation and feature planes are
     /// multiplied by the scene's extent.
     pub struct LearningRates {
-        /// Positions, first step.
-        means_init: f64 = 1.6e-4; RATE, "3DGS";
-        /// Positions, end of the schedule.
-        means_final: f64 = 1.6e-6; RATE, "3DGS";
         /// Deformation network, first step.
         deformation_init: f64 = 1.6e-4; RATE, "reference";
         /// Deformation network, end of the schedule.
@@ -127,20 +124,14 @@ keys! {
         planes_init: f64 = 1.6e-3; RATE, "reference";
         /// Feature planes, end of the schedule.
         planes_final: f64 = 1.6e-4; RATE, "reference";
-        /// Constant color.
-        sh_dc: f64 = 2.5e-3; RATE, "3DGS";
-        /// View-dependent color: `sh_dc` divided by this.
-        sh_rest_divisor: f64 = 20.0; Number { least: 1e-3, most: 1e9 }, "3DGS";
-        /// Opacity logits.
-        opacity: f64 = 0.05; RATE, "3DGS";
-        /// Logarithms of the scales.
-        scale: f64 = 0.005; RATE, "3DGS";
-        /// Quaternions.
-        rotation: f64 = 0.001; RATE, "3DGS";
-        /// The rates of colors, opacities, scales and rotations decay to this share of themselves at the end of the
-        /// schedule; 1 keeps them constant.
-        attributes_final_share: f64 = 1.0;
-            Number { least: 1e-9, most: 1e3 }, "3DGS: constant", "of the five rates above at the end; 1 = constant";
+        /// Attributes of the Gaussians, first step. Further attributes, such as `stillness` of control nodes or one of a
+        /// field of your own, can be named beside these; otherwise they have the rates that the field gives them.
+        attributes_init: ByName = built_in(|attribute| Some(attribute.learning_rate.initial));
+            Bounds::ByName(&RATE), "3DGS", "by name";
+        /// The same at the end of the schedule. An attribute that is not named here keeps its rate, unless its field gives
+        /// it another one.
+        attributes_final: ByName = built_in(|attribute| attribute.learning_rate.last);
+            Bounds::ByName(&RATE), "3DGS", "all others keep their rates";
         /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000", "0 = the stage's length";

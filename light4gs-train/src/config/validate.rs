@@ -6,8 +6,8 @@ use serde_json::Value;
 
 use super::model::{FieldKind, MOST_PLANE_RESOLUTION};
 use super::{
-    CoarseToFineConfig, CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, HexPlaneTable, KEYS, Key,
-    ModelConfig, Problem, TrainConfig,
+    Bounds, CoarseToFineConfig, CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, HexPlaneTable, KEYS,
+    Key, ModelConfig, Problem, TrainConfig,
 };
 use crate::density::PruneConfig;
 
@@ -25,12 +25,20 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
 /// All values out of bounds, in the order of the keys.
 fn out_of_bounds(config: &Config) -> Vec<Problem> {
     let table = serde_json::to_value(config).expect("a configuration is plain data");
-    let check = |key: &Key| {
-        let value = key.path.split('.').try_fold(&table, |table, name| table.get(name));
-        let message = key.bounds.problem(value.unwrap_or(&Value::Null))?;
-        Some(Problem { key: key.path.clone(), message })
+    let problem = |key: String, bounds: &Bounds, value: &Value| {
+        let message = bounds.problem(value)?;
+        Some(Problem { key, message })
     };
-    KEYS.iter().filter_map(check).collect()
+    let check = |Key { path, bounds, .. }: &Key| -> Vec<Problem> {
+        let value = path.split('.').try_fold(&table, |table, name| table.get(name)).unwrap_or(&Value::Null);
+        match (bounds, value) {
+            (Bounds::ByName(each), Value::Object(numbers)) => {
+                numbers.iter().filter_map(|(name, value)| problem(format!("{path}.{name}"), each, value)).collect()
+            }
+            _ => problem(path.clone(), bounds, value).into_iter().collect(),
+        }
+    };
+    KEYS.iter().flat_map(check).collect()
 }
 
 fn hexplane(check: &mut Check, planes: &HexPlaneTable) {
@@ -143,8 +151,8 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
     check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
     check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));
-    for (name, step) in attributes.steps().iter() {
-        check.encodable(&format!("compression.attributes.{name}"), checks::attribute_step(name, step));
+    for (name, step) in attributes.steps.iter() {
+        check.encodable(&format!("compression.attributes.steps.{name}"), checks::attribute_step(name, step as f32));
     }
 }
 

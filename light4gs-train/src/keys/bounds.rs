@@ -60,9 +60,11 @@ pub enum Bounds {
         /// The number of elements; any if not given.
         length: Option<usize>,
     },
+    /// Numbers by name: each of them.
+    ByName(&'static Bounds),
 }
 
-use Bounds::{Device, Flag, Kind, LayoutOrNone, List, Number, Text, Whole, WholeOrNone, Word};
+use Bounds::{ByName, Device, Flag, Kind, LayoutOrNone, List, Number, Text, Whole, WholeOrNone, Word};
 
 /// Iterations, and intervals of them.
 const MOST_ITERATIONS: u64 = 100_000_000;
@@ -96,7 +98,7 @@ impl fmt::Display for Bounds {
             Whole { least, most } => write!(formatter, "{least} to {most}"),
             WholeOrNone { least, most } => write!(formatter, "0, or {least} to {most}"),
             Number { least, most } => write!(formatter, "{} to {}", Short(*least), Short(*most)),
-            List { element, .. } => write!(formatter, "each {element}"),
+            List { element, .. } | ByName(element) => write!(formatter, "each {element}"),
         }
     }
 }

@@ -2,6 +2,7 @@
 //!
 //! - `declaration`: the macro `keys!`, which makes a struct and its table of keys from one declaration
 //! - `bounds`: the values that a key may have
+//! - `by_name`: tables of numbers by name
 //! - `choice`: words, declared as enums
 //! - `kinds`: parts of the training that are chosen by name, each with its own keys
 //! - `optional`: values that may be absent, although TOML has no null
@@ -11,6 +12,7 @@
 //! This room contains no key. The declarations are near the code that they configure, and `config` collects them.
 
 mod bounds;
+mod by_name;
 mod choice;
 mod declaration;
 mod kinds;
@@ -21,6 +23,7 @@ pub use bounds::Bounds;
 pub(crate) use bounds::{
     DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_GAUSSIANS, MOST_INTEGER, RATE, SHARE, STEP, THRESHOLD, WEIGHT,
 };
+pub use by_name::ByName;
 pub use choice::UnknownChoice;
 pub(crate) use choice::{choice, named, nearest, serde_by_name};
 pub(crate) use declaration::has_no_keys;

@@ -98,6 +98,10 @@ fn toml_value(value: &toml::Value) -> String {
         toml::Value::Array(values) => {
             format!("[{}]", values.iter().map(toml_value).collect::<Vec<_>>().join(", "))
         }
+        toml::Value::Table(values) => {
+            let pair = |(name, value): (&String, &toml::Value)| format!("{name} = {}", toml_value(value));
+            format!("{{ {} }}", values.iter().map(pair).collect::<Vec<_>>().join(", "))
+        }
         other => other.to_string(),
     }
 }

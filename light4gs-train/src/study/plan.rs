@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use light4gs_data::DataError;
 
 use super::definition::{Axis, Study, schedule_problem};
-use crate::config::Config;
+use crate::config::{Config, Overrides};
 use crate::error::TrainError;
 
 /// In the name of a configuration, it stands for the name of the scene.
@@ -171,14 +171,13 @@ fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOption
     names.extend(chosen().flat_map(|value| value.presets.iter().cloned()));
     let names = names.join("+");
     let factor: Option<f64> = chosen().filter_map(|value| value.schedule).chain(options.schedule).reduce(|a, b| a * b);
-    let scaled = factor.map(|factor| Ok(Config::load(&names, &[])?.for_schedule(factor)));
-    let load = |scaled: Option<Vec<String>>| {
-        let own = chosen().flat_map(|value| &value.set).chain(&options.overrides).cloned();
-        Config::load(&names, &scaled.into_iter().flatten().chain(own).collect::<Vec<_>>())
+    let own: Vec<String> = chosen().flat_map(|value| &value.set).chain(&options.overrides).cloned().collect();
+    let scaled = |factor| {
+        let longer = Config::load(&names, &[])?.for_schedule(factor, &Overrides::default());
+        longer.with(&Overrides::parse(&own)?)
     };
-    scaled
-        .transpose()
-        .and_then(load)
+    factor
+        .map_or_else(|| Config::load(&names, &own), scaled)
         .map_err(|error| TrainError::Input(format!("variant \"{}\" of \"{}\": {error}", variant.name, study.title)))
 }
 

@@ -8,7 +8,7 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_codec::checks;
 use light4gs_data::Scene;
-use light4gs_model::attributes::check_further;
+use light4gs_model::attributes::{BUILT_IN, check_further};
 use light4gs_model::{Attribute, BuiltInField, DeformationField, DynamicSceneConfig, ModelError};
 
 use super::Trainer;
@@ -17,7 +17,7 @@ use super::list_room::ListRoom;
 use super::profile::Profile;
 use super::views::ViewPools;
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
-use crate::config::{AttributeRate, Config};
+use crate::config::Config;
 use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
@@ -234,15 +234,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         let scene = self.scene();
         check_further(&scene.gaussians.further)
             .map_err(|problem| TrainError::Input(format!("attribute of the Gaussians: {problem}")))?;
-        for attribute in &scene.gaussians.further {
-            if AttributeRate::of(attribute, &self.config.train.learning_rate).is_none() {
-                let (name, rate) = (&attribute.name, attribute.learning_rate);
-                return Err(TrainError::Input(format!(
-                    "attribute of the Gaussians: `{name}` has the learning rate {rate:?}, which is no key of \
-                     train.learning_rate; give it a number"
-                )));
-            }
-        }
+        self.config.check_attributes(BUILT_IN.iter().chain(&scene.gaussians.further))?;
         // Refused now, since the encoder would refuse it at the end.
         light4gs_codec::checks::positions(&self.data.points.positions).map_err(|error| {
             TrainError::Input(format!("the point cloud of the dataset {}: {error}", self.data.root.display()))

@@ -178,7 +178,7 @@ mod tests {
     /// Where the third frame is red, columns and rows.
     const SQUARE: std::ops::Range<usize> = 12..18;
     /// Nothing but the sampling changes the scene.
-    const KEYS: [&str; 20] = [
+    const KEYS: [&str; 17] = [
         "device=flex",
         "model.nodes.lifetime=true",
         "train.sampling=shuffled",
@@ -188,14 +188,11 @@ mod tests {
         "train.prune.fraction=0",
         "train.guided_sampling.iterations=[2]",
         "train.guided_sampling.count=20",
-        "train.learning_rate.means_init=1e-12",
-        "train.learning_rate.means_final=1e-12",
+        "train.learning_rate.attributes_init={ means = 1e-12, log_scales = 1e-12, quats = 1e-12, opacity_logits = 1e-12 }",
+        "train.learning_rate.attributes_init={ sh_dc = 1e-12, sh_rest = 1e-12 }",
+        "train.learning_rate.attributes_final.means=1e-12",
         "train.learning_rate.deformation_init=1e-12",
         "train.learning_rate.deformation_final=1e-12",
-        "train.learning_rate.sh_dc=1e-12",
-        "train.learning_rate.opacity=1e-12",
-        "train.learning_rate.scale=1e-12",
-        "train.learning_rate.rotation=1e-12",
         "compression.rate.attributes=false",
         "compression.rate.lambda=0",
         "eval.interval=0",

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use light4gs_model::{Attribute, LearningRate};
 
-use crate::config::{AttributeRate, Config};
+use crate::config::Config;
 use crate::optimization::parameters::ParameterGroup;
 use crate::optimization::schedule::ExponentialDecay;
 use crate::stage::Stage;
@@ -41,17 +41,17 @@ impl GroupRates {
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
         let attribute = |attribute: &Attribute| {
-            let AttributeRate { first, last, by_extent, .. } = AttributeRate::of(attribute, rates)?;
-            let rate = match by_extent {
-                true => decay(first, last),
-                false => ExponentialDecay::new(first, last, steps).at(iteration as f64),
+            let LearningRate { initial, last } = rates.of(attribute);
+            let rate = match attribute.learning_rate.by_extent {
+                true => decay(initial, last),
+                false => ExponentialDecay::new(initial, last, steps).at(iteration as f64),
             };
-            Some((attribute.path(), rate))
+            (attribute.path(), rate)
         };
         let model =
             |first: f64, last: f64| ExponentialDecay::new(first, last, train.fine_iterations).at(iteration as f64);
         Self {
-            attributes: attributes.filter_map(attribute).collect(),
+            attributes: attributes.map(attribute).collect(),
             planes: decay(rates.planes_init, rates.planes_final),
             deformation: LearningRate {
                 initial: rates.deformation_init * scale,

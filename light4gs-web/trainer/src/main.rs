@@ -31,7 +31,7 @@ use std::process::ExitCode;
 
 use light4gs_data::{Layouts, Scene, SyntheticOptions, write_synthetic};
 use light4gs_model::BuiltInField;
-use light4gs_train::config::Config;
+use light4gs_train::config::{Config, DeviceName};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::evaluation::finish::evaluate_run;
@@ -64,8 +64,7 @@ fn train(dataset: &Path, run: &Path, overrides: &[String]) -> Result<(), TrainEr
         write_synthetic(dataset, &SyntheticOptions::default())?;
         "quickstart"
     };
-    let overrides: Vec<String> = [overrides, &["device=flex".to_owned()]].concat();
-    let config = Config::load(preset, &overrides)?;
+    let config = Config { device: DeviceName::Flex, ..Config::load(preset, overrides)? };
     let data = Scene::open(dataset, &load_options(&config))?;
     let folder = RunFolder::create(run, Some(dataset), &config, true)?;
     let mut trainer =

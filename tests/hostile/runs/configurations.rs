@@ -63,6 +63,8 @@ pub fn ends(bounds: &Bounds) -> Vec<String> {
             .into_iter()
             .map(|value| format!("[{}]", vec![value; length.unwrap_or(1)].join(", ")))
             .collect(),
+        // An attribute that all Gaussians have.
+        Bounds::ByName(each) => ends(each).into_iter().map(|value| format!("{{ means = {value} }}")).collect(),
     }
 }
 

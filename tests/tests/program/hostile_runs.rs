@@ -334,11 +334,12 @@ fn found_before() {
     // Configurations that the encoder would refuse after the last iteration.
     for (key_value, key) in [
         ("model.hexplane.multipliers=[1,2,3,4,5,6,7,8,9,10,11,12,13,14,15,16,17]", "model.hexplane.multipliers"),
-        ("compression.attributes.opacity_logits=1e-45", "compression.attributes.opacity_logits"),
+        ("compression.attributes.steps.opacity_logits=1e-45", "compression.attributes.steps.opacity_logits"),
+        ("compression.attributes.steps.opacty_logits=0.1", "the nearest is `opacity_logits`"),
         ("compression.steps.space_time=1e-45", "compression.steps.space_time"),
         ("compression.sh.step=1e300", "compression.sh.step"),
         ("data.initial_box=3e38", "data.initial_box"),
-        ("train.learning_rate.opacity=1e39", "train.learning_rate.opacity"),
+        ("train.learning_rate.attributes_init.opacity_logits=1e39", "attributes_init.opacity_logits"),
     ] {
         assert_refused(&w.train("x", &[key_value]).output().unwrap(), &[key]);
         assert!(!w.path("x").exists());
@@ -464,11 +465,11 @@ fn a_dataset_that_changed_is_noticed() {
 #[test]
 fn a_run_that_diverges_says_so_and_goes_on_with_another_rate() {
     let w = Workspace::new(PROGRAM);
-    let rate = "train.learning_rate.means_init=1000";
-    let output = w.train("blank", &[rate, "train.learning_rate.means_final=1000"]).output().unwrap();
+    let rate = "train.learning_rate.attributes_init.means=1000";
+    let output = w.train("blank", &[rate, "train.learning_rate.attributes_final.means=1000"]).output().unwrap();
     let text = String::from_utf8_lossy(&output.stderr);
     assert!(text.contains("warning: ") && text.contains("empty image"), "{text}");
-    assert!(text.contains("--set train.learning_rate.means_"), "{text}");
+    assert!(text.contains("--set train.learning_rate.attributes_"), "{text}");
 
     // A checkpoint of a finished coarse stage, and then a rate that no float32 survives.
     assert_success(&w.train("run", &[]).output().unwrap());

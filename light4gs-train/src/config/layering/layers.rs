@@ -8,7 +8,7 @@ use toml::{Table, Value};
 
 use super::super::{Config, ConfigError, MAX_CONFIG_BYTES, Origin};
 use super::schema::line_at;
-use super::{overrides, presets, schema};
+use super::{Overrides, presets, schema};
 
 /// The key by which a layer names the one below it.
 const EXTENDS: &str = "extends";
@@ -30,18 +30,12 @@ pub(in crate::config) fn resolve(
         }
         layers.push((origin.clone(), layer));
     }
-    for text in override_texts {
-        layers.push(overrides::parse(text)?);
-    }
+    layers.extend(Overrides::parse(override_texts)?.into_layers());
     build(layers)
 }
 
 /// The same for text, whose `extends` may name a preset or a path relative to the working folder.
-pub(in crate::config) fn resolve_text(
-    text: &str,
-    origin: &str,
-    override_texts: &[String],
-) -> Result<Config, ConfigError> {
+pub(in crate::config) fn resolve_text(text: &str, origin: &str) -> Result<Config, ConfigError> {
     let origin = Origin::Text(origin.to_owned());
     let (layer, extends) = parse(text, &origin)?;
     let mut layers = vec![(origin.clone(), layer)];
@@ -49,9 +43,17 @@ pub(in crate::config) fn resolve_text(
         collect(&named(&below, None), Some(&origin), &mut Vec::new(), &mut layers)?;
     }
     layers.reverse();
-    for text in override_texts {
-        layers.push(overrides::parse(text)?);
-    }
+    build(layers)
+}
+
+/// Lays overrides over a configuration, and validates.
+pub(in crate::config) fn lay_over(config: &Config, overrides: &Overrides) -> Result<Config, ConfigError> {
+    let origin = Origin::Text("the configuration below the overrides".to_owned());
+    let mut layers = match Table::try_from(config) {
+        Ok(table) => vec![(origin, table)],
+        Err(error) => return Err(ConfigError::Value { origin, message: one_line(&error.to_string()) }),
+    };
+    layers.extend(overrides.clone().into_layers());
     build(layers)
 }
 
@@ -153,10 +155,10 @@ fn parse(text: &str, origin: &Origin) -> Result<(Table, Option<String>), ConfigE
     Ok((layer, extends))
 }
 
-/// Merges the layers, the lowest first. The result must fit the structs after every layer, so that an error names the
-/// layer that causes it.
+/// Merges the layers over the defaults, the lowest first. The result must fit the structs after every layer, so that an
+/// error names the layer that causes it.
 fn build(layers: Vec<(Origin, Table)>) -> Result<Config, ConfigError> {
-    let mut merged = Table::new();
+    let mut merged = schema::defaults();
     let mut config = Config::default();
     for (origin, layer) in layers {
         merge(&mut merged, layer);

@@ -4,3 +4,5 @@ pub(super) mod layers;
 mod overrides;
 pub(super) mod presets;
 pub(super) mod schema;
+
+pub use overrides::Overrides;

@@ -1,12 +1,41 @@
 //! Overrides of the command line: `train.fine_iterations=200`.
 
-use toml::Table;
+use toml::{Table, Value};
 
 use super::super::{ConfigError, Origin};
 use super::schema;
 
+/// What a user has set by hand: layers, each of one line, that are laid over a configuration last.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overrides(Vec<(Origin, Table)>);
+
+impl Overrides {
+    /// Each text is a line of TOML, such as `train.fine_iterations=200` (a bare word is taken as a string). Of two that
+    /// set the same key, the later one applies.
+    ///
+    /// # Errors
+    /// A text that is not `key=value`, an unknown key, a value of the wrong type.
+    pub fn parse(texts: &[String]) -> Result<Self, ConfigError> {
+        texts.iter().map(|text| parse(text)).collect::<Result<_, _>>().map(Self)
+    }
+
+    /// Whether a key is set, by its full path.
+    pub fn has(&self, key: &str) -> bool {
+        self.0.iter().any(|(_, layer)| {
+            let mut names = key.split('.');
+            let first = names.next().and_then(|name| layer.get(name));
+            names.try_fold(first, |value, name| Some(value?.get(name))).flatten().is_some()
+        })
+    }
+
+    /// As layers, the lowest first.
+    pub(super) fn into_layers(self) -> Vec<(Origin, Table)> {
+        self.0
+    }
+}
+
 /// One override as a layer.
-pub(super) fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {
+fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {
     let wrong = |message: String| ConfigError::Override { text: text.to_owned(), message };
     let (key, value) = text
         .split_once('=')
@@ -16,7 +45,7 @@ pub(super) fn parse(text: &str) -> Result<(Origin, Table), ConfigError> {
         return Err(wrong("expected one line".to_owned()));
     }
     // A shell strips quotes: a word that TOML does not know is a string.
-    let quoted = || toml::Value::String(value.to_owned()).to_string();
+    let quoted = || Value::String(value.to_owned()).to_string();
     let layer = toml::from_str::<Table>(&format!("{key} = {value}"))
         .or_else(|error| {
             let word = !value.is_empty() && value.chars().all(|c| c.is_alphanumeric() || "-_./:".contains(c));

@@ -3,7 +3,7 @@
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::super::{Config, ConfigError, Origin};
+use super::super::{Config, ConfigError, KEYS, Origin};
 
 /// The default configuration as a table: every key that exists, with a value of its type.
 pub(in crate::config) fn defaults() -> Table {
@@ -41,22 +41,38 @@ fn check_table(known: &Table, layer: &Table, path: &mut Vec<String>, context: &C
                     nearest: nearest(context.known, path),
                 });
             }
-            (Some(Value::Table(known)), Value::Table(layer)) => check_table(known, layer, path, context)?,
-            (Some(expected), value) => {
-                if let Some((expected, found)) = mismatch(expected, value) {
-                    return Err(ConfigError::WrongType {
-                        origin: context.origin.clone(),
-                        line: context.line(path),
-                        key: path.join("."),
-                        expected,
-                        found,
-                    });
+            (Some(Value::Table(_)), Value::Table(numbers)) if is_key(path) => {
+                for (name, number) in numbers {
+                    path.push(name.clone());
+                    check_type(&Value::Float(0.0), number, path, context)?;
+                    path.pop();
                 }
             }
+            (Some(Value::Table(known)), Value::Table(layer)) => check_table(known, layer, path, context)?,
+            (Some(expected), value) => check_type(expected, value, path, context)?,
         }
         path.pop();
     }
     Ok(())
+}
+
+/// Whether a table is a key itself, with numbers by name: the configuration does not know all names.
+fn is_key(path: &[String]) -> bool {
+    let path = path.join(".");
+    KEYS.iter().any(|key| key.path == path)
+}
+
+fn check_type(expected: &Value, value: &Value, path: &[String], context: &Context) -> Result<(), ConfigError> {
+    match mismatch(expected, value) {
+        None => Ok(()),
+        Some((expected, found)) => Err(ConfigError::WrongType {
+            origin: context.origin.clone(),
+            line: context.line(path),
+            key: path.join("."),
+            expected,
+            found,
+        }),
+    }
 }
 
 /// What was expected and what was found, if they differ.

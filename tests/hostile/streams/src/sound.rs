@@ -1,6 +1,8 @@
 //! Valid streams, from which the hostile ones are made.
 
-use light4gs_codec::{CompressionInput, FrequencyTable, GaussianLayers, Profile, ShCoding, encode, encode_compressed};
+use light4gs_codec::{
+    CompressionInput, FrequencyTable, GaussianLayers, Profile, ShCoding, encode, encode_compressed, info,
+};
 
 use crate::parts::Parts;
 
@@ -9,18 +11,23 @@ mod common;
 
 use common::compression::{ALL_PARTS, ShKind, compact_shape, input, scene, sh_networks, tiny};
 
-const NODES: [&[u8]; 4] = [
-    include_bytes!("../../../golden-streams/nodes.l4gs"),
-    include_bytes!("../../../golden-streams/lifetimes.l4gs"),
-    include_bytes!("../../../golden-streams/affinities.l4gs"),
-    include_bytes!("../../../golden-streams/shading.l4gs"),
-];
+/// The golden streams with control nodes, by name: only a model can make such.
+fn nodes() -> Vec<Vec<u8>> {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../../golden-streams");
+    let mut paths: Vec<_> =
+        std::fs::read_dir(folder).expect("a folder").map(|file| file.expect("a file").path()).collect();
+    paths.retain(|path| path.to_str().is_some_and(|path| path.ends_with(".l4gs") && !path.ends_with(".decoded.l4gs")));
+    paths.sort();
+    let mut streams: Vec<_> = paths.iter().map(|path| std::fs::read(path).expect("a file")).collect();
+    streams.retain(|bytes| info(bytes).expect("sound").motion.kind == "nodes");
+    streams
+}
 
 /// Streams that together contain everything: without loss, in both profiles, with every model of the spherical
-/// harmonics, with control nodes, lifetimes, affinities and shading, with many Gaussians, with long frequency tables.
+/// harmonics, with control nodes and all that Gaussians learn for them, with many Gaussians, with long frequency tables.
 pub(crate) fn streams() -> Vec<Parts> {
     let mut streams = vec![encode(&common::sample()).expect("sound")];
-    streams.extend(NODES.map(<[u8]>::to_vec));
+    streams.extend(nodes());
     let mut add = |scene: &_, input: &_| streams.push(encode_compressed(scene, input).expect("sound").bytes);
     for profile in [Profile::Compact, Profile::Paper] {
         let (scene, input) = tiny(profile);

@@ -28,10 +28,19 @@ pub(super) fn affine(scale: f32, offset: f32) -> Operation {
 /// A network in which many values have a block of channels for each component, one channel a node.
 struct Description {
     network: Network,
+    /// Of the network's inputs.
+    sources: Vec<MotionSource>,
     nodes: usize,
 }
 
 impl Description {
+    /// An attribute of the Gaussians as a further input, behind those that are there.
+    fn input(&mut self, attribute: &str, width: u32) -> Value {
+        self.network.inputs.push(width);
+        self.sources.push(source(attribute));
+        Value(self.network.inputs.len() as u32 - 1)
+    }
+
     fn node(&mut self, operation: Operation, inputs: &[Value]) -> Value {
         self.network.node(operation, inputs)
     }
@@ -143,6 +152,29 @@ impl Description {
         self.channels(all, channels)
     }
 
+    /// The logits with the inner products of a Gaussian's affinities and those of the nodes, `[B, H]` row by row.
+    fn liked(&mut self, logits: Value, affinity: Value, of_nodes: Vec<f32>) -> Value {
+        let layer = Layer::linear(of_nodes, vec![0.0; self.nodes]);
+        let liking = self.network.layer(affinity, layer);
+        self.node(Operation::Add, &[logits, liking])
+    }
+
+    /// Position and quaternion of a Gaussian that follows a blended pose.
+    fn moved(&mut self, blended: Value, means: Value, quats: Value) -> [Value; 2] {
+        let matrix = self.channels(blended, 0..9);
+        let moved = self.node(Operation::Multiply, &[matrix, means]);
+        let moved = self.node(Operation::GroupSum(3), &[moved]);
+        let offset = self.channels(blended, 9..12);
+        let position = self.node(Operation::Add, &[moved, offset]);
+        let turn = self.channels(blended, 12..16);
+        let negative = self.node(affine(-1.0, 0.0), &[turn]);
+        let both = self.node(Operation::Concatenate, &[turn, negative]);
+        let product = self.channels(both, PRODUCT);
+        let turned = self.node(Operation::Multiply, &[product, quats]);
+        let quaternion = self.node(Operation::GroupSum(4), &[turned]);
+        [position, quaternion]
+    }
+
     /// The blended pose, 16 channels.
     fn blended(&mut self, poses: Value, logits: Value, count: usize) -> Value {
         let count = count as u32;
@@ -156,57 +188,107 @@ impl Description {
     }
 }
 
-impl NodesField {
-    pub(super) fn describe(&self) -> MotionArrays {
-        let nodes = self.nodes();
-        let still = self.config.stillness.is_some();
-        let (mut network, [time, means, quats]) = Network::new([1, 3, 4]);
-        let mut sources = vec![MotionSource::Time, source("means"), source("quats")];
-        // Further inputs, behind these.
-        let mut input = |name: &str, width: u32| {
-            network.inputs.push(width);
-            sources.push(source(name));
-            Value(network.inputs.len() as u32 - 1)
+/// A layer of a description: the numbers of the field that it holds.
+struct Part {
+    name: &'static str,
+    outputs: usize,
+    inputs: usize,
+    /// Whether the numbers are its weights; otherwise they are its biases. The others are 0.
+    in_weights: bool,
+}
+
+impl Part {
+    /// Why a layer cannot be this part.
+    fn problem(&self, layer: &Layer) -> Option<String> {
+        let Self { name, outputs, inputs, in_weights } = *self;
+        let found = [layer.outputs as usize, layer.bias.len(), layer.weight.len()];
+        let expected = [outputs, outputs, outputs * inputs];
+        if found != expected {
+            return Some(format!("outputs, biases and weights of the {name} are {found:?}, expected {expected:?}"));
+        }
+        // What is not kept must not do anything in the codec either.
+        let (unused, numbers) = if in_weights { ("biases", &layer.bias) } else { ("weights", &layer.weight) };
+        let number = numbers.iter().find(|number| **number != 0.0)?;
+        Some(format!("one of the {unused} of the {name} is {number}, expected 0"))
+    }
+}
+
+/// The numbers of nodes, of knots and of affinities that a description has.
+struct Sizes {
+    nodes: usize,
+    knots: usize,
+    affinities: usize,
+}
+
+impl Sizes {
+    /// From the layers of a description, in their order.
+    ///
+    /// # Errors
+    /// As text: another number of layers, sizes that no field has.
+    fn of(layers: &[&Layer], has_affinities: bool) -> Result<Self, String> {
+        let expected = 4 + usize::from(has_affinities);
+        let (&[_, translations, _, log_radii, ref others @ ..], true) = (layers, layers.len() == expected) else {
+            return Err(format!("{} layers, expected {expected}", layers.len()));
         };
-        let stillness = still.then(|| input(STILLNESS, 1));
-        let affinity = self.affinities.as_ref().map(|all| (all, input(AFFINITY, all.dims()[1] as u32)));
-        let lifetime = self.config.lifetime.then(|| [input("opacity_logits", 1), input(LIFETIME, 2)]);
-        let mut description = Description { network, nodes };
-        let anchors = numbers(self.world_anchors().transpose());
-        let anchors = description.network.constant(time, 1, anchors);
-        let basis = description.basis(time, self.knots());
-        let unit = self.unit.val().unsqueeze();
-        let translations = by_component(self.translations.val() * unit, nodes);
-        let poses = description.poses(basis, anchors, translations, by_component(self.rotations.val(), nodes));
+        let [nodes, knots] = [log_radii.outputs, translations.inputs].map(|size| size as usize);
+        let affinities = others.first().map_or(0, |layer| layer.inputs as usize);
+        if has_affinities && !(1..=MOST_AFFINITIES).contains(&affinities) {
+            return Err(format!("{affinities} affinities, expected 1 to {MOST_AFFINITIES}"));
+        }
+        if !(1..=MOST_NODES).contains(&nodes) {
+            return Err(format!("{nodes} nodes, expected 1 to {MOST_NODES}"));
+        }
+        if !(4..=MOST_KNOTS).contains(&knots) {
+            return Err(format!("{knots} knots, expected 4 to {MOST_KNOTS}"));
+        }
+        Ok(Self { nodes, knots, affinities })
+    }
+
+    /// The layers of a description of these sizes, in their order.
+    fn parts(&self) -> Vec<Part> {
+        let Self { nodes, knots, affinities } = *self;
+        let part = |name, outputs, inputs, in_weights| Part { name, outputs, inputs, in_weights };
+        let mut parts = vec![
+            part("anchors", 3 * nodes, 1, false),
+            part("translations", 3 * nodes, knots, true),
+            part("rotations", 4 * nodes, knots, true),
+            part("logarithms of radii", nodes, 1, false),
+        ];
+        parts.extend((affinities > 0).then(|| part("affinities", nodes, affinities, true)));
+        parts
+    }
+}
+
+impl NodesField {
+    /// The field as operations of the codec. Its layers are those of [`Sizes::parts`].
+    pub(super) fn describe(&self) -> MotionArrays {
+        let (network, [time, means, quats]) = Network::new([1, 3, 4]);
+        let sources = vec![MotionSource::Time, source("means"), source("quats")];
+        let mut description = Description { network, sources, nodes: self.nodes() };
+        let stillness = self.config.stillness.map(|_| description.input(STILLNESS, 1));
+        let width = |affinities: &Param<Tensor<2>>| affinities.dims()[1] as u32;
+        let affinity = self.affinities.as_ref().map(|all| (all, description.input(AFFINITY, width(all))));
+        let lifetime =
+            self.config.lifetime.then(|| [description.input("opacity_logits", 1), description.input(LIFETIME, 2)]);
+
+        let (anchors, mut poses) = self.describe_poses(&mut description, time);
         let log_radii = self.log_radii.val() + self.unit.val().log().unsqueeze();
         let log_radii = description.network.constant(time, 1, numbers(log_radii));
         let mut logits = description.logits(means, anchors, log_radii);
-        if let Some((affinities, affinity)) = affinity {
-            let layer = Layer::linear(numbers(affinities.val()), vec![0.0; nodes]);
-            let liking = description.network.layer(affinity, layer);
-            logits = description.node(Operation::Add, &[logits, liking]);
+        if let Some((of_nodes, affinity)) = affinity {
+            logits = description.liked(logits, affinity, numbers(of_nodes.val()));
         }
-        let mut all = poses;
+        let mut count = self.nodes();
         if let Some(stillness) = stillness {
-            all = description.with_identity(poses);
+            poses = description.with_identity(poses);
             logits = description.node(Operation::Concatenate, &[logits, stillness]);
+            count += 1;
         }
-        let blended = description.blended(all, logits, nodes + usize::from(still));
+        let blended = description.blended(poses, logits, count);
+        let moved = description.moved(blended, means, quats);
 
-        let matrix = description.channels(blended, 0..9);
-        let moved = description.node(Operation::Multiply, &[matrix, means]);
-        let moved = description.node(Operation::GroupSum(3), &[moved]);
-        let offset = description.channels(blended, 9..12);
-        let position = description.node(Operation::Add, &[moved, offset]);
-        let turn = description.channels(blended, 12..16);
-        let negative = description.node(affine(-1.0, 0.0), &[turn]);
-        let both = description.node(Operation::Concatenate, &[turn, negative]);
-        let product = description.channels(both, PRODUCT);
-        let turned = description.node(Operation::Multiply, &[product, quats]);
-        let quaternion = description.node(Operation::GroupSum(4), &[turned]);
-        let mut network = description.network;
-        network.output(position);
-        network.output(quaternion);
+        let Description { mut network, sources, .. } = description;
+        moved.into_iter().for_each(|value| network.output(value));
         let mut outputs = vec![MotionOutput::NewPosition, MotionOutput::NewQuaternion];
         if let Some([logit, lifetime]) = lifetime {
             let faded = lifetime::describe(&mut network, logit, lifetime, time);
@@ -215,6 +297,18 @@ impl NodesField {
         }
         let network = MotionNetwork { network, sources, outputs };
         MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() }
+    }
+
+    /// The nodes' anchors, and their poses at a time, world units.
+    fn describe_poses(&self, description: &mut Description, time: Value) -> (Value, Value) {
+        let nodes = self.nodes();
+        let anchors = numbers(self.world_anchors().transpose());
+        let anchors = description.network.constant(time, 1, anchors);
+        let basis = description.basis(time, self.knots());
+        let unit = self.unit.val().unsqueeze();
+        let translations = by_component(self.translations.val() * unit, nodes);
+        let rotations = by_component(self.rotations.val(), nodes);
+        (anchors, description.poses(basis, anchors, translations, rotations))
     }
 
     /// The field that a file describes. What it was trained with is not in a file.
@@ -226,66 +320,14 @@ impl NodesField {
         let motion = arrays.network.as_ref().ok_or_else(|| wrong("there is none".to_owned()))?;
         let layers: Vec<&Layer> = motion.network.layers().collect();
         let [still, likes, lives] = [STILLNESS, AFFINITY, LIFETIME].map(|name| motion.sources.contains(&source(name)));
-        let expected = 4 + usize::from(likes);
-        let (&[anchors, translations, rotations, log_radii, ref others @ ..], true) =
-            (layers.as_slice(), layers.len() == expected)
-        else {
-            return Err(wrong(format!("{} layers, expected {expected}", layers.len())));
-        };
-        let affinities = others.first().filter(|_| likes);
-        let width = affinities.map_or(0, |layer| layer.inputs as usize);
-        if affinities.is_some() && !(1..=MOST_AFFINITIES).contains(&width) {
-            return Err(wrong(format!("{width} affinities, expected 1 to {MOST_AFFINITIES}")));
-        }
         // A file may come from anybody: sizes first.
-        let (nodes, knots) = (log_radii.outputs as usize, translations.inputs as usize);
-        if !(1..=MOST_NODES).contains(&nodes) {
-            return Err(wrong(format!("{nodes} nodes, expected 1 to {MOST_NODES}")));
+        let sizes = Sizes::of(&layers, likes).map_err(wrong)?;
+        if let Some(problem) = sizes.parts().iter().zip(&layers).find_map(|(part, layer)| part.problem(layer)) {
+            return Err(wrong(problem));
         }
-        if !(4..=MOST_KNOTS).contains(&knots) {
-            return Err(wrong(format!("{knots} knots, expected 4 to {MOST_KNOTS}")));
-        }
-        for (name, layer, outputs, inputs) in [
-            ("anchors", anchors, 3 * nodes, 1),
-            ("translations", translations, 3 * nodes, knots),
-            ("rotations", rotations, 4 * nodes, knots),
-            ("logarithms of radii", log_radii, nodes, 1),
-        ]
-        .into_iter()
-        .chain(affinities.map(|layer| ("affinities", *layer, nodes, width)))
-        {
-            let found = [layer.outputs as usize, layer.bias.len(), layer.weight.len()];
-            let expected = [outputs, outputs, outputs * inputs];
-            if found != expected {
-                let what = format!("outputs, biases and weights of the {name} are {found:?}, expected {expected:?}");
-                return Err(wrong(what));
-            }
-        }
-        // What we do not keep must not do anything in the codec either.
-        for (name, numbers) in [
-            ("weights of the anchors", &anchors.weight),
-            ("weights of the logarithms of radii", &log_radii.weight),
-            ("biases of the translations", &translations.bias),
-            ("biases of the rotations", &rotations.bias),
-        ]
-        .into_iter()
-        .chain(affinities.map(|layer| ("biases of the affinities", &layer.bias)))
-        {
-            if let Some(number) = numbers.iter().find(|number| **number != 0.0) {
-                return Err(wrong(format!("one of the {name} is {number}, expected 0")));
-            }
-        }
-        let config = NodesFieldConfig::new().with_nodes(nodes);
+        let config = NodesFieldConfig::new().with_nodes(sizes.nodes).with_affinities(sizes.affinities);
         let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives);
-        let config = config.with_affinities(width);
-        let mut field = Self::zeros(config, nodes, knots, device);
-        field.anchors = Param::from_tensor(tensor(anchors.bias.clone(), [3, nodes], device).transpose());
-        field.log_radii = Param::from_tensor(tensor(log_radii.bias.clone(), [nodes, 1], device));
-        field.translations = Param::from_tensor(by_node(translations, nodes, device));
-        field.rotations = Param::from_tensor(by_node(rotations, nodes, device));
-        if let Some(layer) = affinities {
-            field.affinities = Some(Param::from_tensor(tensor(layer.weight.clone(), [nodes, width], device)));
-        }
+        let field = Self::of_layers(config, &sizes, &layers, device);
         // Then everything but the numbers: the operations are those of such a field.
         let own = field.describe();
         let same = own.network.is_some_and(|own| {
@@ -294,6 +336,19 @@ impl NodesField {
                 && own.outputs == motion.outputs
         });
         if same { Ok(field) } else { Err(wrong("operations, sources or outputs are others".to_owned())) }
+    }
+
+    /// The field whose numbers are in the layers of [`Sizes::parts`].
+    fn of_layers(config: NodesFieldConfig, sizes: &Sizes, layers: &[&Layer], device: &Device) -> Self {
+        let Sizes { nodes, knots, affinities } = *sizes;
+        let mut field = Self::zeros(config, nodes, knots, device);
+        field.anchors = Param::from_tensor(tensor(layers[0].bias.clone(), [3, nodes], device).transpose());
+        field.translations = Param::from_tensor(by_node(layers[1], nodes, device));
+        field.rotations = Param::from_tensor(by_node(layers[2], nodes, device));
+        field.log_radii = Param::from_tensor(tensor(layers[3].bias.clone(), [nodes, 1], device));
+        field.affinities =
+            layers.get(4).map(|layer| Param::from_tensor(tensor(layer.weight.clone(), [nodes, affinities], device)));
+        field
     }
 }
 
