@@ -3,35 +3,33 @@
 
 use std::fmt;
 
-use light4gs_codec::checks::LEAST_STEP;
-use serde_json::Value;
+use crate::{Choices, KeyValue, nearest};
 
-use super::nearest;
-
-/// The values that a key may have. Conditions on several keys together are in `config/validate.rs`.
+/// The values that a key may have. A table's conditions on several keys together are checked elsewhere.
 #[derive(Clone, Copy, Debug)]
 pub enum Bounds {
     /// True or false.
     Flag,
     /// Any text, such as a path.
     Text,
-    /// One of these words.
-    Word(&'static [&'static str]),
-    /// The name of a built-in kind of a part of the training.
-    Kind {
-        /// The names of the built-in kinds.
+    /// One of the names of a [`choice!`](crate::choice).
+    Name(&'static Choices),
+    /// A text that the key's own type parses.
+    Parsed {
+        /// Texts that are legal.
         names: &'static [&'static str],
-        /// The file of the repository that lists them, for `docs/configuration.md`: adding a kind then changes only its
-        /// own file and that one.
-        list: &'static str,
+        /// What else is, in words.
+        also: &'static str,
     },
-    /// The name of a dataset's layout, or empty for none.
-    LayoutOrNone {
-        /// The built-in names.
+    /// A name that is looked up when a run begins, or an empty text.
+    NameOrNone {
+        /// The thing that is named.
+        what: &'static str,
+        /// What an empty text means.
+        none: &'static str,
+        /// The known names.
         names: fn() -> Vec<&'static str>,
     },
-    /// The name of a back end: one of these, `wgpu` also with an adapter.
-    Device(&'static [&'static str]),
     /// A whole number.
     Whole {
         /// The smallest.
@@ -62,36 +60,38 @@ pub enum Bounds {
     },
 }
 
-use Bounds::{Device, Flag, Kind, LayoutOrNone, List, Number, Text, Whole, WholeOrNone, Word};
+use Bounds::{Flag, List, Name, NameOrNone, Number, Parsed, Text, Whole, WholeOrNone};
 
 /// Iterations, and intervals of them.
 const MOST_ITERATIONS: u64 = 100_000_000;
 /// TOML has no larger number.
-pub(crate) const MOST_INTEGER: u64 = i64::MAX as u64;
-pub(crate) const MOST_GAUSSIANS: u64 = 50_000_000;
+pub const MOST_INTEGER: u64 = i64::MAX as u64;
 
-pub(crate) const ITERATIONS: Bounds = Whole { least: 0, most: MOST_ITERATIONS };
-pub(crate) const INTERVAL: Bounds = Whole { least: 1, most: MOST_ITERATIONS };
+/// A number of iterations.
+pub const ITERATIONS: Bounds = Whole { least: 0, most: MOST_ITERATIONS };
+/// Iterations from one event to the next.
+pub const INTERVAL: Bounds = Whole { least: 1, most: MOST_ITERATIONS };
 /// An iteration that may lie beyond the end.
-pub(crate) const ITERATION: Bounds = Whole { least: 0, most: MOST_INTEGER };
-pub(crate) const SHARE: Bounds = Number { least: 0.0, most: 1.0 };
+pub const ITERATION: Bounds = Whole { least: 0, most: MOST_INTEGER };
+/// A share of a whole.
+pub const SHARE: Bounds = Number { least: 0.0, most: 1.0 };
 /// A learning rate: float32 can hold it, even multiplied by a scene's extent.
-pub(crate) const RATE: Bounds = Number { least: 1e-20, most: 1e3 };
-pub(crate) const THRESHOLD: Bounds = Number { least: 1e-30, most: 1e30 };
-pub(crate) const WEIGHT: Bounds = Number { least: 0.0, most: 1e6 };
-/// A quantization step that the encoder accepts.
-pub(crate) const STEP: Bounds = Number { least: LEAST_STEP as f64, most: 1e3 };
+pub const RATE: Bounds = Number { least: 1e-20, most: 1e3 };
+/// A threshold.
+pub const THRESHOLD: Bounds = Number { least: 1e-30, most: 1e30 };
+/// The weight of a term of a loss.
+pub const WEIGHT: Bounds = Number { least: 0.0, most: 1e6 };
 /// A PSNR, or the loss of it that a search for coarser steps may cause, dB.
-pub(crate) const DECIBELS: Bounds = Number { least: 0.0, most: 100.0 };
+pub const DECIBELS: Bounds = Number { least: 0.0, most: 100.0 };
 
 impl fmt::Display for Bounds {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Flag => write!(formatter, "true or false"),
             Text => write!(formatter, "any text"),
-            LayoutOrNone { names } => write!(formatter, "empty (found by content) or one of {}", names().join(", ")),
-            Word(words) | Kind { names: words, .. } => write!(formatter, "one of {}", words.join(", ")),
-            Device(names) => write!(formatter, "one of {}; wgpu also with an adapter", names.join(", ")),
+            NameOrNone { none, names, .. } => write!(formatter, "empty ({none}) or one of {}", names().join(", ")),
+            Name(choices) => write!(formatter, "one of {}", choices.names.join(", ")),
+            Parsed { names, also } => write!(formatter, "one of {}; {also}", names.join(", ")),
             Whole { least, most: MOST_INTEGER } => write!(formatter, "{least} or more"),
             Whole { least, most } => write!(formatter, "{least} to {most}"),
             WholeOrNone { least, most } => write!(formatter, "0, or {least} to {most}"),
@@ -119,43 +119,61 @@ impl fmt::Display for Short {
 }
 
 impl Bounds {
-    /// What is wrong with a value, if it is out of bounds. Its type has been checked, and words have been parsed.
-    pub(crate) fn problem(&self, value: &Value) -> Option<String> {
-        let outside = |shown: &dyn fmt::Display| Some(format!("is {shown}; it must be {self}"));
+    /// Why a value of the right type cannot be read at all, in the words of serde: a name that is none of a choice's, or
+    /// a list of another length.
+    pub fn unreadable(&self, value: &toml::Value) -> Option<String> {
         match (self, value) {
-            (Whole { least, most }, Value::Number(number)) => {
-                let whole = number.as_u64()?;
-                if (*least..=*most).contains(&whole) { None } else { outside(&whole) }
+            (Name(choices), toml::Value::String(name)) => choices.unknown(name).map(|unknown| unknown.to_string()),
+            (List { length: Some(length), .. }, toml::Value::Array(values)) if values.len() != *length => {
+                Some(format!("invalid length {}, expected an array of length {length}", values.len()))
             }
-            (WholeOrNone { least, most }, Value::Number(number)) => {
-                let whole = number.as_u64()?;
-                if whole == 0 || (*least..=*most).contains(&whole) { None } else { outside(&whole) }
-            }
-            (Number { least, most }, Value::Number(number)) => {
-                let float = number.as_f64()?;
-                // Compared as float32, to which all numbers are converted: some keys are float32, and their 1e-6 is a
-                // little below that of f64.
-                let holds = (*least as f32..=*most as f32).contains(&(float as f32));
-                if holds { None } else { outside(&Short(float)) }
-            }
-            (LayoutOrNone { names }, Value::String(name)) => {
-                let nearest = nearest(names(), name)?;
-                let known = name.is_empty() || names().contains(&name.as_str());
-                let problem = || format!("is `{name}`, and the nearest layout is `{nearest}`; it must be {self}");
-                (!known).then(problem)
-            }
-            // JSON has no NaN and no infinities.
-            (Number { .. }, Value::Null) => outside(&"no finite number"),
-            (List { element, length }, Value::Array(values)) => {
-                if length.is_some_and(|length| length != values.len()) {
-                    return outside(&format_args!("a list of {}", values.len()));
-                }
-                values
-                    .iter()
-                    .find_map(|value| element.problem(value))
-                    .map(|problem| format!("has an element that {problem}"))
+            (List { element, .. }, toml::Value::Array(values)) => {
+                values.iter().find_map(|value| element.unreadable(value))
             }
             _ => None,
         }
+    }
+
+    fn outside(&self, shown: impl fmt::Display) -> Option<String> {
+        Some(format!("is {shown}; it must be {self}"))
+    }
+
+    pub(crate) fn problem_of_whole(&self, value: u64) -> Option<String> {
+        let holds = match self {
+            Whole { least, most } => (*least..=*most).contains(&value),
+            WholeOrNone { least, most } => value == 0 || (*least..=*most).contains(&value),
+            _ => true,
+        };
+        if holds { None } else { self.outside(value) }
+    }
+
+    pub(crate) fn problem_of_number(&self, value: f64) -> Option<String> {
+        let Number { least, most } = self else { return None };
+        if !value.is_finite() {
+            return self.outside("no finite number");
+        }
+        // Compared as float32, to which all numbers are converted: some keys are float32, and their 1e-6 is a little
+        // below that of f64.
+        let holds = (*least as f32..=*most as f32).contains(&(value as f32));
+        if holds { None } else { self.outside(Short(value)) }
+    }
+
+    pub(crate) fn problem_of_text(&self, value: &str) -> Option<String> {
+        let NameOrNone { what, names, .. } = self else { return None };
+        let names = names();
+        if value.is_empty() || names.contains(&value) {
+            return None;
+        }
+        let nearest = nearest(names, value)?;
+        Some(format!("is `{value}`, and the nearest {what} is `{nearest}`; it must be {self}"))
+    }
+
+    pub(crate) fn problem_of_list<T: KeyValue>(&self, values: &[T]) -> Option<String> {
+        let List { element, length } = self else { return None };
+        if length.is_some_and(|length| length != values.len()) {
+            return self.outside(format_args!("a list of {}", values.len()));
+        }
+        let problem = values.iter().find_map(|value| value.problem(element))?;
+        Some(format!("has an element that {problem}"))
     }
 }

@@ -1,23 +1,54 @@
-//! The macro `keys!`: from one declaration, a table of the configuration becomes a struct, with its defaults and a list
-//! of its keys.
+//! The macro `keys!`: from one declaration, a table of the configuration becomes a struct, with its defaults, a list of
+//! its keys, and the check of their values.
 //!
 //! Other crates do parts of this. `confique` and `schematic` know defaults and documentation, `schemars` bounds as
 //! well. But none of them has all of: bounds that are checked before values are used, sources, and defaults from
 //! another crate; and each would bring crates of its own.
 
-use super::Bounds;
+use crate::{Bounds, KeyValue};
 
 /// A table of the configuration.
-pub(crate) trait KeyTable {
+pub trait KeyTable {
     /// The description of the table, in lines.
     const ABOUT: &'static [&'static str];
     /// Its entries, in order.
     const ENTRIES: &'static [Entry];
+
+    /// Appends every value that is out of its bounds. `at` is the table's full name with a dot behind it; empty at the top.
+    fn problems(&self, at: &str, into: &mut Vec<Problem>);
+}
+
+/// A table without keys.
+impl KeyTable for () {
+    const ABOUT: &'static [&'static str] = &[];
+    const ENTRIES: &'static [Entry] = &[];
+
+    fn problems(&self, _: &str, _: &mut Vec<Problem>) {}
+}
+
+/// One value that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// Full path of the key, such as `train.prune.fraction`.
+    pub key: String,
+    /// What is wrong and what would be right.
+    pub message: String,
+}
+
+/// Appends what is wrong with one value.
+#[doc(hidden)]
+pub fn check<T: KeyValue>(value: &T, bounds: &Bounds, at: &str, name: &str, into: &mut Vec<Problem>) {
+    into.extend(value.problem(bounds).map(|message| Problem { key: format!("{at}{name}"), message }));
+}
+
+/// The lines of a comment, joined to one.
+pub(crate) fn joined(lines: &[&str]) -> String {
+    lines.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
 }
 
 /// An entry of a table.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Entry {
+pub enum Entry {
     /// A key.
     Key {
         /// Its name, without the tables around it.
@@ -28,8 +59,6 @@ pub(crate) enum Entry {
         meaning: &'static [&'static str],
         /// The source of the key or of its default.
         source: &'static str,
-        /// A short note beside it in `configs/base.toml`.
-        note: Option<&'static str>,
     },
     /// A table in the table.
     Table {
@@ -45,26 +74,37 @@ pub(crate) enum Entry {
 }
 
 /// Whether a table has no keys and is therefore not written.
-pub(crate) fn has_no_keys<T: KeyTable>(_: &T) -> bool {
+pub fn has_no_keys<T: KeyTable>(_: &T) -> bool {
     T::ENTRIES.is_empty()
 }
 
-/// Declares a table of the configuration.
+/// Declares a table of the configuration: a struct with its default.
 ///
-/// ```ignore
+/// ```
+/// use light4gs_keys::{Bounds, keys};
+///
+/// keys! {
+///     /// What the inner table is about.
+///     pub struct InnerConfig {
+///         /// What the key does: for rustdoc and for docs/configuration.md.
+///         weight: f32 = 0.5; Bounds::Number { least: 0.0, most: 1.0 }, "ours";
+///     }
+/// }
+///
 /// keys! {
 ///     /// What the table is about.
 ///     pub struct ExampleConfig {
-///         /// What the key does: for rustdoc and for docs/configuration.md.
-///         weight: f32 = 0.5; Bounds::Number { least: 0.0, most: 1.0 }, "ours", "a note for configs/base.toml";
 ///         /// A table in the table: its type is declared by `keys!`, too.
 ///         inner: InnerConfig;
 ///     }
 /// }
+/// assert_eq!(ExampleConfig::default().inner.weight, 0.5);
 /// ```
 ///
-/// The note may be left out. A value that may be absent has `#[serde(with = "optional")]` before its name. The entries
-/// of a struct with `#[serde(flatten)]` are in this table itself.
+/// After the default come the key's bounds and the source of the key or of its default. A value that may be absent has
+/// `#[serde(with = "optional")]` before its name, where [`optional`](crate::optional) is imported. The entries of a
+/// struct with `#[serde(flatten)]` are in this table itself.
+#[macro_export]
 macro_rules! keys {
     (
         $(#[doc = $about:literal])+
@@ -77,8 +117,8 @@ macro_rules! keys {
         }
     ) => {
         $(#[doc = $about])+
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(default)]
+        #[derive(Debug, Clone, PartialEq, $crate::serde::Serialize, $crate::serde::Deserialize)]
+        #[serde(default, crate = "light4gs_keys::serde")]
         pub struct $table {
             $(
                 $(#[doc = $meaning])+
@@ -90,22 +130,27 @@ macro_rules! keys {
 
         impl Default for $table {
             fn default() -> Self {
-                Self { $($name: $crate::keys::default_value!($type $(, $default)?),)* }
+                Self { $($name: $crate::default_value!($type $(, $default)?),)* }
             }
         }
 
-        impl $crate::keys::KeyTable for $table {
+        impl $crate::KeyTable for $table {
             const ABOUT: &'static [&'static str] = &[$($about),+];
-            const ENTRIES: &'static [$crate::keys::Entry] = &[$(
-                $crate::keys::entry!(
-                    [$($serde)?] [$($meaning),+] $name: $type $(; $bounds, $source $(, $note)?)?
-                ),
+            const ENTRIES: &'static [$crate::Entry] = &[$(
+                $crate::entry!([$($serde)?] [$($meaning),+] $name: $type $(; $bounds, $source)?),
             )*];
+
+            fn problems(&self, at: &str, into: &mut Vec<$crate::Problem>) {
+                let _ = (at, &into);
+                $($crate::problems!([$($serde)?] self at into $name $(; $bounds)?);)*
+            }
         }
     };
 }
 
 /// The default of a key; for a table, that of its type.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! default_value {
     ($type:ty) => {
         <$type>::default()
@@ -116,32 +161,36 @@ macro_rules! default_value {
 }
 
 /// The entry of a field.
+#[doc(hidden)]
+#[macro_export]
 macro_rules! entry {
     ([(flatten)] $meaning:tt $name:ident: $type:ty) => {
-        $crate::keys::Entry::Inlined(<$type as $crate::keys::KeyTable>::ENTRIES)
+        $crate::Entry::Inlined(<$type as $crate::KeyTable>::ENTRIES)
     };
     ([] $meaning:tt $name:ident: $type:ty) => {
-        $crate::keys::Entry::Table {
+        $crate::Entry::Table {
             name: stringify!($name),
-            about: <$type as $crate::keys::KeyTable>::ABOUT,
-            entries: <$type as $crate::keys::KeyTable>::ENTRIES,
+            about: <$type as $crate::KeyTable>::ABOUT,
+            entries: <$type as $crate::KeyTable>::ENTRIES,
         }
     };
     ([$($serde:tt)?] $meaning:tt $name:ident: $type:ty; $bounds:expr, $source:literal) => {
-        $crate::keys::entry!(@key $name, $meaning, $bounds, $source, None)
-    };
-    ([$($serde:tt)?] $meaning:tt $name:ident: $type:ty; $bounds:expr, $source:literal, $note:literal) => {
-        $crate::keys::entry!(@key $name, $meaning, $bounds, $source, Some($note))
-    };
-    (@key $name:ident, $meaning:tt, $bounds:expr, $source:literal, $note:expr) => {
-        $crate::keys::Entry::Key {
-            name: stringify!($name),
-            bounds: $bounds,
-            meaning: &$meaning,
-            source: $source,
-            note: $note,
-        }
+        $crate::Entry::Key { name: stringify!($name), bounds: $bounds, meaning: &$meaning, source: $source }
     };
 }
 
-pub(crate) use {default_value, entry, keys};
+/// The check of a field.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! problems {
+    ([(flatten)] $self:ident $at:ident $into:ident $name:ident) => {
+        $crate::KeyTable::problems(&$self.$name, $at, $into)
+    };
+    ([] $self:ident $at:ident $into:ident $name:ident) => {
+        $crate::KeyTable::problems(&$self.$name, &format!("{}{}.", $at, stringify!($name)), $into)
+    };
+    ([$($serde:tt)?] $self:ident $at:ident $into:ident $name:ident; $bounds:expr) => {{
+        const BOUNDS: $crate::Bounds = $bounds;
+        $crate::check(&$self.$name, &BOUNDS, $at, stringify!($name), $into)
+    }};
+}

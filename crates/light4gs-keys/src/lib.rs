@@ -1,30 +1,65 @@
 //! Configuration keys, declared once: type, default, bounds, documentation and source.
 //!
-//! - `declaration`: the macro `keys!`, which makes a struct and its table of keys from one declaration
-//! - `bounds`: the values that a key may have
-//! - `choice`: words, declared as enums
-//! - `kinds`: parts of the training that are chosen by name, each with its own keys
-//! - `optional`: values that may be absent, although TOML has no null
-//! - `reference`: what follows from the declarations: the list of all keys, `configs/base.toml`, and the tables of
-//!   `docs/configuration.md`
+//! A part of Light4GS that has settings declares them beside itself, with two macros:
 //!
-//! This room contains no key. The declarations are near the code that they configure, and `config` collects them.
+//! - [`keys!`] makes a struct of settings. This struct is the table in TOML, and it is what the part is built from.
+//! - [`choice!`] makes an enum of names, among which a key chooses: plain words, or parts with keys of their own.
+//!
+//! What follows from the declarations: the values that a key may have ([`Bounds`]), checked on the typed values
+//! ([`KeyTable::problems`]), the list of all keys ([`list`]), and the tables of `docs/configuration.md` ([`markdown`]).
+//! This crate contains no key.
+//!
+//! ```
+//! use light4gs_keys::{Bounds, KeyTable, choice, keys};
+//!
+//! choice! {
+//!     /// Which end of a list is taken.
+//!     pub enum End: "end" {
+//!         /// The first entry.
+//!         First = "first",
+//!         /// The last entry.
+//!         Last = "last",
+//!     }
+//! }
+//!
+//! keys! {
+//!     /// How a list is read.
+//!     pub struct ListConfig {
+//!         /// The end at which reading begins.
+//!         end: End = End::First; End::BOUNDS, "ours";
+//!         /// Share of the list that is read.
+//!         share: f32 = 0.5; Bounds::Number { least: 0.0, most: 1.0 }, "ours";
+//!     }
+//! }
+//!
+//! assert_eq!("last".parse(), Ok(End::Last));
+//! let mut problems = Vec::new();
+//! ListConfig { share: 2.0, ..ListConfig::default() }.problems("list.", &mut problems);
+//! assert_eq!(problems[0].key, "list.share");
+//! assert_eq!(problems[0].message, "is 2; it must be 0 to 1");
+//! ```
 
 mod bounds;
 mod choice;
 mod declaration;
-mod kinds;
-pub(crate) mod optional;
+pub mod optional;
 mod reference;
+mod value;
 
-pub use bounds::Bounds;
-pub(crate) use bounds::{
-    DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_GAUSSIANS, MOST_INTEGER, RATE, SHARE, STEP, THRESHOLD, WEIGHT,
+// The name by which the macros' serde attributes find this crate, also in its own tests.
+extern crate self as light4gs_keys;
+
+#[doc(hidden)]
+pub use choice::meaning;
+#[doc(hidden)]
+pub use declaration::check;
+#[doc(hidden)]
+pub use serde;
+
+pub use bounds::{
+    Bounds, DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_INTEGER, RATE, SHARE, THRESHOLD, WEIGHT,
 };
-pub use choice::UnknownChoice;
-pub(crate) use choice::{choice, named, nearest, serde_by_name};
-pub(crate) use declaration::has_no_keys;
-pub(crate) use declaration::{Entry, KeyTable, default_value, entry, keys};
-pub(crate) use kinds::kinds;
-pub use reference::Key;
-pub(crate) use reference::{list, markdown, toml_text};
+pub use choice::{Choices, UnknownChoice, nearest};
+pub use declaration::{Entry, KeyTable, Problem, has_no_keys};
+pub use reference::{Key, list, markdown};
+pub use value::KeyValue;
