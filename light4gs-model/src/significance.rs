@@ -17,8 +17,6 @@ pub enum PixelContribution {
     TransmittanceOpacity,
     /// The blending weight, transmittance times alpha.
     BlendingWeight,
-    /// The Gaussian's opacity, as the first public code of LightGaussian does.
-    Opacity,
     /// One for each pixel.
     PixelCount,
 }
@@ -33,31 +31,19 @@ pub enum VolumeWeight {
         /// `beta` in the paper.
         exponent: f64,
     },
-    /// `(V / V_10)^exponent`, not clamped, where 10 % of the volumes are below `V_10`: that of the public code.
-    Unclamped {
-        /// `v_pow` in the public code.
-        exponent: f64,
-    },
 }
 
 impl VolumeWeight {
     /// One factor for each volume.
     pub fn of(self, volumes: &[f64]) -> Vec<f64> {
-        let (exponent, clamp) = match self {
-            Self::None => return vec![1.0; volumes.len()],
-            Self::Clamped { exponent } => (exponent, true),
-            Self::Unclamped { exponent } => (exponent, false),
-        };
+        let Self::Clamped { exponent } = self else { return vec![1.0; volumes.len()] };
         let mut sorted = volumes.to_vec();
         sorted.sort_by(f64::total_cmp);
-        if !clamp {
-            sorted.reverse();
-        }
         let at = (VOLUME_QUANTILE * volumes.len() as f64) as usize;
         let Some(&reference) = sorted.get(at) else { return vec![1.0; volumes.len()] };
         let factor = |volume: &f64| {
             let ratio = if reference > 0.0 { volume / reference } else { 1.0 };
-            (if clamp { ratio.min(1.0) } else { ratio }).powf(exponent)
+            ratio.min(1.0).powf(exponent)
         };
         volumes.iter().map(factor).collect()
     }
@@ -81,14 +67,14 @@ impl VolumeWeight {
 /// ```
 #[derive(Clone, Debug)]
 pub struct Significance {
-    /// Pixels, `T · alpha`, `T · opacity`, opacity.
-    sums: Vec<[f64; 4]>,
+    /// Pixels, `T · alpha`, `T · opacity`.
+    sums: Vec<[f64; 3]>,
 }
 
 impl Significance {
     /// For `count` Gaussians, without any image yet.
     pub fn new(count: usize) -> Self {
-        Self { sums: vec![[0.0; 4]; count] }
+        Self { sums: vec![[0.0; 3]; count] }
     }
 
     /// Adds the image of raw attributes at a time, seen by a camera.
@@ -100,7 +86,7 @@ impl Significance {
         let (inputs, view) = splatter.inputs(gaussians.activated(), camera, None);
         let values = burn::tensor::Tensor::<2>::from_dispatch(Dispatch::significance(inputs, view)).into_data();
         let values: Vec<f32> = values.iter().collect();
-        let (rows, _) = values.as_chunks::<4>();
+        let (rows, _) = values.as_chunks::<3>();
         assert_eq!(rows.len(), self.sums.len(), "the number of Gaussians has changed");
         for (sums, row) in self.sums.iter_mut().zip(rows) {
             for (sum, value) in sums.iter_mut().zip(row) {
@@ -115,7 +101,6 @@ impl Significance {
             PixelContribution::PixelCount => 0,
             PixelContribution::BlendingWeight => 1,
             PixelContribution::TransmittanceOpacity => 2,
-            PixelContribution::Opacity => 3,
         };
         self.sums.iter().map(|sums| sums[column]).collect()
     }

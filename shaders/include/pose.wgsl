@@ -14,23 +14,15 @@ fn position_in(pose: Pose, mean: vec3<f32>) -> vec3<f32> {
     return vec3<f32>(dot(pose.row_x, place), dot(pose.row_y, place), dot(pose.row_z, place));
 }
 
-fn vector_in(pose: Pose, vector: vec3<f32>) -> vec3<f32> {
-    return vec3<f32>(dot(pose.row_x.xyz, vector), dot(pose.row_y.xyz, vector), dot(pose.row_z.xyz, vector));
-}
-
 // What a Gaussian hands to the nodes: itself, and derivatives by what it becomes.
 struct Turning {
     mean: vec3<f32>,
-    vector: vec3<f32>,
     by_position: vec3<f32>,
-    by_vector: vec3<f32>,
     by_turn: vec4<f32>,
 }
 
-fn row_product(row: vec4<f32>, own: Turning) -> vec2<f32> {
-    let place = fma(row.x, own.mean.x, fma(row.y, own.mean.y, fma(row.z, own.mean.z, row.w)));
-    let vector = fma(row.x, own.vector.x, fma(row.y, own.vector.y, row.z * own.vector.z));
-    return vec2<f32>(place, vector);
+fn row_product(row: vec4<f32>, own: Turning) -> f32 {
+    return fma(row.x, own.mean.x, fma(row.y, own.mean.y, fma(row.z, own.mean.z, row.w)));
 }
 
 // The product of a pose with the derivatives by the blended one. Where one weight is 1, the blended pose is that node's own, and the
@@ -42,6 +34,5 @@ fn inner_product(pose: Pose, own: Turning) -> f32 {
     let z = row_product(pose.row_z, own);
     let of_turn = fma(own.by_turn.x, pose.turn.x, fma(own.by_turn.y, pose.turn.y,
         fma(own.by_turn.z, pose.turn.z, own.by_turn.w * pose.turn.w)));
-    let of_place = fma(own.by_position.x, x.x, fma(own.by_position.y, y.x, fma(own.by_position.z, z.x, of_turn)));
-    return fma(own.by_vector.x, x.y, fma(own.by_vector.y, y.y, fma(own.by_vector.z, z.y, of_place)));
+    return fma(own.by_position.x, x, fma(own.by_position.y, y, fma(own.by_position.z, z, of_turn)));
 }

@@ -1,8 +1,7 @@
 // Linear blend skinning: where Gaussians are, and how they are turned, when nodes have moved.
 //
 // One invocation owns one Gaussian and meets all nodes twice: first for the largest exponent, then for the blended pose. Reads
-// Gaussians and nodes. Writes `moved` [N, 7 + VECTOR]: position,
-// quaternion, turned vector if there are any. Saves five vectors of `blended` for the backward pass:
+// Gaussians and nodes. Writes `moved` [N, 7]: position, quaternion. Saves five vectors of `blended` for the backward pass:
 //
 //   0, 1, 2: rows of the blended matrix, each with its component of the blended offset
 //   3: the blended quaternion
@@ -15,13 +14,12 @@ struct Parameters {
 
 @group(0) @binding(0) var<storage, read_write> means: array<f32>;
 @group(0) @binding(1) var<storage, read_write> quats: array<f32>;
-@group(0) @binding(2) var<storage, read_write> vectors: array<f32>;
-@group(0) @binding(3) var<storage, read_write> stillness: array<f32>;
-@group(0) @binding(4) var<storage, read_write> affinities: array<f32>;
-@group(0) @binding(5) var<storage, read_write> nodes: array<f32>;
-@group(0) @binding(6) var<storage, read_write> moved: array<f32>;
-@group(0) @binding(7) var<storage, read_write> blended: array<vec4<f32>>;
-@group(0) @binding(8) var<uniform> parameters: Parameters;
+@group(0) @binding(2) var<storage, read_write> stillness: array<f32>;
+@group(0) @binding(3) var<storage, read_write> affinities: array<f32>;
+@group(0) @binding(4) var<storage, read_write> nodes: array<f32>;
+@group(0) @binding(5) var<storage, read_write> moved: array<f32>;
+@group(0) @binding(6) var<storage, read_write> blended: array<vec4<f32>>;
+@group(0) @binding(7) var<uniform> parameters: Parameters;
 
 fn exponent_of(mean: vec3<f32>, i: u32, node: u32) -> f32 {
     return exponent_between(i, node, squared_length(mean - anchor_of(node)));
@@ -69,18 +67,12 @@ fn main(
     let quat = vec4<f32>(quats[4u * i], quats[4u * i + 1u], quats[4u * i + 2u], quats[4u * i + 3u]);
     let position = position_in(pose, mean);
     let turned = hamilton_product(pose.turn, quat);
-    let own = (7u + VECTOR) * i;
+    let own = 7u * i;
     for (var k = 0u; k < 3u; k++) {
         moved[own + k] = position[k];
     }
     for (var k = 0u; k < 4u; k++) {
         moved[own + 3u + k] = turned[k];
-    }
-    if (VECTOR > 0u) {
-        let turned_vector = vector_in(pose, vec3<f32>(vectors[3u * i], vectors[3u * i + 1u], vectors[3u * i + 2u]));
-        for (var k = 0u; k < 3u; k++) {
-            moved[own + 7u + k] = turned_vector[k];
-        }
     }
     blended[5u * i] = pose.row_x;
     blended[5u * i + 1u] = pose.row_y;

@@ -24,14 +24,14 @@ fn main(
     if (i >= parameters.count) {
         return;
     }
-    let by_position = handed[5u * i];
-    let mean = handed[5u * i + 2u];
-    let by_vector = handed[5u * i + 3u];
-    let own = Turning(mean.xyz, handed[5u * i + 4u].xyz, by_position.xyz, by_vector.xyz, handed[5u * i + 1u]);
+    let by_position = handed[4u * i];
+    let mean = handed[4u * i + 2u];
+    let inverse_sum = handed[4u * i + 3u].x;
+    let own = Turning(mean.xyz, by_position.xyz, handed[4u * i + 1u]);
     var sums = vec4<f32>(0.0);
     for (var node = 0u; node < parameters.nodes; node++) {
         let exponent = exponent_between(i, node, squared_length(mean.xyz - anchor_of(node)));
-        let weight = exponential(exponent - mean.w) * by_vector.w;
+        let weight = exponential(exponent - mean.w) * inverse_sum;
         let by_logit = weight * (inner_product(pose_of(node), own) - by_position.w);
         for (var k = 0u; k < AFFINITIES; k++) {
             sums[k] += by_logit * affinity_of(node, k);

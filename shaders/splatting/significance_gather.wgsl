@@ -1,8 +1,8 @@
 // Adds up every Gaussian's sums over its cells.
 //
 // Each invocation computes one Gaussian. It reads its splat and the sums of its intersections, which begin at three
-// times `first_of_gaussian`, and adds them in their order. It writes `scores` [N, 4]: pixels, sum of T · alpha, sum of
-// T · opacity, sum of the opacity.
+// times `first_of_gaussian`, and adds them in their order. It writes `scores` [N, 3]: pixels, sum of T · alpha, sum of
+// T · opacity.
 
 struct Parameters {
     count: u32,
@@ -11,7 +11,7 @@ struct Parameters {
 @group(0) @binding(0) var<storage, read_write> splats: array<vec4<f32>>;
 @group(0) @binding(1) var<storage, read_write> first_of_gaussian: array<u32>;
 @group(0) @binding(2) var<storage, read_write> sums: array<f32>;
-@group(0) @binding(3) var<storage, read_write> scores: array<vec4<f32>>;
+@group(0) @binding(3) var<storage, read_write> scores: array<f32>;
 @group(0) @binding(4) var<uniform> parameters: Parameters;
 
 @compute @workgroup_size(WORKGROUP)
@@ -25,16 +25,14 @@ fn main(
         return;
     }
     let cells = u32(splats[4u * i + 3u].w);
-    if (cells == 0u) {
-        scores[i] = vec4<f32>(0.0);
-        return;
-    }
     var sum = vec3<f32>(0.0);
     var at = 3u * first_of_gaussian[i];
     for (var k = 0u; k < cells; k++) {
         sum += vec3<f32>(sums[at], sums[at + 1u], sums[at + 2u]);
         at += 3u;
     }
-    let opacity = splats[4u * i].w;
-    scores[i] = vec4<f32>(sum.x, sum.y, opacity * sum.z, opacity * sum.x);
+    let opacity = select(0.0, splats[4u * i].w, cells > 0u);
+    scores[3u * i] = sum.x;
+    scores[3u * i + 1u] = sum.y;
+    scores[3u * i + 2u] = opacity * sum.z;
 }

@@ -7,12 +7,7 @@
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
-use crate::kernels::skinning::{self, PLACE, POSE, POSED, VECTOR};
-
-/// Numbers of a Gaussian's orientation: quaternion, and a vector that turns along, here for all.
-pub(crate) const ORIENTATION: usize = 4 + VECTOR;
-/// Numbers of a moved Gaussian: position, quaternion, turned vector.
-pub(crate) const MOVED: usize = skinning::MOVED + VECTOR;
+use crate::kernels::skinning::{MOVED, PLACE, POSE, POSED};
 
 /// Gaussians whose values stay in the first-level cache while all nodes pass by; a whole number of groups.
 pub(crate) const CHUNK: usize = 256;
@@ -29,8 +24,8 @@ pub(crate) type Block = [f32; LANES];
 pub(crate) struct SkinningSlices<'a> {
     /// `[N, 3]`
     pub(crate) means: &'a [f32],
-    /// `[N, 7]`: quaternions, then vectors
-    pub(crate) orientations: &'a [f32],
+    /// `[N, 4]`
+    pub(crate) quats: &'a [f32],
     /// `[N, W]`: stillness, then affinities
     pub(crate) stillness: &'a [f32],
     /// `[B, 19 + W]`: anchor, precision, pose, affinities
@@ -142,13 +137,6 @@ pub(crate) fn columns<L: Lanes, const C: usize>(rows: &[f32]) -> [L; C] {
     columns
 }
 
-/// Quaternions and vectors of up to eight Gaussians.
-#[inline(always)]
-pub(crate) fn orientation<L: Lanes>(rows: &[f32]) -> ([L; 4], [L; 3]) {
-    let all = columns::<L, ORIENTATION>(rows);
-    ([all[0], all[1], all[2], all[3]], [all[4], all[5], all[6]])
-}
-
 /// Writes columns to as many rows as there are.
 #[inline(always)]
 pub(crate) fn to_rows<L: Lanes, const C: usize>(columns: &[L; C], rows: &mut [f32]) {
@@ -174,15 +162,16 @@ pub(crate) fn product<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> [L; 4] {
     ]
 }
 
-/// `A vector + offset`, with the matrix of a blended pose.
+/// `A mean + t` of a blended pose.
 #[inline(always)]
-pub(crate) fn mapped<L: Lanes>(pose: &[L; POSE], vector: &[L; 3], mut offset: [L; 3]) -> [L; 3] {
+fn place<L: Lanes>(pose: &[L; POSE], mean: &[L; 3]) -> [L; 3] {
+    let mut place = [pose[9], pose[10], pose[11]];
     for i in 0..3 {
         for j in 0..3 {
-            offset[i] = pose[3 * i + j].mul_add(vector[j], offset[i]);
+            place[i] = pose[3 * i + j].mul_add(mean[j], place[i]);
         }
     }
-    offset
+    place
 }
 
 /// Sums over the nodes of weight times the eight numbers of the pose from `first` on.
@@ -204,7 +193,7 @@ pub(crate) const STILL: [f32; POSE] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1
 struct Forward<'a, const W: usize> {
     nodes: &'a [Node<W>],
     means: &'a [f32],
-    orientations: &'a [f32],
+    quats: &'a [f32],
     stillness: &'a [f32],
     moved: &'a mut [f32],
     blended: &'a mut [BlendedGroup],
@@ -216,10 +205,10 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let mut weights = vec![[0.0; LANES]; self.nodes.len()];
-        let inputs = self.means.chunks(3 * LANES).zip(self.orientations.chunks(ORIENTATION * LANES));
+        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
         let outputs = self.moved.chunks_mut(MOVED * LANES).zip(self.blended);
-        for (((means, orientations), stillness), (moved, blended)) in inputs.zip(outputs) {
+        for (((means, quats), stillness), (moved, blended)) in inputs.zip(outputs) {
             let mean = columns::<L, 3>(means);
             let scaled = as_exponents(&columns::<L, W>(stillness));
             let still_exponent = scaled[0];
@@ -245,14 +234,12 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
                     pose[first + k] = with_still.mul(inverse_sum);
                 }
             }
-            let (quat, vector) = orientation::<L>(orientations);
-            let at = mapped(&pose, &mean, [pose[9], pose[10], pose[11]]);
+            let quat = columns::<L, 4>(quats);
+            let at = place(&pose, &mean);
             let turned = product(&[pose[12], pose[13], pose[14], pose[15]], &quat);
-            let vector = mapped(&pose, &vector, [L::splat(0.0); 3]);
             let mut all = [L::splat(0.0); MOVED];
             all[..3].copy_from_slice(&at);
-            all[3..7].copy_from_slice(&turned);
-            all[7..].copy_from_slice(&vector);
+            all[3..].copy_from_slice(&turned);
             to_rows(&all, moved);
             for k in 0..POSE {
                 pose[k].store(&mut blended.pose[k]);
@@ -264,7 +251,7 @@ impl<const W: usize> LaneKernel for Forward<'_, W> {
     }
 }
 
-/// Positions, quaternions and vectors `[N, 10]`, and what the backward pass wants to see again.
+/// Positions and quaternions `[N, 7]`, and what the backward pass wants to see again.
 pub(crate) fn skin(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedGroup>) {
     match inputs.affinities {
         0 => skin_with::<1>(inputs),
@@ -282,13 +269,13 @@ fn skin_with<const W: usize>(inputs: &SkinningSlices) -> (Vec<f32>, Vec<BlendedG
     let mut blended = vec![BlendedGroup::default(); count.div_ceil(LANES)];
     let chunks = (
         inputs.means.par_chunks(3 * CHUNK),
-        inputs.orientations.par_chunks(ORIENTATION * CHUNK),
+        inputs.quats.par_chunks(4 * CHUNK),
         inputs.stillness.par_chunks(W * CHUNK),
         moved.par_chunks_mut(MOVED * CHUNK),
         blended.par_chunks_mut(CHUNK / LANES),
     );
-    chunks.into_par_iter().for_each(|(means, orientations, stillness, moved, blended)| {
-        dispatch(Forward { nodes: &nodes, means, orientations, stillness, moved, blended });
+    chunks.into_par_iter().for_each(|(means, quats, stillness, moved, blended)| {
+        dispatch(Forward { nodes: &nodes, means, quats, stillness, moved, blended });
     });
     (moved, blended)
 }

@@ -16,10 +16,9 @@ use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::skinning::{
-    BlendedGroup, Block, CHUNK, MOVED, Node, ORIENTATION, STILL, SkinningSlices, as_exponents, columns, orientation,
-    product, to_rows, weight,
+    BlendedGroup, Block, CHUNK, Node, STILL, SkinningSlices, as_exponents, columns, product, to_rows, weight,
 };
-use crate::kernels::skinning::{PLACE, POSE, POSED};
+use crate::kernels::skinning::{MOVED, PLACE, POSE, POSED};
 
 /// Tasks at most, so that their sums take no more memory than some thousand Gaussians.
 const MOST_TASKS: usize = 64;
@@ -28,8 +27,8 @@ const MOST_TASKS: usize = 64;
 pub(crate) struct SkinningGradients {
     /// `[N, 3]`
     pub(crate) means: Vec<f32>,
-    /// `[N, 7]`
-    pub(crate) orientations: Vec<f32>,
+    /// `[N, 4]`
+    pub(crate) quats: Vec<f32>,
     /// `[N, W]`
     pub(crate) stillness: Vec<f32>,
     /// `[B, 19 + W]`
@@ -89,30 +88,29 @@ fn inner_product<L: Lanes>(by_pose: &[Block; POSE], pose: &[L; POSE]) -> L {
 struct Backward<'a, const W: usize> {
     nodes: &'a [Node<W>],
     means: &'a [f32],
-    orientations: &'a [f32],
+    quats: &'a [f32],
     stillness: &'a [f32],
     blended: &'a [BlendedGroup],
-    /// `[N, 10]`
+    /// `[N, 7]`
     upstream: &'a [f32],
     of_means: &'a mut [f32],
-    of_orientations: &'a mut [f32],
+    of_quats: &'a mut [f32],
     of_stillness: &'a mut [f32],
 }
 
 /// The gradients of eight Gaussians, and what they hand to the nodes.
 #[inline(always)]
 fn hand<L: Lanes, const W: usize>(
-    [means, orientations, stillness, upstream]: [&[f32]; 4],
+    [means, quats, stillness, upstream]: [&[f32]; 4],
     blended: &BlendedGroup,
-    [of_means, of_orientations]: [&mut [f32]; 2],
+    [of_means, of_quats]: [&mut [f32]; 2],
     of_stillness: &mut [Block; W],
 ) -> Handed<W> {
     let mean = columns::<L, 3>(means);
-    let (quat, vector) = orientation::<L>(orientations);
+    let quat = columns::<L, 4>(quats);
     let upstream = columns::<L, MOVED>(upstream);
     let by_position = [upstream[0], upstream[1], upstream[2]];
     let by_turned = [upstream[3], upstream[4], upstream[5], upstream[6]];
-    let by_vector = [upstream[7], upstream[8], upstream[9]];
     let mut pose = [L::splat(0.0); POSE];
     for k in 0..POSE {
         pose[k] = L::load(&blended.pose[k]);
@@ -122,24 +120,20 @@ fn hand<L: Lanes, const W: usize>(
     let blended_quat = [pose[12], pose[13], pose[14], pose[15]];
     let by_blended_quat = product(&by_turned, &conjugate(quat));
 
-    let (mut of_mean, mut of_vector) = ([zero; 3], [zero; 3]);
+    let mut of_mean = [zero; 3];
     for j in 0..3 {
         for i in 0..3 {
             of_mean[j] = pose[3 * i + j].mul_add(by_position[i], of_mean[j]);
-            of_vector[j] = pose[3 * i + j].mul_add(by_vector[i], of_vector[j]);
         }
     }
     to_rows(&of_mean, of_means);
     let of_quat = product(&conjugate(blended_quat), &by_turned);
-    let mut of_orientation = [zero; ORIENTATION];
-    of_orientation[..4].copy_from_slice(&of_quat);
-    of_orientation[4..].copy_from_slice(&of_vector);
-    to_rows(&of_orientation, of_orientations);
+    to_rows(&of_quat, of_quats);
 
     let mut by_pose = [zero; POSE];
     for i in 0..3 {
         for j in 0..3 {
-            by_pose[3 * i + j] = by_vector[i].mul_add(vector[j], by_position[i].mul(mean[j]));
+            by_pose[3 * i + j] = by_position[i].mul(mean[j]);
         }
         by_pose[9 + i] = by_position[i];
     }
@@ -244,18 +238,18 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
         let mut handed = Vec::with_capacity(CHUNK / LANES);
         let mut weights = vec![[0.0; LANES]; CHUNK / LANES];
         let mut of_stillness = vec![[[0.0; LANES]; W]; CHUNK / LANES];
-        let inputs = self.means.chunks(3 * LANES).zip(self.orientations.chunks(ORIENTATION * LANES));
+        let inputs = self.means.chunks(3 * LANES).zip(self.quats.chunks(4 * LANES));
         let inputs = inputs.zip(self.stillness.chunks(W * LANES));
         let inputs = inputs.zip(self.upstream.chunks(MOVED * LANES)).zip(self.blended);
-        let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_orientations.chunks_mut(ORIENTATION * LANES));
+        let outputs = self.of_means.chunks_mut(3 * LANES).zip(self.of_quats.chunks_mut(4 * LANES));
         let mut rows_of_stillness = self.of_stillness.chunks_mut(W * LANES);
         let last = self.blended.len() - 1;
-        for (group, (input, (of_means, of_orientations))) in inputs.zip(outputs).enumerate() {
-            let ((((means, orientations), stillness), upstream), blended) = input;
+        for (group, (input, (of_means, of_quats))) in inputs.zip(outputs).enumerate() {
+            let ((((means, quats), stillness), upstream), blended) = input;
             let of_stillness_here = &mut of_stillness[handed.len()];
             *of_stillness_here = [[0.0; LANES]; W];
-            let inputs = [means, orientations, stillness, upstream];
-            handed.push(hand::<L, W>(inputs, blended, [of_means, of_orientations], of_stillness_here));
+            let inputs = [means, quats, stillness, upstream];
+            handed.push(hand::<L, W>(inputs, blended, [of_means, of_quats], of_stillness_here));
             if handed.len() == CHUNK / LANES || group == last {
                 for (node, total) in self.nodes.iter().zip(&mut totals) {
                     total.add(&sums::<L, W>(node, &handed, &mut weights, &mut of_stillness));
@@ -274,7 +268,7 @@ impl<const W: usize> LaneKernel for Backward<'_, W> {
     }
 }
 
-/// Gradients of all inputs from `upstream [N, 10]`.
+/// Gradients of all inputs from `upstream [N, 7]`.
 pub(crate) fn skin_backward(inputs: &SkinningSlices, blended: &[BlendedGroup], upstream: &[f32]) -> SkinningGradients {
     match inputs.affinities {
         0 => skin_backward_with::<1>(inputs, blended, upstream),
@@ -294,34 +288,23 @@ fn skin_backward_with<const W: usize>(
     let count = inputs.count();
     let task = count.div_ceil(MOST_TASKS).max(1).next_multiple_of(CHUNK);
     let mut means = vec![0.0; 3 * count];
-    let mut orientations = vec![0.0; ORIENTATION * count];
+    let mut quats = vec![0.0; 4 * count];
     let mut stillness = vec![0.0; W * count];
     let tasks = (
         inputs.means.par_chunks(3 * task),
-        inputs.orientations.par_chunks(ORIENTATION * task),
+        inputs.quats.par_chunks(4 * task),
         inputs.stillness.par_chunks(W * task),
         blended.par_chunks(task / LANES),
         upstream.par_chunks(MOVED * task),
         means.par_chunks_mut(3 * task),
-        orientations.par_chunks_mut(ORIENTATION * task),
+        quats.par_chunks_mut(4 * task),
         stillness.par_chunks_mut(W * task),
     );
-    let parts = tasks.into_par_iter().map(
-        |(means, orientations, stillness, blended, upstream, of_means, of_orientations, of_stillness)| {
+    let parts =
+        tasks.into_par_iter().map(|(means, quats, stillness, blended, upstream, of_means, of_quats, of_stillness)| {
             let nodes = &nodes;
-            dispatch(Backward {
-                nodes,
-                means,
-                orientations,
-                stillness,
-                blended,
-                upstream,
-                of_means,
-                of_orientations,
-                of_stillness,
-            })
-        },
-    );
+            dispatch(Backward { nodes, means, quats, stillness, blended, upstream, of_means, of_quats, of_stillness })
+        });
     let parts: Vec<Vec<NodeSums<W>>> = parts.collect();
     let mut totals = vec![NodeSums::<W>::ZERO; nodes.len()];
     for part in &parts {
@@ -332,5 +315,5 @@ fn skin_backward_with<const W: usize>(
         let of_anchor = sums.offset.map(|sum| 2.0 * row[PLACE - 1] * sum);
         of_anchor.into_iter().chain([-sums.squared]).chain(sums.pose).chain(sums.affinities[1..].iter().copied())
     });
-    SkinningGradients { means, orientations, stillness, nodes: of_nodes.collect() }
+    SkinningGradients { means, quats, stillness, nodes: of_nodes.collect() }
 }

@@ -16,9 +16,6 @@ pub struct AdaptiveQuantizationConfig {
     /// Initial step of the space-time planes.
     #[config(default = 0.05)]
     pub space_time: f64,
-    /// Whether each scale has its own pair of steps.
-    #[config(default = false)]
-    pub per_scale: bool,
 }
 
 impl AdaptiveQuantizationConfig {
@@ -27,20 +24,19 @@ impl AdaptiveQuantizationConfig {
     /// # Panics
     /// If a step is not positive and finite.
     pub fn init(&self, layout: &PlaneLayout, device: &Device) -> AdaptiveQuantization {
-        let log_steps = Param::from_tensor(self.log_steps(layout.scales(), device));
+        let log_steps = Param::from_tensor(self.log_steps(device));
         AdaptiveQuantization { log_steps, layout: layout.clone() }
     }
 
     /// Logarithms of the initial steps, in the order of [`AdaptiveQuantization::log_steps`].
-    fn log_steps(&self, scales: usize, device: &Device) -> Tensor<1> {
+    fn log_steps(&self, device: &Device) -> Tensor<1> {
         let pair = [self.space_only, self.space_time];
         assert!(pair.iter().all(|step| *step > 0.0 && step.is_finite()), "steps must be positive, not {pair:?}");
-        let groups = if self.per_scale { scales } else { 1 };
-        Tensor::<1>::from_floats(pair.map(|step| step.ln() as f32), device).repeat_dim(0, groups)
+        Tensor::from_floats(pair.map(|step| step.ln() as f32), device)
     }
 }
 
-/// A learned step for the space-only planes and one for the space-time planes, optionally for each scale.
+/// A learned step for the space-only planes and one for the space-time planes.
 ///
 /// The parameter is the logarithm. So a step is always positive, and an optimizer changes it by a ratio: a step of
 /// 0.001 is learned as easily as one of 1.
@@ -58,7 +54,7 @@ impl AdaptiveQuantizationConfig {
 /// ```
 #[derive(Module, Debug)]
 pub struct AdaptiveQuantization {
-    /// `[2]` or `[2 · scales]`: space-only, space-time.
+    /// `[2]`: space-only, space-time.
     pub log_steps: Param<Tensor<1>>,
     #[module(skip)]
     layout: PlaneLayout,
@@ -77,12 +73,9 @@ impl AdaptiveQuantization {
     }
 
     /// Resets steps that have become finer than the initial ones of `config` to those.
-    ///
-    /// # Panics
-    /// If this was not made with `config`.
     pub fn no_finer_than(&mut self, config: &AdaptiveQuantizationConfig) {
         let log_steps = self.log_steps.val().inner();
-        let initial = config.log_steps(self.layout.scales(), &log_steps.device());
+        let initial = config.log_steps(&log_steps.device());
         let value = Tensor::from_inner(log_steps.max_pair(initial));
         let learns = self.log_steps.is_require_grad();
         self.log_steps = Param::initialized(self.log_steps.id, value.set_require_grad(learns));
@@ -90,11 +83,7 @@ impl AdaptiveQuantization {
 
     fn steps_of(&self, log_steps: Tensor<1>) -> PlaneSteps {
         let steps = log_steps.exp();
-        let groups = steps.dims()[0] / 2;
-        let of_plane = |plane: &PlaneShape| {
-            let group = 2 * (plane.scale % groups) + usize::from(plane.axes.is_space_time());
-            steps.clone().narrow(0, group, 1)
-        };
+        let of_plane = |plane: &PlaneShape| steps.clone().narrow(0, usize::from(plane.axes.is_space_time()), 1);
         PlaneSteps::new(self.layout.planes().iter().map(of_plane).collect())
     }
 }

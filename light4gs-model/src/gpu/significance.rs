@@ -54,7 +54,7 @@ fn scores(inputs: SplatInputs<CubeBackend>, view: View) -> Result<CubeTensor, Gp
     Ok(gpu.tensor(first_words(&scores, values), Shape::from([frame.gaussians, SCORES])))
 }
 
-/// Scores `[N, 4]` on a wgpu device; see [`SCORES`].
+/// Scores `[N, 3]` on a wgpu device; see [`SCORES`].
 pub(crate) fn significance_on_gpu(inputs: SplatInputs<CubeBackend>, view: View) -> CubeTensor {
     scores(inputs, view).unwrap_or_else(|error| error.raise())
 }

@@ -11,33 +11,22 @@ use super::context::{Gpu, Places, buffer_of, first_words};
 use super::kernel::Kernel;
 use super::launch::Launch;
 use crate::gpu_error::GpuError;
-use crate::kernels::skinning::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningKernels, SkinningTensors, VECTOR};
+use crate::kernels::skinning::{INPUTS, MOST_AFFINITIES, MOVED, POSED, SkinningKernels, SkinningTensors};
 
-/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five vectors each.
+/// Values that a Gaussian saves for the backward pass, and that it hands to the nodes: five and four vectors.
 const BLENDED: usize = 20;
-const HANDED: usize = 20;
+const HANDED: usize = 16;
 
 /// Gaussians of a slice, unless there are so many slices then that their sums take more memory than they are worth.
 const SLICE: usize = 64;
 const MOST_SLICES: usize = 256;
 
-/// The kernels of this file, with vectors or without, for every number of affinities.
+/// The kernels of this file, for every number of affinities.
 pub(super) fn kernels() -> Vec<Kernel> {
-    let by_affinities = |affinities| {
-        let moving = [0, VECTOR].map(|vector| moving(affinities, vector));
-        moving.into_iter().chain([SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities)))
-    };
+    let by_affinities =
+        |affinities| [SKINNING, SKINNING_NODES, SKINNING_GATHER].map(|shader| kernel(shader, affinities));
     let of_affinities = (1..=MOST_AFFINITIES).map(|affinities| kernel(SKINNING_AFFINITIES, affinities));
-    let backward = [0, VECTOR].map(moving_back);
-    (0..=MOST_AFFINITIES).flat_map(by_affinities).chain(of_affinities).chain(backward).collect()
-}
-
-fn moving(affinities: usize, vector: usize) -> Kernel {
-    kernel(SKINNING, affinities).constant("VECTOR", vector as u32)
-}
-
-fn moving_back(vector: usize) -> Kernel {
-    Kernel::new(SKINNING_BACKWARD).constant("VECTOR", vector as u32)
+    (0..=MOST_AFFINITIES).flat_map(by_affinities).chain(of_affinities).chain([Kernel::new(SKINNING_BACKWARD)]).collect()
 }
 
 fn kernel(shader: Shader, affinities: usize) -> Kernel {
@@ -55,11 +44,8 @@ pub struct GpuSaved {
     count: usize,
     node_count: usize,
     affinities: usize,
-    /// Numbers of a vector: none or three.
-    vector: usize,
     means: Handle,
     quats: Handle,
-    vectors: Handle,
     of_gaussians: Handle,
     nodes: Handle,
     blended: Handle,
@@ -72,15 +58,13 @@ fn words(values: &[usize]) -> Vec<u32> {
 fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSaved), GpuError> {
     let gpu = Gpu::of(&tensors.means)?;
     let (count, node_count) = (tensors.means.shape()[0], tensors.nodes.shape()[0]);
-    let (affinities, vector) = (tensors.affinities.shape()[1], tensors.vectors.shape()[1]);
-    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(buffer_of);
-    let columns = MOVED + vector;
-    let moved = gpu.allocate("moved Gaussians", columns * count)?;
+    let affinities = tensors.affinities.shape()[1];
+    let [means, quats, stillness, of_gaussians, nodes] = tensors.into_array().map(buffer_of);
+    let moved = gpu.allocate("moved Gaussians", MOVED * count)?;
     let blended = gpu.allocate("blended poses", BLENDED * count)?;
-    Launch::new(&gpu.client, moving(affinities, vector))
+    Launch::new(&gpu.client, kernel(SKINNING, affinities))
         .reads(&means)
         .reads(&quats)
-        .reads(&vectors)
         .reads(&stillness)
         .reads(&of_gaussians)
         .reads(&nodes)
@@ -88,35 +72,34 @@ fn forward(tensors: SkinningTensors<CubeBackend>) -> Result<(CubeTensor, GpuSave
         .writes(&blended)
         .uniform(&words(&[count, node_count]))
         .invocations(count)?;
-    let output = gpu.tensor(first_words(&moved, columns * count), Shape::from([count, columns]));
-    let saved = GpuSaved { count, node_count, affinities, vector, means, quats, vectors, of_gaussians, nodes, blended };
+    let output = gpu.tensor(first_words(&moved, MOVED * count), Shape::from([count, MOVED]));
+    let saved = GpuSaved { count, node_count, affinities, means, quats, of_gaussians, nodes, blended };
     Ok((output, saved))
 }
 
 fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<CubeBackend>, GpuError> {
     let gpu = Gpu::of(&upstream)?;
-    let GpuSaved { count, node_count, affinities, vector, means, quats, vectors, of_gaussians, nodes, blended } = saved;
+    let GpuSaved { count, node_count, affinities, means, quats, of_gaussians, nodes, blended } = saved;
     let handed = gpu.allocate("gradients by blended poses", HANDED * count)?;
     // Those of the Gaussians in one buffer, in the order of the inputs.
-    let widths = [3, 4, vector, 1, affinities];
+    let widths = [3, 4, 1, affinities];
     let layout = Places::new(&widths.map(|width| width * count));
     let gradients = gpu.allocate("gradients of Gaussians", layout.total)?;
-    Launch::new(&gpu.client, moving_back(vector))
+    Launch::new(&gpu.client, Kernel::new(SKINNING_BACKWARD))
         .reads(&means)
         .reads(&quats)
-        .reads(&vectors)
         .reads(&blended)
         .reads(&buffer_of(upstream))
         .writes(&handed)
         .writes(&gradients)
-        .uniform(&words(&[count, layout.starts[1], layout.starts[2], layout.starts[3]]))
+        .uniform(&words(&[count, layout.starts[1], layout.starts[2]]))
         .invocations(count)?;
     if affinities > 0 {
         Launch::new(&gpu.client, kernel(SKINNING_AFFINITIES, affinities))
             .reads(&handed)
             .reads(&nodes)
             .reads(&of_gaussians)
-            .writes(&layout.of(&gradients, 4))
+            .writes(&layout.of(&gradients, 3))
             .uniform(&words(&[count, node_count]))
             .invocations(count)?;
     }
@@ -145,7 +128,7 @@ fn backward(saved: GpuSaved, upstream: CubeTensor) -> Result<SkinningTensors<Cub
     let mut of_gaussians =
         (0..INPUTS - 1).map(|k| gpu.tensor(layout.of(&gradients, k), Shape::from([count, widths[k]])));
     let mut next = || of_gaussians.next().expect("a piece for each input");
-    Ok(SkinningTensors::from_array([next(), next(), next(), next(), next(), of_nodes]))
+    Ok(SkinningTensors::from_array([next(), next(), next(), next(), of_nodes]))
 }
 
 impl SkinningKernels for CubeBackend {

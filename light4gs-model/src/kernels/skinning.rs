@@ -11,10 +11,8 @@ pub(crate) const POSE: usize = 16;
 pub(crate) const PLACE: usize = 4;
 /// Numbers of a posed node before its affinities.
 pub(crate) const POSED: usize = PLACE + POSE;
-/// Numbers of a moved Gaussian: position (3), quaternion (4); turned vectors (3) stand behind them.
+/// Numbers of a moved Gaussian: position (3), quaternion (4).
 pub(crate) const MOVED: usize = 7;
-/// Numbers of a vector that turns along.
-pub(crate) const VECTOR: usize = 3;
 
 /// Most affinities of a Gaussian and of a node.
 pub const MOST_AFFINITIES: usize = 4;
@@ -26,8 +24,6 @@ pub struct SkinningTensors<B: Backend> {
     pub means: FloatTensor<B>,
     /// `[N, 4]`: quaternions (w, x, y, z) of any length.
     pub quats: FloatTensor<B>,
-    /// `[N, V]`, V 0 or 3: vectors that turn along.
-    pub vectors: FloatTensor<B>,
     /// `[N, 1]`, logits of the node that stands still.
     pub stillness: FloatTensor<B>,
     /// `[N, H]`.
@@ -38,16 +34,16 @@ pub struct SkinningTensors<B: Backend> {
 }
 
 /// Tensors of [`SkinningTensors`].
-pub(crate) const INPUTS: usize = 6;
+pub(crate) const INPUTS: usize = 5;
 
 impl<B: Backend> SkinningTensors<B> {
     pub(crate) fn into_array(self) -> [FloatTensor<B>; INPUTS] {
-        [self.means, self.quats, self.vectors, self.stillness, self.affinities, self.nodes]
+        [self.means, self.quats, self.stillness, self.affinities, self.nodes]
     }
 
     pub(crate) fn from_array(tensors: [FloatTensor<B>; INPUTS]) -> Self {
-        let [means, quats, vectors, stillness, affinities, nodes] = tensors;
-        Self { means, quats, vectors, stillness, affinities, nodes }
+        let [means, quats, stillness, affinities, nodes] = tensors;
+        Self { means, quats, stillness, affinities, nodes }
     }
 }
 
@@ -56,9 +52,9 @@ pub trait SkinningKernels: Backend {
     /// What the backward pass wants to see again.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// Positions, quaternions and vectors `[N, 7 + V]`.
+    /// Positions and quaternions `[N, 7]`.
     fn skinning_forward(tensors: SkinningTensors<Self>) -> (FloatTensor<Self>, Self::Saved);
 
-    /// Gradients of all inputs from that of the output `[N, 7 + V]`.
+    /// Gradients of all inputs from that of the output `[N, 7]`.
     fn skinning_backward(saved: Self::Saved, gradient: FloatTensor<Self>) -> SkinningTensors<Self>;
 }

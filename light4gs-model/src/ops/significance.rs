@@ -21,8 +21,8 @@ use crate::gpu::significance_on_gpu;
 /// The sums on every back end.
 #[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
 pub trait SignificanceOps: Backend {
-    /// `[N, 4]`, sums over the pixels that blend each Gaussian: pixels, `T · alpha`, `T · opacity`, opacity, with `T`
-    /// the transmittance before the Gaussian.
+    /// `[N, 3]`, sums over the pixels that blend each Gaussian: pixels, `T · alpha`, `T · opacity`, with `T` the
+    /// transmittance before the Gaussian.
     fn significance(#[extension_type] inputs: SplatInputs<Self>, view: SplatView) -> FloatTensor<Self>;
 }
 

@@ -18,9 +18,9 @@ use burn_fusion::{Fusion, FusionBackend};
 use super::fusion::{leaf, resolve};
 use super::host::{HostBackend, HostTensor};
 use super::{differentiate, for_all_back_ends, for_cpu_back_ends};
-use crate::cpu::skinning::{BlendedGroup, MOVED as ALL_MOVED, ORIENTATION, SkinningSlices, skin as skin_slices};
+use crate::cpu::skinning::{BlendedGroup, SkinningSlices, skin as skin_slices};
 use crate::cpu::skinning_backward::skin_backward;
-use crate::kernels::skinning::{INPUTS, MOVED, POSED, VECTOR};
+use crate::kernels::skinning::{INPUTS, MOVED, POSED};
 pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTensors};
 
 /// Skinning on every back end that has [`SkinningKernels`], differentiable under [`Autodiff`].
@@ -28,7 +28,7 @@ pub use crate::kernels::skinning::{MOST_AFFINITIES, SkinningKernels, SkinningTen
     NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"), Autodiff
 )]
 pub trait SkinningOps: Backend {
-    /// Positions, quaternions and vectors `[N, 7 + V]`; see [`skin`].
+    /// Positions and quaternions `[N, 7]`; see [`skin`].
     fn skinning(#[extension_type] tensors: SkinningTensors<Self>) -> FloatTensor<Self>;
 }
 
@@ -70,12 +70,10 @@ impl<B: SkinningOps + SkinningKernels, C: CheckpointStrategy> SkinningOps for Au
 #[derive(Clone, Debug)]
 pub struct CpuSaved {
     means: HostTensor,
-    orientations: Arc<Vec<f32>>,
+    quats: HostTensor,
     stillness: Arc<Vec<f32>>,
     nodes: HostTensor,
     affinities: usize,
-    /// Numbers of a vector: none or three.
-    vector: usize,
     blended: Arc<Vec<BlendedGroup>>,
 }
 
@@ -83,7 +81,7 @@ impl CpuSaved {
     fn slices(&self) -> SkinningSlices<'_> {
         SkinningSlices {
             means: self.means.as_slice(),
-            orientations: &self.orientations,
+            quats: self.quats.as_slice(),
             stillness: &self.stillness,
             nodes: self.nodes.as_slice(),
             affinities: self.affinities,
@@ -91,16 +89,12 @@ impl CpuSaved {
     }
 }
 
-/// Rows of two matrices as rows of one, `columns` wide; what both leave of it is 0.
-fn side_by_side([(first, width), (second, other)]: [(&[f32], usize); 2], columns: usize) -> Vec<f32> {
-    let mut rows = vec![0.0; first.len() / width * columns];
-    for (row, own) in rows.chunks_exact_mut(columns).zip(first.chunks_exact(width)) {
-        row[..width].copy_from_slice(own);
-    }
-    if other > 0 {
-        for (row, own) in rows.chunks_exact_mut(columns).zip(second.chunks_exact(other)) {
-            row[width..width + other].copy_from_slice(own);
-        }
+/// Stillness `[N, 1]` and affinities `[N, H]`, a Gaussian's numbers next to each other.
+fn side_by_side(stillness: &[f32], affinities: &[f32], width: usize) -> Vec<f32> {
+    let mut rows = Vec::with_capacity(stillness.len() + affinities.len());
+    for (i, stillness) in stillness.iter().enumerate() {
+        rows.push(*stillness);
+        rows.extend_from_slice(&affinities[width * i..width * (i + 1)]);
     }
     rows
 }
@@ -111,43 +105,32 @@ fn columns_of(matrix: &[f32], width: usize, columns: Range<usize>) -> Vec<f32> {
 }
 
 fn forward_on_cpu<B: HostBackend>(tensors: SkinningTensors<B>) -> (FloatTensor<B>, CpuSaved) {
-    let (vector, affinities) = (tensors.vectors.shape()[1], tensors.affinities.shape()[1]);
-    let [means, quats, vectors, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
-    let orientations = side_by_side([(quats.as_slice(), 4), (vectors.as_slice(), vector)], ORIENTATION);
-    let stillness = side_by_side([(stillness.as_slice(), 1), (of_gaussians.as_slice(), affinities)], 1 + affinities);
-    let mut saved = CpuSaved {
-        means,
-        orientations: Arc::new(orientations),
-        stillness: Arc::new(stillness),
-        nodes,
-        affinities,
-        vector,
-        blended: Arc::default(),
-    };
+    let affinities = tensors.affinities.shape()[1];
+    let [means, quats, stillness, of_gaussians, nodes] = tensors.into_array().map(B::to_host);
+    let stillness = side_by_side(stillness.as_slice(), of_gaussians.as_slice(), affinities);
+    let mut saved =
+        CpuSaved { means, quats, stillness: Arc::new(stillness), nodes, affinities, blended: Arc::default() };
     let (moved, blended) = skin_slices(&saved.slices());
     saved.blended = Arc::new(blended);
-    let count = moved.len() / ALL_MOVED;
-    let moved = if vector == 0 { columns_of(&moved, ALL_MOVED, 0..MOVED) } else { moved };
-    (B::from_values(moved, [count, MOVED + vector]), saved)
+    let count = moved.len() / MOVED;
+    (B::from_values(moved, [count, MOVED]), saved)
 }
 
 fn backward_on_cpu<B: HostBackend>(saved: CpuSaved, gradient: FloatTensor<B>) -> SkinningTensors<B> {
     let upstream = B::to_host(gradient);
-    let CpuSaved { affinities, vector, .. } = saved;
-    let widened = (vector == 0).then(|| side_by_side([(upstream.as_slice(), MOVED), (&[], 0)], ALL_MOVED));
-    let gradients = skin_backward(&saved.slices(), &saved.blended, widened.as_deref().unwrap_or(upstream.as_slice()));
+    let affinities = saved.affinities;
+    let gradients = skin_backward(&saved.slices(), &saved.blended, upstream.as_slice());
     let count = gradients.means.len() / 3;
-    let part = |matrix: &[f32], width: usize, columns: Range<usize>| {
+    let part = |columns: Range<usize>| {
         let shape = [count, columns.len()];
-        B::from_values(columns_of(matrix, width, columns), shape)
+        B::from_values(columns_of(&gradients.stillness, 1 + affinities, columns), shape)
     };
     let columns = POSED + affinities;
     SkinningTensors {
-        quats: part(&gradients.orientations, ORIENTATION, 0..4),
-        vectors: part(&gradients.orientations, ORIENTATION, 4..4 + vector),
-        stillness: part(&gradients.stillness, 1 + affinities, 0..1),
-        affinities: part(&gradients.stillness, 1 + affinities, 1..1 + affinities),
+        stillness: part(0..1),
+        affinities: part(1..1 + affinities),
         means: B::from_values(gradients.means, [count, 3]),
+        quats: B::from_values(gradients.quats, [count, 4]),
         nodes: B::from_values(gradients.nodes, [saved.nodes.as_slice().len() / columns, columns]),
     }
 }
@@ -189,8 +172,6 @@ pub struct SkinningInputs {
     pub means: Tensor<2>,
     /// `[N, 4]`: their orientations at rest as quaternions (w, x, y, z), of any length.
     pub quats: Tensor<2>,
-    /// `[N, 3]`: a vector for each that turns along.
-    pub vectors: Option<Tensor<2>>,
     /// `[N, 1]`: logit of the node that stands still.
     pub stillness: Tensor<2>,
     /// `[N, H]`: each Gaussian's affinities, H up to [`MOST_AFFINITIES`].
@@ -202,12 +183,12 @@ pub struct SkinningInputs {
 }
 
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
-/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized; or `[N, 10]`, with turned vectors (3).
+/// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized.
 ///
 /// ```text
 /// w   = softmax over b of (affinities · affinities_b - precision_b |mean - anchor_b|², and stillness for the node that stands still)
 /// A   = Σ w_b R_b + w_still I,   t = Σ w_b t_b,   q = Σ w_b q_b + w_still (1, 0, 0, 0)
-/// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product),   turned vector = A vector
+/// position = A mean + t,   quaternion = q ⊗ quat   (Hamilton's product)
 /// ```
 ///
 /// A weight of less than 2⁻⁶⁴ of the largest is 0 on the CPU.
@@ -227,8 +208,6 @@ pub struct SkinningInputs {
 /// let moved = skin(SkinningInputs {
 ///     means: rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3),
 ///     quats: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 4),
-///     // Each with a vector along x.
-///     vectors: Some(rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3)),
 ///     // The first Gaussian goes with the node, the second stands still.
 ///     stillness: rows(&[-60.0, 60.0], 1),
 ///     affinities: None,
@@ -238,28 +217,20 @@ pub struct SkinningInputs {
 ///     ], 20),
 /// });
 /// let moved = moved.into_data().to_vec::<f32>().unwrap();
-/// assert_eq!(moved[..10], [0.0, 1.0, 2.0, half, 0.0, 0.0, half, 0.0, 1.0, 0.0]);
-/// assert_eq!(moved[10..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+/// assert_eq!(moved[..7], [0.0, 1.0, 2.0, half, 0.0, 0.0, half]);
+/// assert_eq!(moved[7..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);
 /// ```
 ///
 /// # Panics
 /// If the shapes do not belong together, or there is no node; the message names the tensor.
 pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
+    let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
     let count = means.dims()[0];
     assert!(nodes.dims()[0] > 0, "nodes must have one row or more");
     assert_eq!(means.dims(), [count, 3], "means must be [N, 3]");
     assert_eq!(quats.dims(), [count, 4], "quats must be [N, 4]");
     assert_eq!(stillness.dims(), [count, 1], "stillness must be [N, 1]");
-    let nothing = || Tensor::empty([count, 0], &means.device());
-    let vectors = match vectors {
-        Some(vectors) => {
-            assert_eq!(vectors.dims(), [count, VECTOR], "vectors must be [N, 3]");
-            vectors
-        }
-        None => nothing(),
-    };
-    let affinities = affinities.unwrap_or_else(nothing);
+    let affinities = affinities.unwrap_or_else(|| Tensor::empty([count, 0], &means.device()));
     let [rows, columns] = affinities.dims();
     assert!(columns <= MOST_AFFINITIES, "a Gaussian has at most {MOST_AFFINITIES} affinities");
     assert_eq!(rows, count, "affinities must be [N, H]");
@@ -267,7 +238,6 @@ pub fn skin(inputs: SkinningInputs) -> Tensor<2> {
     Tensor::from_dispatch(Dispatch::skinning(SkinningTensors {
         means: means.into_dispatch(),
         quats: quats.into_dispatch(),
-        vectors: vectors.into_dispatch(),
         stillness: stillness.into_dispatch(),
         affinities: affinities.into_dispatch(),
         nodes: nodes.into_dispatch(),

@@ -13,8 +13,8 @@ use crate::view::View;
 
 /// Sums over the pixels that blend a splat: pixels, `T · alpha`, `T`.
 type Sums = [f32; 3];
-/// Values of a Gaussian in the output: pixels, sum of `T · alpha`, sum of `T · opacity`, sum of the opacity.
-pub const SCORES: usize = 4;
+/// Values of a Gaussian in the output: pixels, sum of `T · alpha`, sum of `T · opacity`.
+pub const SCORES: usize = 3;
 
 struct SignificanceTile<'a> {
     lists: &'a TileLists,
@@ -57,7 +57,7 @@ impl<L: Lanes> TileVisitor<L> for Score<'_> {
     }
 }
 
-/// Scores `[N, 4]` of one image; see [`SCORES`].
+/// Scores `[N, 3]` of one image; see [`SCORES`].
 pub fn significance(lists: &TileLists, view: &View) -> Vec<f32> {
     let mut sums: Vec<Sums> = vec![[0.0; 3]; lists.gaussians.len()];
     lists.split_by_tile(&mut sums).into_par_iter().enumerate().for_each(|(tile, sums)| {
@@ -68,7 +68,7 @@ pub fn significance(lists: &TileLists, view: &View) -> Vec<f32> {
     scores.par_chunks_mut(SCORES).enumerate().for_each(|(i, scores)| {
         let Some([pixels, weights, transmittances]) = lists.sum_of(i, &sums) else { return };
         let opacity = lists.splats[i].opacity;
-        scores.copy_from_slice(&[pixels, weights, transmittances * opacity, pixels * opacity]);
+        scores.copy_from_slice(&[pixels, weights, transmittances * opacity]);
     });
     scores
 }

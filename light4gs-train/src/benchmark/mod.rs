@@ -259,7 +259,6 @@ pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningI
     SkinningInputs {
         means: leaf(random(count, 3)),
         quats: leaf(random(count, 4)),
-        vectors: None,
         stillness: leaf(random(count, 1)),
         affinities: None,
         nodes: leaf(Tensor::cat(vec![random(nodes, 3), precisions, random(nodes, 16)], 1)),

@@ -136,11 +136,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         self.attributes.as_ref().filter(|attributes| attributes.is_started())
     }
 
-    /// Keeps learned steps in the range that a configuration allows.
+    /// Keeps learned steps from becoming finer than a configuration begins with: finer ones help training frames only.
     pub fn bound_steps(&mut self, config: &Config) {
-        if let Some(models) = &mut self.planes
-            && !config.compression.steps.refine
-        {
+        if let Some(models) = &mut self.planes {
             models.quantization.no_finer_than(&quantization_config(config));
         }
     }
@@ -165,8 +163,5 @@ fn coded_attributes(config: &Config, gaussians: &Gaussians, sh_has_model: bool) 
 
 fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
     let steps = &config.compression.steps;
-    AdaptiveQuantizationConfig::new()
-        .with_space_only(steps.space_only)
-        .with_space_time(steps.space_time)
-        .with_per_scale(steps.per_scale)
+    AdaptiveQuantizationConfig::new().with_space_only(steps.space_only).with_space_time(steps.space_time)
 }

@@ -16,7 +16,7 @@ pub(crate) struct AttributeRate {
     pub(crate) first: f64,
     /// At the end of the schedule.
     pub(crate) last: f64,
-    /// Whether `learning_rate.scale_by_extent` applies to it.
+    /// Whether it is multiplied by the scene's extent.
     pub(crate) by_extent: bool,
 }
 

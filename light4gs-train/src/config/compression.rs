@@ -158,15 +158,11 @@ keys! {
         space_only: f64 = quantization().space_only; STEP, "ours; reference: 0.1, fixed";
         /// The same for the space-time planes.
         space_time: f64 = quantization().space_time; STEP, "ours; reference: 0.1, fixed";
-        /// The steps are learned.
+        /// The steps are learned: they become coarser than at the start where that pays, but not finer, which would help
+        /// training frames only ([results](results/hexplane.md#learned-quantization-steps)).
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.
         adaptive_from: usize = 15_000; ITERATION, "paper";
-        /// Learned steps may become finer than they are at the start. Finer steps improve training frames only:
-        /// [results](results/hexplane.md#learned-quantization-steps).
-        refine: bool = false; Flag, "ours; paper: yes", "finer steps help training frames only";
-        /// Every scale has a pair of steps of its own.
-        per_scale: bool = quantization().per_scale; Flag, "ours";
         /// Learning rate of the logarithms of these steps, and of those of attributes.
         learning_rate: f64 = 2e-3; RATE, "ours";
         /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest

@@ -6,7 +6,7 @@ use light4gs_model::{
 };
 
 use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole};
-use crate::keys::{ITERATION, SHARE, WEIGHT, choice, keys};
+use crate::keys::{WEIGHT, choice, keys};
 
 /// Far above anything useful: a mistyped number must not ask for the machine's whole memory.
 pub(super) const MOST_PLANE_RESOLUTION: u64 = 4096;
@@ -120,9 +120,6 @@ keys! {
         /// not move together.
         affinities: usize = nodes().affinities; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS",
             "numbers by which every Gaussian learns which nodes it follows beyond its place";
-        /// Every Gaussian learns how its brightness changes as it turns: a vector that turns along, and one direction of the light
-        /// for the scene.
-        shading: bool = nodes().shading; Flag, "ours", "every Gaussian learns how its brightness changes as it turns";
         /// Weight of the term that keeps neighboring nodes in place as seen from each other.
         rigidity: f64 = nodes().rigidity; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
@@ -133,14 +130,6 @@ keys! {
         rotation_rate: f64 = nodes().rotation_rate; FACTOR, "ours";
         /// How much faster than the deformation's rate the nodes' places and radii are learned.
         anchor_rate: f64 = nodes().anchor_rate; FACTOR, "ours";
-        /// Nodes without which little would move otherwise are moved to where motion is not explained, every so many
-        /// iterations. 0 means never.
-        relocation_interval: usize = nodes().relocation_interval; ITERATION,
-            "after SC-GS", "iterations; 0 = nodes are not moved to where motion is not explained";
-        /// The share of the fine stage after which nodes are no longer moved.
-        relocation_until: f64 = nodes().relocation_until; SHARE, "ours";
-        /// At most this share of the nodes is moved at a time.
-        relocation_share: f64 = nodes().relocation_share; SHARE, "ours";
     }
 }
 
@@ -191,15 +180,11 @@ impl ModelConfig {
             stillness: table.stillness.then_some(table.stillness_start),
             lifetime: table.lifetime,
             affinities: table.affinities,
-            shading: table.shading,
             rigidity: table.rigidity,
             smoothness: table.smoothness,
             translation_rate: table.translation_rate,
             rotation_rate: table.rotation_rate,
             anchor_rate: table.anchor_rate,
-            relocation_interval: table.relocation_interval,
-            relocation_until: table.relocation_until,
-            relocation_share: table.relocation_share,
         }
     }
 

@@ -4,7 +4,7 @@ use light4gs_data::Camera;
 use light4gs_model::regularizer::PlaneRegularizer;
 
 use crate::density::{DensifyConfig, GuidedSamplingConfig, PruneConfig};
-use crate::keys::Bounds::{Flag, Kind, Number, Whole};
+use crate::keys::Bounds::{Kind, Number, Whole};
 use crate::keys::{INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, WEIGHT, keys, optional};
 use crate::loss::{LossKind, Losses};
 use crate::sampling::{SamplerKind, Samplers};
@@ -22,23 +22,18 @@ keys! {
         /// The loss by which rendered views are compared with the frames. The keys of each loss are in a table of its name.
         loss: LossKind = LossKind::Photometric;
             Kind { names: LossKind::NAMES, list: "light4gs-train/src/loss/mod.rs" },
-            "3DGS", "or \"charbonnier\"";
+            "3DGS";
         /// The keys of the losses.
         #[serde(flatten)]
         losses: Losses;
-        /// Which frames an iteration looks at: any (`"shuffled"`), or (`"same_time"`) different cameras at one time, where
-        /// the dataset has several; or (`"widening_window"`) those of a window of time that widens.
+        /// Which frames an iteration looks at: any (`"shuffled"`), or (`"widening_window"`) those of a window of time that
+        /// widens.
         sampling: SamplerKind = SamplerKind::Shuffled;
             Kind { names: SamplerKind::NAMES, list: "light4gs-train/src/sampling/mod.rs" },
-            "ours; the reference shuffles", "or \"same_time\": a batch is several cameras at one time";
+            "ours; the reference shuffles", "or \"widening_window\": frames of a window of time that widens";
         /// The keys of the samplers.
         #[serde(flatten)]
         samplers: Samplers;
-        /// The coarse stage uses only the frames of this many times from the beginning. 0: all. 1 is the reference's
-        /// `zerostamp_init`.
-        #[serde(with = "optional")]
-        coarse_times: Option<usize> = None;
-            ITERATION, "reference", "frames of this many times from the beginning; 0 = all";
         /// Iterations after which the active degree of the spherical harmonics grows by one.
         sh_degree_interval: usize = 1000; INTERVAL, "3DGS";
         /// Iterations between two checkpoints.
@@ -117,7 +112,8 @@ impl CoarseToFineConfig {
 }
 
 keys! {
-    /// Adam's rates. A pair of `init` and `final` decays exponentially.
+    /// Adam's rates. A pair of `init` and `final` decays exponentially; those of positions, deformation and feature planes are
+    /// multiplied by the scene's extent.
     pub struct LearningRates {
         /// Positions, first step.
         means_init: f64 = 1.6e-4; RATE, "3DGS";
@@ -148,8 +144,6 @@ keys! {
         /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
         schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000", "0 = the stage's length";
-        /// Rates of positions, deformation and feature planes are multiplied by the scene's extent.
-        scale_by_extent: bool = true; Flag, "reference";
     }
 }
 

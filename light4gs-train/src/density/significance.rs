@@ -18,17 +18,13 @@ keys! {
         iterations: Vec<usize> = vec![15_001, 20_000];
             List { element: &INTERVAL, length: None },
             "paper: mid-way and near the end", "of the fine stage, after densification";
-        /// What a pixel adds to the score of a Gaussian that it blends: `"transmittance"` times opacity, the blending
-        /// `"weight"` (transmittance times alpha), its `"opacity"`, one (`"count"`), or its
+        /// What a pixel adds to the score of a Gaussian that it blends: `"transmittance"` times opacity, or
         /// `"sensitivity"`, the squared change of the color without the Gaussian.
         score: PruneScore = PruneScore::Transmittance;
-            Word(PruneScore::NAMES), "paper; the reference sums the opacity",
-            "or \"weight\", \"opacity\", \"count\", \"sensitivity\"";
-        /// Factor of the volume V: `"clamped"` is clamp(V / V_90, 0, 1)^exponent, `"unclamped"` (V / V_10)^exponent,
-        /// or `"none"`.
+            Word(PruneScore::NAMES), "paper; the reference sums the opacity", "or \"sensitivity\"";
+        /// Factor of the volume V: `"clamped"` is clamp(V / V_90, 0, 1)^exponent, `"none"` is 1.
         volume: PruneVolume = PruneVolume::Clamped;
-            Word(PruneVolume::NAMES),
-            "paper; the reference has the unclamped one, unused", "or \"none\", \"unclamped\" (as the public code)";
+            Word(PruneVolume::NAMES), "paper", "or \"none\"";
         /// Exponent of that factor.
         volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
         /// A pass uses one random camera for each time instead of every training view; for data with many cameras.
@@ -41,12 +37,6 @@ choice! {
     pub enum PruneScore: "score" {
         /// Transmittance before the Gaussian times its opacity: the paper's.
         Transmittance = "transmittance",
-        /// The blending weight, transmittance times alpha.
-        Weight = "weight",
-        /// The opacity alone, as the first public code of LightGaussian does.
-        Opacity = "opacity",
-        /// One a pixel.
-        Count = "count",
         /// The squared change of the pixel's color without the Gaussian (after SpeeDe3DGS).
         Sensitivity = "sensitivity",
     }
@@ -59,8 +49,6 @@ choice! {
         None = "none",
         /// Relative to the volume that 90 % stay below, at most 1: the paper's.
         Clamped = "clamped",
-        /// Relative to the volume that 10 % stay below, without a bound: the public code's.
-        Unclamped = "unclamped",
     }
 }
 
@@ -80,8 +68,6 @@ pub struct GaussianContributions {
     pub blending_weight: Vec<f64>,
     /// `[N]`: sum over those pixels of transmittance times opacity.
     pub transmittance_opacity: Vec<f64>,
-    /// `[N]`: sum over those pixels of the Gaussian's opacity.
-    pub opacity: Vec<f64>,
     /// `[N]`: sum over those pixels of the squared change of their color without the Gaussian. Empty unless the score
     /// [reads it](SignificanceScore::reads_sensitivity).
     pub sensitivity: Vec<f64>,
@@ -96,7 +82,6 @@ impl GaussianContributions {
             pixels: significance.sums(Sum::PixelCount),
             blending_weight: significance.sums(Sum::BlendingWeight),
             transmittance_opacity: significance.sums(Sum::TransmittanceOpacity),
-            opacity: significance.sums(Sum::Opacity),
             sensitivity: sensitivity.map_or_else(Vec::new, |sensitivity| sensitivity.sums().to_vec()),
             volumes,
         }
@@ -114,7 +99,7 @@ pub trait SignificanceScore: Send {
     }
 }
 
-/// A sum over pixels times a factor of the Gaussian's volume: the paper's score, and its variants. The default.
+/// A sum over pixels times a factor of the Gaussian's volume: the paper's score, or sensitivity. The default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VolumeWeightedScore {
     /// The quantity that is summed.
@@ -130,7 +115,6 @@ impl VolumeWeightedScore {
         let volume = match config.volume {
             PruneVolume::None => VolumeWeight::None,
             PruneVolume::Clamped => VolumeWeight::Clamped { exponent },
-            PruneVolume::Unclamped => VolumeWeight::Unclamped { exponent },
         };
         Self { contribution: config.score, volume }
     }
@@ -140,9 +124,6 @@ impl SignificanceScore for VolumeWeightedScore {
     fn scores(&self, contributions: &GaussianContributions) -> Vec<f64> {
         let sums = match self.contribution {
             PruneScore::Transmittance => &contributions.transmittance_opacity,
-            PruneScore::Weight => &contributions.blending_weight,
-            PruneScore::Opacity => &contributions.opacity,
-            PruneScore::Count => &contributions.pixels,
             PruneScore::Sensitivity => &contributions.sensitivity,
         };
         sums.iter().zip(self.volume.of(&contributions.volumes)).map(|(sum, factor)| sum * factor).collect()

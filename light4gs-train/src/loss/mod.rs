@@ -1,15 +1,13 @@
 //! Losses: how a rendered image is compared with the training image.
 //!
 //! - this file: [`Loss`], the trainer's interface to a loss, and [`LossKind`], the built-in ones by name
-//! - `photometric`, `charbonnier`: one file each
+//! - `photometric`: one file for each
 
-mod charbonnier;
 mod photometric;
 
 use burn::tensor::Tensor;
 use light4gs_data::Frame;
 
-pub use charbonnier::CharbonnierLoss;
 pub use photometric::{PhotometricLoss, photometric};
 
 use crate::keys::kinds;
@@ -19,7 +17,6 @@ kinds! {
     /// The built-in losses, by the names that `train.loss` takes.
     pub enum LossKind: "loss" {
         Photometric = photometric: PhotometricLoss,
-        Charbonnier = charbonnier: CharbonnierLoss,
     }
     /// The keys of the built-in losses.
     pub struct Losses: dyn Loss;

@@ -1,12 +1,11 @@
 //! Observers of a run: progress bars, logs, viewers.
 //!
 //! - this file: [`Observer`], the calls that the trainer makes
-//! - `metrics_log`, `tensorboard`: the logs of a run folder
+//! - `metrics_log`: the log of a run folder
 //!
 //! The progress bars of the command line are an observer as well (`cli/progress.rs`).
 
 pub mod metrics_log;
-pub mod tensorboard;
 
 use std::path::Path;
 

@@ -80,17 +80,6 @@ impl Adam {
         }
     }
 
-    /// Zeroes the moments of some numbers, by their indices in the flattened parameter, and keeps its step count.
-    pub fn reset_elements(&mut self, name: &str, elements: &[usize]) {
-        let Some(state) = self.states.get_mut(name) else { return };
-        let mut keep = vec![1.0; state.first.dims()[0]];
-        elements.iter().for_each(|element| keep[*element] = 0.0);
-        let keep = Tensor::<1>::from_floats(&keep[..], &state.first.device());
-        for moment in [&mut state.first, &mut state.second] {
-            *moment = moment.clone() * keep.clone();
-        }
-    }
-
     /// Zeroes the moments of a parameter and keeps its step count.
     pub fn reset_moments(&mut self, name: &str) {
         if let Some(state) = self.states.get_mut(name) {
@@ -120,32 +109,5 @@ impl<R: Fn(ParameterGroup, &str) -> Option<f64>> ParameterMapper for Step<'_, R>
             self.adam.step(&joined, &mut parameter, gradient, rate);
         }
         parameter
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use burn::tensor::Device;
-
-    use super::*;
-
-    #[test]
-    fn moments_of_some_numbers_begin_anew() {
-        let device = Device::flex();
-        let mut parameter = Param::from_tensor(Tensor::<1>::zeros([3], &device.clone().autodiff()));
-        let mut adam = Adam::default();
-        let gradient = || Tensor::<1>::from_floats([1.0, -2.0, 3.0], &device);
-        adam.step("knots", &mut parameter, gradient(), 0.1);
-        adam.step("knots", &mut parameter, gradient(), 0.1);
-        let before = adam.states["knots"].clone();
-        adam.reset_elements("knots", &[0, 2]);
-        adam.reset_elements("never stepped", &[0]);
-        let after = &adam.states["knots"];
-        assert_eq!((adam.states.len(), after.time), (1, 2));
-        for (before, after) in [(&before.first, &after.first), (&before.second, &after.second)] {
-            let [before, after] = [before, after].map(|moment| moment.to_data().iter::<f32>().collect::<Vec<_>>());
-            assert!(before[1] != 0.0);
-            assert_eq!(after, [0.0, before[1], 0.0]);
-        }
     }
 }

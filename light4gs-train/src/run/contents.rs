@@ -30,7 +30,7 @@ pub(super) const FILES: [&str; 9] = [
 ];
 
 /// Folders of a run; `--overwrite` removes them.
-pub(super) const FOLDERS: [&str; 3] = ["events", "checkpoints", "renders"];
+pub(super) const FOLDERS: [&str; 2] = ["checkpoints", "renders"];
 
 /// Whether this is the path of a file that a run needs: its record or configuration, a log, a checkpoint. Commands may
 /// write its `scene.l4gs`.

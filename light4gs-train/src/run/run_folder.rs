@@ -1,4 +1,4 @@
-//! The folder of a run: `config.toml`, `run.json`, `dataset.json`, `metrics.jsonl`, `events/`, `checkpoints/`, `scene.l4gs`,
+//! The folder of a run: `config.toml`, `run.json`, `dataset.json`, `metrics.jsonl`, `checkpoints/`, `scene.l4gs`,
 //! `eval.json`, `renders/`, `report.html`.
 //!
 //! `run.json` is written last when a run is made, and removed first when it is replaced: if it exists, the rest is

@@ -103,7 +103,7 @@ mod tests {
     use light4gs_data::{Camera, Frame};
 
     use super::*;
-    use crate::sampling::StageFrames;
+    use crate::sampling::CandidateFrames;
 
     /// The windows of some iterations of 100, and whether each batch lies within its own.
     fn windows(sampler: &WideningWindow, iterations: &[usize]) -> Vec<[f32; 2]> {
@@ -111,8 +111,7 @@ mod tests {
         // Two cameras, 41 times.
         let frame = |k: usize| Frame::without_image(format!("{k}"), camera, (k % 41) as f32 / 40.0);
         let frames: Vec<Frame> = (0..82).map(frame).collect();
-        let all = StageFrames::new(None, &frames);
-        let candidates = all.of(Stage::Fine);
+        let candidates = &CandidateFrames::new(&frames);
         let window = |iteration: &usize| {
             let (stage, iteration) = (Stage::Fine, *iteration);
             let request =

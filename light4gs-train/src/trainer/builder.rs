@@ -26,11 +26,10 @@ use crate::error::TrainError;
 use crate::loss::Loss;
 use crate::observers::Observer;
 use crate::observers::metrics_log::MetricsLog;
-use crate::observers::tensorboard::TensorBoardLog;
 use crate::optimization::adam::Adam;
 use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder};
-use crate::sampling::{FrameSampler, StageFrames};
+use crate::sampling::{CandidateFrames, FrameSampler};
 use crate::stage::Stage;
 
 /// The parts of a [`Trainer`]. Parts that are not given are made as the configuration says.
@@ -129,7 +128,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         self
     }
 
-    /// Writes metrics, TensorBoard events, checkpoints and the finished file into a folder.
+    /// Writes metrics, checkpoints and the finished file into a folder.
     pub fn run_folder(mut self, folder: RunFolder) -> Self {
         self.folder = Some(folder);
         self
@@ -344,10 +343,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         if let Some(folder) = &folder {
             let mut metrics = MetricsLog::open(&folder.path("metrics.jsonl"))?;
             metrics.truncate_after(state.stage, state.iteration)?;
-            let step = config.train.global_step(state.stage, state.iteration) as u64;
-            let events = TensorBoardLog::create(&folder.path("events"), (step > 0).then_some(step + 1), &config.train)?;
             all.push(Box::new(metrics));
-            all.push(Box::new(events));
         }
         all.extend(observers);
         // A graphics card is busy with a single view.
@@ -356,7 +352,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             None => config.device.computes_on_processor(),
         };
         let view_pools = if side_by_side { ViewPools::new(config.train.batch_size) } else { ViewPools::none() };
-        let stage_frames = StageFrames::new(config.train.coarse_times, &data.train);
+        let candidates = CandidateFrames::new(&data.train);
         Ok(Trainer {
             config,
             device,
@@ -371,7 +367,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             observers: all,
             stop,
             sampler,
-            stage_frames,
+            candidates,
             regularizers,
             profile: Profile::off(),
             view_pools,

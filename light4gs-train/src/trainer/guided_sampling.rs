@@ -49,7 +49,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         if seeds.is_empty() {
             return Ok(());
         }
-        let times = self.stage_frames.of(Stage::Fine).times.len();
+        let times = self.candidates.times.len();
         let deviation = self.config.train.guided_sampling.lifetime as f32 / (times.max(2) - 1) as f32;
         let before = self.state.scene.gaussians.len();
         let field = self.state.scene.field.valid();

@@ -37,7 +37,7 @@ impl GroupRates {
         let Config { train, compression, .. } = config;
         let rates = &train.learning_rate;
         let steps = rates.schedule_steps.unwrap_or(train.iterations(stage));
-        let scale = if rates.scale_by_extent { f64::from(extent) } else { 1.0 };
+        let scale = f64::from(extent);
         let decay =
             |first: f64, last: f64| ExponentialDecay::new(first * scale, last * scale, steps).at(iteration as f64);
         let attribute = |attribute: &Attribute| {

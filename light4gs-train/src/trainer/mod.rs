@@ -53,7 +53,7 @@ use crate::observers::{Observer, SceneInTraining, StepReport};
 use crate::optimization::adam::Adam;
 use crate::regularizer::Regularizer;
 use crate::run::{Checkpoint, RunFolder, SaveError, checkpoint_name, list_checkpoints};
-use crate::sampling::{FrameSampler, StageFrames};
+use crate::sampling::{CandidateFrames, FrameSampler};
 use crate::stage::Stage;
 use background::Background;
 use list_room::ListRoom;
@@ -123,7 +123,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     observers: Vec<Box<dyn Observer>>,
     stop: Arc<AtomicBool>,
     sampler: Box<dyn FrameSampler>,
-    stage_frames: StageFrames,
+    candidates: CandidateFrames,
     regularizers: Vec<Box<dyn Regularizer<F>>>,
     profile: Profile,
     view_pools: ViewPools,

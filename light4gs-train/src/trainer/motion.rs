@@ -4,9 +4,8 @@ use std::collections::BTreeMap;
 
 use burn::module::Param;
 use burn::tensor::Tensor;
-use light4gs_data::Frame;
 use light4gs_model::parameters::{ParameterVisitor, visit_parameters};
-use light4gs_model::{DeformationField, DynamicScene, FinePosition, PositionGradients, SceneAtRest};
+use light4gs_model::{DeformationField, DynamicScene, FinePosition, SceneAtRest};
 use rand::Rng;
 
 use super::Trainer;
@@ -16,7 +15,6 @@ use crate::error::TrainError;
 use crate::optimization::gradients::GradientSums;
 use crate::optimization::parameters::ParameterGroup;
 use crate::randomness::{Purpose, generator};
-use crate::sampling::BatchRequest;
 use crate::stage::Stage;
 
 /// Prefix of the paths of a field's parameters in the scene.
@@ -32,7 +30,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         FinePosition {
             iteration,
             iterations: self.config.train.iterations(Stage::Fine),
-            times: self.stage_frames.of(Stage::Fine).times.len(),
+            times: self.candidates.times.len(),
             window: window(iteration),
             window_before: window(iteration.saturating_sub(1)),
             seed,
@@ -51,36 +49,6 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let position = self.fine_position(iteration);
         let (field, scene) = parts(&mut self.state.scene, self.data.extent);
         field.begin_step(&scene, &position);
-    }
-
-    /// Gives the field gradients of further views, if it needs them before this iteration of the fine stage.
-    pub(super) fn refine_motion(&mut self, iteration: usize) -> Result<(), TrainError> {
-        let position = self.fine_position(iteration);
-        let batch_size = self.state.scene.field.refinement_views(&position);
-        if batch_size == 0 {
-            return Ok(());
-        }
-        let stage = Stage::Fine;
-        let indices = self.sampled(&BatchRequest { batch_size, ..self.batch_request(stage, iteration) })?;
-        let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
-        let pass = self.view_pass(stage, iteration, 1);
-        let means = &self.state.scene.gaussians.means;
-        let mut views = Vec::with_capacity(frames.len());
-        // As many at a time as in a step, for their memory.
-        for frames in frames.chunks(self.config.train.batch_size.max(1)) {
-            let (seen, ()) = pass.run(&self.state.scene, frames, &self.view_pools, &self.profile, || ())?;
-            for (mut view, frame) in seen.into_iter().zip(frames) {
-                if let Some(gradients) = view.gradients.remove(means.id) {
-                    views.push(PositionGradients { time: frame.time, gradients: gradients.reshape(means.dims()) });
-                }
-            }
-        }
-        let (field, scene) = parts(&mut self.state.scene, self.data.extent);
-        for renewed in field.refine(&scene, &views, &position) {
-            self.state.adam.reset_elements(&format!("{FIELD}.{}", renewed.path), &renewed.elements);
-        }
-        self.profile.lap("refinement of motion");
-        Ok(())
     }
 
     /// Adds the gradients of the field's own regularizer, and returns its value, `[1]`.
@@ -150,7 +118,7 @@ mod tests {
     use burn::module::Module;
     use burn::tensor::{Device, TensorData, s};
     use light4gs_data::{Camera, Frame, PointCloud, RgbImage8, Scene, SplitFrames};
-    use light4gs_model::{GaussianTensors, LearningRate, ModelError, Renewed, ScenePoints};
+    use light4gs_model::{GaussianTensors, LearningRate, ModelError, ScenePoints};
     use rand::SeedableRng;
 
     use super::*;
@@ -210,25 +178,6 @@ mod tests {
             self.count([0.0, 1.0]);
             let [_, steps] = self.calls()[..] else { unreachable!() };
             assert_eq!(steps as usize, position.iteration);
-        }
-
-        fn refinement_views(&self, position: &FinePosition) -> usize {
-            if position.iteration == 4 { 3 } else { 0 }
-        }
-
-        fn refine(
-            &mut self,
-            scene: &SceneAtRest<'_>,
-            views: &[PositionGradients],
-            position: &FinePosition,
-        ) -> Vec<Renewed> {
-            assert_eq!((position.iteration, views.len()), (4, 3));
-            for view in views {
-                assert_eq!(view.gradients.dims(), scene.gaussians.means.dims());
-                assert!(view.gradients.clone().abs().max().into_scalar::<f32>() > 0.0, "time {}", view.time);
-            }
-            self.fast = Param::initialized(self.fast.id, (self.fast.val() * 0.5).detach().require_grad());
-            vec![Renewed { path: "fast", elements: vec![0] }]
         }
 
         fn regularizer(&self, scene: &SceneAtRest<'_>, _: &FinePosition) -> Option<Tensor<1>> {

@@ -50,7 +50,6 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.profile.begin_step();
         if stage == Stage::Fine {
             self.begin_motion_step(iteration);
-            self.refine_motion(iteration)?;
         }
         let indices = self.batch(stage, iteration)?;
         let batch = indices.len();
@@ -156,7 +155,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let train = &self.config.train;
         BatchRequest {
             frames: &self.data.train,
-            candidates: self.stage_frames.of(stage),
+            candidates: &self.candidates,
             batch_size: train.batch_size.max(1),
             stage,
             iteration,

@@ -149,7 +149,6 @@ fn every_configuration_makes_a_file_that_decodes() {
         &["compression.sh.model=mixture_of_logistics", "compression.profile=paper"],
         &["compression.sh.model=channel_autoregressive"],
         &["compression.sh.model=hexplane_coupled"],
-        &["compression.steps.per_scale=true"],
         &["model.sh_degree=0"],
         &["model.sh_degree=2"],
         &["model.hexplane.multipliers=[1]"],

@@ -8,7 +8,7 @@ use light4gs_model::ops::skinning::{SkinningInputs, skin};
 use light4gs_tests::golden::{assert_close, assert_close_relative, cpu_devices, devices, values_of};
 use light4gs_tests::random::Random;
 
-const INPUTS: [&str; 6] = ["means", "orientations", "stillness", "anchors", "precisions", "poses"];
+const INPUTS: [&str; 6] = ["means", "quats", "stillness", "anchors", "precisions", "poses"];
 /// The node that stands still.
 const STILL: [f64; 16] = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
 
@@ -24,7 +24,7 @@ impl Case {
     /// Gaussians and nodes in a box; poses of any numbers, since nothing asks for rotations.
     fn random(count: usize, nodes: usize, affinities: usize, random: &mut Random) -> Self {
         let mut uniform = |count: usize, low: f64, high: f64| (0..count).map(|_| random.uniform(low, high)).collect();
-        let mut inputs: [Vec<f64>; 6] = [
+        let inputs: [Vec<f64>; 6] = [
             uniform(3 * count, -1.0, 1.0),
             uniform(4 * count, -1.0, 1.0),
             uniform((1 + affinities) * count, -3.0, 1.0),
@@ -32,13 +32,12 @@ impl Case {
             uniform(nodes, 0.5, 6.0),
             uniform(16 * nodes, -1.0, 1.0),
         ];
-        inputs[1] = side_by_side([(&inputs[1], 4), (&uniform(3 * count, -1.0, 1.0), 3)]);
         Self { inputs, affinities }
     }
 
     /// Columns of the inputs.
     fn columns(&self) -> [usize; 6] {
-        [3, 7, 1 + self.affinities, 3 + self.affinities, 1, 16]
+        [3, 4, 1 + self.affinities, 3 + self.affinities, 1, 16]
     }
 
     fn leaves(&self, device: &Device) -> [Tensor<2>; 6] {
@@ -58,7 +57,7 @@ impl Case {
         operation: impl Fn(SkinningInputs) -> Tensor<2>,
     ) -> (Vec<f32>, [Vec<f32>; 6]) {
         let leaves = self.leaves(&device.clone().autodiff());
-        let [means, orientations, stillness, anchors, precisions, poses] = leaves.clone();
+        let [means, quats, stillness, anchors, precisions, poses] = leaves.clone();
         let places = anchors.clone().narrow(1, 0, 3);
         let mut nodes = vec![places, precisions, poses];
         if self.affinities > 0 {
@@ -66,8 +65,7 @@ impl Case {
         }
         let moved = operation(SkinningInputs {
             means,
-            quats: columns(orientations.clone(), 0..4),
-            vectors: Some(columns(orientations, 4..7)),
+            quats,
             affinities: (self.affinities > 0).then(|| columns(stillness.clone(), 1..1 + self.affinities)),
             stillness: columns(stillness, 0..1),
             nodes: Tensor::cat(nodes, 1),
@@ -80,7 +78,7 @@ impl Case {
 
     /// Every number of the output in float64, with weights as if the Gaussians were at `weighed` `[N, 3]`.
     fn twin(&self, weighed: &[f64]) -> Vec<f64> {
-        let [means, orientations, stillness, anchors, precisions, poses] = &self.inputs;
+        let [means, quats, stillness, anchors, precisions, poses] = &self.inputs;
         let [_, _, own, place, ..] = self.columns();
         let mut moved = Vec::new();
         for i in 0..stillness.len() / own {
@@ -105,32 +103,23 @@ impl Case {
             }
             let quat = |q: &[f64]| glam::DQuat::from_xyzw(q[1], q[2], q[3], q[0]);
             // Not `*`, which asks for unit quaternions in debug builds.
-            let (a, b) = (quat(&pose[12..]), quat(&orientations[7 * i..]));
+            let (a, b) = (quat(&pose[12..]), quat(&quats[4 * i..]));
             let (u, v) = (a.xyz(), b.xyz());
             moved.push(a.w * b.w - u.dot(v));
             moved.extend((a.w * v + b.w * u + u.cross(v)).to_array());
-            let vector = &orientations[7 * i + 4..7 * i + 7];
-            moved.extend((0..3).map(|row| (0..3).map(|k| pose[3 * row + k] * vector[k]).sum::<f64>()));
         }
         moved
     }
 }
 
-/// Rows of two matrices, given with their columns, as rows of one.
-fn side_by_side([(first, columns), (second, others)]: [(&[f64], usize); 2]) -> Vec<f64> {
-    first.chunks(columns).zip(second.chunks(others)).flat_map(|rows| [rows.0, rows.1].concat()).collect()
-}
-
-/// Weights of a loss over the output: of positions and quaternions, then of vectors.
+/// Weights of a loss over the output.
 fn loss_weights(count: usize, random: &mut Random) -> Vec<f64> {
-    let moved = random.normals(7 * count);
-    side_by_side([(&moved, 7), (&random.normals(3 * count), 3)])
+    random.normals(7 * count)
 }
 
 /// The operation in plain ones.
 fn plain(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
-    let orientations = Tensor::cat(vec![quats, vectors.expect("all cases have vectors")], 1);
+    let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
     let device = means.device();
     let [places, precisions, poses] =
         [(0, 3), (3, 1), (4, 16)].map(|(first, count)| nodes.clone().narrow(1, first, count));
@@ -144,14 +133,10 @@ fn plain(inputs: SkinningInputs) -> Tensor<2> {
     let weights = softmax(Tensor::cat(vec![logits, stillness], 1), 1);
     let still = Tensor::<1>::from_floats(STILL.map(|value| value as f32), &device).unsqueeze::<2>();
     let pose = weights.matmul(Tensor::cat(vec![poses, still], 0));
-    let [p, m, q] = [pose.split(1, 1), means.split(1, 1), orientations.split(1, 1)];
+    let [p, m, q] = [pose.split(1, 1), means.split(1, 1), quats.split(1, 1)];
     let position = |row: usize| {
         let turned = p[3 * row].clone() * m[0].clone() + p[3 * row + 1].clone() * m[1].clone();
         turned + p[3 * row + 2].clone() * m[2].clone() + p[9 + row].clone()
-    };
-    let vector = |row: usize| {
-        let turned = p[3 * row].clone() * q[4].clone() + p[3 * row + 1].clone() * q[5].clone();
-        turned + p[3 * row + 2].clone() * q[6].clone()
     };
     let term = |a: usize, b: usize| p[12 + a].clone() * q[b].clone();
     Tensor::cat(
@@ -163,9 +148,6 @@ fn plain(inputs: SkinningInputs) -> Tensor<2> {
             term(0, 1) + term(1, 0) + term(2, 3) - term(3, 2),
             term(0, 2) - term(1, 3) + term(2, 0) + term(3, 1),
             term(0, 3) + term(1, 2) - term(2, 1) + term(3, 0),
-            vector(0),
-            vector(1),
-            vector(2),
         ],
         1,
     )
@@ -196,7 +178,7 @@ fn assert_alike(what: &str, found: &(Vec<f32>, [Vec<f32>; 6]), expected: &(Vec<f
     let term = |(output, weights): (&[f32], &[f64])| -> f32 {
         output.iter().zip(weights).map(|(output, weight)| (output * *weight as f32).abs()).sum()
     };
-    let terms = expected.0.chunks(10).zip(weights.chunks(10)).map(term).fold(0.0, f32::max);
+    let terms = expected.0.chunks(7).zip(weights.chunks(7)).map(term).fold(0.0, f32::max);
     for (k, input) in INPUTS.iter().enumerate() {
         let what = format!("{what}: gradient of {input}");
         let largest = expected.1[k].iter().fold(0.0f32, |most, value| most.max(value.abs()));
@@ -323,37 +305,19 @@ fn tensors_may_lie_in_memory_as_they_like() {
     for (name, device) in devices() {
         let expected = case.run(&device, &weights, skin);
         let found = case.run(&device, &weights, |inputs| {
-            let SkinningInputs { means, quats, vectors, stillness, affinities, nodes } = inputs;
-            let [vectors, affinities] = [vectors, affinities].map(|tensor| tensor.expect("this case has them"));
-            let gaussians = Tensor::cat(vec![stillness, affinities, means, quats, vectors], 1);
+            let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
+            let affinities = affinities.expect("this case has them");
+            let gaussians = Tensor::cat(vec![stillness, affinities, means, quats], 1);
             let nodes = Tensor::cat(vec![nodes.clone().transpose(), nodes.transpose()], 0);
             skin(SkinningInputs {
                 means: gaussians.clone().narrow(1, 3, 3),
                 quats: gaussians.clone().narrow(1, 6, 4),
-                vectors: Some(gaussians.clone().narrow(1, 10, 3)),
                 stillness: gaussians.clone().narrow(1, 0, 1),
                 affinities: Some(gaussians.narrow(1, 1, 2)),
                 nodes: nodes.narrow(0, 22, 22).transpose(),
             })
         });
         assert!(found == expected, "{name}");
-    }
-}
-
-/// Without vectors there is less to do, and all else is the same.
-#[test]
-fn vectors_may_be_left_out() {
-    let mut random = Random::new(360);
-    let case = Case::random(300, 9, 3, &mut random);
-    let weights = random.normals(7 * 300);
-    for (name, device) in devices() {
-        let with = case.run(&device, &weights, |inputs| skin(inputs).narrow(1, 0, 7));
-        let without = case.run(&device, &weights, |inputs| {
-            let vectors = inputs.vectors.clone().expect("all cases have vectors");
-            // They stay on the tape, with a gradient of zero.
-            skin(SkinningInputs { vectors: None, ..inputs }) + vectors.sum_dim(1) * 0.0
-        });
-        assert!(with == without, "{name}");
     }
 }
 
@@ -373,5 +337,5 @@ fn no_gaussian_is_no_error() {
 fn a_wrong_shape_is_named() {
     let mut case = Case::random(5, 3, 0, &mut Random::new(340));
     case.inputs[2].push(1.0);
-    case.run(&Device::flex(), &[0.0; 50], skin);
+    case.run(&Device::flex(), &[0.0; 35], skin);
 }

@@ -10,7 +10,7 @@ use light4gs_tests::program::{TINY_COMPRESSION, Workspace, assert_refused, asser
 #[test]
 fn a_scene_goes_all_the_way() {
     let w = trained();
-    let expected = ["checkpoints", "config.toml", "eval.json", "events", "metrics.jsonl", "renders", "report.html"];
+    let expected = ["checkpoints", "config.toml", "eval.json", "metrics.jsonl", "renders", "report.html"];
     for name in expected.iter().chain(&["run.json", "scene.l4gs"]) {
         assert!(w.names("run").contains(&name.to_string()), "{name} is missing: {:?}", w.names("run"));
     }

@@ -9,9 +9,7 @@ use light4gs_codec::MotionArrays;
 use super::hexplane::HexPlaneField;
 use super::nodes::NodesField;
 use super::still::StillField;
-use super::{
-    DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest, ScenePoints,
-};
+use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, ScenePoints};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
@@ -88,19 +86,6 @@ macro_rules! built_in_fields {
 
             fn begin_step(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
                 each!(self, field => field.begin_step(scene, position));
-            }
-
-            fn refinement_views(&self, position: &FinePosition) -> usize {
-                each!(self, field => field.refinement_views(position))
-            }
-
-            fn refine(
-                &mut self,
-                scene: &SceneAtRest<'_>,
-                views: &[PositionGradients],
-                position: &FinePosition,
-            ) -> Vec<Renewed> {
-                each!(self, field => field.refine(scene, views, position))
             }
 
             fn passing(&self, attribute: &Attribute, moment: &Moment) -> Option<Vec<f32>> {

@@ -22,9 +22,7 @@ use light4gs_codec::MotionArrays;
 pub use built_in::{BuiltInField, BuiltInFieldConfig};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use hexplane::{HexPlaneField, HexPlaneFieldConfig};
-pub use nodes::{
-    AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, SHADING, STILLNESS,
-};
+pub use nodes::{AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS};
 pub use still::StillField;
 
 use super::arrays::ModelError;
@@ -101,27 +99,6 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     /// ones. Shapes must not change, since the optimizer's moments belong to them.
     fn begin_step(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
         let _ = (scene, position);
-    }
-
-    /// The number of training views of which [`Self::refine`] needs the gradients before an iteration of the fine stage.
-    /// With 0 it is not called. The views are drawn like those of a training step.
-    fn refinement_views(&self, position: &FinePosition) -> usize {
-        let _ = position;
-        0
-    }
-
-    /// Called after [`Self::begin_step`], before those iterations of the fine stage for which
-    /// [`Self::refinement_views`] asks for gradients. As there, values may be changed, but not shapes. Returns the
-    /// numbers that begin anew, of which the optimizer then forgets what it knows. The gradients are computed for this
-    /// call, so that a checkpoint needs no statistics.
-    fn refine(
-        &mut self,
-        scene: &SceneAtRest<'_>,
-        views: &[PositionGradients],
-        position: &FinePosition,
-    ) -> Vec<Renewed> {
-        let _ = (scene, views, position);
-        Vec::new()
     }
 
     /// The numbers of a further attribute for a Gaussian that stands still and is there around one moment only. `None`: as
@@ -206,24 +183,6 @@ pub struct Moment {
     pub time: f32,
     /// Its standard deviation, above 0.
     pub deviation: f32,
-}
-
-/// How the loss of a training view depends on the positions of the Gaussians.
-#[derive(Clone, Debug)]
-pub struct PositionGradients {
-    /// The view's time in [0, 1].
-    pub time: f32,
-    /// `[N, 3]`: gradient of the view's loss with respect to the canonical positions, per world unit. Not on a tape.
-    pub gradients: Tensor<2>,
-}
-
-/// Numbers of a parameter that begin anew.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Renewed {
-    /// The parameter's path within the field.
-    pub path: &'static str,
-    /// Indices of the numbers in the flattened parameter.
-    pub elements: Vec<usize>,
 }
 
 /// The position of a run in its fine stage when a field is called.

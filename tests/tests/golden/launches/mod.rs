@@ -122,7 +122,7 @@ fn scores(case: &str) -> Vec<Outcome> {
         significance.add(&Splatter::new([0.0; 3], 3), gaussians.clone(), camera);
         let expected = SCORES.map(|(name, _)| golden.values(&format!("cam{k}.sig.{name}")));
         let found = SCORES.map(|(_, score)| significance.sums(score));
-        // [N, 4], as the kernel writes them.
+        // [N, 3], as the kernel writes them.
         let found = (0..count).flat_map(|i| found.each_ref().map(|score| score[i] as f32));
         let expected = (0..count).flat_map(|i| expected.each_ref().map(|score| score[i]));
         Outcome::within_share(&format!("scores of cam{k}"), found.collect(), expected.collect(), 2e-5)
@@ -218,7 +218,6 @@ fn skinning(transcript: &mut Transcript) {
             let moved = skin(SkinningInputs {
                 means: tensor(gaussians, 3, -1.0, 1.0),
                 quats: tensor(gaussians, 4, -1.0, 1.0),
-                vectors: (affinities > 0).then(|| tensor(gaussians, 3, -1.0, 1.0)),
                 stillness: tensor(gaussians, 1, -3.0, 1.0),
                 affinities: (affinities > 0).then(|| tensor(gaussians, affinities, -3.0, 1.0)),
                 nodes: tensor(nodes, 20 + affinities, 0.0, 1.0),

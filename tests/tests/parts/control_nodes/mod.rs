@@ -2,7 +2,6 @@
 
 mod golden;
 mod motion;
-mod relocation;
 mod survey;
 
 use burn::module::Param;
@@ -10,7 +9,7 @@ use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Quat, Vec3};
 use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, SceneMeta, decode, encode};
-use light4gs_data::{PointCloud, SH_C0};
+use light4gs_data::PointCloud;
 use light4gs_model::parameters::{ParameterMapper, map_parameters};
 use light4gs_model::{
     BuiltInField, DeformationField, DynamicScene, DynamicSceneConfig, FinePosition, GaussiansConfig, MOST_KNOTS,
@@ -27,18 +26,8 @@ struct Shaken;
 
 impl ParameterMapper for Shaken {
     fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let shaken = [
-            "translations",
-            "rotations",
-            "log_radii",
-            "stillness",
-            "lifetime",
-            "quats",
-            "affinity",
-            "affinities",
-            "shading",
-            "light",
-        ];
+        let shaken =
+            ["translations", "rotations", "log_radii", "stillness", "lifetime", "quats", "affinity", "affinities"];
         if !shaken.iter().any(|name| path.ends_with(name)) {
             return parameter;
         }
@@ -62,7 +51,7 @@ fn many(gaussians: usize, config: NodesFieldConfig, device: &Device) -> DynamicS
     scene
 }
 
-fn configurations() -> [NodesFieldConfig; 8] {
+fn configurations() -> [NodesFieldConfig; 7] {
     let config = NodesFieldConfig::new;
     [
         config().with_nodes(9),
@@ -71,8 +60,7 @@ fn configurations() -> [NodesFieldConfig; 8] {
         config().with_nodes(5).with_lifetime(true),
         config().with_nodes(9).with_affinities(2),
         config().with_nodes(7).with_affinities(3).with_stillness(None).with_lifetime(true),
-        config().with_nodes(6).with_shading(true),
-        config().with_nodes(7).with_affinities(2).with_lifetime(true).with_shading(true),
+        config().with_nodes(7).with_affinities(2).with_lifetime(true),
     ]
 }
 
@@ -84,37 +72,6 @@ fn nothing_moves_when_motion_begins() {
         let moved = scene.at(0.3);
         assert_close("means", &values_of(&moved.means), &values_of(&scene.gaussians.means.val()), 1e-5);
         assert_close("quats", &values_of(&moved.quats), &values_of(&scene.gaussians.quats.val()), 1e-5);
-    }
-}
-
-/// All Gaussians turned upside down, which face a light from above a little.
-struct UpsideDown;
-
-impl ParameterMapper for UpsideDown {
-    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let rows: &[f32] = match path.rsplit('.').next() {
-            // Half a turn about x, less (1, 0, 0, 0).
-            Some("rotations") => &[-1.0, 1.0, 0.0, 0.0],
-            Some("shading") => &[0.0, 0.0, 0.2],
-            Some("light") => &[0.0, 0.0, 2.0],
-            _ => return parameter,
-        };
-        let (dims, device) = (parameter.dims(), parameter.device());
-        let count = dims.iter().product::<usize>() / rows.len();
-        Param::from_tensor(Tensor::from_data(TensorData::new(rows.repeat(count), dims), &device))
-    }
-}
-
-/// Brightness changes by `(R v - v) · light`: with v = (0, 0, 0.2) upside down under a light of 2, by -0.8.
-#[test]
-fn what_turns_away_from_the_light_gets_darker() {
-    for (name, device) in devices() {
-        let config = NodesFieldConfig::new().with_nodes(1).with_shading(true).with_stillness(None);
-        let scene = map_parameters(scene(config, &device), &mut UpsideDown);
-        let brightness = |sh_dc: &Tensor<3>| values_of(&(sh_dc.clone() * SH_C0 + 0.5));
-        let at_rest = brightness(&scene.gaussians.sh_dc.val());
-        let expected: Vec<f32> = at_rest.iter().map(|value| 0.2 * value).collect();
-        assert_close(name, &brightness(&scene.at(0.3).sh_dc), &expected, 1e-6);
     }
 }
 
@@ -135,7 +92,7 @@ fn the_codec_moves_gaussians_as_the_model_does() {
                 assert_close(name, exact.quats.as_flattened(), &values_of(&moved.quats), 1e-4);
                 assert_close(name, &exact.opacity_logits, &values_of(&moved.opacity_logits), 1e-4);
                 assert_close(name, exact.sh_dc.as_flattened(), &values_of(&moved.sh_dc), 1e-4);
-                assert_eq!(exact.sh_dc != data.gaussians.sh_dc, config.shading, "{name}: what gets darker");
+                assert_eq!(exact.sh_dc, data.gaussians.sh_dc, "{name}: colors");
             }
             let again = DynamicScene::<BuiltInField>::from_arrays(&data, &device).unwrap();
             assert_eq!(again.to_arrays(SceneMeta::default()).unwrap(), data, "{name}");
@@ -289,19 +246,6 @@ fn other_networks_are_refused() {
         ("of the affinities are [4, 4, 1], expected [4, 4, 8]", affinities(&|layer| layer.weight.truncate(1))),
         ("of the affinities are [4294967295, 4", affinities(&|layer| layer.outputs = u32::MAX)),
         ("one of the biases of the affinities is 1", affinities(&|layer| layer.bias[0] = 1.0)),
-    ] {
-        assert!(error.contains(expected), "{error}");
-    }
-    let with_shading = self::scene(NodesFieldConfig::new().with_nodes(4).with_shading(true), &Device::flex());
-    let light = |spoil: &dyn Fn(&mut Layer)| {
-        let mut arrays = with_shading.field.to_arrays().unwrap();
-        layer(arrays.network.as_mut().unwrap(), 4, spoil);
-        NodesField::from_arrays(&arrays, None, &Device::flex()).unwrap_err().to_string()
-    };
-    for (expected, error) in [
-        ("the light are [1, 1, 2], expected [1, 1, 3]", light(&|layer| layer.weight.truncate(2))),
-        ("the light are [4294967295, 1", light(&|layer| layer.outputs = u32::MAX)),
-        ("one of the biases of the light is 1", light(&|layer| layer.bias[0] = 1.0)),
     ] {
         assert!(error.contains(expected), "{error}");
     }

@@ -9,11 +9,9 @@
 //! |---|---|
 //! | `trajectory` | trajectories over time, and where nodes are on them |
 //! | `placement` | where the nodes are when motion begins |
-//! | `relocation` | nodes that move to where motion is not explained, while training |
 //! | `survey` | what all times have shown before a window widens |
 //! | `affinity` | which nodes a Gaussian follows beyond its place |
 //! | `lifetime` | what comes and goes |
-//! | `shading` | what turns away from the light |
 //! | `stream` | the same as operations of the codec, in a file |
 //! | `plain` | nodes, Gaussians and poses as plain numbers |
 //! | `weights` | how much each Gaussian follows each node, as numbers |
@@ -22,8 +20,6 @@ mod affinity;
 mod lifetime;
 mod placement;
 mod plain;
-mod relocation;
-mod shading;
 mod stream;
 mod survey;
 mod trajectory;
@@ -39,11 +35,8 @@ use light4gs_codec::MotionArrays;
 
 pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
-pub use shading::SHADING;
 
-use super::{
-    DeformationField, FinePosition, LearningRate, Moment, PositionGradients, Renewed, SceneAtRest, ScenePoints,
-};
+use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, ScenePoints};
 use crate::ops::columns::columns;
 use crate::ops::node_poses::{NodeParameters, pose};
 use crate::ops::node_regularizer::{Regularization, regularize};
@@ -92,9 +85,6 @@ pub struct NodesFieldConfig {
     /// Numbers by which each Gaussian learns which nodes it follows beyond its place; 0 to [`MOST_AFFINITIES`].
     #[config(default = 0)]
     pub affinities: usize,
-    /// Every Gaussian learns how its brightness changes as it turns.
-    #[config(default = false)]
-    pub shading: bool,
     /// Weight of the term that keeps neighboring nodes in place as seen from each other, for distances as shares of the
     /// scene's extent.
     #[config(default = 1.0)]
@@ -111,15 +101,6 @@ pub struct NodesFieldConfig {
     /// How much faster than the usual rate anchors (as shares of the scene's extent) and logarithms of radii are learned.
     #[config(default = 5.0)]
     pub anchor_rate: f64,
-    /// Nodes that do little are moved to where motion is not explained, every so many iterations; 0: they never are.
-    #[config(default = 0)]
-    pub relocation_interval: usize,
-    /// The share of the fine stage after which nodes are no longer moved.
-    #[config(default = 0.67)]
-    pub relocation_until: f64,
-    /// At most this share of the nodes is moved at a time.
-    #[config(default = 0.0625)]
-    pub relocation_share: f64,
 }
 
 /// `B` nodes on trajectories of `K` knots. Lengths are shares of `unit`.
@@ -148,8 +129,6 @@ pub struct NodesField {
     rotations: Param<Tensor<2>>,
     /// `[B, H]`: the nodes' own affinities, where Gaussians have any.
     affinities: Option<Param<Tensor<2>>>,
-    /// `[1, 3]`: where light comes from, where brightness changes as Gaussians turn.
-    light: Option<Param<Tensor<2>>>,
     /// `[1 + K, 3 B]`, constants: after a survey, the middle of each node's object before anything moves, and knots of its way.
     ways: Option<Param<Tensor<2>>>,
     /// `[1]`, a constant: the scene's extent, world units.
@@ -170,7 +149,6 @@ impl NodesField {
             translations: zeros([knots, 3 * nodes]),
             rotations: zeros([knots, 4 * nodes]),
             affinities: (config.affinities > 0).then(|| zeros([nodes, config.affinities])),
-            light: config.shading.then(|| shading::first_light(device)),
             ways: None,
             unit: Param::from_tensor(Tensor::ones([1], device)).set_require_grad(false),
             config,
@@ -199,7 +177,7 @@ impl NodesField {
         }
     }
 
-    /// Moved positions and quaternions `[N, 7]`, with shadings `[N, 10]`, from the nodes `[B, 20 + H]` at a time.
+    /// Moved positions and quaternions `[N, 7]`, from the nodes `[B, 20 + H]` at a time.
     fn skinned(&self, canonical: &GaussianTensors, nodes: Tensor<2>) -> Tensor<2> {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
@@ -207,7 +185,6 @@ impl NodesField {
         skin(SkinningInputs {
             means: canonical.means.clone(),
             quats: canonical.quats.clone(),
-            vectors: canonical.further(SHADING).cloned(),
             stillness,
             affinities: canonical.further(AFFINITY).cloned(),
             nodes,
@@ -233,8 +210,7 @@ impl DeformationField for NodesField {
         };
         let affinity = (config.affinities > 0).then(|| affinity::attribute(config.affinities));
         let lifetime = config.lifetime.then(lifetime::attribute);
-        let shading = config.shading.then(shading::attribute);
-        config.stillness.map(row).into_iter().chain(affinity).chain(lifetime).chain(shading).collect()
+        config.stillness.map(row).into_iter().chain(affinity).chain(lifetime).collect()
     }
 
     /// One node that does not move, until there is a cloud to make more from.
@@ -250,13 +226,7 @@ impl DeformationField for NodesField {
             Some(lifetime) if self.fades => lifetime::faded(&canonical.opacity_logits, lifetime.clone(), time),
             _ => canonical.opacity_logits.clone(),
         };
-        let sh_dc = match (canonical.further(SHADING), &self.light) {
-            (Some(shading), Some(light)) => {
-                shading::shaded(&canonical.sh_dc, shading.clone(), part(7..10), light.val())
-            }
-            _ => canonical.sh_dc.clone(),
-        };
-        GaussianTensors { means: part(0..3), quats: part(3..7), opacity_logits, sh_dc, ..canonical }
+        GaussianTensors { means: part(0..3), quats: part(3..7), opacity_logits, ..canonical }
     }
 
     fn begin_motion(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
@@ -280,19 +250,6 @@ impl DeformationField for NodesField {
         let translations = self.translations_beyond(low, high);
         let translations = translations.unwrap_or_else(|| trajectory::continued(self.translations.val(), low, high));
         self.translations = renewed(&self.translations, translations);
-    }
-
-    fn refinement_views(&self, position: &FinePosition) -> usize {
-        self.relocation_views(position)
-    }
-
-    fn refine(
-        &mut self,
-        scene: &SceneAtRest<'_>,
-        views: &[PositionGradients],
-        position: &FinePosition,
-    ) -> Vec<Renewed> {
-        self.relocate(scene, views, position)
     }
 
     fn passing(&self, attribute: &Attribute, moment: &Moment) -> Option<Vec<f32>> {

@@ -6,7 +6,7 @@ use super::{MOST_NODES, NodesField, affinity, numbers, tensor};
 use crate::scene::field::{FinePosition, SceneAtRest};
 
 /// Least radius of a node, as a share of the scene's extent.
-pub(super) const LEAST_RADIUS: f32 = 5e-3;
+const LEAST_RADIUS: f32 = 5e-3;
 
 impl NodesField {
     /// The same with nodes at points of the scene that are far from each other, on trajectories that do not move yet.

@@ -16,24 +16,24 @@ pub(super) struct Skinned {
     pub(super) means: Vec<[f32; 3]>,
     pub(super) opacities: Vec<f32>,
     stillness: Vec<f32>,
-    pub(super) anchors: Vec<[f32; 3]>,
-    pub(super) precisions: Vec<f32>,
+    anchors: Vec<[f32; 3]>,
+    precisions: Vec<f32>,
     /// Affinities, none or so many of each Gaussian and of each node.
-    pub(super) affinities: usize,
+    affinities: usize,
     of_gaussians: Vec<f32>,
-    pub(super) of_nodes: Vec<f32>,
+    of_nodes: Vec<f32>,
 }
 
 /// The nodes that count for a Gaussian, with their weights.
 pub(super) type Weights = Vec<(usize, f32)>;
 
 impl Skinned {
-    pub(super) fn nodes(&self) -> usize {
+    fn nodes(&self) -> usize {
         self.anchors.len()
     }
 
-    /// The weights of a Gaussian if some nodes were not there, and the logarithm of the sum by which the softmax divides.
-    pub(super) fn weights(&self, gaussian: usize, without: impl Fn(usize) -> bool) -> (Weights, f32) {
+    /// The weights of a Gaussian.
+    pub(super) fn weights(&self, gaussian: usize) -> Weights {
         let place = &self.means[gaussian];
         let columns = |row: usize| row * self.affinities..(row + 1) * self.affinities;
         let own = &self.of_gaussians[columns(gaussian)];
@@ -42,13 +42,13 @@ impl Skinned {
             affinity - self.precisions[node] * square(place, &self.anchors[node])
         };
         let logits = (0..self.nodes()).map(logit).chain([self.stillness[gaussian]]);
-        let mut weights: Weights = logits.enumerate().filter(|(node, _)| !without(*node)).collect();
+        let mut weights: Weights = logits.enumerate().collect();
         let largest = weights.iter().map(|(_, logit)| *logit).fold(f32::MIN, f32::max);
         weights.iter_mut().for_each(|(_, weight)| *weight = (*weight - largest).exp());
         let sum: f32 = weights.iter().map(|(_, weight)| weight).sum();
         weights.retain(|(_, weight)| *weight > LEAST_WEIGHT * sum);
         weights.iter_mut().for_each(|(_, weight)| *weight /= sum);
-        (weights, largest + sum.ln())
+        weights
     }
 }
 
@@ -56,7 +56,7 @@ impl Skinned {
 pub(super) struct PosesAt(Vec<[f32; 12]>);
 
 impl PosesAt {
-    pub(super) fn moved(&self, node: usize, point: &[f32; 3]) -> [f32; 3] {
+    fn moved(&self, node: usize, point: &[f32; 3]) -> [f32; 3] {
         let pose = &self.0[node];
         std::array::from_fn(|row| {
             let [x, y, z] = point;

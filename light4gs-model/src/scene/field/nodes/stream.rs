@@ -10,8 +10,8 @@ use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Ne
 
 use super::trajectory::{DIAGONAL, ELEMENTS, FACTORS, OTHERS};
 use super::{
-    AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, SHADING, STILLNESS,
-    lifetime, numbers, shading, tensor,
+    AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS, lifetime,
+    numbers, tensor,
 };
 use crate::scene::ModelError;
 use crate::scene::field::DeformationField;
@@ -171,7 +171,6 @@ impl NodesField {
         let stillness = still.then(|| input(STILLNESS, 1));
         let affinity = self.affinities.as_ref().map(|all| (all, input(AFFINITY, all.dims()[1] as u32)));
         let lifetime = self.config.lifetime.then(|| [input("opacity_logits", 1), input(LIFETIME, 2)]);
-        let shading = self.light.as_ref().map(|light| (light, [input("sh_dc", 3), input(SHADING, 3)]));
         let mut description = Description { network, nodes };
         let anchors = numbers(self.world_anchors().transpose());
         let anchors = description.network.constant(time, 1, anchors);
@@ -214,11 +213,6 @@ impl NodesField {
             network.output(faded);
             outputs.push(MotionOutput::NewOpacityLogit);
         }
-        if let Some((light, [sh_dc, shading])) = shading {
-            let shaded = shading::describe(&mut network, [sh_dc, shading, matrix], light.val());
-            network.output(shaded);
-            outputs.push(MotionOutput::NewSh);
-        }
         let network = MotionNetwork { network, sources, outputs };
         MotionArrays { kind: self.kind().to_owned(), network: Some(network), tensors: Vec::new() }
     }
@@ -231,16 +225,14 @@ impl NodesField {
         let wrong = |what: String| ModelError::Motion(format!("the network is not that of control nodes: {what}"));
         let motion = arrays.network.as_ref().ok_or_else(|| wrong("there is none".to_owned()))?;
         let layers: Vec<&Layer> = motion.network.layers().collect();
-        let [still, likes, lives, shades] =
-            [STILLNESS, AFFINITY, LIFETIME, SHADING].map(|name| motion.sources.contains(&source(name)));
-        let expected = 4 + usize::from(likes) + usize::from(shades);
+        let [still, likes, lives] = [STILLNESS, AFFINITY, LIFETIME].map(|name| motion.sources.contains(&source(name)));
+        let expected = 4 + usize::from(likes);
         let (&[anchors, translations, rotations, log_radii, ref others @ ..], true) =
             (layers.as_slice(), layers.len() == expected)
         else {
             return Err(wrong(format!("{} layers, expected {expected}", layers.len())));
         };
         let affinities = others.first().filter(|_| likes);
-        let light = others.last().filter(|_| shades);
         let width = affinities.map_or(0, |layer| layer.inputs as usize);
         if affinities.is_some() && !(1..=MOST_AFFINITIES).contains(&width) {
             return Err(wrong(format!("{width} affinities, expected 1 to {MOST_AFFINITIES}")));
@@ -261,7 +253,6 @@ impl NodesField {
         ]
         .into_iter()
         .chain(affinities.map(|layer| ("affinities", *layer, nodes, width)))
-        .chain(light.map(|layer| ("light", *layer, 1, 3)))
         {
             let found = [layer.outputs as usize, layer.bias.len(), layer.weight.len()];
             let expected = [outputs, outputs, outputs * inputs];
@@ -279,7 +270,6 @@ impl NodesField {
         ]
         .into_iter()
         .chain(affinities.map(|layer| ("biases of the affinities", &layer.bias)))
-        .chain(light.map(|layer| ("biases of the light", &layer.bias)))
         {
             if let Some(number) = numbers.iter().find(|number| **number != 0.0) {
                 return Err(wrong(format!("one of the {name} is {number}, expected 0")));
@@ -287,7 +277,7 @@ impl NodesField {
         }
         let config = NodesFieldConfig::new().with_nodes(nodes);
         let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives);
-        let config = config.with_affinities(width).with_shading(shades);
+        let config = config.with_affinities(width);
         let mut field = Self::zeros(config, nodes, knots, device);
         field.anchors = Param::from_tensor(tensor(anchors.bias.clone(), [3, nodes], device).transpose());
         field.log_radii = Param::from_tensor(tensor(log_radii.bias.clone(), [nodes, 1], device));
@@ -295,9 +285,6 @@ impl NodesField {
         field.rotations = Param::from_tensor(by_node(rotations, nodes, device));
         if let Some(layer) = affinities {
             field.affinities = Some(Param::from_tensor(tensor(layer.weight.clone(), [nodes, width], device)));
-        }
-        if let Some(layer) = light {
-            field.light = Some(Param::from_tensor(tensor(layer.weight.clone(), [1, 3], device)));
         }
         // Then everything but the numbers: the operations are those of such a field.
         let own = field.describe();

@@ -75,7 +75,7 @@ impl NodesField {
         let segments = self.knots() - 3;
         let poses: Vec<PosesAt> = (0..=segments).map(|end| self.poses_at(end as f32 / segments as f32)).collect();
         let rest: Vec<[f32; 3]> = skinned.means.iter().map(|mean| mean.map(|x| x / unit)).collect();
-        let followed: Vec<_> = (0..rest.len()).map(|i| skinned.weights(i, |_| false).0).collect();
+        let followed: Vec<_> = (0..rest.len()).map(|i| skinned.weights(i)).collect();
         // Of each Gaussian, three numbers a time.
         let displacements = |i: usize| -> Vec<f32> {
             let displaced = |poses: &PosesAt| {
