@@ -303,10 +303,7 @@ mod tests {
             assert_eq!((side.to_string().as_str(), name.parse()), (name, Ok(*side)));
         }
         let error = "rihgt".parse::<Side>().unwrap_err();
-        assert_eq!(
-            error.to_string(),
-            "unknown side `rihgt`; the nearest is `right` (it must be one of left, right)"
-        );
+        assert_eq!(error.to_string(), "unknown side `rihgt`; the nearest is `right` (it must be one of left, right)");
         let unreadable = Side::BOUNDS.unreadable(&toml::Value::String("rihgt".to_owned()));
         assert_eq!(unreadable, Some(error.to_string()));
         assert_eq!(Side::BOUNDS.unreadable(&toml::Value::String("left".to_owned())), None);

@@ -112,7 +112,7 @@ macro_rules! keys {
             $(
                 $(#[doc = $meaning:literal])+
                 $(#[serde $serde:tt])?
-                $name:ident: $type:ty $(= $default:expr; $bounds:expr, $source:literal $(, $note:literal)?)?;
+                $name:ident: $type:ty $(= $default:expr; $bounds:expr, $source:literal)?;
             )*
         }
     ) => {

@@ -56,9 +56,7 @@ pub use declaration::check;
 #[doc(hidden)]
 pub use serde;
 
-pub use bounds::{
-    Bounds, DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_INTEGER, RATE, SHARE, THRESHOLD, WEIGHT,
-};
+pub use bounds::{Bounds, DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_INTEGER, RATE, SHARE, THRESHOLD, WEIGHT};
 pub use choice::{Choices, UnknownChoice, nearest};
 pub use declaration::{Entry, KeyTable, Problem, has_no_keys};
 pub use reference::{Key, list, markdown};

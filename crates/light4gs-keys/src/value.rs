@@ -94,9 +94,6 @@ mod tests {
         const THREE: Bounds = Bounds::List { element: &SHARE, length: Some(3) };
         assert_eq!([0.0f32, 0.5, 1.0].problem(&THREE), None);
         assert_eq!(vec![0.5f32; 2].problem(&THREE).as_deref(), Some("is a list of 2; it must be each 0 to 1"));
-        assert_eq!(
-            [0.0f32, 7.0, 1.0].problem(&THREE).as_deref(),
-            Some("has an element that is 7; it must be 0 to 1")
-        );
+        assert_eq!([0.0f32, 7.0, 1.0].problem(&THREE).as_deref(), Some("has an element that is 7; it must be 0 to 1"));
     }
 }

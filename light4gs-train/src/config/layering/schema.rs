@@ -3,7 +3,7 @@
 use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
-use super::super::{Config, ConfigError, Origin};
+use super::super::{Config, ConfigError, KEYS, Origin};
 
 /// The default configuration as a table: every key that exists, with a value of its type.
 pub(in crate::config) fn defaults() -> Table {
@@ -52,11 +52,22 @@ fn check_table(known: &Table, layer: &Table, path: &mut Vec<String>, context: &C
                         found,
                     });
                 }
+                unreadable(value, path, context.origin)?;
             }
         }
         path.pop();
     }
     Ok(())
+}
+
+/// Refuses what serde would refuse, but names the key where serde cannot, in a table that is flattened into another one.
+fn unreadable(value: &Value, path: &[String], origin: &Origin) -> Result<(), ConfigError> {
+    let path = path.join(".");
+    let bounds = KEYS.iter().find(|key| key.path == path).map(|key| key.bounds);
+    match bounds.and_then(|bounds| bounds.unreadable(value)) {
+        Some(problem) => Err(ConfigError::Value { origin: origin.clone(), message: format!("{problem} in `{path}`") }),
+        None => Ok(()),
+    }
 }
 
 /// What was expected and what was found, if they differ.

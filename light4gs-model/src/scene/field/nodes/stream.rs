@@ -159,7 +159,7 @@ impl Description {
 impl NodesField {
     pub(super) fn describe(&self) -> MotionArrays {
         let nodes = self.nodes();
-        let still = self.config.stillness.is_some();
+        let still = self.config.stillness;
         let (mut network, [time, means, quats]) = Network::new([1, 3, 4]);
         let mut sources = vec![MotionSource::Time, source("means"), source("quats")];
         // Further inputs, behind these.
@@ -275,9 +275,13 @@ impl NodesField {
                 return Err(wrong(format!("one of the {name} is {number}, expected 0")));
             }
         }
-        let config = NodesFieldConfig::new().with_nodes(nodes);
-        let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives);
-        let config = config.with_affinities(width);
+        let config = NodesFieldConfig {
+            count: nodes,
+            stillness: still,
+            lifetime: lives,
+            affinities: width,
+            ..Default::default()
+        };
         let mut field = Self::zeros(config, nodes, knots, device);
         field.anchors = Param::from_tensor(tensor(anchors.bias.clone(), [3, nodes], device).transpose());
         field.log_radii = Param::from_tensor(tensor(log_radii.bias.clone(), [nodes, 1], device));
