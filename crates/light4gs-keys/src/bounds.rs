@@ -3,7 +3,7 @@
 
 use std::fmt;
 
-use crate::{Choices, KeyValue, nearest};
+use crate::Choices;
 
 /// The values that a key may have. A table's conditions on several keys together are checked elsewhere.
 #[derive(Clone, Copy, Debug)]
@@ -102,7 +102,7 @@ impl fmt::Display for Bounds {
 }
 
 /// A number without long runs of zeros.
-struct Short(f64);
+pub(crate) struct Short(pub(crate) f64);
 
 impl fmt::Display for Short {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -132,48 +132,5 @@ impl Bounds {
             }
             _ => None,
         }
-    }
-
-    fn outside(&self, shown: impl fmt::Display) -> Option<String> {
-        Some(format!("is {shown}; it must be {self}"))
-    }
-
-    pub(crate) fn problem_of_whole(&self, value: u64) -> Option<String> {
-        let holds = match self {
-            Whole { least, most } => (*least..=*most).contains(&value),
-            WholeOrNone { least, most } => value == 0 || (*least..=*most).contains(&value),
-            _ => true,
-        };
-        if holds { None } else { self.outside(value) }
-    }
-
-    pub(crate) fn problem_of_number(&self, value: f64) -> Option<String> {
-        let Number { least, most } = self else { return None };
-        if !value.is_finite() {
-            return self.outside("no finite number");
-        }
-        // Compared as float32, to which all numbers are converted: some keys are float32, and their 1e-6 is a little
-        // below that of f64.
-        let holds = (*least as f32..=*most as f32).contains(&(value as f32));
-        if holds { None } else { self.outside(Short(value)) }
-    }
-
-    pub(crate) fn problem_of_text(&self, value: &str) -> Option<String> {
-        let NameOrNone { what, names, .. } = self else { return None };
-        let names = names();
-        if value.is_empty() || names.contains(&value) {
-            return None;
-        }
-        let nearest = nearest(names, value)?;
-        Some(format!("is `{value}`, and the nearest {what} is `{nearest}`; it must be {self}"))
-    }
-
-    pub(crate) fn problem_of_list<T: KeyValue>(&self, values: &[T]) -> Option<String> {
-        let List { element, length } = self else { return None };
-        if length.is_some_and(|length| length != values.len()) {
-            return self.outside(format_args!("a list of {}", values.len()));
-        }
-        let problem = values.iter().find_map(|value| value.problem(element))?;
-        Some(format!("has an element that {problem}"))
     }
 }

@@ -5,7 +5,7 @@
 //! well. But none of them has all of: bounds that are checked before values are used, sources, and defaults from
 //! another crate; and each would bring crates of its own.
 
-use crate::{Bounds, KeyValue};
+use crate::{Bounds, Problem};
 
 /// A table of the configuration.
 pub trait KeyTable {
@@ -24,26 +24,6 @@ impl KeyTable for () {
     const ENTRIES: &'static [Entry] = &[];
 
     fn problems(&self, _: &str, _: &mut Vec<Problem>) {}
-}
-
-/// One value that cannot be used.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
-    /// Full path of the key, such as `train.prune.fraction`.
-    pub key: String,
-    /// What is wrong and what would be right.
-    pub message: String,
-}
-
-/// Appends what is wrong with one value.
-#[doc(hidden)]
-pub fn check<T: KeyValue>(value: &T, bounds: &Bounds, at: &str, name: &str, into: &mut Vec<Problem>) {
-    into.extend(value.problem(bounds).map(|message| Problem { key: format!("{at}{name}"), message }));
-}
-
-/// The lines of a comment, joined to one.
-pub(crate) fn joined(lines: &[&str]) -> String {
-    lines.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
 }
 
 /// An entry of a table.
@@ -191,6 +171,6 @@ macro_rules! problems {
     };
     ([$($serde:tt)?] $self:ident $at:ident $into:ident $name:ident; $bounds:expr) => {{
         const BOUNDS: $crate::Bounds = $bounds;
-        $crate::check(&$self.$name, &BOUNDS, $at, stringify!($name), $into)
+        $crate::KeyValue::check(&$self.$name, &BOUNDS, &format!("{}{}", $at, stringify!($name)), $into)
     }};
 }

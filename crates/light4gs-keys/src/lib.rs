@@ -42,6 +42,7 @@
 mod bounds;
 mod choice;
 mod declaration;
+mod names;
 pub mod optional;
 mod reference;
 mod value;
@@ -52,12 +53,10 @@ extern crate self as light4gs_keys;
 #[doc(hidden)]
 pub use choice::meaning;
 #[doc(hidden)]
-pub use declaration::check;
-#[doc(hidden)]
 pub use serde;
 
 pub use bounds::{Bounds, DECIBELS, INTERVAL, ITERATION, ITERATIONS, MOST_INTEGER, RATE, SHARE, THRESHOLD, WEIGHT};
-pub use choice::{Choices, UnknownChoice, nearest};
-pub use declaration::{Entry, KeyTable, Problem, has_no_keys};
+pub use declaration::{Entry, KeyTable, has_no_keys};
+pub use names::{Choices, UnknownChoice, nearest};
 pub use reference::{Key, list, markdown};
-pub use value::KeyValue;
+pub use value::{KeyValue, Problem};

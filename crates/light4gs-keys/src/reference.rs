@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::declaration::joined;
+use crate::names::joined;
 use crate::{Bounds, Entry, KeyTable};
 
 /// A key of the configuration.

@@ -1,8 +1,19 @@
 //! The types that a key may have, and the check of a value against its bounds.
 
+use std::fmt;
 use std::path::PathBuf;
 
-use crate::Bounds;
+use crate::bounds::Short;
+use crate::{Bounds, nearest};
+
+/// One value that cannot be used.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Problem {
+    /// Full path of the key, such as `train.prune.fraction`.
+    pub key: String,
+    /// What is wrong and what would be right.
+    pub message: String,
+}
 
 /// A type that a key may have.
 pub trait KeyValue {
@@ -12,6 +23,11 @@ pub trait KeyValue {
         let _ = bounds;
         None
     }
+
+    /// Appends what is wrong with the value of a key, which is named by its full path.
+    fn check(&self, bounds: &Bounds, key: &str, into: &mut Vec<Problem>) {
+        into.extend(self.problem(bounds).map(|message| Problem { key: key.to_owned(), message }));
+    }
 }
 
 impl KeyValue for bool {}
@@ -20,27 +36,66 @@ impl KeyValue for PathBuf {}
 
 impl KeyValue for String {
     fn problem(&self, bounds: &Bounds) -> Option<String> {
-        bounds.problem_of_text(self)
+        let Bounds::NameOrNone { what, names, .. } = bounds else { return None };
+        let names = names();
+        if self.is_empty() || names.contains(&self.as_str()) {
+            return None;
+        }
+        let nearest = nearest(names, self)?;
+        Some(format!("is `{self}`, and the nearest {what} is `{nearest}`; it must be {bounds}"))
     }
+}
+
+fn outside(shown: impl fmt::Display, bounds: &Bounds) -> Option<String> {
+    Some(format!("is {shown}; it must be {bounds}"))
+}
+
+fn of_whole(value: u64, bounds: &Bounds) -> Option<String> {
+    let holds = match bounds {
+        Bounds::Whole { least, most } => (*least..=*most).contains(&value),
+        Bounds::WholeOrNone { least, most } => value == 0 || (*least..=*most).contains(&value),
+        _ => true,
+    };
+    if holds { None } else { outside(value, bounds) }
+}
+
+fn of_number(value: f64, bounds: &Bounds) -> Option<String> {
+    let Bounds::Number { least, most } = bounds else { return None };
+    if !value.is_finite() {
+        return outside("no finite number", bounds);
+    }
+    // Compared as float32, to which all numbers are converted: some keys are float32, and their 1e-6 is a little below
+    // that of f64.
+    let holds = (*least as f32..=*most as f32).contains(&(value as f32));
+    if holds { None } else { outside(Short(value), bounds) }
+}
+
+fn of_list<T: KeyValue>(values: &[T], bounds: &Bounds) -> Option<String> {
+    let Bounds::List { element, length } = bounds else { return None };
+    if length.is_some_and(|length| length != values.len()) {
+        return outside(format_args!("a list of {}", values.len()), bounds);
+    }
+    let problem = values.iter().find_map(|value| value.problem(element))?;
+    Some(format!("has an element that {problem}"))
 }
 
 macro_rules! numbers {
     ($($type:ty => $problem:ident as $wide:ty;)+) => {
         $(impl KeyValue for $type {
             fn problem(&self, bounds: &Bounds) -> Option<String> {
-                bounds.$problem(*self as $wide)
+                $problem(*self as $wide, bounds)
             }
         })+
     };
 }
 
 numbers! {
-    u8 => problem_of_whole as u64;
-    u32 => problem_of_whole as u64;
-    u64 => problem_of_whole as u64;
-    usize => problem_of_whole as u64;
-    f32 => problem_of_number as f64;
-    f64 => problem_of_number as f64;
+    u8 => of_whole as u64;
+    u32 => of_whole as u64;
+    u64 => of_whole as u64;
+    usize => of_whole as u64;
+    f32 => of_number as f64;
+    f64 => of_number as f64;
 }
 
 /// An absent value is checked as the one that stands for it in TOML: see [`optional`](crate::optional).
@@ -55,13 +110,13 @@ impl<T: KeyValue + Default> KeyValue for Option<T> {
 
 impl<T: KeyValue> KeyValue for Vec<T> {
     fn problem(&self, bounds: &Bounds) -> Option<String> {
-        bounds.problem_of_list(self)
+        of_list(self, bounds)
     }
 }
 
 impl<T: KeyValue, const N: usize> KeyValue for [T; N] {
     fn problem(&self, bounds: &Bounds) -> Option<String> {
-        bounds.problem_of_list(self)
+        of_list(self, bounds)
     }
 }
 
