@@ -18,6 +18,8 @@
 /// assert_eq!(PartKind::First.to_string(), "first");
 /// ```
 ///
+/// Further traits may be derived, as `#[derive(Default)]` with a `#[default]` behind the words of a name.
+///
 /// Parts with keys of their own: the names as above, and a struct with the keys of every part, which is flattened into
 /// the table of the key that chooses. The keys of a part are in a table of its name; its type is declared by
 /// [`keys!`](crate::keys), or it is `()` if there are none. The struct gives the part of a name: as a trait object,
@@ -58,13 +60,14 @@
 macro_rules! choice {
     (
         $(#[doc = $about:literal])+
+        $(#[derive($($trait:ident),+)])?
         pub enum $choice:ident: $what:literal {
-            $($(#[doc = $meaning:literal])+ $variant:ident = $name:literal,)+
+            $($(#[doc = $meaning:literal])+ $(#[default $($default:tt)?])? $variant:ident = $name:literal,)+
         }
     ) => {
         $crate::names! {
-            [$($about)+] $choice $what
-            $([$(#[doc = $meaning])+] $variant $name [&[$($meaning),+]])+
+            [$(#[doc = $about])+ $(#[derive($($trait),+)])?] $choice $what
+            $([$(#[doc = $meaning])+ $(#[default $($default)?])?] $variant [$name] [&[$($meaning),+]])+
         }
     };
     (
@@ -73,13 +76,13 @@ macro_rules! choice {
             $($(#[doc = $meaning:literal])* $(#[serde $serde:tt])? $variant:ident = $name:ident: $type:ty,)+
         }
         $(#[doc = $parts_about:literal])+
-        pub struct $parts:ident: $form:tt $part:path;
+        pub struct $parts:ident: $form:tt $part:ident;
     ) => {
         $crate::names! {
-            [$($about)+] $choice $what
+            [$(#[doc = $about])+] $choice $what
             $(
                 [$(#[doc = $meaning])* #[doc = concat!("\n\nKeys: [`", stringify!($type), "`].")]]
-                $variant (stringify!($name))
+                $variant [stringify!($name)]
                 [$crate::meaning(&[$($meaning),*], <$type as $crate::KeyTable>::ABOUT)]
             )+
         }
@@ -120,13 +123,13 @@ pub const fn meaning(own: &'static [&'static str], of_part: &'static [&'static s
 #[macro_export]
 macro_rules! names {
     (
-        [$($about:literal)+] $choice:ident $what:literal
-        $([$(#[$attribute:meta])*] $variant:ident $name:tt [$meaning:expr])+
+        [$(#[$about:meta])+] $choice:ident $what:literal
+        $([$(#[$attribute:meta])*] $variant:ident [$($name:tt)+] [$meaning:expr])+
     ) => {
-        $(#[doc = $about])+
+        $(#[$about])+
         #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
         pub enum $choice {
-            $($(#[$attribute])* #[doc = concat!("\n\nIn TOML: `", $name, "`.")] $variant,)+
+            $($(#[$attribute])* #[doc = concat!("\n\nIn TOML: `", $($name)+, "`.")] $variant,)+
         }
 
         impl $choice {
@@ -134,7 +137,7 @@ macro_rules! names {
             pub const ALL: &'static [Self] = &[$(Self::$variant),+];
 
             /// Their names.
-            pub const NAMES: &'static [&'static str] = &[$($name),+];
+            pub const NAMES: &'static [&'static str] = &[$($($name)+),+];
 
             /// The bounds of a key of this type.
             pub const BOUNDS: $crate::Bounds = {
@@ -185,7 +188,7 @@ macro_rules! names {
 #[doc(hidden)]
 #[macro_export]
 macro_rules! chosen {
-    ($choice:ident $parts:ident dyn [$part:path] $($variant:ident $name:ident [$type:ty])+) => {
+    ($choice:ident $parts:ident dyn [$part:ident] $($variant:ident $name:ident [$type:ty])+) => {
         impl $parts {
             /// The part of a name, with its keys.
             pub fn of(&self, name: $choice) -> Box<dyn $part> {
@@ -215,7 +218,7 @@ macro_rules! chosen {
 
 #[cfg(test)]
 mod tests {
-    use crate::{Bounds, KeyTable, Problem, SHARE, choice, keys};
+    use crate::{Bounds, KeyTable, Problem, SHARE, keys};
 
     keys! {
         /// Has a share. It is small.

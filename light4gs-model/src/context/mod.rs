@@ -216,8 +216,6 @@ impl ContextModelConfig {
 ///
 /// ```
 /// use burn::tensor::Device;
-use light4gs_keys::Bounds::List;
-use light4gs_keys::{choice, keys};
 /// use light4gs_model::{ContextModelConfig, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps};
 ///
 /// let device = Device::flex();
