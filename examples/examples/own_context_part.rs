@@ -14,11 +14,10 @@ use light4gs_codec::{Network, PlaneCoding, PlaneSource, decode, plane_distributi
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    CenteredPlanes, ContextModel, DescribedCondition, DescribedPrior, FeaturePlanes, Latent, Passes, PlaneConv,
-    PlaneConvConfig, PlaneEntropy, Prior, PriorPart, ShEntropyModel,
+    CenteredPlanes, ContextConfig, ContextModel, DescribedCondition, DescribedPrior, FeaturePlanes, Latent, Passes,
+    PlaneConv, PlaneConvConfig, PlaneEntropy, Prior, PriorPart, ShConfig, ShEntropyModel,
 };
 use light4gs_train::compression::{ConfiguredModels, EntropyModels, PlaneModels};
-use light4gs_train::config::{ContextConfig, ShConfig};
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::run::RunFolder;

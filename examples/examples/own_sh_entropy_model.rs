@@ -11,11 +11,11 @@ use light4gs_codec::{Network, ShPrior, ShSource, decode, network::Operation};
 use light4gs_data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs_model::{
-    BuiltInField, ContextModel, DynamicScene, PlaneTensors, SH_CHANNELS, ShEntropy, ShKnown, ShNetwork, channels_first,
-    channels_last, gaussian_bits, round_around,
+    BuiltInField, ContextConfig, ContextModel, DynamicScene, PlaneTensors, SH_CHANNELS, ShConfig, ShEntropy, ShKnown,
+    ShNetwork, channels_first, channels_last, gaussian_bits, round_around,
 };
 use light4gs_train::compression::{ConfiguredModels, EntropyModels};
-use light4gs_train::config::{ContextConfig, FileProfile, ShConfig};
+use light4gs_train::config::FileProfile;
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
 use light4gs_train::trainer::Trainer;

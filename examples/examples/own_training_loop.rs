@@ -41,7 +41,7 @@ fn main() -> Outcome {
     // On a device with autodiff, what the model computes is recorded for the backward pass.
     let device = Device::flex().autodiff();
     device.seed(0);
-    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([16, 16, 16, 8]).init(&device);
+    let hexplane = HexPlaneConfig { channels: 4, resolution: [16, 16, 16, 8], ..Default::default() }.init(&device);
     let mut model = MovingGaussians {
         gaussians: GaussiansConfig::new().with_sh_degree(0).init(&scene.points, &device),
         shift: LinearConfig::new(hexplane.feature_size(), 3).init(&device),

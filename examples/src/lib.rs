@@ -35,9 +35,9 @@ pub fn tiny_config() -> Outcome<Config> {
     config.device = DeviceName::Flex;
     config.data.initial_points = 400;
     config.model.sh_degree = 1;
-    config.model.hexplane.channels = 4;
-    config.model.hexplane.resolution = [16, 16, 16, 8];
-    config.model.deformation.width = 16;
+    config.model.fields.hexplane.hexplane.channels = 4;
+    config.model.fields.hexplane.hexplane.resolution = [16, 16, 16, 8];
+    config.model.fields.hexplane.deformation.width = 16;
     config.train.coarse_iterations = 20;
     config.train.fine_iterations = 100;
     config.train.losses.photometric.l2_until = 0;

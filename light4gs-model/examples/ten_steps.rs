@@ -133,10 +133,10 @@ impl ParameterMapper for Adam<'_> {
 
 /// The field's numbers are the same on every back end, whose random numbers are not.
 fn scene(cloud: &PointCloud, device: &Device) -> DynamicScene<HexPlaneField> {
-    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
+    let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..Default::default() };
     // One head: autotuning tries many kernels for each size of a matrix product, which takes long without optimization.
-    let deformation = DeformationConfig::new(0).with_width(16).with_scale(false).with_rotation(false);
-    let field = HexPlaneFieldConfig::new(hexplane, deformation);
+    let deformation = DeformationConfig { width: 16, scale: false, rotation: false, ..Default::default() };
+    let field = HexPlaneFieldConfig { hexplane, deformation };
     let scene = DynamicSceneConfig::new(GaussiansConfig::new(), field).init(cloud, device);
     DynamicScene { field: map_parameters(scene.field, &mut Waves), ..scene }
 }

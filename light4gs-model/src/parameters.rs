@@ -22,7 +22,8 @@
 //!     }
 //! }
 //!
-//! let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]).init(&Device::flex());
+//! let config = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..HexPlaneConfig::default() };
+//! let hexplane = config.init(&Device::flex());
 //! let mut count = Count::default();
 //! visit_parameters(&hexplane, &mut count);
 //! assert_eq!(count.0[2], ("planes.2".to_owned(), 4 * 4 * 8));
@@ -165,7 +166,7 @@ mod tests {
     fn tapes_do_not_remember_earlier_copies() {
         const ROUND: usize = 200;
         let device = Device::flex().autodiff();
-        let module = HexPlaneConfig::new().with_channels(1).with_resolution([4, 4, 4, 4]).init(&device);
+        let module = HexPlaneConfig { channels: 1, resolution: [4; 4], ..Default::default() }.init(&device);
         let round = || {
             let begin = Instant::now();
             for _ in 0..ROUND {

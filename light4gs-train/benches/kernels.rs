@@ -43,7 +43,7 @@ fn hexplane(criterion: &mut Criterion) {
     group.sample_size(10);
     for name in built_in() {
         let device = device_by_name(name).expect("a built-in device").autodiff();
-        let planes = HexPlaneConfig::new().with_resolution([64, 64, 64, 24]).init(&device);
+        let planes = HexPlaneConfig { resolution: [64, 64, 64, 24], ..Default::default() }.init(&device);
         let points = Tensor::<2>::random([GAUSSIANS, 4], Distribution::Uniform(-1.0, 1.0), &device).require_grad();
         // Off the tape, which no backward pass would clear.
         let (still_planes, still_points) = (planes.valid(), points.clone().inner());

@@ -29,7 +29,7 @@ fn context_model(criterion: &mut Criterion) {
     ];
     for name in built_in() {
         let device = device_by_name(name).expect("a built-in device").autodiff();
-        let config = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([32, 32, 32, 32]);
+        let config = HexPlaneConfig { channels: CHANNELS, resolution: [32; 4], ..Default::default() };
         let planes = config.init(&device).tensors();
         let steps = PlaneSteps::fixed(&[0.05; 12], &device);
         for (sizes, config) in

@@ -292,8 +292,8 @@ mod tests {
         let device = Device::flex().autodiff();
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let mut config = Config::default();
-        config.model.hexplane.channels = 2;
-        config.model.hexplane.resolution = [8, 8, 8, 4];
+        config.model.fields.hexplane.hexplane.channels = 2;
+        config.model.fields.hexplane.hexplane.resolution = [8, 8, 8, 4];
         let mut scene = config.model.build().init(&cloud, &device);
         assert_eq!(not_finite_parameter(&scene, "scene"), None);
         let with = |value: f32| {

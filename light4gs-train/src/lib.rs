@@ -12,7 +12,6 @@ pub mod divergence;
 pub mod error;
 pub mod evaluation;
 pub mod import;
-mod keys;
 pub mod loss;
 pub mod memory;
 pub mod metrics;

@@ -37,10 +37,6 @@ impl DatasetLayout for DNerf {
         "transforms_train.json"
     }
 
-    fn preset(&self) -> Option<&'static str> {
-        Some("dnerf-cpu+nodes")
-    }
-
     fn detect(&self, root: &Path) -> bool {
         root.join(self.signature()).is_file()
     }

@@ -10,7 +10,7 @@ use std::path::Path;
 /// A layout reads metadata only. Images stay on disk until [`crate::ImageStore`] decodes them, so
 /// [`open`](Self::open) is quick even for a large capture.
 ///
-/// A layout of this crate is one file in `layouts/`, its line in `layouts/mod.rs`, and a preset. A layout of another
+/// A layout of this crate is one file in `layouts/`, and its line in `layouts/mod.rs`. A layout of another
 /// crate is added to a [`Layouts`](crate::Layouts), without changes here: see `examples/own_dataset_layout.rs` of the
 /// repository.
 pub trait DatasetLayout: Send + Sync {
@@ -19,12 +19,6 @@ pub trait DatasetLayout: Send + Sync {
 
     /// The file or files by which the layout is recognized, for the message when a folder holds no known one.
     fn signature(&self) -> &'static str;
-
-    /// The preset of `light4gs-train` that fits datasets of this layout, or several joined by `+`: `light4gs train`
-    /// takes it where no configuration is named. `None` if the user must name one.
-    fn preset(&self) -> Option<&'static str> {
-        None
-    }
 
     /// Whether the folder `root` has this layout. It looks for files only; a damaged dataset is still detected, so that
     /// [`open`](Self::open) can say what is wrong with it.

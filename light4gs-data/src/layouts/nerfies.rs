@@ -47,10 +47,6 @@ impl DatasetLayout for HyperNerf {
         "dataset.json and camera/"
     }
 
-    fn preset(&self) -> Option<&'static str> {
-        Some("hypernerf-cpu")
-    }
-
     fn detect(&self, root: &Path) -> bool {
         root.join("dataset.json").is_file() && root.join("camera").is_dir()
     }
@@ -67,10 +63,6 @@ impl DatasetLayout for NerfDs {
 
     fn signature(&self) -> &'static str {
         "dataset.json, camera/ID_left.json and mask/"
-    }
-
-    fn preset(&self) -> Option<&'static str> {
-        Some("nerfds-cpu")
     }
 
     fn detect(&self, root: &Path) -> bool {

@@ -41,10 +41,6 @@ impl DatasetLayout for Nerfstudio {
         "transforms.json"
     }
 
-    fn preset(&self) -> Option<&'static str> {
-        Some("nerfstudio-cpu")
-    }
-
     fn detect(&self, root: &Path) -> bool {
         root.join(self.signature()).is_file()
     }

@@ -39,41 +39,28 @@ pub use rate::{PlaneRate, QuantizedPlane};
 use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::Device;
+use light4gs_keys::Bounds::List;
+use light4gs_keys::{choice, keys};
 
-/// A part of a [`ContextModel`] by name. An ablation leaves some out.
-#[derive(Config, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum ContextPart {
-    /// A transmitted latent for planes that nothing else describes.
-    Hyperprior,
-    /// Anchors first, then the others with them as context.
-    Checkerboard,
-    /// Space-only planes from space-time planes.
-    InterPlane,
-    /// Higher scales from the scale below.
-    InterScale,
-    /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
-    HighScaleHyperprior,
+choice! {
+    /// A part of a [`ContextModel`]. An ablation leaves some out.
+    pub enum ContextPart: "part" {
+        /// A transmitted latent for planes that nothing else describes.
+        Hyperprior = "hyperprior",
+        /// Anchors first, then the others with them as context.
+        Checkerboard = "checkerboard",
+        /// Space-only planes from space-time planes.
+        InterPlane = "inter_plane",
+        /// Higher scales from the scale below.
+        InterScale = "inter_scale",
+        /// The reference's: a transmitted latent for higher scales too, with the inter-scale context beside it.
+        HighScaleHyperprior = "high_scale_hyperprior",
+    }
 }
 
 impl ContextPart {
-    /// All of them.
-    pub const ALL: &[Self] =
-        &[Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale, Self::HighScaleHyperprior];
-    /// Their names, in the same order.
-    pub const NAMES: &[&'static str] =
-        &["hyperprior", "checkerboard", "inter_plane", "inter_scale", "high_scale_hyperprior"];
     /// Those of the paper's model.
     pub const PAPER: [Self; 4] = [Self::Hyperprior, Self::Checkerboard, Self::InterPlane, Self::InterScale];
-
-    /// Its name in configurations.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-
-    /// The part of a name.
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|part| part.name() == name)
-    }
 
     /// The parts that it needs: it consists of them or builds on them.
     pub fn needs(self) -> &'static [Self] {
@@ -86,6 +73,42 @@ impl ContextPart {
     /// The paper's parts without these.
     pub fn paper_without(absent: &[Self]) -> Vec<Self> {
         Self::PAPER.into_iter().filter(|part| !absent.contains(part)).collect()
+    }
+}
+
+choice! {
+    /// Sizes of the context model's networks.
+    pub enum ContextArchitecture: "architecture" {
+        /// Small networks, for small scenes: about 6000 weights at 16 channels.
+        Compact = "compact",
+        /// The public code's sizes.
+        Reference = "reference",
+    }
+}
+
+keys! {
+    /// Parts and sizes of the context model.
+    pub struct ContextConfig {
+        /// Sizes of the context model's networks.
+        architecture: ContextArchitecture = ContextArchitecture::Compact;
+            ContextArchitecture::BOUNDS, "ours; reference";
+        /// The parts of the context model; the default is the paper's four. The public code also has
+        /// `"high_scale_hyperprior"`, which needs `"hyperprior"` and `"inter_scale"`. Without any part, every channel
+        /// has one learned distribution.
+        parts: Vec<ContextPart> = ContextPart::PAPER.to_vec();
+            List { element: &ContextPart::BOUNDS, length: None }, "paper";
+    }
+}
+
+impl ContextConfig {
+    /// The model of planes with this number of channels.
+    pub fn model(&self, channels: usize) -> ContextModelConfig {
+        let sizes = match self.architecture {
+            // The composition is what the list of parts says; the reference's centers and start belong to its sizes.
+            ContextArchitecture::Reference => ContextModelConfig::reference(channels),
+            ContextArchitecture::Compact => ContextModelConfig::compact(channels),
+        };
+        sizes.with_parts(self.parts.clone())
     }
 }
 
@@ -196,7 +219,7 @@ impl ContextModelConfig {
 /// use light4gs_model::{ContextModelConfig, HexPlaneConfig, Latent, PlaneEntropy, PlaneSteps};
 ///
 /// let device = Device::flex();
-/// let hexplane = HexPlaneConfig::new().with_channels(8).with_resolution([8, 8, 8, 4]).init(&device);
+/// let hexplane = HexPlaneConfig { channels: 8, resolution: [8, 8, 8, 4], ..Default::default() }.init(&device);
 /// let model = ContextModelConfig::compact(8).init(&device);
 /// let steps = PlaneSteps::fixed(&[0.1; 12], &device);
 /// let rates = model.rate(&steps.add_noise(&hexplane.tensors()), &steps, &[2, 6], Latent::Noise);

@@ -1,21 +1,20 @@
 //! Adaptive quantization: learned steps (paper III-D; docs/design.md).
 
-use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::plane_layout::{PlaneLayout, PlaneShape};
+use light4gs_keys::keys;
 
-use super::quantization_steps::PlaneSteps;
+use super::quantization_steps::{PlaneSteps, QUANTIZATION_STEP};
 
-/// Configuration of an [`AdaptiveQuantization`].
-#[derive(Config, Debug)]
-pub struct AdaptiveQuantizationConfig {
-    /// Initial step of the space-only planes.
-    #[config(default = 0.05)]
-    pub space_only: f64,
-    /// Initial step of the space-time planes.
-    #[config(default = 0.05)]
-    pub space_time: f64,
+keys! {
+    /// The initial steps of an [`AdaptiveQuantization`].
+    pub struct AdaptiveQuantizationConfig {
+        /// Quantization step of the space-only planes at the start.
+        space_only: f64 = 0.05; QUANTIZATION_STEP, "ours; reference: 0.1, fixed";
+        /// The same for the space-time planes.
+        space_time: f64 = 0.05; QUANTIZATION_STEP, "ours; reference: 0.1, fixed";
+    }
 }
 
 impl AdaptiveQuantizationConfig {
@@ -47,7 +46,8 @@ impl AdaptiveQuantizationConfig {
 /// use light4gs_model::AdaptiveQuantizationConfig;
 ///
 /// let planes = PlaneLayout::multiscale(&PlaneAxes::ALL, [8, 8, 8, 4], &[1, 2]);
-/// let quantization = AdaptiveQuantizationConfig::new().with_space_time(0.1).init(&planes, &Device::flex());
+/// let quantization = AdaptiveQuantizationConfig { space_time: 0.1, ..Default::default() }
+///     .init(&planes, &Device::flex());
 /// let steps = quantization.steps().values();
 /// assert_eq!(steps.len(), 12);
 /// assert!((steps[0] - 0.05).abs() < 1e-6 && (steps[2] - 0.1).abs() < 1e-6);

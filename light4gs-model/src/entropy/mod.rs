@@ -17,4 +17,4 @@ pub use bottleneck::{EntropyBottleneck, EntropyBottleneckConfig, Latent};
 pub use convolution::{LEAKY_SLOPE, PlaneConv, PlaneConvConfig, PlaneDeconv, PlaneDeconvConfig, checkerboard_kernel};
 pub use factorized_density::{FactorizedDensity, FactorizedDensityConfig, PlainDensity};
 pub use logistic_mixture::{LogisticMixture, LogisticMixtureConfig, PlainMixture};
-pub use quantization_steps::PlaneSteps;
+pub use quantization_steps::{PlaneSteps, QUANTIZATION_STEP};

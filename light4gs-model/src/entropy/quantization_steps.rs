@@ -1,8 +1,13 @@
 //! Quantization steps of the planes, and quantization noise.
 
 use burn::tensor::{Device, Distribution, Tensor};
+use light4gs_codec::checks::LEAST_STEP;
+use light4gs_keys::Bounds;
 
 use crate::planes::PlaneTensors;
+
+/// The bounds of a key that is a quantization step: those of the encoder.
+pub const QUANTIZATION_STEP: Bounds = Bounds::Number { least: LEAST_STEP as f64, most: 1e3 };
 
 /// A step for each plane, in the order of the planes. Learned steps have a gradient.
 #[derive(Clone, Debug)]

@@ -1,34 +1,30 @@
 //! The multiscale hexplane (HexPlane, Cao and Johnson 2023; multiscale as in K-Planes and 4DGS): a plane over each pair of
 //! axes at every scale.
 
-use burn::config::Config;
 use burn::tensor::Device;
 use light4gs_codec::plane_layout::{AXIS_NAMES, IllegalSize, PlaneAxes, PlaneLayout, check_resolution};
+use light4gs_keys::Bounds::{List, Whole};
+use light4gs_keys::keys;
 
 use super::FeaturePlanes;
 
-/// Configuration of [`FeaturePlanes`] that are a hexplane.
-///
-/// ```
-/// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::HexPlaneConfig;
-///
-/// let device = Device::flex();
-/// let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]).init(&device);
-/// let points = Tensor::<2>::zeros([10, 4], &device);
-/// assert_eq!(hexplane.query(points).dims(), [10, 4 * 2]);
-/// ```
-#[derive(Config, Debug)]
-pub struct HexPlaneConfig {
-    /// Channels of each plane (`h` in the paper).
-    #[config(default = 32)]
-    pub channels: usize,
-    /// Cells along x, y, z and t at the lowest scale, each a multiple of 4.
-    #[config(default = "[64, 64, 64, 24]")]
-    pub resolution: [usize; 4],
-    /// One for each scale: spatial resolutions are multiplied by it, time keeps its own.
-    #[config(default = "vec![1, 2]")]
-    pub multipliers: Vec<usize>,
+/// Most cells along an axis, far above anything useful: a mistyped number must not ask for the machine's whole memory.
+pub const MOST_PLANE_RESOLUTION: usize = 4096;
+
+keys! {
+    /// Sizes of the multiscale hexplane.
+    pub struct HexPlaneConfig {
+        /// Number of features of a plane.
+        channels: usize = 32; Whole { least: 1, most: 1024 }, "paper: 32 for D-NeRF, 16 for real scenes";
+        /// Resolution along x, y, z, t at the lowest scale. Multiples of 4.
+        resolution: [usize; 4] = [64, 64, 64, 24];
+            List { element: &Whole { least: 4, most: MOST_PLANE_RESOLUTION as u64 }, length: Some(4) },
+            "paper; its 25 time steps are no multiple of 4";
+        /// One scale of planes for each number, ascending. The spatial resolution is the base resolution times the
+        /// number; the resolution in time stays the same.
+        multipliers: Vec<usize> = vec![1, 2];
+            List { element: &Whole { least: 1, most: MOST_PLANE_RESOLUTION as u64 / 4 }, length: None }, "paper";
+    }
 }
 
 impl HexPlaneConfig {
@@ -60,6 +56,16 @@ impl HexPlaneConfig {
     }
 
     /// Planes with their initial values; see [`FeaturePlanes::init`].
+    ///
+    /// ```
+    /// use burn::tensor::{Device, Tensor};
+    /// use light4gs_model::HexPlaneConfig;
+    ///
+    /// let device = Device::flex();
+    /// let config = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..HexPlaneConfig::default() };
+    /// let points = Tensor::<2>::zeros([10, 4], &device);
+    /// assert_eq!(config.init(&device).query(points).dims(), [10, 4 * 2]);
+    /// ```
     ///
     /// # Panics
     /// If [`Self::check`] refuses the resolution.

@@ -11,5 +11,5 @@ mod hexplane;
 mod tensors;
 
 pub use feature_planes::FeaturePlanes;
-pub use hexplane::HexPlaneConfig;
+pub use hexplane::{HexPlaneConfig, MOST_PLANE_RESOLUTION};
 pub use tensors::PlaneTensors;

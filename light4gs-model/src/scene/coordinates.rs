@@ -3,6 +3,8 @@
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::CoordinateMapping;
+use light4gs_keys::Bounds::Flag;
+use light4gs_keys::keys;
 use nalgebra::{Matrix3, SymmetricEigen, Vector3};
 
 use super::contraction::contract;
@@ -73,20 +75,15 @@ impl Pca {
     }
 }
 
-/// How the coordinates of a scene are made. With both on they are the paper's (III-A); each may be switched off to
-/// study its effect.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CoordinatesConfig {
-    /// Along the principal axes of the cloud. Off: along the world's axes, with the cloud's standard deviation along each.
-    pub pca: bool,
-    /// Contracted outside of one standard deviation. Off: the whole cloud is scaled into the ball that the contraction
-    /// does not change, which is half as wide as the planes. Points outside of that ball are still contracted.
-    pub contraction: bool,
-}
-
-impl Default for CoordinatesConfig {
-    fn default() -> Self {
-        Self { pca: true, contraction: true }
+keys! {
+    /// From world coordinates to those of the planes (paper III-A).
+    pub struct CoordinatesConfig {
+        /// The planes lie along the principal axes of the initial cloud. Off: along the world's axes, scaled by the
+        /// cloud's standard deviation along each.
+        pca: bool = true; Flag, "paper";
+        /// Points more than one standard deviation away from the cloud's center are contracted. Off: the whole cloud is
+        /// scaled into the ball that contraction does not change, which is half as wide as the planes.
+        contraction: bool = true; Flag, "paper";
     }
 }
 

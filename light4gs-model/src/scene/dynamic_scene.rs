@@ -60,8 +60,8 @@ impl<F: DeformationField> DynamicSceneConfig<F> {
 /// use light4gs_model::*;
 ///
 /// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.5]], colors: vec![[0.5; 3]; 3] };
-/// let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
-/// let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(16));
+/// let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..Default::default() };
+/// let field = HexPlaneFieldConfig { hexplane, deformation: DeformationConfig { width: 16, ..Default::default() } };
 /// let config = DynamicSceneConfig::<HexPlaneField>::new(GaussiansConfig::new(), field);
 /// let scene = config.init(&cloud, &Device::flex());
 /// assert_eq!(scene.at(0.25).means.dims(), [3, 3]);

@@ -1,6 +1,7 @@
 //! Regularizers of the planes (4DGS: `compute_regulation`).
 
 use burn::tensor::{Tensor, s};
+use light4gs_keys::{WEIGHT, keys};
 
 use crate::planes::FeaturePlanes;
 
@@ -41,15 +42,16 @@ pub fn time_l1(planes: &FeaturePlanes) -> Tensor<1> {
     sum_over(planes, true, |plane| (plane - 1.0).abs().mean())
 }
 
-/// Weights of the three terms.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PlaneRegularizer {
-    /// Of [`plane_smoothness`].
-    pub plane_smoothness: f32,
-    /// Of [`time_smoothness`].
-    pub time_smoothness: f32,
-    /// Of [`time_l1`].
-    pub time_l1: f32,
+keys! {
+    /// Weights of the space-time regularizers, fine stage only.
+    pub struct PlaneRegularizer {
+        /// Squared second difference of the space-only planes.
+        plane_smoothness: f32 = 1e-4; WEIGHT, "reference";
+        /// Squared second difference over time of the space-time planes.
+        time_smoothness: f32 = 1e-2; WEIGHT, "reference";
+        /// Distance of the space-time planes from 1, which means "no motion".
+        time_l1: f32 = 1e-4; WEIGHT, "reference";
+    }
 }
 
 impl PlaneRegularizer {

@@ -33,34 +33,33 @@ use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::ShPrior;
+use light4gs_keys::{choice, keys};
+
+use crate::entropy::QUANTIZATION_STEP;
 
 /// Width of the factorized densities before training, in the units of the values. The reference begins at 8, and in its log
 /// the rate needs hundreds of iterations to come down from there; our runs are shorter.
 const SH_INITIAL_SCALE: f64 = 0.3;
 
-/// From a list of models, defines their names, their configurations, and one type that can hold any of them.
+/// From a list of models, declares their names, the configuration of each, and one type that can hold any of them.
 macro_rules! built_in_models {
     ($(
-        $(#[$about:meta])*
+        $(#[doc = $about:literal])+
         $variant:ident = $name:literal: $model:ident, $config:ident: |$step:pat_param, $features:pat_param| $usual:expr;
     )+) => {
-        /// The built-in models by name, from which a configuration chooses.
-        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-        pub enum ShKind {
-            $($(#[$about])* $variant,)+
+        choice! {
+            /// The built-in models.
+            pub enum ShKind: "model" {
+                $($(#[doc = $about])+ $variant = $name,)+
+            }
         }
 
-        impl ShKind {
-            /// All of them.
-            pub const ALL: &[Self] = &[$(Self::$variant),+];
-            /// Their names, in the same order.
-            pub const NAMES: &[&'static str] = &[$($name),+];
-
-            /// Its default configuration, for planes with features of this length (0 without planes).
-            pub fn config(self, step: f32, feature_size: usize) -> ShEntropyConfig {
-                match self {
-                    $(Self::$variant => {
-                        let ($step, $features) = (step, feature_size);
+        impl ShConfig {
+            /// The chosen model, for planes with features of this length (0 without planes).
+            pub fn model(&self, feature_size: usize) -> ShEntropyConfig {
+                match self.model {
+                    $(ShKind::$variant => {
+                        let ($step, $features) = (self.step as f32, feature_size);
                         ShEntropyConfig::$variant($usual)
                     })+
                 }
@@ -70,7 +69,7 @@ macro_rules! built_in_models {
         /// The choice of an entropy model, with its configuration.
         #[derive(Config, Debug)]
         pub enum ShEntropyConfig {
-            $($(#[$about])* $variant($config),)+
+            $($(#[doc = $about])+ $variant($config),)+
         }
 
         impl ShEntropyConfig {
@@ -102,7 +101,7 @@ macro_rules! built_in_models {
         #[allow(clippy::large_enum_variant)]
         #[derive(Module, Debug)]
         pub enum ShEntropyModel {
-            $($(#[$about])* $variant($model),)+
+            $($(#[doc = $about])+ $variant($model),)+
         }
 
         impl ShEntropyModel {
@@ -130,19 +129,21 @@ built_in_models! {
 }
 
 impl ShKind {
-    /// Its name in configurations.
-    pub fn name(self) -> &'static str {
-        Self::NAMES[self as usize]
-    }
-
-    /// The model of a name.
-    pub fn by_name(name: &str) -> Option<Self> {
-        Self::ALL.iter().copied().find(|kind| kind.name() == name)
-    }
-
     /// Whether it looks at the planes of the deformation field.
     pub fn needs_planes(self) -> bool {
         self == Self::HexPlaneCoupled
+    }
+}
+
+keys! {
+    /// The model of the spherical harmonics beyond degree 0.
+    pub struct ShConfig {
+        /// Entropy model of the spherical harmonics beyond degree 0. It is trained for degree 3. Scenes of a lower degree
+        /// have none. The file in the `compact` profile does without the models of single channels, `"factorized"` and
+        /// `"mixture_of_logistics"`: there neighbors tell more.
+        model: ShKind = ShKind::Factorized; ShKind::BOUNDS, "paper";
+        /// Quantization step of the spherical harmonics beyond degree 0.
+        step: f64 = 0.02; QUANTIZATION_STEP, "paper";
     }
 }
 

@@ -323,7 +323,7 @@ fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device, presets: &[(Con
     add("splat forward + backward", meter.measure(|| trained.tensors(), |g| weighted(g).backward()));
 
     let count = scene.count();
-    let planes = HexPlaneConfig::new().with_resolution([64, 64, 64, 24]).init(autodiff);
+    let planes = HexPlaneConfig { resolution: [64, 64, 64, 24], ..Default::default() }.init(autodiff);
     let points = Tensor::<2>::random([count, 4], Distribution::Uniform(-1.0, 1.0), autodiff).require_grad();
     let upstream = Tensor::<2>::random([count, planes.feature_size()], Distribution::Default, autodiff);
     add("hexplane forward", meter.measure(|| points.clone(), |points| planes.query(points)));
@@ -340,7 +340,7 @@ fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device, presets: &[(Con
     let both = meter.measure(|| inputs.clone(), |inputs| skinned(inputs).backward());
     add("skinning forward + backward", both);
 
-    let network = DeformationConfig::new(64).init(autodiff);
+    let network = DeformationConfig::default().init(64, autodiff);
     let features = Tensor::<2>::random([count, 64], Distribution::Default, autodiff).require_grad();
     let deform = |features: Tensor<2>| {
         let deltas = network.forward(features);

@@ -71,7 +71,7 @@ pub(super) fn timings(
         seed: 0,
     };
     let mut dynamic = dynamic(scene, config, &position, autodiff);
-    let regularizer = config.train.regularizer.build();
+    let regularizer = config.train.regularizer.clone();
     // As a trainer, which knows from the step before.
     let seen = splatter.render(dynamic.at(TIME), &scene.camera, None).intersections.into_scalar::<i64>();
     let trained = splatter.with_room_for(2 * seen as usize);

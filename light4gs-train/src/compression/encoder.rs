@@ -229,7 +229,7 @@ pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     Ok(CompressionInput {
         profile,
         planes: compression.plane_coding(scene)?,
-        sh: compression.sh_coding(&data.gaussians, config.sh.step as f32, profile)?,
+        sh: compression.sh_coding(&data.gaussians, config.sh.entropy.step as f32, profile)?,
         attributes,
         weights: WeightPrecisions {
             motion: WeightPrecision::Bits(config.weights.deformation_bits),

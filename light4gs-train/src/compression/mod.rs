@@ -28,7 +28,7 @@ pub use encoder::{
     BitEstimate, BitMap, EncodedScene, SearchImages, compression_input, encode, encoded_so_far, freeze_planes,
 };
 pub use fit::fit;
-pub use models::{ConfiguredModels, EntropyModels, ShModel, context_model};
+pub use models::{ConfiguredModels, EntropyModels, ShModel};
 pub use quality::{mean_psnr, measured_views};
 pub use rate::{NoisyScene, Rate};
 pub use step_factor::MissedQuality;
@@ -37,8 +37,8 @@ use burn::module::Module;
 use burn::tensor::Device;
 use light4gs_model::attributes::Coding;
 use light4gs_model::{
-    AdaptiveQuantization, AdaptiveQuantizationConfig, Attribute, AttributeEntropy, CodedAttribute, ContextModel,
-    DeformationField, DynamicScene, FeaturePlanes, Gaussians, PlaneEntropy, ShEntropyModel,
+    AdaptiveQuantization, Attribute, AttributeEntropy, CodedAttribute, ContextModel, DeformationField, DynamicScene,
+    FeaturePlanes, Gaussians, PlaneEntropy, ShEntropyModel,
 };
 
 use crate::config::{CompressionConfig, Config};
@@ -106,12 +106,12 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         let feature_size = planes.map_or(0, FeaturePlanes::feature_size);
         let plane_models = |planes: &FeaturePlanes| -> Result<_, TrainError> {
             Ok(PlaneModels {
-                context: models.planes(context, planes.channels(), device)?,
-                quantization: quantization_config(config).init(planes.layout(), device),
+                context: models.planes(&context.model, planes.channels(), device)?,
+                quantization: config.compression.steps.initial.init(planes.layout(), device),
             })
         };
         let planes = planes.map(plane_models).transpose()?;
-        let sh = (config.model.sh_degree == 3).then(|| models.sh(sh, feature_size, device)).transpose()?;
+        let sh = (config.model.sh_degree == 3).then(|| models.sh(&sh.entropy, feature_size, device)).transpose()?;
         Ok(Self { planes, sh, attributes: None })
     }
 
@@ -137,7 +137,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     /// Keeps learned steps from becoming finer than a configuration begins with: finer ones help training frames only.
     pub fn bound_steps(&mut self, config: &Config) {
         if let Some(models) = &mut self.planes {
-            models.quantization.no_finer_than(&quantization_config(config));
+            models.quantization.no_finer_than(&config.compression.steps.initial);
         }
     }
 }
@@ -149,15 +149,10 @@ fn coded_attributes(config: &Config, gaussians: &Gaussians, sh_has_model: bool) 
         let width = attribute.width.of(gaussians.sh_degree());
         let step = match attribute.coding {
             Coding::Harmonics if sh_has_model || width == 0 => None,
-            Coding::Harmonics => Some(config.compression.sh.step as f32),
+            Coding::Harmonics => Some(config.compression.sh.entropy.step as f32),
             Coding::Quantized(_) | Coding::Float32 => config.compression.attributes.step(attribute),
         };
         step.map(|step| CodedAttribute { name: attribute.name.to_string(), width, step })
     };
     gaussians.attributes().filter(|attribute| !attribute.optional).filter_map(coded).collect()
-}
-
-fn quantization_config(config: &Config) -> AdaptiveQuantizationConfig {
-    let steps = &config.compression.steps;
-    AdaptiveQuantizationConfig::new().with_space_only(steps.space_only).with_space_time(steps.space_time)
 }

@@ -4,9 +4,8 @@ use std::fmt::Debug;
 
 use burn::module::{Module, ModuleDisplay};
 use burn::tensor::Device;
-use light4gs_model::{ContextModel, ContextModelConfig, PlaneEntropy, ShEntropy, ShEntropyModel};
+use light4gs_model::{ContextConfig, ContextModel, PlaneEntropy, ShConfig, ShEntropy, ShEntropyModel};
 
-use crate::config::{ContextArchitecture, ContextConfig, ShConfig};
 use crate::error::TrainError;
 
 /// Makes the entropy models that a run trains beside its scene, and codes it with.
@@ -47,28 +46,18 @@ impl EntropyModels for ConfiguredModels {
     type Sh = ShEntropyModel;
 
     fn planes(&self, settings: &ContextConfig, channels: usize, device: &Device) -> Result<ContextModel, TrainError> {
-        Ok(context_model(settings, channels).init(device))
+        Ok(settings.model(channels).init(device))
     }
 
     fn sh(&self, settings: &ShConfig, feature_size: usize, device: &Device) -> Result<ShEntropyModel, TrainError> {
-        if settings.model.0.needs_planes() && feature_size == 0 {
+        if settings.model.needs_planes() && feature_size == 0 {
             return Err(TrainError::Input(format!(
                 "compression.sh.model = \"{}\" needs a deformation field with feature planes; choose another model",
                 settings.model
             )));
         }
-        Ok(settings.model.0.config(settings.step as f32, feature_size).init(device))
+        Ok(settings.model(feature_size).init(device))
     }
-}
-
-/// The context model of a configuration, for planes with this number of channels.
-pub fn context_model(settings: &ContextConfig, channels: usize) -> ContextModelConfig {
-    let sizes = match settings.architecture {
-        // The composition is what the list of parts says; the reference's centers and start belong to its sizes.
-        ContextArchitecture::Reference => ContextModelConfig::reference(channels),
-        ContextArchitecture::Compact => ContextModelConfig::compact(channels),
-    };
-    sizes.with_parts(settings.parts.iter().map(|part| part.0).collect())
 }
 
 #[cfg(test)]
@@ -97,8 +86,8 @@ mod tests {
     #[test]
     fn every_parameter_has_its_group() {
         let mut config = Config::default();
-        config.model.hexplane.channels = 2;
-        config.model.hexplane.resolution = [8, 8, 8, 4];
+        config.model.fields.hexplane.hexplane.channels = 2;
+        config.model.fields.hexplane.hexplane.resolution = [8, 8, 8, 4];
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let device = Device::flex();
         let scene = config.model.build().init(&cloud, &device);

@@ -28,7 +28,7 @@ pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images
         sum / exact.len().max(1) as f64
     };
     if settings.steps.search_tolerance > 0.0 && !scene.feature_planes.planes.is_empty() {
-        let (space, time) = (settings.steps.space_only, settings.steps.space_time);
+        let (space, time) = (settings.steps.initial.space_only, settings.steps.initial.space_time);
         let factor = factor(budget(settings.steps.search_tolerance), |factor| {
             let mut rounded = scene.clone();
             for plane in &mut rounded.feature_planes.planes {
@@ -36,16 +36,16 @@ pub(super) fn search(scene: &SceneData, settings: &mut CompressionConfig, images
             }
             distortion(&rounded)
         });
-        (settings.steps.space_only, settings.steps.space_time) = (factor * space, factor * time);
+        (settings.steps.initial.space_only, settings.steps.initial.space_time) = (factor * space, factor * time);
     }
     if settings.sh.search_tolerance > 0.0 && !scene.gaussians.sh_rest.is_empty() {
-        let step = settings.sh.step;
+        let step = settings.sh.entropy.step;
         let factor = factor(budget(settings.sh.search_tolerance), |factor| {
             let mut rounded = scene.clone();
             round(&mut rounded.gaussians.sh_rest, factor * step);
             distortion(&rounded)
         });
-        settings.sh.step = factor * step;
+        settings.sh.entropy.step = factor * step;
     }
 }
 
@@ -108,14 +108,14 @@ mod tests {
         let settings = found(tolerance, error);
         let exact = render(&scene());
         let mut rounded = scene();
-        let step = settings.steps.space_only;
+        let step = settings.steps.initial.space_only;
         rounded.feature_planes.planes.iter_mut().for_each(|plane| round(&mut plane.values, step));
         let squares: f64 = render(&rounded).iter().zip(&exact).map(|(a, b)| f64::from(a - b).powi(2)).sum();
         let budget = error * (10f64.powf(tolerance / 10.0) - 1.0);
         let distortion = squares / exact.len() as f64;
         assert!(distortion <= budget && distortion > 0.2 * budget, "{distortion} of {budget}");
-        assert!(found(0.01, error).steps.space_only < step);
-        assert!(settings.sh.step > settings.steps.space_only);
+        assert!(found(0.01, error).steps.initial.space_only < step);
+        assert!(settings.sh.entropy.step > settings.steps.initial.space_only);
     }
 
     #[test]

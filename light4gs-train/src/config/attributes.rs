@@ -2,11 +2,11 @@
 //! of those in the table of attributes.
 
 use light4gs_codec::attributes::AttributeSteps;
+use light4gs_keys::{ByName, nearest};
 use light4gs_model::attributes::{BUILT_IN, Coding};
 use light4gs_model::{Attribute, LearningRate};
 
 use super::{AttributesConfig, Config, ConfigError, LearningRates, Problem};
-use crate::keys::{ByName, nearest};
 
 /// The numbers that the built-in rows have.
 pub(super) fn built_in(number: impl Fn(&Attribute) -> Option<f64>) -> ByName {

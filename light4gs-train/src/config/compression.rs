@@ -2,40 +2,39 @@
 
 use light4gs_codec::network_weights::WeightPrecision;
 use light4gs_codec::{GaussianLayers, Profile, WeightPrecisions};
-use light4gs_model::{AdaptiveQuantizationConfig, ContextPart, ShKind};
+use light4gs_keys::Bounds::{self, Flag, Number, Whole};
+use light4gs_keys::{ByName, DECIBELS, ITERATION, RATE, WEIGHT, choice, keys};
+use light4gs_model::{AdaptiveQuantizationConfig, ContextConfig, QUANTIZATION_STEP, ShConfig};
 
 use super::attributes::{built_in, step_of};
-use crate::keys::Bounds::{self, Flag, Kind, List, Number, Whole, Word};
-use crate::keys::{ByName, DECIBELS, ITERATION, RATE, STEP, WEIGHT, choice, keys, named};
 
 keys! {
     /// The form of the file, and what is trained to make it small (paper III-C to III-E,
     /// [design](design.md#compression)).
     pub struct CompressionConfig {
-        /// `"compact"`: everything is quantized and entropy coded. `"paper"`: planes and spherical harmonics are
-        /// coded, all else is float32. `"float32"`: nothing is coded.
+        /// What is quantized and entropy coded.
         profile: FileProfile = FileProfile::Compact;
-            Word(FileProfile::NAMES),
-            "ours; paper", "or \"paper\" (other attributes and weights as float32), \"float32\"";
+            FileProfile::BOUNDS,
+            "ours; paper";
         /// The file has at most so many bytes, and hardly fewer: the weight of the rate follows while training, and at last
         /// the steps of the attributes. 0: lambda and steps alone say how large it becomes.
-        target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours", "0 = as many as lambda asks for";
+        target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
         /// The decoded file has at least this PSNR on the test views (on those of training where there are none), and is hardly
         /// better: as with `target_bytes`, weight and steps follow. 0: no such wish.
-        target_db: f64 = 0.0; DECIBELS, "ours", "0 = what lambda gives";
+        target_db: f64 = 0.0; DECIBELS, "ours";
         /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
         /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
         /// bytes; the profile `float32` has only one.
         layers: usize = GaussianLayers::default().count as usize;
-            Whole { least: 1, most: GaussianLayers::MOST as u64 }, "ours", "more = a coarse scene comes first, for slow connections";
+            Whole { least: 1, most: GaussianLayers::MOST as u64 }, "ours";
         /// The rate in the loss.
         rate: RateConfig;
         /// The context model of the feature planes (MHCM).
-        context: ContextConfig;
+        context: ContextTraining;
         /// Quantization steps of the feature planes.
-        steps: StepsConfig;
+        steps: PlaneStepsTraining;
         /// The entropy model of the spherical harmonics.
-        sh: ShConfig;
+        sh: ShTraining;
         /// Steps of the other attributes, in the `compact` profile.
         attributes: AttributesConfig;
         /// Precision of network weights, in the `compact` profile.
@@ -72,66 +71,52 @@ keys! {
         /// Weight of the rate in the loss. 0: the scene is trained without it, and the entropy models are fitted to
         /// the finished scene.
         lambda: f64 = 0.0;
-            WEIGHT, "ours; the reference's log of *bouncing balls* has 0.001 per symbol", "0 = no rate in the loss";
-        /// What lambda weighs: `"megabytes"` (10^6 bytes) of the file, so that one lambda trades bytes for
-        /// distortion, or `"per_symbol"`, bits per plane symbol plus bits per symbol of the spherical harmonics.
+            WEIGHT, "ours; the reference's log of *bouncing balls* has 0.001 per symbol";
+        /// What lambda weighs.
         weighting: RateWeighting = RateWeighting::Megabytes;
-            Word(RateWeighting::NAMES), "ours; paper", "what lambda weighs; or \"per_symbol\", as the paper";
+            RateWeighting::BOUNDS, "ours; paper";
         /// The rate of the planes has a gradient with respect to the planes. Off: their entropy model is trained, but
         /// the planes are not trained for a low rate.
         planes: bool = true;
-            Flag, "ours, for the ablation", "false = the rate trains only the planes' entropy model";
+            Flag, "ours, for the ablation";
         /// The same for the spherical harmonics.
-        sh: bool = true; Flag, "ours, for the ablation", "the same for the spherical harmonics";
+        sh: bool = true; Flag, "ours, for the ablation";
         /// The other attributes of the Gaussians have noise, a rate and learned steps too, once densification is over.
         /// Spherical harmonics of degree 1 or 2 are among them. Off: the encoder searches for their steps. Only the
         /// `compact` profile quantizes them in the file; the `paper` profile quantizes only the spherical harmonics.
-        attributes: bool = false; Flag, "ours, after HAC++", "the same for the other attributes, with a lambda of their own";
+        attributes: bool = false; Flag, "ours, after HAC++";
         /// What a megabyte of these attributes weighs in the loss.
-        attribute_lambda: f64 = 0.03; WEIGHT, "ours", "of loss for a megabyte";
+        attribute_lambda: f64 = 0.03; WEIGHT, "ours";
         /// Iterations from one that has the rate in its loss to the next such iteration.
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
         /// Share of the planes, and of the Gaussians, on which the rate is estimated. The estimate is unbiased.
-        fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours", "of the planes and the Gaussians";
+        fraction: f64 = 0.125; Number { least: 1e-6, most: 1.0 }, "ours";
         /// Iteration of the fine stage from which the planes have quantization noise and the rate is part of the loss.
         /// Spherical harmonics follow when densification is over.
         from: usize = 1000; ITERATION, "reference: 3; SH 2000";
         /// Iteration of the fine stage after which the planes are frozen: they take the values that the file will have,
         /// and only the rest of the scene is trained on. 0: never.
         planes_until: usize = 27_000;
-            ITERATION, "ours", "0 = the planes are trained to the last iteration, as in the paper";
+            ITERATION, "ours";
     }
 }
 
 choice! {
     /// What `compression.rate.lambda` weighs.
     pub enum RateWeighting: "weighting" {
-        /// Megabytes (10^6 bytes) in the file.
+        /// Megabytes (10^6 bytes) of the file, so that one lambda trades bytes for distortion.
         Megabytes = "megabytes",
-        /// The paper's sum of the bits per plane symbol and the bits per spherical-harmonics symbol.
+        /// Bits per plane symbol plus bits per symbol of the spherical harmonics, as in the paper.
         PerSymbol = "per_symbol",
     }
 }
 
-named! {
-    /// A part of the context model: one of [`ContextPart::NAMES`] in TOML. The model crate has the list.
-    pub struct ContextPartName(pub ContextPart): "part";
-}
-
-const PART: Bounds = Kind { names: ContextPart::NAMES, list: "light4gs-model/src/context/mod.rs" };
-
 keys! {
     /// Parts and sizes of the context model.
-    pub struct ContextConfig {
-        /// Sizes of the context model's networks: about 6000 weights at 16 channels, or the public code's
-        /// (`"reference"`).
-        architecture: ContextArchitecture = ContextArchitecture::Compact;
-            Word(ContextArchitecture::NAMES), "ours; reference", "or \"reference\", the public code's sizes";
-        /// The parts of the context model; the default is the paper's four. The public code also has
-        /// `"high_scale_hyperprior"`, which needs `"hyperprior"` and `"inter_scale"`. Without any part, every channel
-        /// has one learned distribution.
-        parts: Vec<ContextPartName> = ContextPart::PAPER.map(ContextPartName).to_vec();
-            List { element: &PART, length: None }, "paper", "the public code also has \"high_scale_hyperprior\"";
+    pub struct ContextTraining {
+        /// What it is.
+        #[serde(flatten)]
+        model: ContextConfig;
         /// Learning rate of the context model at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// The same at the end of the fine stage.
@@ -141,23 +126,12 @@ keys! {
     }
 }
 
-choice! {
-    /// Sizes of the context model's networks.
-    pub enum ContextArchitecture: "architecture" {
-        /// Small networks, for small scenes.
-        Compact = "compact",
-        /// The public code's sizes.
-        Reference = "reference",
-    }
-}
-
 keys! {
     /// Quantization steps of the planes.
-    pub struct StepsConfig {
-        /// Quantization step of the space-only planes at the start.
-        space_only: f64 = quantization().space_only; STEP, "ours; reference: 0.1, fixed";
-        /// The same for the space-time planes.
-        space_time: f64 = quantization().space_time; STEP, "ours; reference: 0.1, fixed";
+    pub struct PlaneStepsTraining {
+        /// The steps at the start.
+        #[serde(flatten)]
+        initial: AdaptiveQuantizationConfig;
         /// The steps are learned: they become coarser than at the start where that pays, but not finer, which would help
         /// training frames only ([results](results/hexplane.md#learned-quantization-steps)).
         adaptive: bool = true; Flag, "paper; dropped by the reference";
@@ -167,21 +141,16 @@ keys! {
         learning_rate: f64 = 2e-3; RATE, "ours";
         /// For a scene that was trained without a rate, such as an imported one: the encoder searches for the coarsest
         /// steps that cost at most this much PSNR, in dB. 0: the steps are used as they are.
-        search_tolerance: f64 = 0.0; DECIBELS, "ours", "dB; 0 = no search, also for a scene trained without a rate";
+        search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
 }
 
 keys! {
     /// The model of the spherical harmonics beyond degree 0.
-    pub struct ShConfig {
-        /// Entropy model of the spherical harmonics beyond degree 0: `"factorized"`, `"mixture_of_logistics"`,
-        /// `"channel_autoregressive"` or `"hexplane_coupled"`. It is trained for degree 3. Scenes of a lower degree have
-        /// none. The file in the `compact` profile does without the first two: there neighbors tell more.
-        model: ShModel = ShModel(ShKind::Factorized);
-            Kind { names: ShKind::NAMES, list: "light4gs-model/src/sh/mod.rs" },
-            "paper", "or \"mixture_of_logistics\", \"channel_autoregressive\", \"hexplane_coupled\"";
-        /// Quantization step of the spherical harmonics beyond degree 0.
-        step: f64 = 0.02; STEP, "paper";
+    pub struct ShTraining {
+        /// What it is.
+        #[serde(flatten)]
+        entropy: ShConfig;
         /// Learning rate of that model, and of the densities of other attributes, at the first step.
         learning_rate_init: f64 = 5e-3; RATE, "ours";
         /// The same at the end of the fine stage.
@@ -189,11 +158,6 @@ keys! {
         /// As `compression.steps.search_tolerance`, for this step.
         search_tolerance: f64 = 0.0; DECIBELS, "ours";
     }
-}
-
-named! {
-    /// The entropy model of the spherical harmonics: one of [`ShKind::NAMES`] in TOML. The model crate has the list.
-    pub struct ShModel(pub ShKind): "model";
 }
 
 keys! {
@@ -204,10 +168,10 @@ keys! {
         /// or one of a field of your own, can be named beside these; otherwise they have the steps that the field gives
         /// them. The search starts from them.
         steps: ByName = built_in(step_of);
-            Bounds::ByName(&STEP), "ours", "means: of the size of the typical Gaussian";
+            Bounds::ByName(&QUANTIZATION_STEP), "ours";
         /// The encoder searches for the coarsest steps that cost at most this much PSNR on some training views, in dB.
         /// 0: the steps are used as they are.
-        search_tolerance: f64 = 0.05; DECIBELS, "ours", "dB of training PSNR";
+        search_tolerance: f64 = 0.05; DECIBELS, "ours";
     }
 }
 
@@ -223,11 +187,6 @@ keys! {
         /// Bits per weight of the entropy models' networks.
         context_bits: u8 = bits(WeightPrecisions::default().context_model); WEIGHT_BITS, "ours";
     }
-}
-
-/// The model crate's defaults for the planes' quantization.
-fn quantization() -> AdaptiveQuantizationConfig {
-    AdaptiveQuantizationConfig::new()
 }
 
 /// A precision in bits, the only form that the configuration has.

@@ -1,9 +1,10 @@
 //! `[data]`: the training data.
 
-use light4gs_data::Layouts;
+use light4gs_keys::Bounds::{List, NameOrNone, Number, Whole, WholeOrNone};
+use light4gs_keys::{SHARE, keys, optional};
 
-use crate::keys::Bounds::{LayoutOrNone, List, Number, Whole, WholeOrNone};
-use crate::keys::{MOST_GAUSSIANS, SHARE, keys, optional};
+use crate::density::MOST_GAUSSIANS;
+use light4gs_data::Layouts;
 
 keys! {
     /// Images, and the cloud that training starts from.
@@ -12,19 +13,19 @@ keys! {
         /// --format` sets it.
         #[serde(with = "optional")]
         layout: Option<String> = None;
-            LayoutOrNone { names: || Layouts::default().names() },
-            "ours", "or \"dnerf\", \"neu3d\", \"nerfds\", ...; empty = found by content";
+            NameOrNone { what: "layout", none: "found by content", names: || Layouts::default().names() },
+            "ours";
         /// Length of the sequence in frames; later frames are left out. Where the dataset numbers its frames (`neu3d`),
         /// frame `i` has the time `i` divided by this. 0: all frames.
         #[serde(with = "optional")]
         frames: Option<usize> = None;
             WholeOrNone { least: 1, most: 1_000_000 },
-            "reference, Neu3D: 300", "length of the sequence; 0 = all there are";
+            "reference, Neu3D: 300";
         /// Larger images are reduced so that their longer side has this many pixels, keeping their shape. 0 leaves all as
         /// they are. `train --pixels` sets it.
         #[serde(with = "optional")]
         resolution: Option<u32> = None;
-            WholeOrNone { least: 8, most: 16_384 }, "ours", "pixels of the longer side; 0 = images as they are";
+            WholeOrNone { least: 8, most: 16_384 }, "ours";
         /// Color behind transparent pixels, each channel 0 to 1.
         background: [f32; 3] = [1.0; 3]; List { element: &SHARE, length: Some(3) }, "reference, D-NeRF: white";
         /// Upper bound of the memory for decoded images. Images that do not fit are decoded again, ahead of the

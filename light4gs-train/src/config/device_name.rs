@@ -3,9 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use light4gs_keys::{KeyValue, nearest};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-use crate::keys::nearest;
 
 /// The back ends by name; `wgpu` may be followed by an adapter, as in `wgpu:0` or `wgpu:cpu`.
 pub const DEVICES: &[&str] = &["ndarray", "flex", "wgpu"];
@@ -106,6 +105,8 @@ impl FromStr for DeviceName {
         }
     }
 }
+
+impl KeyValue for DeviceName {}
 
 impl Serialize for DeviceName {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {

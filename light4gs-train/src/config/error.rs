@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::PathBuf;
 
+use light4gs_keys::Problem;
+
 /// Where a layer of the configuration comes from.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Origin {
@@ -22,15 +24,6 @@ impl fmt::Display for Origin {
             Origin::Text(name) => write!(formatter, "{name}"),
         }
     }
-}
-
-/// One value out of its range.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Problem {
-    /// Full path of the key, such as `train.prune.fraction`.
-    pub key: String,
-    /// What is wrong and what would be right.
-    pub message: String,
 }
 
 /// A configuration that cannot be used. Every variant is wrong input, none a fault of the program.

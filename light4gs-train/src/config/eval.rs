@@ -3,16 +3,15 @@
 use std::path::PathBuf;
 
 use light4gs_data::Split;
-
-use crate::keys::Bounds::{Flag, List, Text, Whole, Word};
-use crate::keys::{ITERATION, choice, keys};
+use light4gs_keys::Bounds::{Flag, List, Text, Whole};
+use light4gs_keys::{ITERATION, choice, keys};
 
 keys! {
     /// What is measured, on the decoded file.
     pub struct EvalConfig {
-        /// Splits to measure: `test`, `val`, `train`. A split that the dataset does not have is skipped.
+        /// Splits to measure. A split that the dataset does not have is skipped.
         splits: Vec<EvalSplit> = vec![EvalSplit::Test, EvalSplit::Val];
-            List { element: &Word(EvalSplit::NAMES), length: None }, "ours";
+            List { element: &EvalSplit::BOUNDS, length: None }, "ours";
         /// Save every rendered view as a PNG in `renders/`.
         save_renders: bool = true; Flag, "ours";
         /// Frames rendered before the clock starts.
@@ -26,7 +25,7 @@ keys! {
         /// Files with the weights of LPIPS ([metrics.md](metrics.md)). Without them LPIPS is not measured, and its
         /// columns say so.
         lpips: Vec<PathBuf> = Vec::new();
-            List { element: &Text, length: None }, "ours", "files with weights, see docs/metrics.md";
+            List { element: &Text, length: None }, "ours";
     }
 }
 

@@ -31,25 +31,25 @@ use std::path::Path;
 use std::sync::LazyLock;
 
 use light4gs_data::DatasetLayout;
+use light4gs_keys::Bounds::{Parsed, Whole};
+use light4gs_keys::{MOST_INTEGER, keys};
 use sha2::{Digest, Sha256};
 
-use crate::keys::Bounds::{Device, Whole};
-use crate::keys::{MOST_INTEGER, keys};
-use layering::layers;
+use layering::{layers, presets};
 
-pub use crate::keys::{Bounds, ByName, Key, UnknownChoice};
 pub use compression::{
-    AttributesConfig, CompressionConfig, ContextArchitecture, ContextConfig, FileProfile, RateConfig, RateWeighting,
-    ShConfig, ShModel, StepsConfig, WeightsConfig,
+    AttributesConfig, CompressionConfig, ContextTraining, FileProfile, PlaneStepsTraining, RateConfig, RateWeighting,
+    ShTraining, WeightsConfig,
 };
 pub use data::DataConfig;
 pub use device_name::{Adapter, DEVICES, DeviceName, UnknownDevice};
-pub use error::{ConfigError, Origin, Problem};
+pub use error::{ConfigError, Origin};
 pub use eval::{EvalConfig, EvalSplit};
 pub use layering::Overrides;
 pub use layering::presets::preset_names;
-pub use model::{CoordinatesTable, DeformationTable, FieldKind, HexPlaneTable, ModelConfig};
-pub use train::{CoarseToFineConfig, LearningRates, RegularizerConfig, TrainConfig};
+pub use light4gs_keys::{Bounds, ByName, Key, Problem, UnknownChoice};
+pub use model::ModelConfig;
+pub use train::{CoarseToFineConfig, LearningRates, TrainConfig};
 
 /// Far longer than any real configuration.
 pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;
@@ -61,7 +61,8 @@ keys! {
         seed: u64 = 0; Whole { least: 0, most: MOST_INTEGER }, "ours";
         /// Back end that computes: `ndarray`, `flex`, or `wgpu`, the last with an adapter if wanted: `wgpu:0` (by
         /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
-        device: DeviceName = DeviceName::default(); Device(DEVICES), "ours", "or \"ndarray\", \"wgpu\", \"wgpu:0\"";
+        device: DeviceName = DeviceName::default();
+            Parsed { names: DEVICES, also: "wgpu also with an adapter" }, "ours";
         /// What is trained on.
         data: DataConfig;
         /// What is trained.
@@ -76,16 +77,11 @@ keys! {
 }
 
 /// Every key, in the order of the configuration.
-pub static KEYS: LazyLock<Vec<Key>> = LazyLock::new(crate::keys::list::<Config>);
+pub static KEYS: LazyLock<Vec<Key>> = LazyLock::new(light4gs_keys::list::<Config>);
 
 /// Every key with its default, as the tables of `docs/configuration.md`.
 pub fn keys_as_markdown() -> String {
-    crate::keys::markdown::<Config>()
-}
-
-/// Every key with its default and a note, as a TOML file: the preset `base`.
-pub fn keys_as_toml() -> String {
-    crate::keys::toml_text::<Config>()
+    light4gs_keys::markdown::<Config>()
 }
 
 impl Config {
@@ -104,7 +100,7 @@ impl Config {
     /// # Errors
     /// [`ConfigError::NoPreset`] for a layout that has none.
     pub fn preset_of(layout: &dyn DatasetLayout) -> Result<&'static str, ConfigError> {
-        layout.preset().ok_or_else(|| ConfigError::NoPreset { layout: layout.name() })
+        presets::of_layout(layout.name()).ok_or_else(|| ConfigError::NoPreset { layout: layout.name() })
     }
 
     /// What a command line gives: a preset's name or a file's path, and overrides as [`Overrides::parse`] takes them,

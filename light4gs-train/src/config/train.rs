@@ -1,12 +1,12 @@
 //! `[train]`: how it is trained.
 
 use light4gs_data::Camera;
+use light4gs_keys::Bounds::{self, Whole};
+use light4gs_keys::{ByName, INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, keys, optional};
 use light4gs_model::regularizer::PlaneRegularizer;
 
 use super::attributes::built_in;
 use crate::density::{DensifyConfig, GuidedSamplingConfig, PruneConfig};
-use crate::keys::Bounds::{self, Kind, Whole};
-use crate::keys::{ByName, INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, WEIGHT, keys, optional};
 use crate::loss::{LossKind, Losses};
 use crate::sampling::{SamplerKind, Samplers};
 use crate::stage::Stage;
@@ -22,16 +22,12 @@ keys! {
         batch_size: usize = 1; Whole { least: 1, most: 1024 }, "paper: 1 for D-NeRF, 2 to 4 elsewhere";
         /// The loss by which rendered views are compared with the frames. The keys of each loss are in a table of its name.
         loss: LossKind = LossKind::Photometric;
-            Kind { names: LossKind::NAMES, list: "light4gs-train/src/loss/mod.rs" },
-            "3DGS";
+            LossKind::BOUNDS, "3DGS";
         /// The keys of the losses.
         #[serde(flatten)]
         losses: Losses;
-        /// Which frames an iteration looks at: any (`"shuffled"`), or (`"widening_window"`) those of a window of time that
-        /// widens.
-        sampling: SamplerKind = SamplerKind::Shuffled;
-            Kind { names: SamplerKind::NAMES, list: "light4gs-train/src/sampling/mod.rs" },
-            "ours; the reference shuffles", "or \"widening_window\": frames of a window of time that widens";
+        /// Which frames an iteration looks at.
+        sampling: SamplerKind = SamplerKind::Shuffled; SamplerKind::BOUNDS, "ours; the reference shuffles";
         /// The keys of the samplers.
         #[serde(flatten)]
         samplers: Samplers;
@@ -54,7 +50,7 @@ keys! {
         /// Adding Gaussians where frames are not explained.
         guided_sampling: GuidedSamplingConfig;
         /// Weights of the space-time regularizers, used in the fine stage.
-        regularizer: RegularizerConfig;
+        regularizer: PlaneRegularizer;
     }
 }
 
@@ -89,9 +85,9 @@ keys! {
     /// the size with which the fine stage begins. No side of an image is made shorter than 200 pixels.
     pub struct CoarseToFineConfig {
         /// Images have a quarter of their width and height until this share of the fine stage is over. 0: never.
-        quarter_until: f64 = 0.0; SHARE, "ours", "of the fine stage; 0 = never";
+        quarter_until: f64 = 0.0; SHARE, "ours";
         /// They have half of them until this share is over.
-        half_until: f64 = 0.0; SHARE, "ours", "of the fine stage; 0 = never";
+        half_until: f64 = 0.0; SHARE, "ours";
     }
 }
 
@@ -127,34 +123,14 @@ keys! {
         /// Attributes of the Gaussians, first step. Further attributes, such as `stillness` of control nodes or one of a
         /// field of your own, can be named beside these; otherwise they have the rates that the field gives them.
         attributes_init: ByName = built_in(|attribute| Some(attribute.learning_rate.initial));
-            Bounds::ByName(&RATE), "3DGS", "by name";
+            Bounds::ByName(&RATE), "3DGS";
         /// The same at the end of the schedule. An attribute that is not named here keeps its rate, unless its field gives
         /// it another one.
         attributes_final: ByName = built_in(|attribute| attribute.learning_rate.last);
-            Bounds::ByName(&RATE), "3DGS", "all others keep their rates";
+            Bounds::ByName(&RATE), "3DGS";
         /// Length of the decay in iterations. 0: the length of the stage.
         #[serde(with = "optional")]
-        schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000", "0 = the stage's length";
-    }
-}
-
-keys! {
-    /// Weights of the space-time regularizers, fine stage only.
-    pub struct RegularizerConfig {
-        /// Squared second difference of the space-only planes.
-        plane_smoothness: f32 = 1e-4; WEIGHT, "reference";
-        /// Squared second difference over time of the space-time planes.
-        time_smoothness: f32 = 1e-2; WEIGHT, "reference";
-        /// Distance of the space-time planes from 1, which means "no motion".
-        time_l1: f32 = 1e-4; WEIGHT, "reference";
-    }
-}
-
-impl RegularizerConfig {
-    /// The regularizer that this stands for.
-    pub fn build(&self) -> PlaneRegularizer {
-        let Self { plane_smoothness, time_smoothness, time_l1 } = *self;
-        PlaneRegularizer { plane_smoothness, time_smoothness, time_l1 }
+        schedule_steps: Option<usize> = None; ITERATION, "ours; reference: 20000";
     }
 }
 

@@ -1,20 +1,19 @@
 //! Checks of keys against each other. The bounds of a single key are where it is declared.
 
-use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, check_resolution};
+use light4gs_codec::plane_layout::AXIS_NAMES;
 use light4gs_codec::{CodecError, checks};
-use serde_json::Value;
+use light4gs_keys::KeyTable;
+use light4gs_model::{FieldKind, HexPlaneFieldConfig, MOST_PLANE_RESOLUTION};
 
-use super::model::{FieldKind, MOST_PLANE_RESOLUTION};
 use super::{
-    Bounds, CoarseToFineConfig, CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, HexPlaneTable, KEYS,
-    Key, ModelConfig, Problem, TrainConfig,
+    CoarseToFineConfig, CompressionConfig, Config, ConfigError, EvalConfig, FileProfile, Problem, TrainConfig,
 };
 use crate::density::PruneConfig;
 
 pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
-    let mut check = Check { problems: out_of_bounds(config) };
-    hexplane(&mut check, &config.model.hexplane);
-    deformation(&mut check, &config.model);
+    let mut check = Check { problems: Vec::new() };
+    config.problems("", &mut check.problems);
+    hexplane(&mut check, &config.model.fields.hexplane);
     train(&mut check, &config.train);
     guided_sampling(&mut check, config);
     compression(&mut check, &config.compression);
@@ -22,33 +21,15 @@ pub(super) fn validate(config: &Config) -> Result<(), ConfigError> {
     if check.problems.is_empty() { Ok(()) } else { Err(ConfigError::Invalid { problems: check.problems }) }
 }
 
-/// All values out of bounds, in the order of the keys.
-fn out_of_bounds(config: &Config) -> Vec<Problem> {
-    let table = serde_json::to_value(config).expect("a configuration is plain data");
-    let problem = |key: String, bounds: &Bounds, value: &Value| {
-        let message = bounds.problem(value)?;
-        Some(Problem { key, message })
-    };
-    let check = |Key { path, bounds, .. }: &Key| -> Vec<Problem> {
-        let value = path.split('.').try_fold(&table, |table, name| table.get(name)).unwrap_or(&Value::Null);
-        match (bounds, value) {
-            (Bounds::ByName(each), Value::Object(numbers)) => {
-                numbers.iter().filter_map(|(name, value)| problem(format!("{path}.{name}"), each, value)).collect()
-            }
-            _ => problem(path.clone(), bounds, value).into_iter().collect(),
-        }
-    };
-    KEYS.iter().flat_map(check).collect()
-}
-
-fn hexplane(check: &mut Check, planes: &HexPlaneTable) {
-    let illegal = check_resolution(planes.resolution).err();
+fn hexplane(check: &mut Check, field: &HexPlaneFieldConfig) {
+    let planes = &field.hexplane;
+    let illegal = planes.check().err();
     let legal = illegal.is_none();
     check.that("model.hexplane.resolution", legal, || format!("is {}", illegal.expect("it is illegal")));
-    for (axis, size) in ["x", "y", "z", "t"].into_iter().zip(planes.resolution) {
+    for (axis, size) in AXIS_NAMES.into_iter().zip(planes.resolution) {
         for &multiplier in if axis == "t" { &[1][..] } else { &planes.multipliers[..] } {
             let scaled = size.saturating_mul(multiplier);
-            check.that("model.hexplane.resolution", scaled as u64 <= MOST_PLANE_RESOLUTION, || {
+            check.that("model.hexplane.resolution", scaled <= MOST_PLANE_RESOLUTION, || {
                 format!("is {size} along {axis}, times {multiplier} it is over the limit of {MOST_PLANE_RESOLUTION}")
             });
         }
@@ -60,15 +41,11 @@ fn hexplane(check: &mut Check, planes: &HexPlaneTable) {
     });
     if legal {
         let narrow = |size: usize| u32::try_from(size).unwrap_or(u32::MAX);
-        let layout = PlaneLayout::multiscale(&PlaneAxes::ALL, planes.resolution, multipliers);
-        let answer = checks::feature_planes(narrow(planes.channels), &layout);
+        let answer = checks::feature_planes(narrow(planes.channels), &planes.layout());
         check.encodable("model.hexplane.multipliers", answer);
     }
-}
-
-/// Width and depth may be too large together even where each is within its bounds.
-fn deformation(check: &mut Check, model: &ModelConfig) {
-    check.encodable("model.deformation.width", model.hexplane_field().deformation.check_size());
+    // Width and depth may be too large together even where each is within its bounds.
+    check.encodable("model.deformation.width", field.check_size());
 }
 
 fn train(check: &mut Check, train: &TrainConfig) {
@@ -98,7 +75,7 @@ fn guided_sampling(check: &mut Check, config: &Config) {
             format!("has {iteration}, but the fine stage has iterations 1 to {most}")
         });
     }
-    let lives = config.model.field == FieldKind::Nodes && config.model.nodes.lifetime;
+    let lives = config.model.field == FieldKind::Nodes && config.model.fields.nodes.lifetime;
     check.that(KEY, iterations.is_empty() || lives, || {
         "asks for Gaussians that come and go: set `model.field=nodes` and `model.nodes.lifetime=true`, or no iteration".to_owned()
     });
@@ -122,12 +99,12 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.that("compression.rate.planes_until", rate.planes_until == 0 || rate.planes_until > rate.from, || {
         format!("is {}; it must be 0 (never) or above compression.rate.from, {}", rate.planes_until, rate.from)
     });
-    for (i, part) in context.parts.iter().enumerate() {
-        check.that("compression.context.parts", !context.parts[..i].contains(part), || format!("has `{part}` twice"));
-        for needed in part.0.needs() {
-            let there = context.parts.iter().any(|other| other.0 == *needed);
-            check.that("compression.context.parts", there, || {
-                format!("has `{part}`, which needs `{}` beside it", needed.name())
+    let parts = &context.model.parts;
+    for (i, part) in parts.iter().enumerate() {
+        check.that("compression.context.parts", !parts[..i].contains(part), || format!("has `{part}` twice"));
+        for needed in part.needs() {
+            check.that("compression.context.parts", parts.contains(needed), || {
+                format!("has `{part}`, which needs `{needed}` beside it")
             });
         }
     }
@@ -148,9 +125,9 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
     check.that("compression.layers", compression.layers == 1 || !float32, || {
         format!("is {}, but the profile \"float32\" has one layer; set compression.profile=compact", compression.layers)
     });
-    check.encodable("compression.steps.space_only", checks::plane_step(steps.space_only as f32));
-    check.encodable("compression.steps.space_time", checks::plane_step(steps.space_time as f32));
-    check.encodable("compression.sh.step", checks::sh_step(sh.step as f32));
+    check.encodable("compression.steps.space_only", checks::plane_step(steps.initial.space_only as f32));
+    check.encodable("compression.steps.space_time", checks::plane_step(steps.initial.space_time as f32));
+    check.encodable("compression.sh.step", checks::sh_step(sh.entropy.step as f32));
     for (name, step) in attributes.steps.iter() {
         check.encodable(&format!("compression.attributes.steps.{name}"), checks::attribute_step(name, step as f32));
     }

@@ -4,16 +4,16 @@
 use std::collections::BTreeMap;
 
 use burn::tensor::{Device, Tensor};
+use light4gs_keys::Bounds::{Number, Whole};
+use light4gs_keys::{INTERVAL, ITERATION, SHARE, THRESHOLD, keys};
 
 use super::clone_and_split::{
     DensifyMasks, SizeLimit, densify, largest_scales, least_of_largest, reset_opacity, survivors,
 };
 use super::{
-    DensityConfig, DensityStatistics, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics,
-    gaussians_for_images,
+    DensityConfig, DensityStatistics, DensityStrategy, GaussianEditor, MOST_GAUSSIANS, TrainingPosition,
+    ViewStatistics, gaussians_for_images,
 };
-use crate::keys::Bounds::{Number, Whole};
-use crate::keys::{INTERVAL, ITERATION, MOST_GAUSSIANS, SHARE, THRESHOLD, keys};
 use crate::randomness::standard_normal;
 use crate::stage::Stage;
 
@@ -54,7 +54,7 @@ keys! {
         /// Gaussians are pruned by opacity only while there are more than this. While there are fewer, fast objects
         /// survive the coarse stage, where they are faint. 0: always.
         prune_above: usize = 200_000;
-            ITERATION, "reference: 200000", "Gaussians; below it nothing is pruned for its opacity";
+            ITERATION, "reference: 200000";
         /// Iterations between two resets of the opacities; 0 = never.
         opacity_reset_interval: usize = 3000; ITERATION, "3DGS";
     }

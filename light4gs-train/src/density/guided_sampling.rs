@@ -1,7 +1,7 @@
 //! Where frames are not explained, Gaussians of a short life are added (guided sampling: Li et al., CVPR 2024).
 
-use crate::keys::Bounds::{List, Number, Whole};
-use crate::keys::{INTERVAL, keys};
+use light4gs_keys::Bounds::{List, Number, Whole};
+use light4gs_keys::{INTERVAL, keys};
 
 keys! {
     /// Guided sampling: new Gaussians at pixels of the training frames that are not explained, each there around the time of its
@@ -9,10 +9,10 @@ keys! {
     pub struct GuidedSamplingConfig {
         /// Iterations of the fine stage after which Gaussians are added; empty = never.
         iterations: Vec<usize> = Vec::new();
-            List { element: &INTERVAL, length: None }, "after Li et al. 2024", "of the fine stage; empty = never";
+            List { element: &INTERVAL, length: None }, "after Li et al. 2024";
         /// New Gaussians of each time, at one of its frames; fewer where little is not explained. They may exceed
         /// `train.densify.adaptive.max_gaussians`.
-        count: usize = 100; Whole { least: 1, most: 1_000_000 }, "ours", "Gaussians of each time";
+        count: usize = 100; Whole { least: 1, most: 1_000_000 }, "ours";
         /// Their lifetime: its standard deviation in distances between training times.
         lifetime: f64 = 0.6; Number { least: 0.01, most: 1e6 }, "ours";
     }

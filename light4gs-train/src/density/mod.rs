@@ -19,6 +19,7 @@ mod statistics;
 use std::collections::BTreeMap;
 
 use burn::tensor::{Device, Int, Tensor};
+use light4gs_keys::{choice, keys};
 use rand::Rng;
 
 pub use adaptive::{AdaptiveDensityConfig, AdaptiveDensityControl};
@@ -30,12 +31,13 @@ pub use significance::{
 };
 pub use statistics::DensityStatistics;
 
-use crate::keys::Bounds::Kind;
-use crate::keys::{keys, kinds};
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
 
-kinds! {
+/// The most Gaussians that a configuration may ask for.
+pub(crate) const MOST_GAUSSIANS: u64 = 50_000_000;
+
+choice! {
     /// The built-in density strategies, by the names that `train.densify.strategy` takes.
     pub enum DensityKind: "strategy" {
         Adaptive = adaptive: AdaptiveDensityConfig,
@@ -48,11 +50,9 @@ kinds! {
 keys! {
     /// How Gaussians are added and removed.
     pub struct DensifyConfig {
-        /// The strategy: `"adaptive"` clones, splits and prunes, `"none"` keeps the Gaussians of the cloud. The keys of
-        /// each strategy are in a table of its name.
+        /// The strategy. The keys of each are in a table of its name.
         strategy: DensityKind = DensityKind::Adaptive;
-            Kind { names: DensityKind::NAMES, list: "light4gs-train/src/density/mod.rs" },
-            "3DGS", "or \"none\"";
+            DensityKind::BOUNDS, "3DGS";
         /// The keys of the strategies.
         #[serde(flatten)]
         strategies: DensityStrategies;

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 
 use burn::tensor::{Device, Tensor};
+use light4gs_keys::keys;
 
 use super::{DensityConfig, DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
-use crate::keys::keys;
 use crate::stage::Stage;
 
 keys! {

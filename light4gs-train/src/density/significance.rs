@@ -1,9 +1,8 @@
 //! Scores by which Gaussians are pruned (paper III-B).
 
+use light4gs_keys::Bounds::{Flag, List, Number};
+use light4gs_keys::{INTERVAL, choice, keys};
 use light4gs_model::{PixelContribution as Sum, Sensitivity, Significance, VolumeWeight};
-
-use crate::keys::Bounds::{Flag, List, Number, Word};
-use crate::keys::{INTERVAL, choice, keys};
 
 keys! {
     /// Significance pruning (STP, paper III-B): passes after densification, each dropping the Gaussians that
@@ -13,18 +12,17 @@ keys! {
         /// 64 %.
         fraction: f64 = 0.0;
             Number { least: 0.0, most: 0.999 },
-            "paper: 0.1 to 0.4", "of the Gaussians, each pass; 0 = never. The paper: 0.1, 0.2, 0.3, 0.4";
+            "paper: 0.1 to 0.4";
         /// Iterations of the fine stage after which a pass takes place; all after the end of densification.
         iterations: Vec<usize> = vec![15_001, 20_000];
             List { element: &INTERVAL, length: None },
-            "paper: mid-way and near the end", "of the fine stage, after densification";
-        /// What a pixel adds to the score of a Gaussian that it blends: `"transmittance"` times opacity, or
-        /// `"sensitivity"`, the squared change of the color without the Gaussian.
+            "paper: mid-way and near the end";
+        /// What a pixel adds to the score of a Gaussian that it blends.
         score: PruneScore = PruneScore::Transmittance;
-            Word(PruneScore::NAMES), "paper; the reference sums the opacity", "or \"sensitivity\"";
-        /// Factor of the volume V: `"clamped"` is clamp(V / V_90, 0, 1)^exponent, `"none"` is 1.
+            PruneScore::BOUNDS, "paper; the reference sums the opacity";
+        /// Factor of the volume V.
         volume: PruneVolume = PruneVolume::Clamped;
-            Word(PruneVolume::NAMES), "paper", "or \"none\"";
+            PruneVolume::BOUNDS, "paper";
         /// Exponent of that factor.
         volume_exponent: f64 = 0.1; Number { least: 1e-6, most: 3.0 }, "LightGaussian";
         /// A pass uses one random camera for each time instead of every training view; for data with many cameras.
@@ -45,9 +43,9 @@ choice! {
 choice! {
     /// The factor of a Gaussian's volume in its significance.
     pub enum PruneVolume: "volume" {
-        /// None.
+        /// 1.
         None = "none",
-        /// Relative to the volume that 90 % stay below, at most 1: the paper's.
+        /// clamp(V / V_90, 0, 1)^exponent, where 90 % of the volumes are below V_90: the paper's.
         Clamped = "clamped",
     }
 }

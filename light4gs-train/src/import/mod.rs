@@ -14,7 +14,7 @@ mod views;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use light4gs_model::{DynamicScene, HexPlaneConfig, HexPlaneField};
+use light4gs_model::{DeformationConfig, DynamicScene, HexPlaneConfig, HexPlaneField, HexPlaneFieldConfig};
 
 pub use views::scene_around;
 
@@ -45,18 +45,19 @@ impl ImportedScene {
         let planes = HexPlaneConfig::of(&self.scene.field.hexplane).expect("what is imported has a hexplane");
         let deformation = &self.scene.field.deformation;
         config.model.sh_degree = self.scene.gaussians.sh_degree() as u8;
-        config.model.hexplane.channels = planes.channels;
-        config.model.hexplane.resolution = planes.resolution;
-        config.model.hexplane.multipliers = planes.multipliers;
-        let network = &mut config.model.deformation;
-        network.width = deformation.trunk[0].weight.dims()[1];
-        network.depth = deformation.trunk.len();
-        network.position = deformation.position.is_some();
-        network.scale = deformation.scale.is_some();
-        network.rotation = deformation.rotation.is_some();
-        network.opacity = deformation.opacity.is_some();
-        network.sh = deformation.sh.is_some();
-        network.differentiate_points = false;
+        config.model.fields.hexplane = HexPlaneFieldConfig {
+            hexplane: planes,
+            deformation: DeformationConfig {
+                width: deformation.trunk[0].weight.dims()[1],
+                depth: deformation.trunk.len(),
+                position: deformation.position.is_some(),
+                scale: deformation.scale.is_some(),
+                rotation: deformation.rotation.is_some(),
+                opacity: deformation.opacity.is_some(),
+                sh: deformation.sh.is_some(),
+                differentiate_points: false,
+            },
+        };
         config.data.background = self.background;
         // Entropy models are fitted when the scene is encoded.
         config.compression.rate.lambda = 0.0;

@@ -7,13 +7,13 @@ mod photometric;
 
 use burn::tensor::Tensor;
 use light4gs_data::Frame;
+use light4gs_keys::choice;
 
 pub use photometric::{PhotometricLoss, photometric};
 
-use crate::keys::kinds;
 use crate::stage::Stage;
 
-kinds! {
+choice! {
     /// The built-in losses, by the names that `train.loss` takes.
     pub enum LossKind: "loss" {
         Photometric = photometric: PhotometricLoss,

@@ -1,9 +1,9 @@
 //! L1, squared difference and D-SSIM (3DGS, Kerbl et al. 2023, equation 7).
 
 use burn::tensor::Tensor;
+use light4gs_keys::{ITERATION, SHARE, keys};
 
 use super::{Loss, LossInput};
-use crate::keys::{ITERATION, SHARE, keys};
 use crate::metrics::{l1, l2, ssim};
 use crate::stage::Stage;
 
@@ -14,7 +14,7 @@ keys! {
         lambda_dssim: f32 = 0.0; SHARE, "reference";
         /// The loss is the squared difference until this iteration of the fine stage (and in the coarse stage, if not
         /// 0). L1 is smallest at the median, which for a fast object is the background behind it.
-        l2_until: usize = 0; ITERATION, "ours", "iteration; squared differences until then keep fast objects alive";
+        l2_until: usize = 0; ITERATION, "ours";
     }
 }
 

@@ -11,8 +11,9 @@ use std::collections::BTreeSet;
 use std::time::Instant;
 
 use light4gs_data::Scene;
+use light4gs_model::FieldKind;
 
-use crate::config::{Config, FieldKind};
+use crate::config::Config;
 use crate::error::TrainError;
 use crate::stage::Stage;
 use crate::trainer::Trainer;

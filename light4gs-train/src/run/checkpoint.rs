@@ -410,8 +410,8 @@ mod tests {
     #[test]
     fn further_attributes_are_kept_and_their_shapes_checked() {
         let mut config = Config::default();
-        config.model.hexplane.channels = 2;
-        config.model.hexplane.resolution = [8, 8, 8, 4];
+        config.model.fields.hexplane.hexplane.channels = 2;
+        config.model.fields.hexplane.hexplane.resolution = [8, 8, 8, 4];
         let device = Device::flex().autodiff();
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let zeros = || vector(vec![0.0; 4], &device.clone().inner());

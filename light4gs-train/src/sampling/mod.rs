@@ -9,17 +9,17 @@ mod shuffled;
 mod widening_window;
 
 use light4gs_data::Frame;
+use light4gs_keys::choice;
 use rand::Rng;
 
 pub use candidates::CandidateFrames;
 pub use shuffled::Shuffled;
 pub use widening_window::WideningWindow;
 
-use crate::keys::kinds;
 use crate::randomness::{Purpose, generator};
 use crate::stage::Stage;
 
-kinds! {
+choice! {
     /// The built-in samplers, by the names that `train.sampling` takes.
     pub enum SamplerKind: "sampler" {
         Shuffled = shuffled: Shuffled,

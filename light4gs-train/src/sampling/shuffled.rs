@@ -1,9 +1,9 @@
 //! Any frames, in an order that is shuffled anew whenever all have been used.
 
+use light4gs_keys::keys;
 use rand::seq::SliceRandom;
 
 use super::{BatchRequest, FrameSampler};
-use crate::keys::keys;
 
 keys! {
     /// Any frames, in an order that is shuffled anew whenever all have been used. The default.

@@ -1,10 +1,10 @@
 //! A window of time that widens: motion is followed outwards from where it is known.
 
+use light4gs_keys::Bounds::Whole;
+use light4gs_keys::{SHARE, keys};
 use rand::Rng;
 
 use super::{BatchRequest, FrameSampler, Shuffled};
-use crate::keys::Bounds::Whole;
-use crate::keys::{SHARE, keys};
 use crate::stage::Stage;
 
 keys! {

@@ -24,13 +24,13 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use light4gs_data::read_regular_text;
+use light4gs_keys::choice;
 use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::measure::{Column, Measure, default_columns};
 use crate::config::{MAX_CONFIG_BYTES, UnknownChoice};
 use crate::error::TrainError;
-use crate::keys::choice;
 
 /// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;

@@ -271,8 +271,8 @@ mod tests {
     fn the_noise_passes_gradients_on_to_the_steps() {
         let device = Device::flex().autodiff();
         let mut config = Config::default();
-        config.model.hexplane.channels = 2;
-        config.model.hexplane.resolution = [8, 8, 8, 4];
+        config.model.fields.hexplane.hexplane.channels = 2;
+        config.model.fields.hexplane.hexplane.resolution = [8, 8, 8, 4];
         let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.5, 2.0]], colors: vec![[0.5; 3]; 2] };
         let scene = config.model.build().init(&cloud, &device);
         let compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device).unwrap();

@@ -169,7 +169,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             return None;
         }
         let scene = &self.state.scene;
-        let term = self.config.train.regularizer.build().loss(scene.planes()?);
+        let term = self.config.train.regularizer.loss(scene.planes()?);
         let value = term.clone().inner();
         gradients.add_module(scene, &mut term.backward());
         self.profile.lap("regularizers");

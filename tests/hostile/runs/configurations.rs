@@ -49,11 +49,10 @@ pub fn ends(bounds: &Bounds) -> Vec<String> {
         Bounds::Flag => ["true", "false"].map(str::to_owned).to_vec(),
         Bounds::Text => vec!["\"\"".to_owned()],
         // A named layout needs a dataset in that layout.
-        Bounds::LayoutOrNone { .. } => vec!["\"\"".to_owned()],
-        Bounds::Word(words) | Bounds::Kind { names: words, .. } => {
-            words.iter().map(|word| format!("\"{word}\"")).collect()
-        }
-        Bounds::Device(_) => ["\"ndarray\"", "\"flex\""].map(str::to_owned).to_vec(),
+        Bounds::NameOrNone { .. } => vec!["\"\"".to_owned()],
+        Bounds::Name(choices) => choices.names.iter().map(|name| format!("\"{name}\"")).collect(),
+        // The name of a device.
+        Bounds::Parsed { .. } => ["\"ndarray\"", "\"flex\""].map(str::to_owned).to_vec(),
         Bounds::Whole { least, most } => vec![least.to_string(), most.to_string()],
         Bounds::WholeOrNone { least, most } => vec!["0".to_owned(), least.to_string(), most.to_string()],
         Bounds::Number { least, most } => [least, most].map(|value| format!("{value:e}")).to_vec(),
@@ -112,10 +111,10 @@ pub fn odd(random: &mut impl Rng) -> String {
 
 /// Whether a few iterations with a configuration are quick and need little memory.
 pub fn is_cheap(config: &Config) -> bool {
-    let planes = &config.model.hexplane;
+    let planes = &config.model.fields.hexplane.hexplane;
     let largest = planes.multipliers.last().copied().unwrap_or(1);
     let area = planes.resolution.iter().map(|side| side * largest).max().unwrap_or(0).pow(2);
-    let network = &config.model.deformation;
+    let network = &config.model.fields.hexplane.deformation;
     planes.channels <= 64
         && area * planes.channels * planes.multipliers.len() <= 1 << 18
         && network.width * network.width * network.depth.max(1) <= 1 << 18

@@ -173,7 +173,10 @@ fn deformation() {
         for depth in 0..3 {
             let prefix = format!("depth{depth}");
             let GoldenNetwork { network, layers } = network_of(&golden, &prefix, &device);
-            assert_eq!(DeformationConfig::new(1).with_depth(depth).init(&device).trunk.len(), network.trunk.len());
+            assert_eq!(
+                DeformationConfig { depth, ..Default::default() }.init(1, &device).trunk.len(),
+                network.trunk.len()
+            );
             let features = golden.tensor::<2>(&format!("{prefix}.feat"), &device).require_grad();
             let check = |key: &str, found: &[f32]| {
                 let key = format!("{prefix}.{key}");

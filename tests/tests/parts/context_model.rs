@@ -18,7 +18,7 @@ const PLANES: usize = 12;
 
 /// Random planes of two scales; sizes differ between the axes.
 fn random_planes(device: &Device) -> PlaneTensors {
-    let config = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([8, 12, 4, 8]);
+    let config = HexPlaneConfig { channels: CHANNELS, resolution: [8, 12, 4, 8], ..Default::default() };
     random_values(&config.layout(), device)
 }
 
@@ -193,7 +193,7 @@ fn learned_steps_have_a_gradient() {
     for (name, device) in devices() {
         let device = device.autodiff();
         let planes = random_planes(&device);
-        let quantization = AdaptiveQuantizationConfig::new().init(planes.layout(), &device);
+        let quantization = AdaptiveQuantizationConfig::default().init(planes.layout(), &device);
         let mut model = ContextModelConfig::compact(CHANNELS).init(&device);
         model.start_from(&planes, &quantization.steps());
         let steps = quantization.steps();
@@ -217,8 +217,8 @@ fn learned_steps_have_a_gradient() {
 fn steps_no_finer_than_they_began() {
     for (name, device) in devices() {
         let device = device.autodiff();
-        let layout = HexPlaneConfig::new().layout();
-        let config = AdaptiveQuantizationConfig::new().with_space_only(0.05).with_space_time(0.2);
+        let layout = HexPlaneConfig::default().layout();
+        let config = AdaptiveQuantizationConfig { space_only: 0.05, space_time: 0.2 };
         let mut quantization = config.init(&layout, &device);
         let began = values_of(&quantization.log_steps.val());
         for steps in [[0.04f32, 0.3], [0.06, 0.1]] {
@@ -238,7 +238,7 @@ fn steps_no_finer_than_they_began() {
 #[test]
 fn training_lowers_the_rate() {
     let device = Device::flex().autodiff();
-    let config = HexPlaneConfig::new().with_channels(CHANNELS).with_resolution([16, 16, 16, 8]);
+    let config = HexPlaneConfig { channels: CHANNELS, resolution: [16, 16, 16, 8], ..Default::default() };
     let planes = (0..PLANES)
         .map(|i| {
             let ([height, width], channels) = (config.layout().planes()[i].size, CHANNELS);

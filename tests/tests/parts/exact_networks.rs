@@ -22,9 +22,9 @@ fn scene(depth: usize, device: &Device) -> DynamicScene<HexPlaneField> {
     let mut random = ChaCha8Rng::seed_from_u64(9);
     let positions = (0..COUNT).map(|_| std::array::from_fn(|_| random.random_range(-2.0..2.0))).collect();
     let colors = (0..COUNT).map(|_| std::array::from_fn(|_| random.random())).collect();
-    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 12, 4, 8]);
-    let deformation = DeformationConfig::new(0).with_width(16).with_depth(depth).with_opacity(true).with_sh(true);
-    let field = HexPlaneFieldConfig::new(hexplane, deformation);
+    let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 12, 4, 8], ..Default::default() };
+    let deformation = DeformationConfig { width: 16, depth, opacity: true, sh: true, ..Default::default() };
+    let field = HexPlaneFieldConfig { hexplane, deformation };
     let config = DynamicSceneConfig::<HexPlaneField>::new(GaussiansConfig::new(), field);
     let mut scene = config.init(&PointCloud { positions, colors }, device);
     for plane in &mut scene.field.hexplane.planes {

@@ -80,7 +80,7 @@ fn scores_are_those_of_the_cpu() {
 #[test]
 fn a_crowded_cell() {
     const POINTS: usize = 20_000;
-    let config = HexPlaneConfig::new().with_channels(18).with_resolution([4, 4, 4, 4]).with_multipliers(vec![1]);
+    let config = HexPlaneConfig { channels: 18, resolution: [4, 4, 4, 4], multipliers: vec![1] };
     // Once: tests beside this one draw from the same generator.
     let values = config.init(&Device::flex()).planes.into_iter().map(|plane| plane.val().into_data());
     let values: Vec<_> = values.collect();

@@ -397,8 +397,8 @@ fn finite_raw_attributes_have_finite_gradients() {
 /// A file may legally hold no Gaussians: it renders as background at every time.
 #[test]
 fn a_scene_without_gaussians_renders_the_background() {
-    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
-    let field = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(8));
+    let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..Default::default() };
+    let field = HexPlaneFieldConfig { hexplane, deformation: DeformationConfig { width: 8, ..Default::default() } };
     let config = DynamicSceneConfig::<HexPlaneField>::new(GaussiansConfig::new(), field);
     for (name, device) in devices() {
         let scene = config.init(&PointCloud::default(), &device);

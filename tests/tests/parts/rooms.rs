@@ -10,7 +10,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates that have rooms.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 8] = [
+    "crates/light4gs-keys",
     "light4gs-codec",
     "light4gs-data",
     "light4gs-render",

@@ -24,7 +24,7 @@ fn random(shape: [usize; 3], device: &Device) -> Tensor<3> {
 }
 
 fn known(device: &Device) -> ShKnown {
-    let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 12, 4, 8]).init(device);
+    let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 12, 4, 8], ..Default::default() }.init(device);
     ShKnown {
         sh_dc: random([COUNT, 1, 3], device),
         positions: Tensor::random([COUNT, 3], Distribution::Uniform(-1.0, 1.0), device),

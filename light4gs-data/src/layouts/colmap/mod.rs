@@ -40,10 +40,6 @@ impl DatasetLayout for Colmap {
         "sparse/0/cameras.bin and images.bin, or both as .txt"
     }
 
-    fn preset(&self) -> Option<&'static str> {
-        Some("colmap-cpu")
-    }
-
     fn detect(&self, root: &Path) -> bool {
         !model_folders(root).is_empty()
     }

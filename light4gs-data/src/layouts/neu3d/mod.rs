@@ -37,10 +37,6 @@ impl DatasetLayout for Neu3d {
         "poses_bounds.npy"
     }
 
-    fn preset(&self) -> Option<&'static str> {
-        Some("neu3d-cpu")
-    }
-
     fn detect(&self, root: &Path) -> bool {
         root.join(self.signature()).is_file()
     }

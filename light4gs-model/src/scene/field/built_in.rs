@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs_codec::MotionArrays;
+use light4gs_keys::choice;
 
 use super::hexplane::HexPlaneField;
 use super::nodes::NodesField;
@@ -13,9 +14,23 @@ use super::{DeformationField, FinePosition, LearningRate, Moment, SceneAtRest, S
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
-/// Makes one field type from several. Each call is passed to the field that a value holds.
+/// Declares the names of several fields with their keys, and makes one field type of them. Each call is passed to the field
+/// that a value holds.
 macro_rules! built_in_fields {
-    ($($(#[$about:meta])* $variant:ident($field:ident),)+) => {
+    ($($(#[doc = $about:literal])+ $(#[serde $serde:tt])? $variant:ident = $name:ident: $field:ident,)+) => {
+        choice! {
+            /// The built-in deformation fields.
+            pub enum FieldKind: "field" {
+                $(
+                    $(#[doc = $about])+
+                    $(#[serde $serde])?
+                    $variant = $name: <$field as DeformationField>::Config,
+                )+
+            }
+            /// The keys of the built-in deformation fields.
+            pub struct FieldConfigs: enum BuiltInFieldConfig;
+        }
+
         /// One of the built-in deformation fields. Paths of its parameters are those of the field that it holds.
         ///
         /// ```
@@ -30,13 +45,7 @@ macro_rules! built_in_fields {
         #[allow(clippy::large_enum_variant)]
         #[derive(Module, Debug)]
         pub enum BuiltInField {
-            $($(#[$about])* $variant($field),)+
-        }
-
-        /// The choice of a field, with its configuration.
-        #[derive(Clone, Debug)]
-        pub enum BuiltInFieldConfig {
-            $($(#[$about])* $variant(<$field as DeformationField>::Config),)+
+            $($(#[doc = $about])+ $variant($field),)+
         }
 
         /// Evaluates an expression with the field that a value holds.
@@ -120,10 +129,11 @@ macro_rules! built_in_fields {
 }
 
 built_in_fields! {
-    /// The paper's field: multiscale hexplane and network.
-    HexPlane(HexPlaneField),
+    /// The paper's: multiscale hexplane and network.
+    #[serde(flatten)]
+    HexPlane = hexplane: HexPlaneField,
     /// Control nodes, which Gaussians follow.
-    Nodes(NodesField),
+    Nodes = nodes: NodesField,
     /// Nothing moves.
-    Still(StillField),
+    Still = still: StillField,
 }

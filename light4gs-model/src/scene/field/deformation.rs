@@ -1,43 +1,38 @@
 //! The deformation network: from a hexplane feature to changes of a Gaussian's attributes (paper III-A).
 
-use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::nn::{Initializer, Linear, LinearConfig};
 use burn::tensor::activation::relu;
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::network::{Layer, Value};
 use light4gs_codec::{CodecError, MotionNetwork, MotionOutput, MotionSource, Network, checks};
+use light4gs_keys::Bounds::{Flag, Whole};
+use light4gs_keys::keys;
 
 use super::Offsets;
 use crate::ops::linear::layer;
 use crate::scene::ModelError;
 
-/// Configuration of a [`Deformation`].
-#[derive(Config, Debug)]
-pub struct DeformationConfig {
-    /// Length of the input feature.
-    pub feature_size: usize,
-    /// Width of every hidden layer.
-    #[config(default = 64)]
-    pub width: usize,
-    /// Layers of the trunk: 1 is a single linear layer (0 means the same); each further one adds a ReLU and a layer.
-    #[config(default = 1)]
-    pub depth: usize,
-    /// Whether positions change.
-    #[config(default = true)]
-    pub position: bool,
-    /// Whether logarithms of scales change.
-    #[config(default = true)]
-    pub scale: bool,
-    /// Whether quaternions change.
-    #[config(default = true)]
-    pub rotation: bool,
-    /// Whether opacity logits change.
-    #[config(default = false)]
-    pub opacity: bool,
-    /// Whether spherical harmonics change (all of degree 3).
-    #[config(default = false)]
-    pub sh: bool,
+keys! {
+    /// Sizes and heads of the deformation network.
+    pub struct DeformationConfig {
+        /// Width of the deformation network.
+        width: usize = 64; Whole { least: 1, most: 4096 }, "paper, D-NeRF";
+        /// Layers before the heads. 0 means the same as 1.
+        depth: usize = 1; Whole { least: 0, most: 64 }, "reference";
+        /// Positions move.
+        position: bool = true; Flag, "reference";
+        /// Scales change.
+        scale: bool = true; Flag, "reference";
+        /// Rotations change.
+        rotation: bool = true; Flag, "reference";
+        /// Opacities change.
+        opacity: bool = false; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
+        /// Spherical harmonics change.
+        sh: bool = false; Flag, "reference: off for D-NeRF and HyperNeRF, on for Neu3D";
+        /// Positions get a gradient through the hexplane query as well. Off is what the reference does.
+        differentiate_points: bool = true; Flag, "ours";
+    }
 }
 
 fn linear(inputs: usize, outputs: usize, device: &Device) -> Linear {
@@ -51,18 +46,18 @@ impl DeformationConfig {
     }
 
     /// Refuses a network that no stream can hold, before it takes memory: the largest one within the bounds of `width`
-    /// and `depth` would take 17 GB.
+    /// and `depth` would take 17 GB. `features` is the length of the input.
     ///
     /// # Errors
     /// More weights, or more channels of all values together, than a network may have.
-    pub fn check_size(&self) -> Result<(), CodecError> {
-        let (weights, channels) = self.size();
+    pub fn check_size(&self, features: usize) -> Result<(), CodecError> {
+        let (weights, channels) = self.size(features);
         checks::network_size("motion", weights, channels)
     }
 
     /// Weights with biases, and channels of all values together.
-    fn size(&self) -> (u64, u64) {
-        let [features, width, depth] = [self.feature_size, self.width, self.depth.max(1)].map(|size| size as u64);
+    fn size(&self, features: usize) -> (u64, u64) {
+        let [features, width, depth] = [features, self.width, self.depth.max(1)].map(|size| size as u64);
         let outputs = self.outputs().into_iter().filter_map(|(changes, channels)| changes.then_some(channels as u64));
         let outputs: Vec<u64> = outputs.collect();
         let layer = |inputs: u64, outputs: u64| inputs.saturating_add(1).saturating_mul(outputs);
@@ -76,10 +71,10 @@ impl DeformationConfig {
         (weights, channels)
     }
 
-    /// Xavier-uniform weights.
-    pub fn init(&self, device: &Device) -> Deformation {
+    /// Xavier-uniform weights, for features of a length.
+    pub fn init(&self, features: usize, device: &Device) -> Deformation {
         let trunk = (0..self.depth.max(1))
-            .map(|layer| linear(if layer == 0 { self.feature_size } else { self.width }, self.width, device))
+            .map(|layer| linear(if layer == 0 { features } else { self.width }, self.width, device))
             .collect();
         let head = |wanted: bool, outputs: usize| {
             wanted.then(|| DeformationHead {
@@ -122,7 +117,7 @@ impl DeformationHead {
 /// use light4gs_model::DeformationConfig;
 ///
 /// let device = Device::flex();
-/// let deformation = DeformationConfig::new(16).with_width(32).init(&device);
+/// let deformation = DeformationConfig { width: 32, ..DeformationConfig::default() }.init(16, &device);
 /// let offsets = deformation.forward(Tensor::zeros([5, 16], &device));
 /// assert_eq!(offsets.position.unwrap().dims(), [5, 3]);
 /// assert!(offsets.sh.is_none());
@@ -206,7 +201,6 @@ impl Deformation {
         let layers: Vec<&Layer> = motion.network.layers().collect();
         let width = layers.first().map_or(0, |layer| layer.outputs as usize);
         let config = DeformationConfig {
-            feature_size,
             width,
             depth: layers.len().saturating_sub(2 * motion.outputs.len()),
             position: has(MotionOutput::Position),
@@ -214,6 +208,7 @@ impl Deformation {
             rotation: has(MotionOutput::Quaternion),
             opacity: has(MotionOutput::OpacityLogit),
             sh: has(MotionOutput::Sh),
+            ..DeformationConfig::default()
         };
         let other = |what: &str| ModelError::Motion(format!("{what} are not those of a trunk with heads"));
         // Sizes are checked first, so that no memory is taken for weights that are not there.
@@ -223,7 +218,7 @@ impl Deformation {
         if width == 0 || !layers.iter().all(sizes) {
             return Err(other("layers"));
         }
-        let mut deformation = config.init(device);
+        let mut deformation = config.init(feature_size, device);
         let own = deformation.to_motion();
         if (&own.sources, &own.outputs) != (&motion.sources, &motion.outputs) {
             return Err(other("sources or outputs"));
@@ -265,19 +260,19 @@ mod tests {
     #[test]
     fn sizes_are_those_of_the_network() {
         for depth in [0, 1, 3] {
-            let config = DeformationConfig::new(5).with_width(7).with_depth(depth).with_rotation(false).with_sh(true);
-            let motion = config.init(&Device::flex()).to_motion();
+            let config = DeformationConfig { width: 7, depth, rotation: false, sh: true, ..Default::default() };
+            let motion = config.init(5, &Device::flex()).to_motion();
             // All layers except the last ones of the heads for positions, scales and harmonics are followed by a ReLU.
             let layers: u64 = motion.network.layers().map(|layer| u64::from(layer.outputs)).sum();
             let weights: usize = motion.network.layers().map(|layer| layer.weight.len() + layer.bias.len()).sum();
-            assert_eq!(config.size(), (weights as u64, 5 + 2 * layers - (3 + 3 + 48)), "depth {depth}");
+            assert_eq!(config.size(5), (weights as u64, 5 + 2 * layers - (3 + 3 + 48)), "depth {depth}");
         }
     }
 
     #[test]
     fn a_network_that_no_stream_can_hold_is_refused() {
         let sizes = |features: usize, width: usize, depth: usize| {
-            DeformationConfig::new(features).with_width(width).with_depth(depth).with_opacity(true).check_size()
+            DeformationConfig { width, depth, opacity: true, ..Default::default() }.check_size(features)
         };
         assert!(sizes(64, 4096, 1).is_ok());
         assert!(sizes(32, 4096, 17).unwrap_err().to_string().contains("number of weights"));

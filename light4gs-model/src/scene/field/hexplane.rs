@@ -1,22 +1,23 @@
 //! The paper's field: a feature of the multiscale hexplane, and a small network that turns it into changes (III-A).
 
-use burn::config::Config;
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::MotionArrays;
+use light4gs_codec::{CodecError, MotionArrays};
+use light4gs_keys::keys;
 
 use super::deformation::{Deformation, DeformationConfig};
 use super::{DeformationField, Offsets, ScenePoints};
 use crate::planes::{FeaturePlanes, HexPlaneConfig};
 use crate::scene::{GaussianTensors, ModelError};
 
-/// Configuration of a [`HexPlaneField`].
-#[derive(Config, Debug)]
-pub struct HexPlaneFieldConfig {
-    /// The planes.
-    pub hexplane: HexPlaneConfig,
-    /// The network; its `feature_size` is set from the planes.
-    pub deformation: DeformationConfig,
+keys! {
+    /// The paper's field: multiscale hexplane and network.
+    pub struct HexPlaneFieldConfig {
+        /// The feature planes.
+        hexplane: HexPlaneConfig;
+        /// The network that turns features into motion.
+        deformation: DeformationConfig;
+    }
 }
 
 /// Features over space and time, and the network that turns them into changes.
@@ -26,8 +27,9 @@ pub struct HexPlaneFieldConfig {
 /// use light4gs_model::*;
 ///
 /// let device = Device::flex();
-/// let hexplane = HexPlaneConfig::new().with_channels(4).with_resolution([8, 8, 8, 4]);
-/// let config = HexPlaneFieldConfig::new(hexplane, DeformationConfig::new(0).with_width(16));
+/// let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..Default::default() };
+/// let deformation = DeformationConfig { width: 16, ..Default::default() };
+/// let config = HexPlaneFieldConfig { hexplane, deformation };
 /// let field = HexPlaneField::init(&config, &device);
 /// let offsets = field.offsets(Tensor::zeros([5, 3], &device), 0.25);
 /// assert_eq!(offsets.position.unwrap().dims(), [5, 3]);
@@ -38,6 +40,17 @@ pub struct HexPlaneField {
     pub hexplane: FeaturePlanes,
     /// From features to changes.
     pub deformation: Deformation,
+}
+
+impl HexPlaneFieldConfig {
+    /// Refuses a network that no stream can hold: see [`DeformationConfig::check_size`].
+    ///
+    /// # Errors
+    /// More weights, or more channels of all values together, than a network may have.
+    pub fn check_size(&self) -> Result<(), CodecError> {
+        let features = self.hexplane.channels.saturating_mul(self.hexplane.multipliers.len());
+        self.deformation.check_size(features)
+    }
 }
 
 impl HexPlaneField {
@@ -61,8 +74,8 @@ impl DeformationField for HexPlaneField {
 
     fn init(config: &HexPlaneFieldConfig, device: &Device) -> Self {
         let hexplane = config.hexplane.init(device);
-        let deformation = DeformationConfig { feature_size: hexplane.feature_size(), ..config.deformation.clone() };
-        Self { hexplane, deformation: deformation.init(device) }
+        let deformation = config.deformation.init(hexplane.feature_size(), device);
+        Self { hexplane, deformation }
     }
 
     fn deform(&self, canonical: GaussianTensors, points: ScenePoints<'_>, time: f32) -> GaussianTensors {

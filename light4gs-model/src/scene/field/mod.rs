@@ -19,7 +19,7 @@ use burn::module::{Module, ModuleDisplay};
 use burn::tensor::{Device, Tensor, s};
 use light4gs_codec::MotionArrays;
 
-pub use built_in::{BuiltInField, BuiltInFieldConfig};
+pub use built_in::{BuiltInField, BuiltInFieldConfig, FieldConfigs, FieldKind};
 pub use deformation::{Deformation, DeformationConfig, DeformationHead};
 pub use hexplane::{HexPlaneField, HexPlaneFieldConfig};
 pub use nodes::{AFFINITY, LIFETIME, MOST_AFFINITIES, MOST_KNOTS, MOST_NODES, NodesField, NodesFieldConfig, STILLNESS};

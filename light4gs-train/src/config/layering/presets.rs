@@ -16,5 +16,14 @@ pub(in crate::config) fn text(name: &str) -> Option<&'static str> {
 
 /// The preset whose name is most like `name`.
 pub(in crate::config) fn nearest(name: &str) -> &'static str {
-    crate::keys::nearest(PRESETS.iter().map(|(known, _)| *known), name).unwrap_or("base")
+    light4gs_keys::nearest(PRESETS.iter().map(|(known, _)| *known), name).unwrap_or("base")
+}
+
+/// The preset that fits datasets of a layout, or several joined by `+`: the one of the layout's name for a CPU. Objects
+/// of D-NeRF are rigid bodies for the most part, which control nodes move in fewer bytes.
+pub(in crate::config) fn of_layout(layout: &str) -> Option<&'static str> {
+    match layout {
+        "dnerf" => Some("dnerf-cpu+nodes"),
+        _ => PRESETS.iter().map(|(name, _)| *name).find(|name| name.strip_suffix("-cpu") == Some(layout)),
+    }
 }

@@ -63,15 +63,25 @@ fn is_key(path: &[String]) -> bool {
 }
 
 fn check_type(expected: &Value, value: &Value, path: &[String], context: &Context) -> Result<(), ConfigError> {
-    match mismatch(expected, value) {
-        None => Ok(()),
-        Some((expected, found)) => Err(ConfigError::WrongType {
+    if let Some((expected, found)) = mismatch(expected, value) {
+        return Err(ConfigError::WrongType {
             origin: context.origin.clone(),
             line: context.line(path),
             key: path.join("."),
             expected,
             found,
-        }),
+        });
+    }
+    unreadable(value, path, context.origin)
+}
+
+/// Refuses what serde would refuse, but names the key where serde cannot, in a table that is flattened into another one.
+fn unreadable(value: &Value, path: &[String], origin: &Origin) -> Result<(), ConfigError> {
+    let path = path.join(".");
+    let bounds = KEYS.iter().find(|key| key.path == path).map(|key| key.bounds);
+    match bounds.and_then(|bounds| bounds.unreadable(value)) {
+        Some(problem) => Err(ConfigError::Value { origin: origin.clone(), message: format!("{problem} in `{path}`") }),
+        None => Ok(()),
     }
 }
 

@@ -52,15 +52,15 @@ fn many(gaussians: usize, config: NodesFieldConfig, device: &Device) -> DynamicS
 }
 
 fn configurations() -> [NodesFieldConfig; 7] {
-    let config = NodesFieldConfig::new;
+    let config = |count| NodesFieldConfig { count, ..NodesFieldConfig::default() };
     [
-        config().with_nodes(9),
-        config().with_nodes(9).with_stillness(None),
-        config().with_nodes(1).with_times_a_knot(20.0),
-        config().with_nodes(5).with_lifetime(true),
-        config().with_nodes(9).with_affinities(2),
-        config().with_nodes(7).with_affinities(3).with_stillness(None).with_lifetime(true),
-        config().with_nodes(7).with_affinities(2).with_lifetime(true),
+        config(9),
+        NodesFieldConfig { stillness: false, ..config(9) },
+        NodesFieldConfig { times_a_knot: 20.0, ..config(1) },
+        NodesFieldConfig { lifetime: true, ..config(5) },
+        NodesFieldConfig { affinities: 2, ..config(9) },
+        NodesFieldConfig { affinities: 3, stillness: false, lifetime: true, ..config(7) },
+        NodesFieldConfig { affinities: 2, lifetime: true, ..config(7) },
     ]
 }
 
@@ -68,7 +68,7 @@ fn configurations() -> [NodesFieldConfig; 7] {
 fn nothing_moves_when_motion_begins() {
     for config in configurations() {
         let scene = scene(config.clone(), &Device::flex());
-        assert_eq!(scene.field.nodes(), config.nodes);
+        assert_eq!(scene.field.nodes(), config.count);
         let moved = scene.at(0.3);
         assert_close("means", &values_of(&moved.means), &values_of(&scene.gaussians.means.val()), 1e-5);
         assert_close("quats", &values_of(&moved.quats), &values_of(&scene.gaussians.quats.val()), 1e-5);
@@ -108,7 +108,7 @@ fn weights_and_places_of_the_nodes_are_those_of_skinning() {
             let scene = map_parameters(scene(config.clone(), &device), &mut Shaken);
             let canonical = scene.gaussians.tensors();
             let weights = values_of(&scene.field.weights(&canonical));
-            let weights: Vec<&[f32]> = weights.chunks_exact(config.nodes + 1).collect();
+            let weights: Vec<&[f32]> = weights.chunks_exact(config.count + 1).collect();
             let some = values_of(&scene.field.weights(&canonical.rows(7..20)));
             assert_close("weights of some rows", &some, &weights[7..20].concat(), 1e-6);
             let anchors = values_of(&scene.field.world_anchors());
@@ -123,10 +123,10 @@ fn weights_and_places_of_the_nodes_are_those_of_skinning() {
                 };
                 let moved = means.as_chunks().0.iter().zip(&weights).flat_map(|(mean, weights)| {
                     assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-5, "{name}: {weights:?}");
-                    assert!(config.stillness.is_some() || weights[config.nodes] == 0.0);
+                    assert!(config.stillness || weights[config.count] == 0.0);
                     let mean = Vec3::from_array(*mean);
-                    let of_nodes: Vec3 = (0..config.nodes).map(|node| by_node(mean, node) * weights[node]).sum();
-                    (of_nodes + mean * weights[config.nodes]).to_array()
+                    let of_nodes: Vec3 = (0..config.count).map(|node| by_node(mean, node) * weights[node]).sum();
+                    (of_nodes + mean * weights[config.count]).to_array()
                 });
                 assert_close(name, &moved.collect::<Vec<f32>>(), &values_of(&scene.at(time).means), 1e-5);
             }
@@ -138,7 +138,7 @@ fn weights_and_places_of_the_nodes_are_those_of_skinning() {
 #[test]
 fn gaussians_fade_once_all_times_are_seen() {
     let device = Device::flex().autodiff();
-    let config = NodesFieldConfig::new().with_nodes(3).with_lifetime(true);
+    let config = NodesFieldConfig { count: 3, lifetime: true, ..Default::default() };
     let mut scene = map_parameters(scene(config, &device), &mut Shaken);
     let at_rest = values_of(&scene.gaussians.opacity_logits.val());
     let mut at_the_end = |window: [f32; 2]| {
@@ -157,7 +157,7 @@ fn gaussians_fade_once_all_times_are_seen() {
 #[test]
 fn motion_is_rigid() {
     let device = Device::flex();
-    let config = NodesFieldConfig::new().with_nodes(1).with_stillness(None);
+    let config = NodesFieldConfig { count: 1, stillness: false, ..Default::default() };
     let scene = map_parameters(scene(config, &device), &mut Shaken);
     let before = values_of(&scene.gaussians.means.val());
     let after = values_of(&scene.at(0.6).means);
@@ -174,7 +174,7 @@ fn motion_is_rigid() {
 #[test]
 fn what_stands_still_stands_still() {
     let device = Device::flex();
-    let config = NodesFieldConfig::new().with_stillness(Some(30.0));
+    let config = NodesFieldConfig { stillness_start: 30.0, ..Default::default() };
     let mut scene = map_parameters(scene(config, &device), &mut Shaken);
     let canonical = scene.gaussians.means.val();
     assert_close("means", &values_of(&scene.at(0.6).means), &values_of(&canonical), 1e-5);
@@ -187,7 +187,7 @@ fn what_stands_still_stands_still() {
 #[test]
 fn the_largest_field_is_within_the_limits_for_strangers() {
     let device = Device::flex();
-    let config = NodesFieldConfig::new().with_nodes(MOST_NODES).with_times_a_knot(0.01).with_lifetime(true);
+    let config = NodesFieldConfig { count: MOST_NODES, times_a_knot: 0.01, lifetime: true, ..Default::default() };
     let scene = many(1000, config, &device);
     let data = scene.to_arrays(SceneMeta::default()).unwrap();
     let knots = data.motion.network.as_ref().unwrap().network.layers().map(|layer| layer.inputs).max();
@@ -198,7 +198,7 @@ fn the_largest_field_is_within_the_limits_for_strangers() {
 /// Every field is named, before memory is taken for it.
 #[test]
 fn other_networks_are_refused() {
-    let scene = scene(NodesFieldConfig::new().with_nodes(4), &Device::flex());
+    let scene = scene(NodesFieldConfig { count: 4, ..Default::default() }, &Device::flex());
     let refused = |expected: &str, spoil: &dyn Fn(&mut MotionNetwork)| {
         let mut arrays = scene.field.to_arrays().unwrap();
         spoil(arrays.network.as_mut().unwrap());
@@ -234,7 +234,8 @@ fn other_networks_are_refused() {
     refused("weights of the logarithms", &|motion| layer(motion, radii, &|layer| layer.weight[0] = f32::NAN));
     refused("biases of the translations", &|motion| layer(motion, translations, &|layer| layer.bias[0] = 1.0));
     refused("biases of the rotations", &|motion| layer(motion, rotations, &|layer| layer.bias[0] = f32::INFINITY));
-    let with_affinities = self::scene(NodesFieldConfig::new().with_nodes(4).with_affinities(2), &Device::flex());
+    let with_affinities =
+        self::scene(NodesFieldConfig { count: 4, affinities: 2, ..Default::default() }, &Device::flex());
     let affinities = |spoil: &dyn Fn(&mut Layer)| {
         let mut arrays = with_affinities.field.to_arrays().unwrap();
         layer(arrays.network.as_mut().unwrap(), 4, spoil);

@@ -61,7 +61,7 @@ fn thrown(speed: f32, device: &Device) -> DynamicScene<NodesField> {
     let mut coordinate = || random.uniform(-0.25, 0.25) as f32;
     let positions = (0..COUNT).map(|i| (MIDDLES[i % 2] + Vec3::from_array([(); 3].map(|()| coordinate()))).to_array());
     let cloud = PointCloud { positions: positions.collect(), colors: vec![[0.5; 3]; COUNT] };
-    let config = NodesFieldConfig::new().with_nodes(8).with_stillness(None);
+    let config = NodesFieldConfig { count: 8, stillness: false, ..Default::default() };
     let mut scene = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), config).init(&cloud, device);
     let DynamicScene { gaussians, coordinates, field, .. } = &mut scene;
     field.begin_motion(&SceneAtRest { gaussians, coordinates, extent: EXTENT }, &POSITION);

@@ -28,10 +28,11 @@ mod weights;
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, TensorData};
 use light4gs_codec::MotionArrays;
+use light4gs_keys::Bounds::{self, Flag, Number, Whole};
+use light4gs_keys::{WEIGHT, keys};
 
 pub use affinity::AFFINITY;
 pub use lifetime::LIFETIME;
@@ -61,46 +62,40 @@ const FIRMLY_STILL: f32 = 8.0;
 /// A logit of standing still whose weight is 0.
 const NEVER_STILL: f32 = -1e30;
 
-/// Configuration of a [`NodesField`].
-#[derive(Config, Debug)]
-pub struct NodesFieldConfig {
-    /// Nodes, or as many as there are Gaussians if those are fewer; 1 to [`MOST_NODES`].
-    #[config(default = 32)]
-    pub nodes: usize,
-    /// Training times between two knots of a trajectory.
-    #[config(default = 4.0)]
-    pub times_a_knot: f64,
-    /// A node's radius at the beginning, as a share of the distance to the nearest other one.
-    #[config(default = 0.6)]
-    pub radius: f64,
-    /// Nodes are placed where Gaussians are at least so opaque.
-    #[config(default = 0.15)]
-    pub opacity: f64,
-    /// Every Gaussian has a share of its own that stands still, with this logit at the beginning. None: all follow the nodes alone.
-    #[config(default = "Some(-4.0)")]
-    pub stillness: Option<f64>,
-    /// Every Gaussian learns when it is there.
-    #[config(default = false)]
-    pub lifetime: bool,
-    /// Numbers by which each Gaussian learns which nodes it follows beyond its place; 0 to [`MOST_AFFINITIES`].
-    #[config(default = 0)]
-    pub affinities: usize,
-    /// Weight of the term that keeps neighboring nodes in place as seen from each other, for distances as shares of the
-    /// scene's extent.
-    #[config(default = 1.0)]
-    pub rigidity: f64,
-    /// Weight of the squared second differences of trajectories, translations as shares of the scene's extent.
-    #[config(default = 0.1)]
-    pub smoothness: f64,
-    /// How much faster than the usual rate translations are learned, as shares of the scene's extent.
-    #[config(default = 2.0)]
-    pub translation_rate: f64,
-    /// How much faster than the usual rate rotations are learned.
-    #[config(default = 8.0)]
-    pub rotation_rate: f64,
-    /// How much faster than the usual rate anchors (as shares of the scene's extent) and logarithms of radii are learned.
-    #[config(default = 5.0)]
-    pub anchor_rate: f64,
+const FACTOR: Bounds = Number { least: 0.0, most: 1e3 };
+
+keys! {
+    /// Control nodes, and their trajectories.
+    pub struct NodesFieldConfig {
+        /// Nodes, or as many as there are Gaussians if those are fewer.
+        count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
+        /// Training times between two knots of a trajectory.
+        times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
+        /// A node's radius at the beginning, as a share of the distance to the nearest other one.
+        radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
+        /// Nodes are placed where Gaussians are at least so opaque.
+        opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
+        /// Every Gaussian learns how still it stands.
+        stillness: bool = true; Flag, "ours";
+        /// The logit of standing still at the beginning, where 0 is that of a node's own place.
+        stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
+        /// Every Gaussian learns when it is there: its opacity is multiplied by a bell curve over time. From the iteration on
+        /// at which the sampler's window holds all times.
+        lifetime: bool = false; Flag, "ours";
+        /// Numbers by which every Gaussian learns which nodes it follows beyond its place: a foot and the floor under it need
+        /// not move together.
+        affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
+        /// Weight of the term that keeps neighboring nodes in place as seen from each other.
+        rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
+        /// Weight of the squared second differences of trajectories.
+        smoothness: f64 = 0.1; WEIGHT, "ours";
+        /// How much faster than the deformation's rate translations are learned, as shares of the scene's extent.
+        translation_rate: f64 = 2.0; FACTOR, "ours";
+        /// How much faster than the deformation's rate rotations are learned.
+        rotation_rate: f64 = 8.0; FACTOR, "ours";
+        /// How much faster than the deformation's rate the nodes' places and radii are learned.
+        anchor_rate: f64 = 5.0; FACTOR, "ours";
+    }
 }
 
 /// `B` nodes on trajectories of `K` knots. Lengths are shares of `unit`.
@@ -111,7 +106,7 @@ pub struct NodesFieldConfig {
 /// use light4gs_model::{DynamicSceneConfig, GaussiansConfig, NodesField, NodesFieldConfig};
 ///
 /// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0]], colors: vec![[0.5; 3]; 2] };
-/// let config = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), NodesFieldConfig::new());
+/// let config = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), NodesFieldConfig::default());
 /// // Until motion begins there is one node, which does not move.
 /// let scene = config.init(&cloud, &Device::flex());
 /// let moved = scene.at(0.25).means - scene.gaussians.means.val();
@@ -204,13 +199,14 @@ impl DeformationField for NodesField {
     const KINDS: &'static [&'static str] = &["nodes"];
 
     fn attributes(config: &NodesFieldConfig) -> Vec<Attribute> {
-        let row = |logit: f64| {
-            let attribute = Attribute::new(STILLNESS, 1).with_start(vec![logit as f32]).constant();
+        let stillness = || {
+            let attribute = Attribute::new(STILLNESS, 1).with_start(vec![config.stillness_start as f32]).constant();
             attribute.with_learning_rate(STILLNESS_RATE).with_step(STILLNESS_STEP)
         };
+        let stillness = config.stillness.then(stillness);
         let affinity = (config.affinities > 0).then(|| affinity::attribute(config.affinities));
         let lifetime = config.lifetime.then(lifetime::attribute);
-        config.stillness.map(row).into_iter().chain(affinity).chain(lifetime).collect()
+        stillness.into_iter().chain(affinity).chain(lifetime).collect()
     }
 
     /// One node that does not move, until there is a cloud to make more from.

@@ -16,7 +16,7 @@ impl NodesField {
         let unit = scene.extent.max(f32::MIN_POSITIVE);
         let points: Vec<[f32; 3]> =
             self.matter(scene).into_iter().map(|point| point.map(|coordinate| coordinate / unit)).collect();
-        let anchors = spread_out(&points, config.nodes.min(MOST_NODES));
+        let anchors = spread_out(&points, config.count.min(MOST_NODES));
         let radii = distances_to_nearest(&anchors)
             .into_iter()
             .map(|distance| (config.radius as f32 * distance).max(LEAST_RADIUS).ln())
@@ -42,7 +42,7 @@ impl NodesField {
         let mut order: Vec<usize> = (0..means.len()).collect();
         order.sort_by(|a, b| logits[*b].total_cmp(&logits[*a]));
         let visible = order.iter().take_while(|at| logits[**at] > least).count();
-        let enough = (means.len() / 10).max(2 * self.config.nodes).min(means.len());
+        let enough = (means.len() / 10).max(2 * self.config.count).min(means.len());
         order.truncate(visible.max(enough));
         order.into_iter().map(|at| means[at]).collect()
     }

@@ -265,7 +265,7 @@ impl NodesField {
         let (network, [time, means, quats]) = Network::new([1, 3, 4]);
         let sources = vec![MotionSource::Time, source("means"), source("quats")];
         let mut description = Description { network, sources, nodes: self.nodes() };
-        let stillness = self.config.stillness.map(|_| description.input(STILLNESS, 1));
+        let stillness = self.config.stillness.then(|| description.input(STILLNESS, 1));
         let width = |affinities: &Param<Tensor<2>>| affinities.dims()[1] as u32;
         let affinity = self.affinities.as_ref().map(|all| (all, description.input(AFFINITY, width(all))));
         let lifetime =
@@ -325,8 +325,13 @@ impl NodesField {
         if let Some(problem) = sizes.parts().iter().zip(&layers).find_map(|(part, layer)| part.problem(layer)) {
             return Err(wrong(problem));
         }
-        let config = NodesFieldConfig::new().with_nodes(sizes.nodes).with_affinities(sizes.affinities);
-        let config = config.with_stillness(still.then_some(0.0)).with_lifetime(lives);
+        let config = NodesFieldConfig {
+            count: sizes.nodes,
+            stillness: still,
+            lifetime: lives,
+            affinities: sizes.affinities,
+            ..Default::default()
+        };
         let field = Self::of_layers(config, &sizes, &layers, device);
         // Then everything but the numbers: the operations are those of such a field.
         let own = field.describe();

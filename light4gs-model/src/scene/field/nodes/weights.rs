@@ -24,7 +24,7 @@ impl NodesField {
     /// use light4gs_model::{DynamicSceneConfig, GaussiansConfig, NodesField, NodesFieldConfig};
     ///
     /// let cloud = PointCloud { positions: vec![[0.0; 3], [1.0, 0.0, 0.0]], colors: vec![[0.5; 3]; 2] };
-    /// let config = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), NodesFieldConfig::new());
+    /// let config = DynamicSceneConfig::<NodesField>::new(GaussiansConfig::new(), NodesFieldConfig::default());
     /// let scene = config.init(&cloud, &Device::flex());
     /// let weights = scene.field.weights(&scene.gaussians.tensors());
     /// assert_eq!(weights.dims(), [2, scene.field.nodes() + 1]);

@@ -3,7 +3,8 @@
 
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
-pub(crate) fn serialize<T, S>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error>
+/// Writes a value, or the default of its type for none.
+pub fn serialize<T, S>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error>
 where
     T: Serialize + Default + Clone,
     S: Serializer,
@@ -11,7 +12,8 @@ where
     value.clone().unwrap_or_default().serialize(serializer)
 }
 
-pub(crate) fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
+/// Reads a value, and takes the default of its type as none.
+pub fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
 where
     T: Deserialize<'de> + Default + PartialEq,
     D: Deserializer<'de>,

@@ -1,9 +1,9 @@
-//! What is generated from the declarations: the list of all keys, `configs/base.toml`, and the tables of
-//! `docs/configuration.md`.
+//! What is generated from the declarations: the list of all keys, and the tables of `docs/configuration.md`.
 
 use serde::Serialize;
 
-use super::{Bounds, Entry, KeyTable};
+use crate::names::joined;
+use crate::{Bounds, Entry, KeyTable};
 
 /// A key of the configuration.
 #[derive(Clone, Debug)]
@@ -19,7 +19,7 @@ pub struct Key {
 }
 
 /// Every key of a table and of those in it, in the order of their declarations.
-pub(crate) fn list<T: KeyTable>() -> Vec<Key> {
+pub fn list<T: KeyTable>() -> Vec<Key> {
     fn walk(entries: &[Entry], prefix: &str, into: &mut Vec<Key>) {
         for entry in entries {
             match *entry {
@@ -34,11 +34,6 @@ pub(crate) fn list<T: KeyTable>() -> Vec<Key> {
     let mut keys = Vec::new();
     walk(T::ENTRIES, "", &mut keys);
     keys
-}
-
-/// The lines of a comment, joined to one.
-fn joined(lines: &[&str]) -> String {
-    lines.iter().map(|line| line.trim()).collect::<Vec<_>>().join(" ")
 }
 
 /// A table under its full name, without the tables in it.
@@ -106,28 +101,8 @@ fn toml_value(value: &toml::Value) -> String {
     }
 }
 
-/// Every key with its default, as a TOML file.
-pub(crate) fn toml_text<T: KeyTable + Default + Serialize>() -> String {
-    /// The column in which notes begin.
-    const COLUMN: usize = 43;
-    let mut text = String::new();
-    for Section { path, keys, .. } in sections::<T>() {
-        if !path.is_empty() {
-            text.push_str(&format!("\n[{path}]\n"));
-        }
-        for (name, default, key) in keys {
-            let line = format!("{name} = {default}");
-            match key {
-                Entry::Key { note: Some(note), .. } => text.push_str(&format!("{line:<COLUMN$} # {note}\n")),
-                _ => text.push_str(&format!("{line}\n")),
-            }
-        }
-    }
-    text
-}
-
 /// Every key with its default, bounds, meaning and source, as Markdown tables: one for each table of the configuration.
-pub(crate) fn markdown<T: KeyTable + Default + Serialize>() -> String {
+pub fn markdown<T: KeyTable + Default + Serialize>() -> String {
     let mut text = String::new();
     for Section { path, about, keys } in sections::<T>() {
         if !path.is_empty() {
@@ -137,16 +112,23 @@ pub(crate) fn markdown<T: KeyTable + Default + Serialize>() -> String {
         for (name, default, key) in keys {
             let Entry::Key { bounds, meaning, source, .. } = key else { continue };
             let key = if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
-            let meaning = joined(meaning);
-            let listed = |list: &str| format!("a name that [{list}](../{list}) lists");
+            let meaning = [joined(meaning)].into_iter().chain(choices(&bounds)).collect::<Vec<_>>().join(" ");
             let bounds = match bounds {
-                Bounds::Kind { list, .. } => listed(list),
-                Bounds::List { element: Bounds::Kind { list, .. }, .. } => format!("each {}", listed(list)),
-                Bounds::LayoutOrNone { .. } => "empty, or the name of a layout".to_owned(),
+                // Every name is in the documentation of what is named.
+                Bounds::NameOrNone { what, .. } => format!("empty, or the name of a {what}"),
                 _ => bounds.to_string(),
             };
             text.push_str(&format!("| `{key}` | `{default}` | {bounds} | {meaning} | {source} |\n"));
         }
     }
     text
+}
+
+/// What the names among which a key chooses mean.
+fn choices(bounds: &Bounds) -> Option<String> {
+    match bounds {
+        Bounds::Name(choices) => Some(choices.explained()),
+        Bounds::List { element, .. } => choices(element),
+        _ => None,
+    }
 }

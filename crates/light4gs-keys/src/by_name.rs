@@ -4,8 +4,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use crate::{Bounds, KeyValue, Problem};
+
 /// A key that is a table of numbers by name. A layer changes some of them, and may name more. Its bounds are
-/// [`Bounds::ByName`](super::Bounds::ByName).
+/// [`Bounds::ByName`].
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct ByName(BTreeMap<String, f64>);
@@ -30,5 +32,14 @@ impl ByName {
 impl<N: Into<String>> FromIterator<(N, f64)> for ByName {
     fn from_iter<I: IntoIterator<Item = (N, f64)>>(numbers: I) -> Self {
         Self(numbers.into_iter().map(|(name, number)| (name.into(), number)).collect())
+    }
+}
+
+impl KeyValue for ByName {
+    fn check(&self, bounds: &Bounds, key: &str, into: &mut Vec<Problem>) {
+        let Bounds::ByName(each) = bounds else { return };
+        for (name, number) in self.iter() {
+            number.check(each, &format!("{key}.{name}"), into);
+        }
     }
 }
