@@ -18,7 +18,7 @@ const virtual = (parts) => ({
   },
 });
 // What a worker decodes before the first file, so that its code is compiled by then.
-const sample = readFileSync("../tests/golden-streams/compact.l4gs").toString("base64");
+const sample = readFileSync("../../tests/golden-streams/compact.l4gs").toString("base64");
 const workerPlugins = [virtual({ "virtual:sample": sample })];
 const worker = await build({ ...common, entryPoints: ["player/scene/worker.js"], format: "iife", plugins: workerPlugins });
 const packed = gzipSync(readFileSync(wasm), { level: 9 });

@@ -1,4 +1,4 @@
-// Reads .l4gs files and draws them on the CPU. Made by cbindgen from light4gs-c/src: do not edit.
+// Reads .l4gs files and draws them on the CPU. Made by cbindgen from bindings/c/src: do not edit.
 //
 // Ownership: a scene belongs to the caller, who closes it with l4gs_close. Strings belong to the library: those of a scene are
 // valid until it is closed, those of an error until the next error on the same thread. Buffers belong to the caller; the

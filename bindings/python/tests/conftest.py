@@ -6,9 +6,9 @@ import pytest
 
 import light4gs
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 GOLDEN = ROOT / "tests" / "golden-streams"
-PLAYER = ROOT / "light4gs-web" / "tests" / "data"
+PLAYER = ROOT / "bindings" / "web" / "tests" / "data"
 
 
 @pytest.fixture(scope="session")

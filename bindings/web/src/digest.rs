@@ -58,8 +58,8 @@ mod tests {
     /// The browser test compares the results of WebAssembly with the same list.
     #[test]
     fn golden_streams_have_the_digests_on_record() {
-        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/..");
-        let list = std::fs::read_to_string(format!("{root}/light4gs-web/tests/data/digests.txt")).expect("the list");
+        let root = concat!(env!("CARGO_MANIFEST_DIR"), "/../..");
+        let list = std::fs::read_to_string(format!("{root}/bindings/web/tests/data/digests.txt")).expect("the list");
         let digest_of = |name: &str| {
             let bytes = std::fs::read(format!("{root}/tests/golden-streams/{name}.l4gs")).expect("a golden stream");
             format!("{:016x}", super::digest(&light4gs_codec::decode(&bytes).expect("a scene")))

@@ -3,14 +3,14 @@
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 
-/// The player: an ES module that also defines the element `<l4gs-player>`. Made by `light4gs-web/build`.
+/// The player: an ES module that also defines the element `<l4gs-player>`. Made by `bindings/web/build`.
 pub const PLAYER: &str = include_str!("../dist/light4gs-player.js");
 
 /// The script of [`TRAINER_PAGE`], an ES module.
 pub const TRAINER: &str = include_str!("../dist/light4gs-trainer.js");
 
 /// A page that trains a scene. Beside it stand `light4gs-player.js`, `light4gs-trainer.js` and the program that
-/// `light4gs-web/build-trainer` makes, `light4gs-web-trainer.wasm`.
+/// `bindings/web/build-trainer` makes, `light4gs-web-trainer.wasm`.
 pub const TRAINER_PAGE: &str = include_str!("../dist/trainer.html");
 
 const PAGE: &str = include_str!("../dist/page.html");

@@ -8,7 +8,7 @@ import { tmpdir } from "node:os";
 import { after, before, describe, test } from "node:test";
 import { bundle, dist, launch, open, orbitCamera, psnr, readPng, root, sceneBytes, serve } from "./harness.mjs";
 
-const examples = `${root}/light4gs-web/examples`;
+const examples = `${root}/bindings/web/examples`;
 const installed = existsSync(`${examples}/node_modules`);
 const SIZE = 400;
 /** The view of examples/page.js, as an OpenCV pinhole. */
@@ -18,7 +18,7 @@ const TIMES = [0.2, 0.7];
 const LEAST_PSNR = { three: 50, spark: 34.5, babylon: 37.5, playcanvas: 31 };
 const pictures = process.env.LIGHT4GS_WEB_PICTURES;
 
-describe("in other engines", { skip: !installed && "npm ci in light4gs-web/examples has not been run" }, () => {
+describe("in other engines", { skip: !installed && "npm ci in bindings/web/examples has not been run" }, () => {
   const folder = mkdtempSync(`${tmpdir()}/light4gs-engines-`);
   let browser, server;
   /** The player's pictures at `TIMES`. */

@@ -6,9 +6,9 @@ import { fileURLToPath } from "node:url";
 import { inflateSync } from "node:zlib";
 import { chromium } from "playwright-core";
 
-export const root = fileURLToPath(new URL("../..", import.meta.url));
-export const dist = process.env.LIGHT4GS_WEB_DIST ?? `${root}/light4gs-web/dist`;
-export const scenePath = process.env.LIGHT4GS_WEB_SCENE ?? `${root}/light4gs-web/tests/data/quickstart.l4gs`;
+export const root = fileURLToPath(new URL("../../..", import.meta.url));
+export const dist = process.env.LIGHT4GS_WEB_DIST ?? `${root}/bindings/web/dist`;
+export const scenePath = process.env.LIGHT4GS_WEB_SCENE ?? `${root}/bindings/web/tests/data/quickstart.l4gs`;
 
 const TYPES = { js: "text/javascript", html: "text/html", l4gs: "application/octet-stream", json: "application/json" };
 

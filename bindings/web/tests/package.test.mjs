@@ -108,7 +108,7 @@ describe("the package", () => {
     });
   }
 
-  test("has types of the four adapters", { skip: !existsSync(engines) && "npm ci in light4gs-web/examples has not been run" }, () => {
+  test("has types of the four adapters", { skip: !existsSync(engines) && "npm ci in bindings/web/examples has not been run" }, () => {
     for (const name of ["three", "@types", "@babylonjs", "playcanvas", "@sparkjsdev"]) symlinkSync(`${engines}/${name}`, `${folder}/node_modules/${name}`);
     // The engines' own types are not ours to check.
     check("engines.ts", ENGINES, "--module", "esnext", "--moduleResolution", "bundler", "--skipLibCheck");

@@ -11,7 +11,7 @@ import { bundle, dist, launch, open, orbitCamera, psnr, readPng, root, sceneByte
 const program = process.env.LIGHT4GS;
 const golden = `${root}/tests/golden-streams`;
 const goldenNames = ["float32", ...["compact", "paper", "nodes", "lifetimes", "affinities", "shading"].flatMap((name) => [name, `${name}.decoded`])];
-const data = `${root}/light4gs-web/tests/data`;
+const data = `${root}/bindings/web/tests/data`;
 /** Radius in world units, elevation in degrees: cameras of `light4gs render --path fixed`. */
 const CAMERAS = { near: [3, 10], above: [4.5, 60] };
 const LEAST_PSNR = 35;

@@ -38,7 +38,7 @@ pub(super) struct View {
     /// Dataset whose cameras the player offers; by default the run's own.
     #[arg(long)]
     scene: Option<PathBuf>,
-    /// In place of a scene, a page that trains one in the browser: the program that light4gs-web/build-trainer makes.
+    /// In place of a scene, a page that trains one in the browser: the program that bindings/web/build-trainer makes.
     #[arg(long, value_name = "FILE.wasm", conflicts_with_all = ["what", "scene", "device"])]
     trainer: Option<PathBuf>,
     /// Port on this machine; 0 is any free one.
@@ -95,7 +95,7 @@ impl View {
         if !module.starts_with(b"\0asm") {
             let program = program.display();
             return Err(TrainError::Input(format!(
-                "{program} is no WebAssembly module; light4gs-web/build-trainer makes one"
+                "{program} is no WebAssembly module; bindings/web/build-trainer makes one"
             )));
         }
         self.serve(move |path| match path {

@@ -13,29 +13,27 @@ use std::path::{Path, PathBuf};
 const CRATES: [&str; 7] = [
     "light4gs-codec",
     "light4gs-data",
-    "light4gs-render",
+    "crates/light4gs-render",
     "light4gs-model",
     "light4gs-train",
-    "light4gs-web",
-    "light4gs-c",
+    "bindings/web",
+    "bindings/c",
 ];
 
 /// How many files a folder may hold.
 const MOST_FILES: usize = 16;
 
 /// The repository's folders.
-const PARTS: [&str; 13] = [
+const PARTS: [&str; 11] = [
     ".ci",
+    "bindings",
+    "crates",
     "docs",
     "examples",
-    "light4gs-c",
     "light4gs-codec",
     "light4gs-data",
     "light4gs-model",
-    "light4gs-python",
-    "light4gs-render",
     "light4gs-train",
-    "light4gs-web",
     "shaders",
     "tests",
 ];

@@ -6,7 +6,7 @@ import { SceneError } from "../errors.js";
 const SLICE = 8192;
 
 /**
- * @typedef {object} Exports  what light4gs-web/src/abi.rs exports
+ * @typedef {object} Exports  what bindings/web/src/abi.rs exports
  * @property {WebAssembly.Memory} memory
  * @property {(bytes: number) => number} reserve_input
  * @property {() => number} open
