@@ -15,7 +15,7 @@ pub enum Align {
 /// A table that prints with its columns aligned, two spaces apart, and a rule under the header.
 ///
 /// ```
-/// use light4gs_train::report::table::{Align, Table};
+/// use light4gs_train::table::{Align, Table};
 ///
 /// let mut table = Table::new([("section", Align::Left), ("bytes", Align::Right)]);
 /// table.row(["gaussians", "1024"]).row(["planes", "65536"]);

@@ -3,5 +3,5 @@
 fn main() -> std::process::ExitCode {
     // SAFETY: no other thread runs yet.
     unsafe { light4gs_train::memory::keep_freed_memory() };
-    light4gs_train::cli::main()
+    light4gs::cli::main()
 }

@@ -1,12 +1,7 @@
 //! A dataset's cameras for the player.
 
-use std::path::Path;
-
 use light4gs_data::{Camera, Frame, Scene, Split};
 use serde::Serialize;
-
-use crate::config::Config;
-use crate::run::{RunFolder, RunRecord};
 
 /// A camera as the player has it: an OpenCV pinhole.
 #[derive(Serialize)]
@@ -55,10 +50,4 @@ pub fn cameras_json(scene: &Scene, most: usize) -> String {
         })
         .collect();
     serde_json::to_string(&cameras).expect("plain data has a JSON form")
-}
-
-/// The run whose folder holds a file, where there is one.
-pub fn run_around(file: &Path) -> Option<(RunFolder, RunRecord, Config)> {
-    let folder = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder })?;
-    RunFolder::open(folder).ok()
 }

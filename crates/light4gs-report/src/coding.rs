@@ -5,13 +5,13 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use light4gs_data::{DataError, RgbImage8};
+use light4gs_train::compression::{BitMap, CodedPart, CodingRecord};
 
 use super::CodingReport;
 use super::color_map::{css_gradient, inferno};
 use super::format::{count, fixed};
 use super::html::escape;
 use super::images::data_uri;
-use crate::compression::{BitMap, CodedPart, CodingRecord};
 
 pub(super) fn section(path: &Path, coding: Option<&CodingReport>) -> Result<String, DataError> {
     let Some(CodingReport { record, bit_maps }) = coding else { return Ok(String::new()) };

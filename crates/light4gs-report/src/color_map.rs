@@ -23,7 +23,7 @@ const INFERNO: [[u8; 3]; 17] = [
 ];
 
 /// The color of a value, 0 to 1. Values outside have the color of the nearer end.
-pub(crate) fn inferno(value: f32) -> [u8; 3] {
+pub fn inferno(value: f32) -> [u8; 3] {
     let last = INFERNO.len() - 1;
     // In this form NaN becomes 0.
     let value = if value > 0.0 { value.min(1.0) } else { 0.0 };

@@ -1,7 +1,7 @@
 //! The run's curves over its iterations, both stages on one axis.
 
-use crate::observers::metrics_log::MetricsRecord;
-use crate::stage::Stage;
+use light4gs_train::Stage;
+use light4gs_train::observers::metrics_log::MetricsRecord;
 
 use super::chart::{Chart, Mark, Series};
 

@@ -1,7 +1,7 @@
 //! Conversion of text to HTML.
 
 /// Text for readers: safe between tags and within quoted attributes.
-pub(crate) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

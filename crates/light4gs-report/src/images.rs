@@ -8,8 +8,8 @@ use base64::engine::general_purpose::STANDARD;
 use image::codecs::png::PngEncoder;
 use image::{ExtendedColorType, ImageEncoder};
 use light4gs_data::{DataError, RgbImage8};
+use light4gs_train::evaluation::RenderedView;
 
-use super::ViewImages;
 use super::color_map::{css_gradient, inferno};
 use super::format::fixed;
 use super::html::escape;
@@ -18,7 +18,7 @@ use super::html::escape;
 /// errors reach 0.2 only along edges.
 const BRIGHTEST_ERROR: f32 = 0.2;
 
-pub(super) fn section(path: &Path, views: &[ViewImages]) -> Result<String, DataError> {
+pub(super) fn section(path: &Path, views: &[RenderedView]) -> Result<String, DataError> {
     if views.is_empty() {
         return Ok(String::new());
     }
@@ -34,14 +34,15 @@ pub(super) fn section(path: &Path, views: &[ViewImages]) -> Result<String, DataE
     Ok(html)
 }
 
-fn figure(html: &mut String, path: &Path, view: &ViewImages) -> Result<(), DataError> {
+fn figure(html: &mut String, path: &Path, view: &RenderedView) -> Result<(), DataError> {
+    let name = format!("{} {}", view.split, view.name);
     let wrong = |problem: String| DataError::Image {
         path: path.to_path_buf(),
-        problem: format!("view {}: {problem}", view.name),
+        problem: format!("view {name}: {problem}"),
         remedy: "this is a fault of the program: please report it".to_owned(),
     };
-    let error = error_map(&view.ground_truth, &view.render).map_err(&wrong)?;
-    let name = escape(&view.name);
+    let error = error_map(&view.truth, &view.render).map_err(&wrong)?;
+    let name = escape(&name);
     let psnr = fixed(view.psnr, 2);
     let _ = write!(
         html,
@@ -49,7 +50,7 @@ fn figure(html: &mut String, path: &Path, view: &ViewImages) -> Result<(), DataE
          <button type=\"button\" class=\"compare\" hidden>Compare</button></figcaption>\n<div class=\"triple\">\n",
         fixed(view.time.into(), 3)
     );
-    for (kind, image) in [("Ground truth", &view.ground_truth), ("Render", &view.render), ("Error", &error)] {
+    for (kind, image) in [("Ground truth", &view.truth), ("Render", &view.render), ("Error", &error)] {
         let data = data_uri(image).map_err(|error| wrong(error.to_string()))?;
         let alt = match kind {
             "Error" => format!("Error of {name}: PSNR {psnr} dB"),
@@ -84,8 +85,11 @@ fn error_map(truth: &RgbImage8, render: &RgbImage8) -> Result<RgbImage8, String>
     Ok(RgbImage8 { width, height, pixels })
 }
 
-/// The image as a PNG, embedded in the page.
-pub(crate) fn data_uri(image: &RgbImage8) -> image::ImageResult<String> {
+/// The image as the address of a PNG that is embedded in the page: `data:image/png;base64,...`.
+///
+/// # Errors
+/// An image without pixels.
+pub fn data_uri(image: &RgbImage8) -> image::ImageResult<String> {
     let mut png = Vec::new();
     PngEncoder::new(&mut png).write_image(&image.pixels, image.width, image.height, ExtendedColorType::Rgb8)?;
     Ok(format!("data:image/png;base64,{}", STANDARD.encode(png)))

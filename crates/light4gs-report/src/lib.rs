@@ -3,6 +3,7 @@
 //! Style, script, charts (SVG) and images (PNG) are all inside, and the page forbids all requests. It can be read
 //! without its script, in light and dark mode, on paper and with a screen reader.
 
+mod cameras;
 mod chart;
 mod coding;
 mod color_map;
@@ -11,29 +12,25 @@ mod format;
 mod html;
 mod images;
 mod quality;
+mod run;
 mod sizes;
-pub mod table;
 
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::path::Path;
 
-use light4gs_data::write_atomically;
-use light4gs_data::{DataError, RgbImage8};
+use light4gs_data::{DataError, write_atomically};
+use light4gs_train::compression::{BitMap, CodingRecord};
+use light4gs_train::evaluation::{RenderedView, SectionSize, SplitScore};
+use light4gs_train::observers::metrics_log::MetricsRecord;
 use light4gs_web::page::{Content, PLAYER, Place, element};
 
-use crate::compression::{BitMap, CodingRecord};
-use crate::metrics::scores::Scores;
-use crate::observers::metrics_log::MetricsRecord;
-#[cfg(feature = "cli")]
-pub(crate) use color_map::inferno;
-#[cfg(not(feature = "cli"))]
-use html::escape;
-#[cfg(feature = "cli")]
-pub(crate) use html::escape;
+pub use cameras::cameras_json;
+pub use color_map::inferno;
+pub use html::escape;
 use html::fill;
-#[cfg(feature = "cli")]
-pub(crate) use images::data_uri;
+pub use images::data_uri;
+pub use run::evaluate_run;
 
 const PAGE: &str = include_str!("page.html");
 const STYLE: &str = include_str!("style.css");
@@ -51,15 +48,15 @@ pub struct Report {
     /// The figures at the top.
     pub summary: Vec<SummaryTile>,
     /// Bytes of the file by section, in the order of the file.
-    pub sections: Vec<SectionBytes>,
+    pub sections: Vec<SectionSize>,
     /// The file itself, to be played at the top of the page.
     pub player: Option<PlayerReport>,
     /// How the file was coded.
     pub coding: Option<CodingReport>,
     /// Quality by split.
-    pub splits: Vec<SplitQuality>,
-    /// Views to show beside their ground truth.
-    pub images: Vec<ViewImages>,
+    pub splits: Vec<SplitScore>,
+    /// Views to show beside their ground truth; both images of one must have the same size.
+    pub images: Vec<RenderedView>,
     /// The run's curves.
     pub metrics: Vec<MetricsRecord>,
     /// The configuration, as resolved.
@@ -82,7 +79,7 @@ pub struct SummaryTile {
 pub struct PlayerReport {
     /// A `.l4gs` stream.
     pub scene: Vec<u8>,
-    /// Cameras as JSON, see [`crate::view::cameras_json`].
+    /// Cameras as JSON, see [`cameras_json`].
     pub cameras: String,
 }
 
@@ -93,52 +90,6 @@ pub struct CodingReport {
     pub record: CodingRecord,
     /// Maps of the planes' bits; may be empty.
     pub bit_maps: Vec<BitMap>,
-}
-
-/// Size of one section of the file.
-#[derive(Debug, Clone, Default)]
-pub struct SectionBytes {
-    /// Name of the section.
-    pub name: String,
-    /// Its size.
-    pub bytes: u64,
-}
-
-/// Quality over one split.
-#[derive(Debug, Clone, Default)]
-pub struct SplitQuality {
-    /// `test`, `val`...
-    pub name: String,
-    /// The scores over the views.
-    pub scores: Scores,
-    /// The views.
-    pub views: Vec<ViewQuality>,
-}
-
-/// Quality of one view.
-#[derive(Debug, Clone, Default)]
-pub struct ViewQuality {
-    /// Name of the frame.
-    pub name: String,
-    /// Its time, 0 to 1.
-    pub time: f32,
-    /// Its scores.
-    pub scores: Scores,
-}
-
-/// A rendered view beside its ground truth; both must have the same size.
-#[derive(Debug, Clone)]
-pub struct ViewImages {
-    /// Name of the frame.
-    pub name: String,
-    /// Its time, 0 to 1.
-    pub time: f32,
-    /// PSNR over the whole image, dB.
-    pub psnr: f64,
-    /// The frame of the dataset, composited.
-    pub ground_truth: RgbImage8,
-    /// The decoded file, rendered.
-    pub render: RgbImage8,
 }
 
 /// Writes the report. The file is complete or absent; one that exists is replaced.
@@ -182,8 +133,7 @@ fn player(player: Option<&PlayerReport>) -> String {
 }
 
 /// A page in the style of the report, with sections of the caller's: pairs of a heading and HTML.
-#[cfg(feature = "cli")]
-pub(crate) fn page_of(title: &str, about: &str, sections: &[(String, String)]) -> String {
+pub fn page_of(title: &str, about: &str, sections: &[(String, String)]) -> String {
     let sections = sections.iter().enumerate();
     let sections: String =
         sections.map(|(k, (heading, html))| section(&format!("s{k}"), &escape(heading), html.clone())).collect();

@@ -3,15 +3,15 @@
 use std::fmt::Write as _;
 
 use light4gs_data::Region;
+use light4gs_train::evaluation::SplitScore;
+use light4gs_train::metrics::Metric;
+use light4gs_train::metrics::scores::Scores;
 
-use super::SplitQuality;
 use super::chart::{Chart, Mark, Series};
 use super::format::{count, fixed};
 use super::html::escape;
-use crate::metrics::Metric;
-use crate::metrics::scores::Scores;
 
-pub(super) fn section(splits: &[SplitQuality]) -> String {
+pub(super) fn section(splits: &[SplitScore]) -> String {
     if splits.is_empty() {
         return String::new();
     }
@@ -57,12 +57,12 @@ fn cells(html: &mut String, scores: &Scores, columns: &[Metric]) {
     html.push_str("</tr>\n");
 }
 
-fn summary(html: &mut String, splits: &[SplitQuality]) {
+fn summary(html: &mut String, splits: &[SplitScore]) {
     let columns = Scores::columns(splits.iter().map(|split| &split.scores));
     html.push_str("<div class=\"scroll\"><table>\n");
     heads(html, &["Split", "Views"], &columns);
     for split in splits {
-        let (name, views) = (escape(&split.name), count(split.views.len() as u64));
+        let (name, views) = (escape(&split.split), count(split.views.len() as u64));
         let _ = write!(html, "<tr><th scope=\"row\">{name}</th><td class=\"number\">{views}</td>");
         cells(html, &split.scores, &columns);
     }
@@ -70,7 +70,7 @@ fn summary(html: &mut String, splits: &[SplitQuality]) {
     html.push_str(&legend(&columns));
 }
 
-fn views(html: &mut String, splits: &[SplitQuality]) {
+fn views(html: &mut String, splits: &[SplitScore]) {
     if splits.iter().all(|split| split.views.is_empty()) {
         return;
     }
@@ -83,7 +83,7 @@ fn views(html: &mut String, splits: &[SplitQuality]) {
                 html,
                 "<tr><th scope=\"row\">{}</th><td>{}</td><td class=\"number\">{}</td>",
                 escape(&view.name),
-                escape(&split.name),
+                escape(&split.split),
                 fixed(view.time.into(), 3),
             );
             cells(html, &view.scores, &columns);
@@ -92,14 +92,14 @@ fn views(html: &mut String, splits: &[SplitQuality]) {
     html.push_str("</tbody>\n</table></div></details>\n");
 }
 
-fn over_time(splits: &[SplitQuality]) -> Chart {
+fn over_time(splits: &[SplitScore]) -> Chart {
     Chart {
         title: "PSNR over the time of the view, dB".to_owned(),
         x_label: "time".to_owned(),
         series: splits
             .iter()
             .map(|split| Series {
-                label: split.name.clone(),
+                label: split.split.clone(),
                 mark: Mark::Dots,
                 points: split.views.iter().map(|view| (f64::from(view.time), view.scores.psnr())).collect(),
             })

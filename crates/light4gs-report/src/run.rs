@@ -1,23 +1,19 @@
-//! The steps after training: the decoded file is measured, and `eval.json`, `renders/` and `report.html` are written.
+//! The report of a finished run: its file is measured, and the page written.
 
 use std::fs;
 
-use light4gs_codec::Limits;
 use light4gs_data::{DataError, Region, Scene};
 use light4gs_model::DeformationField;
+use light4gs_train::compression::BitMap;
+use light4gs_train::config::Config;
+use light4gs_train::error::TrainError;
+use light4gs_train::evaluation::{Evaluation, RenderedView, measure_run};
+use light4gs_train::metrics::{Metric, RegionMetric};
+use light4gs_train::observers::metrics_log::read_metrics;
+use light4gs_train::run::RunFolder;
+use light4gs_train::utc;
 
-use crate::compression::BitMap;
-use crate::config::Config;
-use crate::dataset::image_store;
-use crate::device::{self, describe};
-use crate::error::TrainError;
-use crate::evaluation::{DecodedScene, Evaluation, RenderedView};
-use crate::metrics::{Metric, RegionMetric};
-use crate::observers::metrics_log::read_metrics;
-use crate::report::{CodingReport, PlayerReport, Report, SectionBytes, SummaryTile, write_report};
-use crate::run::RunFolder;
-use crate::utc;
-use crate::view::cameras_json;
+use crate::{CodingReport, PlayerReport, Report, SummaryTile, cameras_json, write_report};
 
 /// Number of views in a report.
 const REPORT_VIEWS: usize = 6;
@@ -26,33 +22,23 @@ const PLAYER_CAMERAS: usize = 60;
 /// Size in bytes of the largest file that a report plays.
 const LARGEST_PLAYED_FILE: usize = 16 << 20;
 
-/// Measures the run's file on its own dataset and writes everything that depends on it.
+/// Measures the run's file on its own dataset and writes everything that depends on it: `eval.json` and the renders, as
+/// [`measure_run`] does, then `report.html`.
+///
+/// # Errors
+/// As [`measure_run`]; a record of the run that is damaged; a page that cannot be written.
 pub fn evaluate_run<F: DeformationField>(
     folder: &RunFolder,
     config: &Config,
     scene: &Scene,
 ) -> Result<Evaluation, TrainError> {
-    let device = device::open(config.device)?;
-    let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
-    let images = image_store(config);
-    let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
-    let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
-    evaluation.training_seconds = metrics.last().map(|record| record.seconds);
-    evaluation.coding = folder.read_json("coding.json")?;
-    folder.write_json("eval.json", &evaluation)?;
-    if config.eval.save_renders {
-        save_renders(folder, &views)?;
-    }
+    let (evaluation, views) = measure_run::<F>(folder, config, scene)?;
     let report = Report {
         title: scene.name.clone(),
         created: utc::now_to_the_minute(),
         device: evaluation.device.clone(),
         summary: summary(&evaluation),
-        sections: evaluation
-            .sections
-            .iter()
-            .map(|section| SectionBytes { name: section.name.clone(), bytes: section.bytes })
-            .collect(),
+        sections: evaluation.sections.clone(),
         player: player(folder, scene)?,
         coding: match &evaluation.coding {
             Some(record) => {
@@ -68,12 +54,12 @@ pub fn evaluate_run<F: DeformationField>(
             }
             None => None,
         },
-        splits: evaluation.report_splits(),
+        splits: evaluation.splits.clone(),
         images: {
             let stride = views.len().div_ceil(REPORT_VIEWS).max(1);
-            views.iter().step_by(stride).map(RenderedView::image).collect()
+            views.iter().step_by(stride).cloned().collect()
         },
-        metrics,
+        metrics: read_metrics(&folder.path("metrics.jsonl"))?,
         config_toml: config.to_toml(),
     };
     write_report(&folder.path("report.html"), &report)?;
@@ -86,15 +72,6 @@ fn player(folder: &RunFolder, scene: &Scene) -> Result<Option<PlayerReport>, Tra
     let bytes = fs::read(&path).map_err(|source| DataError::Io { action: "read", path, source })?;
     let small = bytes.len() <= LARGEST_PLAYED_FILE;
     Ok(small.then(|| PlayerReport { scene: bytes, cameras: cameras_json(scene, PLAYER_CAMERAS) }))
-}
-
-fn save_renders(folder: &RunFolder, views: &[RenderedView]) -> Result<(), TrainError> {
-    for view in views {
-        let path = folder.path("renders").join(view.split.name());
-        fs::create_dir_all(&path).map_err(|source| DataError::Io { action: "create", path: path.clone(), source })?;
-        view.render.save_png(&path.join(format!("{}.png", view.name)))?;
-    }
-    Ok(())
 }
 
 fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {

@@ -2,11 +2,12 @@
 
 use std::fmt::Write as _;
 
-use super::SectionBytes;
+use light4gs_train::evaluation::SectionSize;
+
 use super::format::{count, fixed};
 use super::html::escape;
 
-pub(super) fn section(sections: &[SectionBytes]) -> String {
+pub(super) fn section(sections: &[SectionSize]) -> String {
     if sections.is_empty() {
         return String::new();
     }

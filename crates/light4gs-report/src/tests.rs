@@ -1,8 +1,13 @@
+use light4gs_data::{RgbImage8, Split};
+use light4gs_train::Stage;
+use light4gs_train::compression::{AttributeRecord, BitEstimate, PlaneRecord};
+use light4gs_train::config::FileProfile;
+use light4gs_train::evaluation::ViewScore;
+use light4gs_train::metrics::Metric;
+use light4gs_train::metrics::lpips::LpipsNetwork;
+use light4gs_train::metrics::scores::Scores;
+
 use super::*;
-use crate::compression::{AttributeRecord, BitEstimate, PlaneRecord};
-use crate::metrics::Metric;
-use crate::metrics::lpips::LpipsNetwork;
-use crate::stage::Stage;
 
 fn image(width: u32, height: u32, shift: u8) -> RgbImage8 {
     let at = |x: u32, y: u32| [(x * 2) as u8, (y * 2) as u8, 128].map(|v: u8| v.saturating_add(shift));
@@ -27,28 +32,29 @@ fn sample() -> Report {
     }
     let measured = [(Metric::Psnr, 31.0), (Metric::Ssim, 0.95), (Metric::Lpips(LpipsNetwork::Alex), 0.05)];
     let scores = Scores::from_values(measured);
-    let view = |name: &str| ViewQuality { name: name.into(), time: 0.5, scores: scores.clone() };
+    let view = |name: &str| ViewScore { name: name.into(), time: 0.5, scores: scores.clone() };
     Report {
         title: "<b>bouncing</b> & \"more\" {{style}}".into(),
         created: "today".into(),
         device: "ndarray".into(),
         summary: vec![SummaryTile { label: "Test PSNR".into(), value: "31.0 dB".into(), hint: "20 views".into() }],
         sections: vec![
-            SectionBytes { name: "gaussians".into(), bytes: 123_456 },
-            SectionBytes { name: "planes".into(), bytes: 1_234_567 },
+            SectionSize { name: "gaussians".into(), bytes: 123_456 },
+            SectionSize { name: "planes".into(), bytes: 1_234_567 },
         ],
         player: Some(PlayerReport { scene: b"\x89L4GS".to_vec(), cameras: "[]".into() }),
         coding: Some(CodingReport { record: coding_record(), bit_maps: vec![bit_map()] }),
-        splits: vec![SplitQuality {
-            name: "test".into(),
+        splits: vec![SplitScore {
+            split: "test".into(),
             scores: scores.clone(),
             views: vec![view("r_000"), view("r_001")],
         }],
-        images: vec![ViewImages {
+        images: vec![RenderedView {
+            split: Split::Test,
             name: "r_000".into(),
             time: 0.5,
             psnr: 31.0,
-            ground_truth: image(40, 30, 0),
+            truth: image(40, 30, 0),
             render: image(40, 30, 9),
         }],
         metrics,
@@ -64,7 +70,7 @@ fn coding_record() -> CodingRecord {
     let plane = PlaneRecord { name: "0.xy".into(), step: 0.05, symbols: 512, latent_bytes: 3, value_bytes: 64 };
     let attribute = AttributeRecord { name: "<age>".into(), estimated_bits: 707.0, coded_bits: 700.0 };
     CodingRecord {
-        profile: crate::config::FileProfile::Compact,
+        profile: FileProfile::Compact,
         fit_seconds: None,
         encode_seconds: 0.5,
         estimated_bits: BitEstimate { planes: 530.0, sh: 1010.0, attributes: 707.0 },

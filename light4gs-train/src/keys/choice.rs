@@ -16,7 +16,7 @@ pub struct UnknownChoice {
 
 impl UnknownChoice {
     /// `known` must not be empty.
-    pub(crate) fn new(what: &'static str, name: &str, known: &'static [&'static str]) -> Self {
+    pub fn new(what: &'static str, name: &str, known: &'static [&'static str]) -> Self {
         let nearest = nearest(known.iter().copied(), name).expect("some names are known");
         Self { what, name: name.to_owned(), nearest, known }
     }
@@ -30,6 +30,7 @@ pub(crate) fn nearest<'a>(known: impl IntoIterator<Item = &'a str>, name: &str) 
 
 /// Declares an enum whose variants have names: `Display` and serde write the name, `FromStr` and serde read it. An
 /// unknown name is an [`UnknownChoice`] with the nearest one.
+#[macro_export]
 macro_rules! choice {
     (
         $(#[$attribute:meta])*
@@ -72,7 +73,7 @@ macro_rules! choice {
             }
         }
 
-        $crate::keys::serde_by_name!($choice);
+        $crate::serde_by_name!($choice);
     };
 }
 
@@ -99,11 +100,12 @@ macro_rules! named {
             }
         }
 
-        $crate::keys::serde_by_name!($named);
+        $crate::serde_by_name!($named);
     };
 }
 
 /// Serde through `Display` and `FromStr`.
+#[macro_export]
 macro_rules! serde_by_name {
     ($name:ident) => {
         impl serde::Serialize for $name {

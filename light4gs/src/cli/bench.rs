@@ -1,15 +1,15 @@
-//! `bench`: the tables of `crate::benchmark` and `crate::benchmark::codec`.
+//! `bench`: the tables of `light4gs_lab::benchmark` and `light4gs_lab::benchmark::codec`.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use light4gs_lab::benchmark::codec::{codec_benchmark, codec_table};
+use light4gs_lab::benchmark::{BenchScene, benchmark, table};
+use light4gs_train::config::DeviceName;
+use light4gs_train::device;
+use light4gs_train::error::TrainError;
 
 use super::output::{say, say_json};
-use crate::benchmark::codec::{codec_benchmark, codec_table};
-use crate::benchmark::{BenchScene, benchmark, table};
-use crate::config::DeviceName;
-use crate::device;
-use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Bench {

@@ -3,11 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use light4gs_train::error::TrainError;
+use light4gs_train::run::{Comparison, Difference};
+use light4gs_train::table::{Align, Table};
 
 use super::output::{say, say_json};
-use crate::error::TrainError;
-use crate::report::table::{Align, Table};
-use crate::run::{Comparison, Difference};
 
 #[derive(Debug, Args)]
 pub(super) struct Compare {

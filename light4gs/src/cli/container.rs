@@ -13,6 +13,15 @@ use light4gs_codec::{
 use light4gs_data::{Scene, write_atomically};
 use light4gs_model::DeformationField;
 use light4gs_model::attributes::BUILT_IN;
+use light4gs_train::compression::{CodedScene, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
+use light4gs_train::config::{Config, DeviceName};
+use light4gs_train::dataset::{image_store, load_options};
+use light4gs_train::device;
+use light4gs_train::error::TrainError;
+use light4gs_train::evaluation::section_sizes;
+use light4gs_train::import::scene_around;
+use light4gs_train::run::Checkpoint;
+use light4gs_train::run::RunFolder;
 use safetensors::Dtype;
 use safetensors::tensor::TensorView;
 use serde_json::json;
@@ -23,15 +32,6 @@ use super::output::progress::FitBar;
 use super::output::{say, say_json, tell};
 use super::train::{coding_table, sections_table};
 use super::wishes::{bytes, decibels};
-use crate::compression::{CodedScene, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
-use crate::config::{Config, DeviceName};
-use crate::dataset::{image_store, load_options};
-use crate::device;
-use crate::error::TrainError;
-use crate::evaluation::section_sizes;
-use crate::import::scene_around;
-use crate::run::Checkpoint;
-use crate::run::RunFolder;
 
 #[derive(Debug, Args)]
 pub(super) struct Encode {

@@ -4,8 +4,7 @@ use std::panic::{self, AssertUnwindSafe};
 use std::sync::Arc;
 
 use light4gs_model::GpuError;
-
-use crate::error::TrainError;
+use light4gs_train::error::TrainError;
 
 /// Runs a command. Errors of GPU operations are panics, since Burn's operations return no results. They become ordinary
 /// errors here, and are not reported as panics. At the end the caller's panic hook is restored.

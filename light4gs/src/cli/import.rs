@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use light4gs_data::Scene;
+use light4gs_train::compression::{ConfiguredModels, TrainedScene};
+use light4gs_train::config::{Config, DeviceName};
+use light4gs_train::dataset::{image_store, load_options};
+use light4gs_train::device;
+use light4gs_train::error::TrainError;
+use light4gs_train::import::{reference, scene_around, still};
 
 use super::check_output;
 use super::container::code_to_file;
 use super::output::say;
-use crate::compression::{ConfiguredModels, TrainedScene};
-use crate::config::{Config, DeviceName};
-use crate::dataset::{image_store, load_options};
-use crate::device;
-use crate::error::TrainError;
-use crate::import::{reference, scene_around, still};
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum Source {

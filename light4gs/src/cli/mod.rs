@@ -22,12 +22,11 @@ use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use light4gs_train::error::TrainError;
+use light4gs_train::run::belongs_to_run;
 use tracing_subscriber::filter::{LevelFilter, Targets};
 use tracing_subscriber::layer::{Layer, SubscriberExt};
 use tracing_subscriber::util::SubscriberInitExt;
-
-use crate::error::TrainError;
-use crate::run::belongs_to_run;
 
 /// Learns dynamic scenes as deformable 3D Gaussians and stores each as one .l4gs file.
 #[derive(Debug, Parser)]

@@ -5,9 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use light4gs_data::{PrepareOptions, PrepareProgress, prepare};
+use light4gs_train::error::TrainError;
 
 use super::output::{say, tell};
-use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Prepare {

@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use clap::Args;
 use light4gs_data::{SyntheticOptions, write_synthetic};
+use light4gs_train::config::{Config, DeviceName};
+use light4gs_train::error::TrainError;
 
 use super::train::{RunOutput, train};
-use crate::config::{Config, DeviceName};
-use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Quickstart {

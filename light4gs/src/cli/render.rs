@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 use light4gs_codec::SceneMeta;
 use light4gs_data::{Camera, Frame, LoadOptions, Resolution, Scene, orbit_path};
+use light4gs_train::config::DeviceName;
+use light4gs_train::device;
+use light4gs_train::error::TrainError;
+use light4gs_train::evaluation::DecodedScene;
 
 use super::check_output;
 use super::limits::LimitsArgument;
 use super::limits::most::{MOST_FRAMES, MOST_SIDE, image_size};
 use super::output::say;
-use crate::config::DeviceName;
-use crate::device;
-use crate::error::TrainError;
-use crate::evaluation::DecodedScene;
 use crate::video::{Looping, write_gif, write_mp4, write_png_sequence};
 
 /// Radius in world units and elevation in degrees of the orbit, those of the D-NeRF video path.

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use light4gs_data::{SyntheticOptions, write_synthetic};
+use light4gs_train::error::TrainError;
 
 use super::output::say;
-use crate::error::TrainError;
 
 #[derive(Debug, Args)]
 pub(super) struct Synth {

@@ -6,24 +6,24 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use light4gs_data::{Layouts, Scene};
 use light4gs_model::BuiltInField;
+use light4gs_report::evaluate_run;
+use light4gs_train::compression::{CodedPart, CodingRecord};
+use light4gs_train::config::{Config, DeviceName};
+use light4gs_train::dataset::{image_store, load_options};
+use light4gs_train::device::{self, describe};
+use light4gs_train::error::TrainError;
+use light4gs_train::evaluation::{DecodedScene, Evaluation};
+use light4gs_train::metrics::lpips::Lpips;
+use light4gs_train::metrics::scores::Scores;
+use light4gs_train::run::{RunFolder, RunRecord};
+use light4gs_train::table::{Align, Table};
+use light4gs_train::trainer::{Trainer, TrainerBuilder};
 
 use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
 use super::wishes::Wishes;
-use crate::compression::{CodedPart, CodingRecord};
-use crate::config::{Config, DeviceName};
-use crate::dataset::{image_store, load_options};
-use crate::device::{self, describe};
-use crate::error::TrainError;
-use crate::evaluation::finish::evaluate_run;
-use crate::evaluation::{DecodedScene, Evaluation};
-use crate::metrics::lpips::Lpips;
-use crate::metrics::scores::Scores;
-use crate::report::table::{Align, Table};
-use crate::run::{RunFolder, RunRecord};
-use crate::trainer::{Trainer, TrainerBuilder};
 
 /// Options for the output of a run.
 #[derive(Debug, Args)]

@@ -4,12 +4,12 @@ use std::path::Path;
 
 use clap::Args;
 use light4gs_data::Scene;
+use light4gs_train::config::Config;
+use light4gs_train::dataset::load_options;
+use light4gs_train::error::TrainError;
+use light4gs_train::pace::Pace;
 
 use super::output::tell;
-use crate::config::Config;
-use crate::dataset::load_options;
-use crate::error::TrainError;
-use crate::pace::Pace;
 
 /// Shorter trainings are not worth an estimate.
 const FEWEST_ESTIMATED: usize = 1000;

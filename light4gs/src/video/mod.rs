@@ -13,11 +13,11 @@ use image::{Delay, RgbaImage};
 use light4gs_data::write_atomically;
 use light4gs_data::{DataError, RgbImage8};
 
-pub use mp4::write_mp4;
+pub(crate) use mp4::write_mp4;
 
 /// How often a GIF plays.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Looping {
+pub(crate) enum Looping {
     /// Without end.
     #[default]
     Forever,
@@ -27,7 +27,7 @@ pub enum Looping {
 
 /// GIFs with a higher rate play slowly: a GIF counts in hundredths of a second, and players take a delay of less than
 /// two of them for a mistake.
-pub const MAX_GIF_FPS: f32 = 50.0;
+pub(crate) const MAX_GIF_FPS: f32 = 50.0;
 
 /// Effort of the color quantizer, 1 (best) to 30 (fast).
 const GIF_SPEED: i32 = 10;
@@ -39,7 +39,7 @@ const GIF_SPEED: i32 = 10;
 /// # Errors
 /// [`DataError`] naming the file, if `fps` is not above 0 and at most [`MAX_GIF_FPS`], if there is no frame, if sizes
 /// differ, or if the file cannot be written.
-pub fn write_gif<E: From<DataError>>(
+pub(crate) fn write_gif<E: From<DataError>>(
     path: &Path,
     frames: impl IntoIterator<Item = Result<RgbImage8, E>>,
     fps: f32,
@@ -90,7 +90,7 @@ pub fn write_gif<E: From<DataError>>(
 /// # Errors
 /// The first error of `frames`, or [`DataError`] naming the file that cannot be written. Each file is whole or absent;
 /// those before it stay.
-pub fn write_png_sequence<E: From<DataError>>(
+pub(crate) fn write_png_sequence<E: From<DataError>>(
     folder: &Path,
     frames: impl IntoIterator<Item = Result<RgbImage8, E>>,
 ) -> Result<Vec<PathBuf>, E> {

@@ -19,7 +19,7 @@ const QUALITY: &str = "18";
 /// # Errors
 /// [`DataError`] naming the file: if `fps` is not a positive number, if there is no frame, if sizes differ, if `ffmpeg` is not
 /// installed, and what it says if it fails.
-pub fn write_mp4<E: From<DataError>>(
+pub(crate) fn write_mp4<E: From<DataError>>(
     path: &Path,
     frames: impl IntoIterator<Item = Result<RgbImage8, E>>,
     fps: f32,

@@ -10,10 +10,13 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates that have rooms.
-const CRATES: [&str; 7] = [
+const CRATES: [&str; 10] = [
     "light4gs-codec",
     "light4gs-data",
+    "crates/light4gs-lab",
     "crates/light4gs-render",
+    "crates/light4gs-report",
+    "light4gs",
     "light4gs-model",
     "light4gs-train",
     "bindings/web",
@@ -24,12 +27,13 @@ const CRATES: [&str; 7] = [
 const MOST_FILES: usize = 16;
 
 /// The repository's folders.
-const PARTS: [&str; 11] = [
+const PARTS: [&str; 12] = [
     ".ci",
     "bindings",
     "crates",
     "docs",
     "examples",
+    "light4gs",
     "light4gs-codec",
     "light4gs-data",
     "light4gs-model",

@@ -31,10 +31,10 @@ use std::process::ExitCode;
 
 use light4gs_data::{Layouts, Scene, SyntheticOptions, write_synthetic};
 use light4gs_model::BuiltInField;
+use light4gs_report::evaluate_run;
 use light4gs_train::config::Config;
 use light4gs_train::dataset::load_options;
 use light4gs_train::error::TrainError;
-use light4gs_train::evaluation::finish::evaluate_run;
 use light4gs_train::run::RunFolder;
 use light4gs_train::trainer::Trainer;
 use serde_json::json;

@@ -11,7 +11,7 @@ use light4gs_train::Stage;
 use light4gs_train::error::TrainError;
 use light4gs_train::observers::metrics_log::MetricsRecord;
 use light4gs_train::observers::{Observer, SceneInTraining, StepReport};
-use light4gs_train::view::ViewSource;
+use light4gs_train::view_source::ViewSource;
 use serde_json::{Value, json};
 
 use crate::messages::say;

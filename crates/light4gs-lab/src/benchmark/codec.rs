@@ -10,15 +10,14 @@ use light4gs_codec::{
 };
 use light4gs_data::PointCloud;
 use light4gs_model::DynamicScene;
+use light4gs_train::compression::{Compression, ConfiguredModels, compression_input};
+use light4gs_train::config::Config;
+use light4gs_train::error::TrainError;
+use light4gs_train::table::{Align, Table};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
-
-use crate::compression::{Compression, ConfiguredModels, compression_input};
-use crate::config::Config;
-use crate::error::TrainError;
-use crate::report::table::{Align, Table};
 
 /// Gaussians of the scene: as many as the paper keeps of *bouncing balls*.
 const GAUSSIANS: usize = 12_000;
@@ -61,7 +60,7 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 
 /// Times every coder; each time is the best of `repeats`.
 pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
-    let device = crate::device::any()?;
+    let device = light4gs_train::device::any()?;
     let config = Config::from_preset("dnerf")?;
     let scene = scene(&config, &device);
     let mut compression = Compression::new(&ConfiguredModels, &config, scene.planes(), &device)?;

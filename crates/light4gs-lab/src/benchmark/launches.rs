@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::config::DeviceName;
+use light4gs_train::config::DeviceName;
 
 /// Counts the launches of the process, if the device launches kernels.
 #[derive(Debug)]

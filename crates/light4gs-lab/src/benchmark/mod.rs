@@ -13,17 +13,17 @@ use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError};
 use light4gs_model::ops::skinning::{SkinningInputs, skin};
 use light4gs_model::{DeformationConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter};
+use light4gs_train::config::DeviceName;
+use light4gs_train::device::adapter_name;
+use light4gs_train::error::TrainError;
+use light4gs_train::table::{Align, Table};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use safetensors::{Dtype, SafeTensors};
 use serde::Serialize;
 
 use self::launches::Launches;
-use self::steps::StepNames;
-use crate::config::{Config, DeviceName};
-use crate::device::adapter_name;
-use crate::error::TrainError;
-use crate::report::table::{Align, Table};
+use self::steps::FIELDS;
 
 /// Untimed repetitions before the timed ones.
 const WARM_UP: usize = 2;
@@ -176,7 +176,7 @@ impl BenchScene {
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
     /// Its name.
-    pub name: &'static str,
+    pub name: String,
     /// What it takes.
     #[serde(flatten)]
     pub cost: Cost,
@@ -279,14 +279,11 @@ pub fn benchmark(
     let launches = &Launches::on(name);
     let meter = &Meter { device, repeats, launches };
     let calibration = meter.measure(|| (a.clone(), b.clone()), |(a, b)| a.matmul(b));
-    let presets = [
-        (Config::from_preset("dnerf-cpu")?, steps::HEXPLANE),
-        (Config::load("dnerf-cpu+nodes+medium", &[])?, steps::NODES),
-    ];
-    let scenes = scenes
-        .iter()
-        .map(|scene| SceneTimes { scene: scene.name.clone(), timings: timings(scene, meter, &autodiff, &presets) })
-        .collect();
+    let of_scene = |scene: &BenchScene| {
+        let timings = timings(scene, meter, &autodiff)?;
+        Ok(SceneTimes { scene: scene.name.clone(), timings })
+    };
+    let scenes = scenes.iter().map(of_scene).collect::<Result<_, TrainError>>()?;
     Ok(DeviceTimes {
         device: name.to_string(),
         adapter: adapter_name(name, device),
@@ -295,9 +292,9 @@ pub fn benchmark(
     })
 }
 
-fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device, presets: &[(Config, StepNames)]) -> Vec<Timing> {
+fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device) -> Result<Vec<Timing>, TrainError> {
     let mut out = Vec::new();
-    let mut add = |name: &'static str, cost: Cost| out.push(Timing { name, cost });
+    let mut add = |name: &str, cost: Cost| out.push(Timing { name: name.to_owned(), cost });
     let device = meter.device;
     let splatter = Splatter::new(scene.background, 3);
     let [height, width] = [scene.camera.height as usize, scene.camera.width as usize];
@@ -351,10 +348,10 @@ fn timings(scene: &BenchScene, meter: &Meter, autodiff: &Device, presets: &[(Con
     add("deformation forward", meter.measure(|| features.clone(), &deform));
     add("deformation backward", meter.measure(|| deform(features.clone()), |loss| loss.backward()));
 
-    for (config, names) in presets {
-        steps::timings(scene, config, names, meter, &mut add);
+    for field in &FIELDS {
+        field.timings(scene, meter, &mut |name, cost| out.push(Timing { name, cost }))?;
     }
-    out
+    Ok(out)
 }
 
 /// One table: a row for each part, a column for each device and scene.
@@ -372,17 +369,17 @@ pub fn table(results: &[DeviceTimes]) -> String {
             .collect::<Vec<_>>()
     };
     for (i, timing) in first.timings.iter().enumerate() {
-        table.row(cells(timing.name, &|_, scene| scene.timings[i].cost.milliseconds));
+        table.row(cells(&timing.name, &|_, scene| scene.timings[i].cost.milliseconds));
     }
-    let timing_of = |name: &'static str| {
+    let timing_of = |name: String| {
         move |_: &DeviceTimes, scene: &SceneTimes| {
             let timing = scene.timings.iter().find(|timing| timing.name == name);
             1e3 / timing.map_or(f64::NAN, |timing| timing.cost.milliseconds)
         }
     };
-    for (field, names) in [("hexplane", steps::HEXPLANE), ("nodes", steps::NODES)] {
-        table.row(cells(&format!("{field}, training it/s"), &timing_of(names.plain)));
-        table.row(cells(&format!("{field}, render FPS"), &timing_of(names.render)));
+    for field in &FIELDS {
+        table.row(cells(&field.row("training it/s"), &timing_of(field.row("training step"))));
+        table.row(cells(&field.row("render FPS"), &timing_of(field.row("render"))));
     }
     table.rule().row(cells("1024×1024 matmul", &|device, _| device.calibration_ms));
     let launches = launch_table(results).unwrap_or_default();
@@ -403,7 +400,7 @@ fn launch_table(results: &[DeviceTimes]) -> Option<String> {
     let mut table = Table::new(std::iter::once(("kernel launches".to_owned(), Align::Left)).chain(columns));
     for (i, timing) in first.timings.iter().enumerate() {
         let sums = launching.iter().map(|(_, scene)| scene.timings[i].cost.launches.values().sum::<u64>().to_string());
-        table.row(std::iter::once(timing.name.to_owned()).chain(sums));
+        table.row(std::iter::once(timing.name.clone()).chain(sums));
     }
     Some(format!("\n{table}"))
 }

@@ -1,177 +1,200 @@
-//! Timing of whole training steps, each of one view, and of rendering, with the field and the rate of a preset.
+//! Timing of the trainer's own step, and of rendering: for every deformation field with every loss, without and with
+//! noise and rate.
 
 use std::collections::BTreeMap;
-use std::time::Instant;
+use std::path::Path;
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_data::PointCloud;
-use light4gs_model::{DeformationField, DynamicScene, FinePosition, GaussianTensors, SceneAtRest, Splatter};
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
+use light4gs_data::{Frame, PointCloud, RgbImage32, Scene, SplitFrames};
+use light4gs_model::{GaussianTensors, Splatter};
+use light4gs_train::Stage;
+use light4gs_train::config::Config;
+use light4gs_train::dataset::MemoryImages;
+use light4gs_train::density::{DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
+use light4gs_train::error::TrainError;
+use light4gs_train::loss::LossKind;
+use light4gs_train::trainer::Trainer;
 
-use super::{BenchScene, Cost, Meter, WARM_UP, median_of};
-use crate::compression::{Compression, ConfiguredModels};
-use crate::config::Config;
-use crate::density::GaussianEditor;
-use crate::metrics::l1;
-use crate::optimization::adam::Adam;
-use crate::optimization::gradients::GradientSums;
+use super::{BenchScene, Cost, Meter};
 
-/// The time at which views are rendered.
+/// The fields, each with the preset whose steps are timed and the changes to it.
+pub(super) const FIELDS: [TimedField; 3] = [
+    TimedField { name: "hexplane", preset: "dnerf-cpu", keys: &[] },
+    TimedField { name: "nodes", preset: "dnerf-cpu+nodes+medium", keys: &[] },
+    TimedField { name: "still", preset: "dnerf-cpu", keys: &["model.field=still"] },
+];
+
+/// Frames that are trained on, each at a time of its own.
+const FRAMES: usize = 8;
+/// The time at which a trained scene is rendered.
 const TIME: f32 = 0.3;
-/// What a megabyte weighs in the loss.
-const LAMBDA: f64 = 0.05;
 
-/// The rows of a preset in the table.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct StepNames {
-    pub(super) adam: &'static str,
-    pub(super) plain: &'static str,
-    pub(super) noise: &'static str,
-    pub(super) rate: &'static str,
-    pub(super) render: &'static str,
+/// Every iteration is like the one before: one view at full size, all degrees of the harmonics, Gaussians that are neither
+/// added nor dropped, no end that comes near.
+const STEADY: [&str; 13] = [
+    "train.coarse_iterations=1",
+    "train.fine_iterations=1000000",
+    "train.batch_size=1",
+    "train.sampling=shuffled",
+    "train.sh_degree_interval=1",
+    "train.log_interval=1000000",
+    "train.photometric.l2_until=0",
+    "train.coarse_to_fine.quarter_until=0",
+    "train.coarse_to_fine.half_until=0",
+    "train.prune.fraction=0",
+    "train.guided_sampling.iterations=[]",
+    "eval.interval=0",
+    "compression.rate.lambda=0",
+];
+
+/// Entropy models and learned steps, but an iteration with a rate never comes.
+const NOISE: [&str; 5] = [
+    "compression.rate.lambda=0.05",
+    "compression.rate.from=1",
+    "compression.rate.planes_until=0",
+    "compression.rate.interval=1000000",
+    "compression.steps.adaptive_from=0",
+];
+
+/// On top of [`NOISE`]: every iteration has a rate.
+const RATE: &str = "compression.rate.interval=1";
+
+/// A deformation field whose steps are timed.
+#[derive(Debug)]
+pub(super) struct TimedField {
+    name: &'static str,
+    preset: &'static str,
+    keys: &'static [&'static str],
 }
 
-pub(super) const HEXPLANE: StepNames = StepNames {
-    adam: "hexplane, Adam step",
-    plain: "hexplane, training step",
-    noise: "hexplane, step with noise",
-    rate: "hexplane, step with noise and rate",
-    render: "hexplane, render",
-};
-
-pub(super) const NODES: StepNames = StepNames {
-    adam: "nodes, Adam step",
-    plain: "nodes, training step",
-    noise: "nodes, step with noise",
-    rate: "nodes, step with noise and rate",
-    render: "nodes, render",
-};
-
-/// Times the steps of a preset on a scene's Gaussians.
-pub(super) fn timings(
-    scene: &BenchScene,
-    config: &Config,
-    names: &StepNames,
-    meter: &Meter,
-    add: &mut impl FnMut(&'static str, Cost),
-) {
-    let Meter { device, repeats, launches } = *meter;
-    let autodiff = &device.clone().autodiff();
-    let splatter = Splatter::new(scene.background, config.model.sh_degree.into());
-    let [height, width] = [scene.camera.height as usize, scene.camera.width as usize];
-    let truth = Tensor::<3>::zeros([height, width, 3], autodiff);
-    let position = FinePosition {
-        iteration: 1,
-        iterations: 2,
-        times: 100,
-        window: [0.0, 1.0],
-        window_before: [0.0, 1.0],
-        seed: 0,
-    };
-    let mut dynamic = dynamic(scene, config, &position, autodiff);
-    let regularizer = config.train.regularizer.build();
-    // As a trainer, which knows from the step before.
-    let seen = splatter.render(dynamic.at(TIME), &scene.camera, None).intersections.into_scalar::<i64>();
-    let trained = splatter.with_room_for(2 * seen as usize);
-    let loss_of = |model: &DynamicScene, frame: usize| {
-        let image = trained.render(model.at(TIME), &scene.camera_at(frame), None).image;
-        let loss = l1(image, truth.clone());
-        let loss = match model.planes() {
-            Some(planes) => loss + regularizer.loss(planes),
-            None => loss,
-        };
-        match model.field.regularizer(&at_rest(model), &position) {
-            Some(own) => loss + own,
-            None => loss,
-        }
-    };
-    let mut adam = Adam::default();
-    // Rates so small that the scene does not change while it is timed.
-    let mut update = |dynamic: &mut DynamicScene, mut gradients: GradientSums| {
-        adam.step_module("", dynamic, &mut gradients, |_, _| Some(1e-12));
-    };
-    let mut times = [Vec::new(), Vec::new()];
-    let mut counts = [BTreeMap::new(), BTreeMap::new()];
-    for repetition in 0..WARM_UP + repeats {
-        launches.take();
-        let begin = Instant::now();
-        let mut tape = loss_of(&dynamic, repetition).backward();
-        let mut gradients = GradientSums::default();
-        gradients.add_module(&dynamic, &mut tape);
-        let _ = device.sync();
-        let of_gradients = launches.take();
-        let middle = Instant::now();
-        update(&mut dynamic, gradients);
-        let _ = device.sync();
-        counts = [launches.take(), of_gradients];
-        if repetition >= WARM_UP {
-            times[0].push(middle.elapsed().as_secs_f64() * 1e3);
-            times[1].push(begin.elapsed().as_secs_f64() * 1e3);
-        }
-    }
-    let [adam_ms, step_ms] = times.map(median_of);
-    let [of_adam, of_gradients] = counts;
-    let mut of_step = of_adam.clone();
-    of_gradients.into_iter().for_each(|(kernel, count)| *of_step.entry(kernel).or_default() += count);
-    add(names.adam, Cost { milliseconds: adam_ms, launches: of_adam });
-    add(names.plain, Cost { milliseconds: step_ms, launches: of_step });
-
-    let mut config = config.clone();
-    config.compression.rate.lambda = LAMBDA;
-    let compression = Compression::of_run(&ConfiguredModels, &config, &dynamic, autodiff);
-    let mut compression = compression.expect("the preset's models fit its field").expect("it has a rate");
-    compression.start_attributes_from(&dynamic.gaussians);
-    for (name, with_rate) in [(names.noise, false), (names.rate, true)] {
-        let mut random = ChaCha8Rng::seed_from_u64(1);
-        let step = meter.measure(
-            || (),
-            |()| {
-                let noisy = compression.noisy(&dynamic, true, true, 0);
-                let mut sums = GradientSums::default();
-                let image = trained.render(noisy.scene.at(TIME), &scene.camera, None).image;
-                sums.add_module(&noisy.scene, &mut l1(image, truth.clone()).backward());
-                if with_rate {
-                    let rate = compression.rate(&noisy, config.compression.rate.fraction, true, None, &mut random);
-                    let attributes = rate.attribute_megabytes();
-                    let term = attributes.into_iter().fold(rate.megabytes(), |sum, part| sum + part) * LAMBDA;
-                    sums.add_module(&noisy.scene, &mut term.backward());
-                }
-                update(&mut dynamic, sums);
-            },
-        );
-        add(name, step);
+impl TimedField {
+    /// The name of a row about the field.
+    pub(super) fn row(&self, part: &str) -> String {
+        format!("{}, {part}", self.name)
     }
 
-    let decoded = dynamic.valid();
+    fn config(&self, keys: &[&str]) -> Result<Config, TrainError> {
+        let keys: Vec<String> = STEADY.iter().chain(self.keys).chain(keys).map(|key| (*key).to_owned()).collect();
+        Ok(Config::load(self.preset, &keys)?)
+    }
+
+    /// Times the steps with the field on a scene's Gaussians.
+    pub(super) fn timings(
+        &self,
+        scene: &BenchScene,
+        meter: &Meter,
+        add: &mut impl FnMut(String, Cost),
+    ) -> Result<(), TrainError> {
+        let config = self.config(&[])?;
+        let usual = config.train.loss;
+        let mut trainer = trainer(scene, config, meter.device)?;
+        let step = step(&mut trainer, meter)?;
+        add(self.row("Adam step"), adam(&mut trainer, &step, meter)?);
+        add(self.row("training step"), step);
+        let render = render(scene, &trainer, meter);
+        drop(trainer);
+
+        let time = |keys: &[&str]| step_with(scene, self.config(keys)?, meter);
+        for loss in LossKind::NAMES.iter().filter(|loss| **loss != usual.name()) {
+            add(self.row(&format!("step with {loss} loss")), time(&[&format!("train.loss={loss}")])?);
+        }
+        add(self.row("step with noise"), time(&NOISE)?);
+        add(self.row("step with noise and rate"), time(&[NOISE.as_slice(), &[RATE]].concat())?);
+        add(self.row("render"), render);
+        Ok(())
+    }
+}
+
+/// What a step of a new trainer takes.
+fn step_with(scene: &BenchScene, config: Config, meter: &Meter) -> Result<Cost, TrainError> {
+    step(&mut trainer(scene, config, meter.device)?, meter)
+}
+
+/// What a step takes.
+fn step(trainer: &mut Trainer, meter: &Meter) -> Result<Cost, TrainError> {
+    let mut failed = None;
+    let cost = meter.measure(|| (), |()| failed = failed.take().or(trainer.step().err()));
+    failed.map_or(Ok(cost), Err)
+}
+
+/// What the optimizer takes of a step, by the trainer's profile; of the step's launches, those of its kernel.
+fn adam(trainer: &mut Trainer, step: &Cost, meter: &Meter) -> Result<Cost, TrainError> {
+    trainer.measure_stages();
+    while trainer.profile().laps("Adam").len() < meter.repeats {
+        trainer.step()?;
+    }
+    let seconds = super::median_of(trainer.profile().laps("Adam"));
+    let launches = step.launches.iter().filter(|(kernel, _)| kernel.to_lowercase().contains("adam"));
+    let launches = launches.map(|(kernel, count)| (kernel.clone(), *count)).collect();
+    Ok(Cost { milliseconds: 1e3 * seconds, launches })
+}
+
+/// What an image of the trained scene takes.
+fn render(scene: &BenchScene, trainer: &Trainer, meter: &Meter) -> Cost {
+    let splatter = Splatter::new(scene.background, trainer.config().model.sh_degree.into());
+    let trained = trainer.scene().valid();
     let mut frame = 0;
-    let render = meter.measure(
-        || (),
-        |()| {
-            frame += 1;
-            splatter.render(decoded.at(TIME), &scene.camera_at(frame), None).image
-        },
-    );
-    add(names.render, render);
+    let draw = |()| {
+        frame += 1;
+        splatter.render(trained.at(TIME), &scene.camera_at(frame), None).image
+    };
+    meter.measure(|| (), draw)
 }
 
-/// A dynamic scene over the scene's Gaussians, with the field and the degree of a preset, and with motion begun.
-fn dynamic(scene: &BenchScene, config: &Config, position: &FinePosition, device: &Device) -> DynamicScene {
+/// A trainer in its fine stage, whose Gaussians are those of the scene. Its frames show them as they are, so that they hardly
+/// change while they are trained.
+fn trainer(scene: &BenchScene, config: Config, device: &Device) -> Result<Trainer, TrainError> {
+    let still = scene.gaussians(device).tensors();
+    let sh_rest = still.sh_rest.clone().narrow(1, 0, (usize::from(config.model.sh_degree) + 1).pow(2) - 1);
+    let still = GaussianTensors { sh_rest, ..still };
+    let splatter = Splatter::new(scene.background, config.model.sh_degree.into());
+    let frames: Vec<Frame> = (0..FRAMES)
+        .map(|k| Frame::without_image(k.to_string(), scene.camera_at(k), k as f32 / (FRAMES - 1) as f32))
+        .collect();
+    let image = |frame: &Frame| {
+        let pixels = splatter.render(still.clone(), &frame.camera, None).image.into_data().iter::<f32>().collect();
+        let image = RgbImage32 { width: frame.camera.width, height: frame.camera.height, pixels };
+        (frame.name.clone(), image.to_u8())
+    };
+    let images: MemoryImages = frames.iter().map(image).collect();
     let positions = scene.means.as_chunks::<3>().0.to_vec();
-    let colors = vec![[0.5; 3]; positions.len()];
-    let mut dynamic = config.model.build().init(&PointCloud { positions, colors }, device);
-    let gaussians = scene.gaussians(&device.clone().inner()).tensors();
-    GaussianEditor::new(&mut dynamic.gaussians, &mut Adam::default()).update(|own| {
-        let sh_rest = gaussians.sh_rest.narrow(1, 0, own.sh_rest.dims()[1]);
-        GaussianTensors { sh_rest, further: own.further, ..gaussians }
-    });
-    let begin = FinePosition { iteration: 0, ..*position };
-    let DynamicScene { gaussians, coordinates, field, .. } = &mut dynamic;
-    field.begin_motion(&SceneAtRest { gaussians, coordinates, extent: 1.0 }, &begin);
-    dynamic
+    let cloud = PointCloud { colors: vec![[0.5; 3]; positions.len()], positions };
+    let frames = SplitFrames { test: frames[..1].to_vec(), train: frames, ..SplitFrames::default() };
+    let data = Scene::new("memory", Path::new(&scene.name), frames, cloud, scene.background)?;
+    let given = GivenGaussians(Some(still));
+    let builder = Trainer::builder(config, data).device(device.clone()).images(images).density(given);
+    let mut trainer = builder.build()?;
+    // The coarse stage's only iteration.
+    trainer.step()?;
+    Ok(trainer)
 }
 
-fn at_rest(model: &DynamicScene) -> SceneAtRest<'_> {
-    SceneAtRest { gaussians: &model.gaussians, coordinates: &model.coordinates, extent: 1.0 }
+/// Gaussians that take the place of those of the cloud after the first iteration. From then on none comes and none goes.
+struct GivenGaussians(Option<GaussianTensors>);
+
+impl DensityStrategy for GivenGaussians {
+    fn begin_stage(&mut self, _: usize, _: &Device) {}
+
+    fn after_backward(&mut self, _: &[ViewStatistics], _: &TrainingPosition) {}
+
+    fn after_step(&mut self, gaussians: &mut GaussianEditor, _: &TrainingPosition) {
+        if let Some(given) = self.0.take() {
+            gaussians.update(|own| GaussianTensors { further: own.further, ..given });
+        }
+    }
+
+    fn rows_kept(&mut self, _: &[bool]) {}
+
+    fn is_over(&self, _: Stage, _: usize) -> bool {
+        true
+    }
+
+    fn state(&self) -> BTreeMap<String, Tensor<1>> {
+        BTreeMap::new()
+    }
+
+    fn restore(&mut self, _: BTreeMap<String, Tensor<1>>, _: usize) -> Result<(), String> {
+        Ok(())
+    }
 }

@@ -14,7 +14,7 @@
 //!     { name = "strong", set = ["compression.rate.lambda=0.02"] },
 //! ]
 //! "#;
-//! let study = light4gs_train::study::Study::from_toml(text, "mine.toml")?;
+//! let study = light4gs_lab::study::Study::from_toml(text, "mine.toml")?;
 //! assert_eq!(study.axis[0].value.len(), 2);
 //! # Ok::<(), light4gs_train::error::TrainError>(())
 //! ```
@@ -24,13 +24,13 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use light4gs_data::read_regular_text;
+use light4gs_train::choice;
+use light4gs_train::config::{MAX_CONFIG_BYTES, UnknownChoice};
+use light4gs_train::error::TrainError;
 use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::measure::{Column, Measure, default_columns};
-use crate::config::{MAX_CONFIG_BYTES, UnknownChoice};
-use crate::error::TrainError;
-use crate::keys::choice;
 
 /// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;

@@ -6,12 +6,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use light4gs_data::{DataError, read_regular_file, read_regular_text, write_atomically};
+use light4gs_train::config::{Config, MAX_CONFIG_BYTES};
+use light4gs_train::error::TrainError;
 use serde::{Deserialize, Serialize};
 
 use super::definition::Study;
 use super::plan::{Plan, Variant, variants};
-use crate::config::{Config, MAX_CONFIG_BYTES};
-use crate::error::TrainError;
 
 /// The file in a study's folder.
 pub const MANIFEST: &str = "study.json";

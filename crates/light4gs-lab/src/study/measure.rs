@@ -1,10 +1,10 @@
 //! The measures of a run, and the columns of tables.
 
+use light4gs_train::choice;
 use serde::de::Error as _;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use super::results::RunResult;
-use crate::keys::choice;
 
 choice! {
     /// A quantity that is measured on a finished run.

@@ -8,18 +8,16 @@
 //!   studies
 //! - [`table`]: means, spreads and differences to the reference
 //! - [`quality_curves`]: runs as curves of quality over bytes or minutes
-//! - `plots`, `figures`: plots and images, and the study's `report.html` (feature `cli`)
+//! - `plots`, `figures`: plots and images, and the study's `report.html`
 //! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
 
 pub mod catalog;
 pub mod curve;
 pub mod definition;
-#[cfg(feature = "cli")]
 pub mod figures;
 pub mod manifest;
 pub mod measure;
 pub mod plan;
-#[cfg(feature = "cli")]
 pub mod plots;
 pub mod quality_curves;
 pub mod results;

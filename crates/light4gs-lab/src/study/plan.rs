@@ -4,10 +4,10 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use light4gs_data::DataError;
+use light4gs_train::config::Config;
+use light4gs_train::error::TrainError;
 
 use super::definition::{Axis, Study, schedule_problem};
-use crate::config::Config;
-use crate::error::TrainError;
 
 /// In the name of a configuration, it stands for the name of the scene.
 const SCENE_PLACE: &str = "{scene}";

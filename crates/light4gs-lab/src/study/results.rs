@@ -5,14 +5,14 @@
 
 use std::path::Path;
 
+use light4gs_train::compression::CodingRecord;
+use light4gs_train::error::TrainError;
+use light4gs_train::observers::metrics_log::read_metrics;
+use light4gs_train::run::RunFolder;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::{Manifest, ManifestRun, StudyFolder};
 use super::measure::Measure;
-use crate::compression::CodingRecord;
-use crate::error::TrainError;
-use crate::observers::metrics_log::read_metrics;
-use crate::run::RunFolder;
 
 /// A finished run.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -2,11 +2,12 @@
 
 use std::path::{Path, PathBuf};
 
+use light4gs_train::config::Config;
+use light4gs_train::error::TrainError;
+use light4gs_train::run::RunFolder;
+
 use super::manifest::StudyFolder;
 use super::results::is_finished;
-use crate::config::Config;
-use crate::error::TrainError;
-use crate::run::RunFolder;
 
 /// A finished run of other studies whose training a run with this configuration can take over: begun by this version of
 /// the program on the same dataset, without changes during training, and with a configuration that differs at most in

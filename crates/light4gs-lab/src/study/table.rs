@@ -1,5 +1,6 @@
 //! A study's tables: a row for each variant, means and standard deviations over seeds, differences to the reference.
 
+use light4gs_train::table::{Align, Table};
 use serde::Serialize;
 
 use super::manifest::Manifest;
@@ -7,7 +8,6 @@ use super::measure::{Column, Form, Measure};
 use super::quality_curves::QualityCurves;
 use super::results::Results;
 use super::spread::Spread;
-use crate::report::table::{Align, Table};
 
 /// Marks a difference that is no larger than its standard deviation over seeds.
 pub const WITHIN_SPREAD: &str = "≈";

@@ -12,6 +12,10 @@ use light4gs_data::{
     DataError, GaussianPly, GlbOptions, MotionSample, write_atomically, write_four_dgs, write_glb, write_ply_zip,
 };
 use light4gs_model::{BuiltInField, STILLNESS};
+use light4gs_train::config::DeviceName;
+use light4gs_train::device;
+use light4gs_train::error::TrainError;
+use light4gs_train::evaluation::DecodedScene;
 use light4gs_web::page::{Content, page};
 
 use self::skin::{Distances, NodesMotion};
@@ -20,10 +24,6 @@ use super::limits::LimitsArgument;
 use super::limits::most::{MOST_FRAMES, frame_count};
 use super::output::say;
 use super::view::dataset_cameras;
-use crate::config::DeviceName;
-use crate::device;
-use crate::error::TrainError;
-use crate::evaluation::DecodedScene;
 
 /// Most cameras of each split in a page: enough to choose from, few enough to send.
 const MOST_CAMERAS: usize = 60;

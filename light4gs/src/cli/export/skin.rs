@@ -3,8 +3,7 @@
 use burn::tensor::Tensor;
 use light4gs_data::{Influence, Joint, JointPose, Skin};
 use light4gs_model::{DynamicScene, NodesField, STILLNESS};
-
-use crate::error::TrainError;
+use light4gs_train::error::TrainError;
 
 /// Gaussians whose weights of all nodes are in memory at once.
 const ROWS: usize = 1 << 14;

@@ -1,8 +1,7 @@
 //! The most output that a command makes. The limits are the same for numbers from a file and from the command line.
 
 use light4gs_codec::SceneMeta;
-
-use crate::error::TrainError;
+use light4gs_train::error::TrainError;
 
 /// Width and height of an image.
 pub(in crate::cli) const MOST_SIDE: u32 = 16_384;

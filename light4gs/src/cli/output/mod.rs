@@ -6,7 +6,7 @@ use std::borrow::Cow;
 use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 
-use crate::error::TrainError;
+use light4gs_train::error::TrainError;
 
 /// Prints a line, or a table. A reader that has gone away, such as `head`, is no error: the work continues without it.
 pub(super) fn say(text: impl Display) -> Result<(), TrainError> {

@@ -1,12 +1,12 @@
 //! Progress bars, as an observer of the trainer.
 
 use indicatif::{ProgressBar, ProgressStyle};
+use light4gs_train::Stage;
+use light4gs_train::error::TrainError;
+use light4gs_train::observers::metrics_log::MetricsRecord;
+use light4gs_train::observers::{Observer, SceneInTraining, StepReport};
 
 use super::tell;
-use crate::Stage;
-use crate::error::TrainError;
-use crate::observers::metrics_log::MetricsRecord;
-use crate::observers::{Observer, SceneInTraining, StepReport};
 
 /// A bar for each stage, and one for the fitting of entropy models.
 pub(in crate::cli) struct ProgressBars {

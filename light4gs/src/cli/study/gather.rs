@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use light4gs_lab::study::figures::{figures, write_report};
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::quality_curves::{QualityCurves, quality_curves};
+use light4gs_lab::study::results::Results;
+use light4gs_lab::study::table::{StudyTable, legend, tables, to_markdown};
+use light4gs_train::error::TrainError;
 use serde::Serialize;
 
 use super::super::output::{say, say_json, tell};
-use crate::error::TrainError;
-use crate::study::figures::{figures, write_report};
-use crate::study::manifest::{Manifest, StudyFolder};
-use crate::study::quality_curves::{QualityCurves, quality_curves};
-use crate::study::results::Results;
-use crate::study::table::{StudyTable, legend, tables, to_markdown};
 
 #[derive(Debug, Args)]
 pub(in crate::cli) struct Gather {

@@ -6,12 +6,12 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use light4gs_data::DataError;
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_train::error::TrainError;
 
 use super::super::output::tell;
 use super::super::signals::stop_flag;
 use super::unfinished;
-use crate::error::TrainError;
-use crate::study::manifest::{Manifest, StudyFolder};
 
 /// Time between two checks of the processes.
 const PAUSE: Duration = Duration::from_millis(50);

@@ -9,20 +9,20 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::plan::{Plan, PlanOptions};
+use light4gs_lab::study::results::is_finished;
+use light4gs_lab::study::reuse::find_trained;
+use light4gs_lab::study::{Study as Definition, catalog};
+use light4gs_train::config::DeviceName;
+use light4gs_train::error::TrainError;
+use light4gs_train::table::{Align, Table};
 use serde::Serialize;
 
 pub(super) use gather::Gather;
 pub(super) use task::StudyTask;
 
 use super::output::{say, say_json};
-use crate::config::DeviceName;
-use crate::error::TrainError;
-use crate::report::table::{Align, Table};
-use crate::study::manifest::{Manifest, StudyFolder};
-use crate::study::plan::{Plan, PlanOptions};
-use crate::study::results::is_finished;
-use crate::study::reuse::find_trained;
-use crate::study::{Study as Definition, catalog};
 
 /// The launcher of the tasks.
 #[derive(Clone, Copy, Debug, ValueEnum)]

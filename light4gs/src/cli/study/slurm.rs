@@ -9,12 +9,12 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use light4gs_data::read_regular_text;
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_train::error::TrainError;
 use serde::Deserialize;
 
 use super::super::output::say;
 use super::unfinished;
-use crate::error::TrainError;
-use crate::study::manifest::{Manifest, StudyFolder};
 
 const TASK_SCRIPT: &str = include_str!("task.sh");
 const GATHER_SCRIPT: &str = include_str!("gather.sh");

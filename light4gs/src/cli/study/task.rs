@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::Args;
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::results::is_finished;
+use light4gs_lab::study::reuse::find_trained;
+use light4gs_train::error::TrainError;
 
 use super::super::output::tell;
 use super::super::signals::stop_flag;
 use super::super::train::{RunOutput, train_to_evaluation};
-use crate::error::TrainError;
-use crate::study::manifest::{Manifest, StudyFolder};
-use crate::study::results::is_finished;
-use crate::study::reuse::find_trained;
 
 /// Time between two attempts to lock a run that another process holds.
 const PAUSE: Duration = Duration::from_millis(500);

@@ -1,5 +1,7 @@
 //! `view`.
 
+mod server;
+
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -7,14 +9,17 @@ use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use light4gs_data::{DataError, Scene, read_regular_file};
+use light4gs_report::cameras_json;
+use light4gs_train::config::{Config, DeviceName};
+use light4gs_train::dataset::load_options;
+use light4gs_train::error::TrainError;
+use light4gs_train::run::RunFolder;
+use light4gs_train::view_source::ViewSource;
 use light4gs_web::page::{Content, PLAYER, TRAINER, TRAINER_PAGE, page};
 use serde_json::json;
 
+use self::server::{Answer, Server};
 use super::output::{say, tell};
-use crate::config::{Config, DeviceName};
-use crate::dataset::load_options;
-use crate::error::TrainError;
-use crate::view::{Answer, Server, ViewSource, cameras_json, run_around};
 
 /// The player's script.
 const PLAYER_ADDRESS: &str = "light4gs-player.js";
@@ -142,7 +147,9 @@ pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) ->
         return Ok(cameras_json(&Scene::open(folder, &load_options(&Config::default()))?, most));
     }
     // If the dataset of a run no longer exists, its file can be played all the same.
-    let dataset = run_around(file)
+    let around = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    let dataset = around
+        .and_then(|folder| RunFolder::open(folder).ok())
         .and_then(|(_, record, config)| Scene::open(record.dataset().ok()?, &load_options(&config)).ok());
     Ok(dataset.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
 }

@@ -15,16 +15,16 @@ const PATIENCE: Duration = Duration::from_secs(10);
 
 /// The answer for a path.
 #[derive(Clone, Debug)]
-pub struct Answer {
+pub(super) struct Answer {
     /// Such as `text/html; charset=utf-8`.
-    pub content_type: &'static str,
+    pub(super) content_type: &'static str,
     /// The content.
-    pub body: Cow<'static, [u8]>,
+    pub(super) body: Cow<'static, [u8]>,
 }
 
 /// A server that is ready to answer.
 #[derive(Debug)]
-pub struct Server {
+pub(super) struct Server {
     listener: TcpListener,
 }
 
@@ -33,7 +33,7 @@ impl Server {
     ///
     /// # Errors
     /// A port that is taken or reserved.
-    pub fn bind(port: u16) -> Result<Self> {
+    pub(super) fn bind(port: u16) -> Result<Self> {
         Ok(Self { listener: TcpListener::bind((Ipv4Addr::LOCALHOST, port))? })
     }
 
@@ -41,12 +41,12 @@ impl Server {
     ///
     /// # Errors
     /// What the system refuses.
-    pub fn address(&self) -> Result<SocketAddr> {
+    pub(super) fn address(&self) -> Result<SocketAddr> {
         self.listener.local_addr()
     }
 
     /// Answers requests until the process ends, each on its own thread. `respond` gets the path without its query.
-    pub fn run(&self, respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static) {
+    pub(super) fn run(&self, respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static) {
         let respond = Arc::new(respond);
         for stream in self.listener.incoming().flatten() {
             let respond = Arc::clone(&respond);

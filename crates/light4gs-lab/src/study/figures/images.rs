@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use light4gs_data::{RgbImage8, Scene};
+use light4gs_train::dataset::{ImageSource, image_store, load_options};
+use light4gs_train::error::TrainError;
+use light4gs_train::run::RunFolder;
 
 use super::{Content, Figure};
-use crate::dataset::{ImageSource, image_store, load_options};
-use crate::error::TrainError;
-use crate::run::RunFolder;
 use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::results::RunResult;
 

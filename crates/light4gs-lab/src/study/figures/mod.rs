@@ -8,6 +8,8 @@ mod report;
 use std::fmt::Write as _;
 
 use light4gs_data::RgbImage8;
+use light4gs_report::{data_uri, escape};
+use light4gs_train::error::TrainError;
 
 pub use report::write_report;
 
@@ -18,8 +20,6 @@ use super::plots::{Bar, BarPlot, Drawing, Mark, ScatterPlot, Series, draw};
 use super::quality_curves::QualityCurves;
 use super::results::{Results, RunResult};
 use super::spread::Spread;
-use crate::error::TrainError;
-use crate::report::{data_uri, escape};
 
 /// The seed whose run is shown for a variant, where one image is shown.
 const SHOWN_SEED: u64 = 0;

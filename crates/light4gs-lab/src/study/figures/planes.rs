@@ -1,12 +1,12 @@
 //! Figures of the feature planes: the distribution of their values, and maps of their bits.
 
 use light4gs_data::RgbImage8;
+use light4gs_report::inferno;
+use light4gs_train::compression::BitMap;
+use light4gs_train::error::TrainError;
+use light4gs_train::run::RunFolder;
 
 use super::{Content, Figure};
-use crate::compression::BitMap;
-use crate::error::TrainError;
-use crate::report::inferno;
-use crate::run::RunFolder;
 use crate::study::manifest::StudyFolder;
 use crate::study::plots::{Mark, ScatterPlot, Series, draw};
 use crate::study::results::RunResult;

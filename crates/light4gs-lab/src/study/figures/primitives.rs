@@ -3,13 +3,13 @@
 use burn::tensor::Device;
 use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene};
 use light4gs_model::Splatter;
+use light4gs_train::dataset::load_options;
+use light4gs_train::device;
+use light4gs_train::error::TrainError;
+use light4gs_train::evaluation::DecodedScene;
+use light4gs_train::run::RunFolder;
 
 use super::{Content, Figure};
-use crate::dataset::load_options;
-use crate::device;
-use crate::error::TrainError;
-use crate::evaluation::DecodedScene;
-use crate::run::RunFolder;
 use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::results::RunResult;
 

@@ -2,9 +2,10 @@
 
 use std::fmt::Write as _;
 
+use light4gs_report::{escape, page_of};
+use light4gs_train::error::TrainError;
+
 use super::Figure;
-use crate::error::TrainError;
-use crate::report::{escape, page_of};
 use crate::study::manifest::{Manifest, StudyFolder};
 use crate::study::quality_curves::QualityCurves;
 use crate::study::results::Results;

@@ -10,6 +10,7 @@ use std::error::Error;
 use std::sync::Once;
 
 use light4gs_data::RgbImage8;
+use light4gs_train::error::TrainError;
 use plotters::backend::DrawingBackend;
 use plotters::coord::Shift;
 use plotters::prelude::{BitMapBackend, DrawingArea, IntoDrawingArea, SVGBackend};
@@ -17,8 +18,6 @@ use plotters::style::{Color, FontStyle, RGBColor, WHITE, register_font};
 
 pub use bars::{Bar, BarPlot};
 pub use scatter::{Mark, ScatterPlot, Series};
-
-use crate::error::TrainError;
 
 const SIZE: (u32, u32) = (900, 540);
 const FONT: &str = "sans-serif";
