@@ -1,4 +1,4 @@
-//! Tells the program which commit it is built from, and embeds the presets of `configs/`.
+//! Tells the library which commit it is built from, and embeds the presets of `configs/`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -22,12 +22,11 @@ fn main() {
     }
 }
 
-/// Writes the list of presets: every TOML file of `configs/` and of the folders in it, but for the studies, which are listed in
-/// their order (`src/study/catalog.rs`).
+/// Writes the list of presets: every TOML file of `configs/` and of the folders in it.
 fn write_presets(folder: &Path) {
     fn collect(folder: &Path, into: &mut BTreeMap<String, PathBuf>) {
         for entry in fs::read_dir(folder).expect("reading configs").map(|entry| entry.expect("an entry").path()) {
-            if entry.is_dir() && !entry.ends_with("studies") {
+            if entry.is_dir() {
                 collect(&entry, into);
             } else if let (Some(stem), Some("toml")) =
                 (entry.file_stem(), entry.extension().and_then(|end| end.to_str()))

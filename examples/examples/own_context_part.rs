@@ -8,20 +8,20 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::network::Operation;
-use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout, PlaneShape};
-use light4gs_codec::{Network, PlaneCoding, PlaneSource, decode, plane_distributions};
-use light4gs_data::Scene;
+use light4gs::codec::network::Operation;
+use light4gs::codec::plane_layout::{PlaneAxes, PlaneLayout, PlaneShape};
+use light4gs::codec::{Network, PlaneCoding, PlaneSource, decode, plane_distributions};
+use light4gs::data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
-use light4gs_model::{
+use light4gs::model::{
     CenteredPlanes, ContextConfig, ContextModel, DescribedCondition, DescribedPrior, FeaturePlanes, Latent, Passes,
     PlaneConv, PlaneConvConfig, PlaneEntropy, Prior, PriorPart, ShConfig, ShEntropyModel,
 };
-use light4gs_train::compression::{ConfiguredModels, EntropyModels, PlaneModels};
-use light4gs_train::dataset::load_options;
-use light4gs_train::error::TrainError;
-use light4gs_train::run::RunFolder;
-use light4gs_train::trainer::Trainer;
+use light4gs::train::compression::{ConfiguredModels, EntropyModels, PlaneModels};
+use light4gs::train::dataset::load_options;
+use light4gs::train::error::TrainError;
+use light4gs::train::run::RunFolder;
+use light4gs::train::trainer::Trainer;
 
 /// The place of the plane xz in the list of a hexplane's planes.
 const XZ: usize = 1;
@@ -114,7 +114,7 @@ impl EntropyModels for WithProfile {
 }
 
 /// The weights of our part, as they are in a training.
-fn weights(trainer: &Trainer<light4gs_model::BuiltInField, WithProfile>) -> Vec<f32> {
+fn weights(trainer: &Trainer<light4gs::model::BuiltInField, WithProfile>) -> Vec<f32> {
     let models = trainer.compression().and_then(|models| models.planes.as_ref()).expect("the rate is in the loss");
     models.context.profile.conv.to_layer().weight
 }
@@ -133,7 +133,7 @@ fn main() -> Outcome {
     let builder = |data: &Scene| Trainer::builder(config.clone(), data.clone()).entropy_models(WithProfile);
     let mut trainer = builder(&data).run_folder(run.clone()).build()?;
     let before = weights(&trainer);
-    while trainer.position() != (light4gs_train::Stage::Fine, 70) {
+    while trainer.position() != (light4gs::train::Stage::Fine, 70) {
         trainer.step()?;
     }
     assert_ne!(weights(&trainer), before, "our part learns nothing");
@@ -141,7 +141,7 @@ fn main() -> Outcome {
 
     // Resumed: the checkpoint holds the part, at iteration 50.
     let mut trainer = builder(&data).run_folder(run).resume()?;
-    assert_eq!(trainer.position(), (light4gs_train::Stage::Fine, 50));
+    assert_eq!(trainer.position(), (light4gs::train::Stage::Fine, 50));
     trainer.run()?;
 
     // Coded: the file is as large as the model expects. Any decoder reads it, since the composition is part of the

@@ -6,7 +6,7 @@
 use std::fs;
 use std::path::Path;
 
-use light4gs_data::{
+use light4gs::data::{
     Camera, DataError, DatasetLayout, Frame, ImageStore, Layouts, LoadOptions, PointCloud, Resolution, Scene, Split,
     SplitFrames, image_size,
 };

@@ -9,15 +9,15 @@ use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::tensor::activation::leaky_relu;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::network::Operation;
-use light4gs_codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, decode};
-use light4gs_data::Scene;
-use light4gs_examples::{Outcome, first_and_last, linear_from_layer, linear_to_layer, tiny_config, tiny_scene};
-use light4gs_model::{
+use light4gs::codec::network::Operation;
+use light4gs::codec::{MotionArrays, MotionNetwork, MotionOutput, MotionSource, Network, decode};
+use light4gs::data::Scene;
+use light4gs::model::{
     DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, HexPlaneField, ModelError, ScenePoints,
 };
-use light4gs_train::dataset::load_options;
-use light4gs_train::trainer::Trainer;
+use light4gs::train::dataset::load_options;
+use light4gs::train::trainer::Trainer;
+use light4gs_examples::{Outcome, first_and_last, linear_from_layer, linear_to_layer, tiny_config, tiny_scene};
 
 /// Slope of the activations where they are negative.
 const SLOPE: f32 = 0.25;

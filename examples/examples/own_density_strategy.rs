@@ -10,12 +10,12 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use burn::tensor::activation::sigmoid;
 use burn::tensor::{Device, Tensor};
-use light4gs_data::Scene;
+use light4gs::data::Scene;
+use light4gs::train::Stage;
+use light4gs::train::dataset::load_options;
+use light4gs::train::density::{DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
+use light4gs::train::trainer::Trainer;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_train::Stage;
-use light4gs_train::dataset::load_options;
-use light4gs_train::density::{DensityStrategy, GaussianEditor, TrainingPosition, ViewStatistics};
-use light4gs_train::trainer::Trainer;
 use rand::Rng;
 
 /// Iterations between two moves of the Gaussians whose opacity is below `TOO_FAINT`.

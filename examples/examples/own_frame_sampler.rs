@@ -7,14 +7,14 @@
 
 use std::path::Path;
 
-use light4gs_data::Scene;
+use light4gs::data::Scene;
+use light4gs::train::Stage;
+use light4gs::train::config::Config;
+use light4gs::train::dataset::load_options;
+use light4gs::train::run::RunFolder;
+use light4gs::train::sampling::{BatchRequest, FrameSampler};
+use light4gs::train::trainer::Trainer;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_train::Stage;
-use light4gs_train::config::Config;
-use light4gs_train::dataset::load_options;
-use light4gs_train::run::RunFolder;
-use light4gs_train::sampling::{BatchRequest, FrameSampler};
-use light4gs_train::trainer::Trainer;
 use rand::Rng;
 
 /// Frames whose time is near `center`.

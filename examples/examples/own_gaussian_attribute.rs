@@ -7,18 +7,18 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, s};
-use light4gs_codec::network::{Operation, Value};
-use light4gs_codec::{
+use light4gs::codec::network::{Operation, Value};
+use light4gs::codec::{
     GaussianArrays, MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource, Network, decode,
 };
-use light4gs_data::Scene;
-use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{
+use light4gs::data::Scene;
+use light4gs::model::{
     Attribute, DeformationField, DynamicScene, FeaturePlanes, GaussianTensors, ModelError, ScenePoints,
 };
-use light4gs_train::dataset::load_options;
-use light4gs_train::run::RunFolder;
-use light4gs_train::trainer::Trainer;
+use light4gs::train::dataset::load_options;
+use light4gs::train::run::RunFolder;
+use light4gs::train::trainer::Trainer;
+use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
 
 /// The name of the attribute, in checkpoints and in files: center, and logarithm of the width, in time.
 const LIFETIME: &str = "lifetime";

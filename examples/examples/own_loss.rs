@@ -5,12 +5,12 @@
 //! rest.
 
 use burn::tensor::{Device, Tensor};
-use light4gs_data::Scene;
+use light4gs::data::Scene;
+use light4gs::model::{DynamicScene, Splatter};
+use light4gs::train::dataset::{image_store, load_options};
+use light4gs::train::loss::{Loss, LossInput};
+use light4gs::train::trainer::Trainer;
 use light4gs_examples::{Outcome, first_and_last, image_tensor, tiny_config, tiny_scene};
-use light4gs_model::{DynamicScene, Splatter};
-use light4gs_train::dataset::{image_store, load_options};
-use light4gs_train::loss::{Loss, LossInput};
-use light4gs_train::trainer::Trainer;
 
 /// `[H, W]`: 1 where an image `[H, W, 3]` shows something, 0 where it shows the white background.
 fn silhouette(image: Tensor<3>) -> Tensor<2> {

@@ -5,12 +5,12 @@
 //! that it leaves out. The trainer adds the number to the loss, beside the regularizers of planes and field.
 
 use burn::tensor::Tensor;
-use light4gs_data::Scene;
+use light4gs::data::Scene;
+use light4gs::model::{DeformationField, DynamicScene};
+use light4gs::train::dataset::load_options;
+use light4gs::train::regularizer::{Regularizer, RegularizerInput};
+use light4gs::train::trainer::Trainer;
 use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{DeformationField, DynamicScene};
-use light4gs_train::dataset::load_options;
-use light4gs_train::regularizer::{Regularizer, RegularizerInput};
-use light4gs_train::trainer::Trainer;
 
 /// Mean over the Gaussians of `max(0, ratio of longest to shortest axis - limit)`.
 struct Roundness {

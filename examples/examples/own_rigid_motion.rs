@@ -13,19 +13,19 @@ use burn::config::Config;
 use burn::module::{Module, Param};
 use burn::tensor::activation::softmax;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
-use light4gs_codec::network::{Layer, Operation, Value};
-use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource, Network, decode};
-use light4gs_data::Scene;
-use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
-use light4gs_model::{
+use light4gs::codec::network::{Layer, Operation, Value};
+use light4gs::codec::{MotionArrays, MotionEvaluator, MotionNetwork, MotionOutput, MotionSource, Network, decode};
+use light4gs::data::Scene;
+use light4gs::model::{
     DeformationField, DynamicScene, FeaturePlanes, FinePosition, GaussianTensors, LearningRate, ModelError,
     SceneAtRest, ScenePoints,
 };
-use light4gs_train::Stage;
-use light4gs_train::dataset::load_options;
-use light4gs_train::run::RunFolder;
-use light4gs_train::sampling::BatchRequest;
-use light4gs_train::trainer::Trainer;
+use light4gs::train::Stage;
+use light4gs::train::dataset::load_options;
+use light4gs::train::run::RunFolder;
+use light4gs::train::sampling::BatchRequest;
+use light4gs::train::trainer::Trainer;
+use light4gs_examples::{Outcome, first_and_last, tiny_config, tiny_scene};
 use rand::Rng;
 
 /// Configuration of [`RigidNodes`].

@@ -7,18 +7,18 @@
 
 use burn::module::Module;
 use burn::tensor::{Device, Tensor};
-use light4gs_codec::{Network, ShPrior, ShSource, decode, network::Operation};
-use light4gs_data::Scene;
+use light4gs::codec::{Network, ShPrior, ShSource, decode, network::Operation};
+use light4gs::data::Scene;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
-use light4gs_model::{
+use light4gs::model::{
     BuiltInField, ContextConfig, ContextModel, DynamicScene, PlaneTensors, SH_CHANNELS, ShConfig, ShEntropy, ShKnown,
     ShNetwork, channels_first, channels_last, gaussian_bits, round_around,
 };
-use light4gs_train::compression::{ConfiguredModels, EntropyModels};
-use light4gs_train::config::FileProfile;
-use light4gs_train::dataset::load_options;
-use light4gs_train::error::TrainError;
-use light4gs_train::trainer::Trainer;
+use light4gs::train::compression::{ConfiguredModels, EntropyModels};
+use light4gs::train::config::FileProfile;
+use light4gs::train::dataset::load_options;
+use light4gs::train::error::TrainError;
+use light4gs::train::trainer::Trainer;
 
 /// From a Gaussian's values that a decoder already has to a normal distribution for each of its 45 coefficients.
 #[derive(Module, Debug)]

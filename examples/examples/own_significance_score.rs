@@ -6,12 +6,12 @@
 
 use std::sync::{Arc, Mutex};
 
-use light4gs_data::Scene;
+use light4gs::data::Scene;
+use light4gs::train::Stage;
+use light4gs::train::dataset::load_options;
+use light4gs::train::density::{GaussianContributions, SignificanceScore};
+use light4gs::train::trainer::Trainer;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
-use light4gs_train::Stage;
-use light4gs_train::dataset::load_options;
-use light4gs_train::density::{GaussianContributions, SignificanceScore};
-use light4gs_train::trainer::Trainer;
 
 /// Mean blending weight over the pixels of a Gaussian: many faint pixels count less than a few opaque ones. Keeps the
 /// scores that it has returned, so that `main` can look at them.

@@ -6,9 +6,9 @@ use burn::module::Module;
 use burn::nn::{Linear, LinearConfig};
 use burn::optim::{AdamConfig, GradientsParams};
 use burn::tensor::{Device, Tensor, activation::tanh};
-use light4gs_data::{ImageStore, LoadOptions, Scene};
+use light4gs::data::{ImageStore, LoadOptions, Scene};
+use light4gs::model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, HexPlaneConfig, Splatter};
 use light4gs_examples::{Outcome, image_tensor, tiny_scene};
-use light4gs_model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, HexPlaneConfig, Splatter};
 
 /// Gaussians, features over space and time, and one layer that turns a feature into a shift.
 #[derive(Module, Debug)]

@@ -4,11 +4,11 @@
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor, s};
-use light4gs_data::{Scene, Split};
+use light4gs::data::{Scene, Split};
+use light4gs::model::{DeformationField, GaussianTensors, ScenePoints};
+use light4gs::train::dataset::load_options;
+use light4gs::train::trainer::Trainer;
 use light4gs_examples::{Outcome, tiny_config, tiny_scene};
-use light4gs_model::{DeformationField, GaussianTensors, ScenePoints};
-use light4gs_train::dataset::load_options;
-use light4gs_train::trainer::Trainer;
 
 /// `[1]`: the angle at the last time, relative to the first, in radians.
 #[derive(Module, Debug)]

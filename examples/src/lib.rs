@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use burn::module::Param;
 use burn::nn::Linear;
 use burn::tensor::{Device, Tensor, TensorData};
-use light4gs_codec::network::Layer;
-use light4gs_data::{DataError, RgbImage8, SyntheticOptions, write_synthetic};
-use light4gs_train::config::{Config, DeviceName};
+use light4gs::codec::network::Layer;
+use light4gs::data::{DataError, RgbImage8, SyntheticOptions, write_synthetic};
+use light4gs::train::config::{Config, DeviceName};
 
 /// Result of an example: any error.
 pub type Outcome<T = ()> = Result<T, Box<dyn std::error::Error>>;

@@ -1,8 +1,5 @@
-//! Training, evaluation and the command line of Light4GS.
+//! Training and evaluation of Light4GS.
 
-pub mod benchmark;
-#[cfg(feature = "cli")]
-pub mod cli;
 pub mod compression;
 pub mod config;
 pub mod dataset;
@@ -20,14 +17,12 @@ pub mod optimization;
 pub mod pace;
 mod randomness;
 pub mod regularizer;
-pub mod report;
 pub mod run;
 pub mod sampling;
 mod stage;
-pub mod study;
+pub mod table;
 pub mod trainer;
-mod utc;
-pub mod video;
-pub mod view;
+pub mod utc;
+pub mod view_source;
 
 pub use stage::Stage;

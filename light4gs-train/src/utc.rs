@@ -3,13 +3,13 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 /// For example `2026-11-23 08:47:05 UTC`.
-pub(crate) fn now() -> String {
+pub fn now() -> String {
     let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     at(since.as_secs())
 }
 
 /// For example `2026-11-23 08:47 UTC`.
-pub(crate) fn now_to_the_minute() -> String {
+pub fn now_to_the_minute() -> String {
     to_the_minute(&now())
 }
 

@@ -6,7 +6,7 @@
 
 import { readFileSync } from "node:fs";
 import { fileURLToPath } from "node:url";
-import { launch, open, serve } from "../../light4gs-web/tests/harness.mjs";
+import { launch, open, serve } from "../../bindings/web/tests/harness.mjs";
 
 const folder = process.argv[2];
 if (!folder) throw new Error("usage: node check.mjs FOLDER");

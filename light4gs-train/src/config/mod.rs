@@ -52,7 +52,7 @@ pub use model::ModelConfig;
 pub use train::{CoarseToFineConfig, LearningRates, TrainConfig};
 
 /// Far longer than any real configuration.
-pub(crate) const MAX_CONFIG_BYTES: u64 = 1 << 20;
+pub const MAX_CONFIG_BYTES: u64 = 1 << 20;
 
 keys! {
     /// The complete configuration of a run.

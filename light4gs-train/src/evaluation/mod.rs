@@ -1,6 +1,6 @@
 //! Measuring a decoded file: quality on held-out views, speed, size.
 
-pub mod finish;
+mod run;
 
 use std::path::Path;
 use std::time::Instant;
@@ -18,7 +18,7 @@ use crate::error::TrainError;
 use crate::metrics::image_tensor;
 use crate::metrics::lpips::Lpips;
 use crate::metrics::scores::Scores;
-use crate::report::{SplitQuality, ViewImages, ViewQuality};
+pub use run::measure_run;
 
 /// Quality of one view.
 #[derive(Clone, Debug, Serialize)]
@@ -80,6 +80,7 @@ pub struct Evaluation {
 }
 
 /// A render next to its ground truth.
+#[derive(Clone, Debug)]
 pub struct RenderedView {
     /// Split and frame.
     pub split: Split,
@@ -214,32 +215,4 @@ pub fn section_sizes(info: &StreamInfo) -> Vec<SectionSize> {
     let sections = SectionInfo::bytes_by_name(&info.sections).into_iter();
     let sections = sections.map(|(name, bytes)| SectionSize { name: name.to_owned(), bytes });
     std::iter::once(header).chain(sections).collect()
-}
-
-impl Evaluation {
-    /// The part of a report that shows splits.
-    pub fn report_splits(&self) -> Vec<SplitQuality> {
-        let view = |v: &ViewScore| ViewQuality { name: v.name.clone(), time: v.time, scores: v.scores.clone() };
-        self.splits
-            .iter()
-            .map(|split| SplitQuality {
-                name: split.split.clone(),
-                scores: split.scores.clone(),
-                views: split.views.iter().map(view).collect(),
-            })
-            .collect()
-    }
-}
-
-impl RenderedView {
-    /// For the report.
-    pub fn image(&self) -> ViewImages {
-        ViewImages {
-            name: format!("{} {}", self.split, self.name),
-            time: self.time,
-            psnr: self.psnr,
-            ground_truth: self.truth.clone(),
-            render: self.render.clone(),
-        }
-    }
 }

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use burn::tensor::Device;
 
-use crate::report::table::{Align, Table};
+use crate::table::{Align, Table};
 
 /// Steps that are not counted, since they compile kernels and fill caches.
 const WARM_UP: usize = 3;
@@ -30,10 +30,17 @@ struct Laps {
 #[derive(Debug)]
 struct Part {
     name: &'static str,
-    /// Seconds.
-    time: f64,
+    /// Seconds, of each time that it was measured.
+    laps: Vec<f64>,
     /// Seconds of all threads together.
     work: f64,
+}
+
+impl Part {
+    /// Seconds in all.
+    fn time(&self) -> f64 {
+        self.laps.iter().sum()
+    }
 }
 
 /// The processor time of all threads of the process so far, in seconds. `None` where the system does not tell it.
@@ -91,11 +98,18 @@ impl Profile {
         }
         match laps.parts.iter_mut().find(|other| other.name == part) {
             Some(total) => {
-                total.time += time;
+                total.laps.push(time);
                 total.work += work;
             }
-            None => laps.parts.push(Part { name: part, time, work }),
+            None => laps.parts.push(Part { name: part, laps: vec![time], work }),
         }
+    }
+
+    /// Seconds of a part, each time that it was measured after the warm-up: `"Adam"`, once a step. Empty where it never was.
+    pub fn laps(&self, part: &str) -> Vec<f64> {
+        let laps = self.laps.as_ref().map(|laps| laps.borrow());
+        let part = laps.as_ref().and_then(|laps| laps.parts.iter().find(|other| other.name == part));
+        part.map(|part| part.laps.clone()).unwrap_or_default()
     }
 
     /// Milliseconds of each part of a step, busy threads where the system tells them, and what more threads could give; `None` if
@@ -104,15 +118,15 @@ impl Profile {
         let laps = self.laps.as_ref()?.borrow();
         let steps = laps.steps.checked_sub(WARM_UP).filter(|steps| *steps > 0)?;
         let of_all = |number: fn(&Part) -> f64| laps.parts.iter().map(number).sum::<f64>();
-        let step = Part { name: "step", time: of_all(|part| part.time), work: of_all(|part| part.work) };
+        let step = Part { name: "step", laps: vec![of_all(Part::time)], work: of_all(|part| part.work) };
         let is_told = laps.last_work.is_some();
         let mut columns = vec![("part", Align::Left), ("ms a step", Align::Right), ("share", Align::Right)];
         columns.extend(is_told.then_some(("threads busy", Align::Right)));
         let mut table = Table::new(columns);
         let row = |part: &Part| {
-            let milliseconds = format!("{:.2}", 1e3 * part.time / steps as f64);
-            let share = format!("{:.1} %", 1e2 * part.time / step.time);
-            let busy = is_told.then(|| format!("{:.2}", part.work / part.time));
+            let milliseconds = format!("{:.2}", 1e3 * part.time() / steps as f64);
+            let share = format!("{:.1} %", 1e2 * part.time() / step.time());
+            let busy = is_told.then(|| format!("{:.2}", part.work / part.time()));
             [part.name.to_owned(), milliseconds, share].into_iter().chain(busy)
         };
         for part in &laps.parts {
@@ -122,7 +136,7 @@ impl Profile {
         let mut text = format!("{table}\n{steps} steps, {WARM_UP} before them not counted");
         let threads = rayon::current_num_threads();
         if is_told && threads > 1 {
-            let serial = serial_share(step.work / step.time, threads);
+            let serial = serial_share(step.work / step.time(), threads);
             let on_sixteen = serial + (1.0 - serial) / 16.0;
             text += &format!(
                 "\n{:.0} % of the work is serial (Amdahl's law, {threads} threads): on 16 cores a step would take {:.0} % of its work",

@@ -2,5 +2,5 @@
 
 #![allow(dead_code, reason = "the kernels that use them are not here")]
 
-#[path = "../../../light4gs-render/src/lanes.rs"]
+#[path = "../../../crates/light4gs-render/src/lanes.rs"]
 mod lanes;

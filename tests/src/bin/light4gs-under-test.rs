@@ -2,5 +2,5 @@
 //! dependencies, so this package has its own.
 
 fn main() -> std::process::ExitCode {
-    light4gs_train::cli::main()
+    light4gs::cli::main()
 }

@@ -10,15 +10,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// The crates that have rooms.
-const CRATES: [&str; 8] = [
+const CRATES: [&str; 11] = [
     "crates/light4gs-keys",
     "light4gs-codec",
     "light4gs-data",
-    "light4gs-render",
+    "crates/light4gs-lab",
+    "crates/light4gs-render",
+    "crates/light4gs-report",
+    "light4gs",
     "light4gs-model",
     "light4gs-train",
-    "light4gs-web",
-    "light4gs-c",
+    "bindings/web",
+    "bindings/c",
 ];
 
 #[test]

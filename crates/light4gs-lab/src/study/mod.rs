@@ -1,0 +1,30 @@
+//! Studies: the paper's tables and figures, each a TOML file that says what varies and what is shown of it.
+//!
+//! - [`definition`]: such a file; [`catalog`]: those of the paper, embedded in the program
+//! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs with equal training are trained once
+//! - [`manifest`]: `study.json`, the plan of a study's folder
+//! - [`measure`]: the measures of a run, and the columns of tables
+//! - [`results`]: the results of the runs so far, `results.json` and the CSV files; [`reuse`]: trainings of other
+//!   studies
+//! - [`table`]: means, spreads and differences to the reference
+//! - [`quality_curves`]: runs as curves of quality over bytes or minutes
+//! - `plots`, `figures`: plots and images, and the study's `report.html`
+//! - [`curve`]: convex hulls and Bjøntegaard's differences; [`spread`]: mean and spread over seeds
+
+pub mod catalog;
+pub mod curve;
+pub mod definition;
+pub mod figures;
+pub mod manifest;
+pub mod measure;
+pub mod plan;
+pub mod plots;
+pub mod quality_curves;
+pub mod results;
+pub mod reuse;
+pub mod spread;
+pub mod table;
+
+pub use definition::Study;
+pub use manifest::Manifest;
+pub use plan::Plan;

@@ -1,0 +1,337 @@
+//! From a study to its runs: variants x scenes x seeds.
+
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+
+use light4gs_data::DataError;
+use light4gs_train::config::Config;
+use light4gs_train::error::TrainError;
+
+use super::definition::{Axis, Study, schedule_problem};
+
+/// In the name of a configuration, it stands for the name of the scene.
+const SCENE_PLACE: &str = "{scene}";
+
+/// The options of a study.
+#[derive(Clone, Debug, Default)]
+pub struct PlanOptions {
+    /// The preset or file that every variant starts from; `{scene}` in it stands for the scene's name.
+    pub config: String,
+    /// Folders of the datasets.
+    pub scenes: Vec<PathBuf>,
+    /// How many times as long the schedule of every run is as the configuration's, see [`SCHEDULES`](super::definition::SCHEDULES).
+    pub schedule: Option<f64>,
+    /// Overrides of every run.
+    pub overrides: Vec<String>,
+    /// Runs of each variant on each scene, with different seeds. At least 1.
+    pub seeds: u64,
+    /// Folders of other studies, whose trainings are reused.
+    pub reuse: Vec<PathBuf>,
+}
+
+/// One combination of the axes' values.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variant {
+    /// The values' names, joined by `+`: a folder.
+    pub name: String,
+    /// The values' labels.
+    pub label: String,
+    /// Index of the value of each axis.
+    pub values: Vec<usize>,
+}
+
+/// A dataset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StudyScene {
+    /// Name of its folder, which is a folder of the study.
+    pub name: String,
+    /// Absolute path.
+    pub path: PathBuf,
+}
+
+/// One run.
+#[derive(Clone, Debug)]
+pub struct PlannedRun {
+    /// `SCENE/VARIANT/seed-K`: its folder below the study's.
+    pub name: String,
+    /// Index of the scene.
+    pub scene: usize,
+    /// Index of the variant.
+    pub variant: usize,
+    /// Counted from 0.
+    pub seed: u64,
+    /// The complete configuration.
+    pub config: Config,
+    /// Runs of one task differ only in how the file is written. They are trained once, by the first of them.
+    pub task: usize,
+}
+
+/// All runs of a study.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The definition of the study.
+    pub study: Study,
+    /// In the order of the tables' rows.
+    pub variants: Vec<Variant>,
+    /// In the order given.
+    pub scenes: Vec<StudyScene>,
+    /// Runs of each variant on each scene.
+    pub seeds: u64,
+    /// Scene by scene, seed by seed, variant by variant.
+    pub runs: Vec<PlannedRun>,
+    /// Absolute paths of other studies, whose trainings are reused.
+    pub reuse: Vec<PathBuf>,
+}
+
+impl Plan {
+    /// The runs of a study. Every configuration is made and checked; datasets are not opened.
+    ///
+    /// # Errors
+    /// A configuration that is wrong, with its variant; two variants or scenes that would be the same; a scene that
+    /// does not exist.
+    pub fn new(study: Study, options: &PlanOptions) -> Result<Self, TrainError> {
+        if options.seeds == 0 {
+            return Err(TrainError::Input("--seeds is 0; at least one run of each variant is needed".into()));
+        }
+        if let Some(problem) = options.schedule.and_then(schedule_problem) {
+            return Err(TrainError::Input(format!("--schedule {problem}")));
+        }
+        let variants = variants(&study.axis);
+        check_reference(&study, &variants)?;
+        let scenes = scenes(&options.scenes)?;
+        let mut runs: Vec<PlannedRun> = Vec::new();
+        let mut tasks = 0;
+        for (scene_index, scene) in scenes.iter().enumerate() {
+            let configs = variants
+                .iter()
+                .map(|variant| config_of(&study, variant, &scene.name, options))
+                .collect::<Result<Vec<_>, _>>()?;
+            check_different(&variants, &configs)?;
+            for seed in 0..options.seeds {
+                let first = runs.len();
+                for (variant_index, (variant, config)) in variants.iter().zip(&configs).enumerate() {
+                    let mut config = config.clone();
+                    config.seed = config.seed.saturating_add(seed);
+                    config.validate()?;
+                    let like = runs[first..].iter().find(|earlier| earlier.config.trains_like(&config));
+                    let task = like.map_or(tasks, |earlier| earlier.task);
+                    tasks = tasks.max(task + 1);
+                    let name = format!("{}/{}/seed-{seed}", scene.name, variant.name);
+                    runs.push(PlannedRun { name, scene: scene_index, variant: variant_index, seed, config, task });
+                }
+            }
+        }
+        let absolute = |path: &PathBuf| std::fs::canonicalize(path).map_err(DataError::io("read", path));
+        let reuse = options.reuse.iter().map(absolute).collect::<Result<Vec<_>, _>>()?;
+        Ok(Self { study, variants, scenes, seeds: options.seeds, runs, reuse })
+    }
+
+    /// Number of tasks.
+    pub fn tasks(&self) -> usize {
+        self.runs.iter().map(|run| run.task + 1).max().unwrap_or(0)
+    }
+}
+
+/// All combinations of the axes' values; the last axis varies fastest.
+pub fn variants(axes: &[Axis]) -> Vec<Variant> {
+    let mut indices = vec![Vec::new()];
+    for axis in axes {
+        let longer = |before: &Vec<usize>| {
+            let before = before.clone();
+            (0..axis.value.len()).map(move |value| before.iter().copied().chain([value]).collect::<Vec<_>>())
+        };
+        indices = indices.iter().flat_map(longer).collect();
+    }
+    let variant = |values: Vec<usize>| {
+        let chosen: Vec<_> = axes.iter().zip(&values).map(|(axis, value)| &axis.value[*value]).collect();
+        let name = chosen.iter().map(|value| value.name.as_str()).collect::<Vec<_>>().join("+");
+        let label = chosen.iter().map(|value| value.label()).collect::<Vec<_>>().join(", ");
+        Variant { name, label, values }
+    };
+    indices.into_iter().map(variant).collect()
+}
+
+fn check_reference(study: &Study, variants: &[Variant]) -> Result<(), TrainError> {
+    match &study.reference {
+        Some(reference) if !variants.iter().any(|variant| variant.name == *reference) => {
+            let names = variants.iter().map(|variant| variant.name.as_str()).collect::<Vec<_>>().join(", ");
+            Err(TrainError::Input(format!(
+                "study \"{}\": `reference` is \"{reference}\", which is no variant; it must be one of {names}",
+                study.title
+            )))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOptions) -> Result<Config, TrainError> {
+    let chosen = || study.axis.iter().zip(&variant.values).map(|(axis, value)| &axis.value[*value]);
+    let mut names = vec![options.config.replace(SCENE_PLACE, scene)];
+    names.extend(study.presets.iter().cloned());
+    names.extend(chosen().flat_map(|value| value.presets.iter().cloned()));
+    let names = names.join("+");
+    let factor: Option<f64> = chosen().filter_map(|value| value.schedule).chain(options.schedule).reduce(|a, b| a * b);
+    let own: Vec<String> = chosen().flat_map(|value| &value.set).chain(&options.overrides).cloned().collect();
+    let scaled = |factor| {
+        let longer = Config::load(&names, &[])?.for_schedule(factor, &Overrides::default());
+        longer.with(&Overrides::parse(&own)?)
+    };
+    factor
+        .map_or_else(|| Config::load(&names, &own), scaled)
+        .map_err(|error| TrainError::Input(format!("variant \"{}\" of \"{}\": {error}", variant.name, study.title)))
+}
+
+/// Refuses variants that an override has made equal, since nothing would vary between them.
+fn check_different(variants: &[Variant], configs: &[Config]) -> Result<(), TrainError> {
+    for (later, config) in configs.iter().enumerate() {
+        if let Some(earlier) = configs[..later].iter().position(|earlier| earlier == config) {
+            return Err(TrainError::Input(format!(
+                "variants \"{}\" and \"{}\" have the same configuration: nothing would vary between them. Leave out the \
+                 --set that makes them alike, or change their values in the study",
+                variants[earlier].name, variants[later].name
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn scenes(paths: &[PathBuf]) -> Result<Vec<StudyScene>, TrainError> {
+    if paths.is_empty() {
+        return Err(TrainError::Input("no scene is given; name the folder of at least one dataset".into()));
+    }
+    let mut names = BTreeSet::new();
+    let scene = |path: &PathBuf| {
+        let path = std::fs::canonicalize(path).map_err(DataError::io("read", path))?;
+        let name = scene_name(&path)?;
+        if !names.insert(name.clone()) {
+            return Err(TrainError::Input(format!(
+                "two scenes are called {name}, the second at {}; their runs would share folders. Study them apart",
+                path.display()
+            )));
+        }
+        Ok(StudyScene { name, path })
+    };
+    paths.iter().map(scene).collect()
+}
+
+fn scene_name(path: &Path) -> Result<String, TrainError> {
+    let name = path.file_name().and_then(|name| name.to_str());
+    // Names that begin with a point are reserved for the study's own files.
+    name.filter(|name| path.to_str().is_some() && !name.starts_with('.')).map(str::to_owned).ok_or_else(|| {
+        TrainError::Input(format!(
+            "{} has no name that a folder of the study could have (in Unicode, no point in front); rename it",
+            path.display()
+        ))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn study(axes: &str) -> Study {
+        Study::from_toml(&format!("title = \"t\"\nreproduces = \"-\"\noutputs = [\"table\"]\n{axes}"), "test").unwrap()
+    }
+
+    const LAMBDAS: &str = r#"
+[[axis]]
+name = "lambda"
+value = [
+    { name = "none", set = ["compression.rate.lambda=0"] },
+    { name = "none-float32", set = ["compression.rate.lambda=0", "compression.profile=float32"] },
+    { name = "strong", set = ["compression.rate.lambda=0.05"] },
+]
+"#;
+    const DEGREES: &str = r#"
+[[axis]]
+name = "degree"
+value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.sh_degree=1"] }]
+"#;
+
+    fn options(scene: &Path) -> PlanOptions {
+        PlanOptions {
+            config: "dnerf-cpu".into(),
+            scenes: vec![scene.into()],
+            schedule: None,
+            overrides: Vec::new(),
+            seeds: 1,
+            reuse: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn runs_are_the_product() {
+        let folder = tempfile::tempdir().unwrap();
+        let scenes: Vec<PathBuf> = ["one", "two"].iter().map(|name| folder.path().join(name)).collect();
+        scenes.iter().for_each(|scene| std::fs::create_dir(scene).unwrap());
+        let options = PlanOptions { scenes, seeds: 3, ..options(folder.path()) };
+        let plan = Plan::new(study(&format!("{DEGREES}{LAMBDAS}")), &options).unwrap();
+        assert_eq!(plan.variants.len(), 6);
+        assert_eq!(plan.variants[4].name, "one+none-float32");
+        assert_eq!(plan.variants[1].label, "degree 3, none-float32");
+        assert_eq!(plan.runs.len(), 2 * 3 * 6);
+        // The two without rate differ only in how the file is written.
+        assert_eq!(plan.tasks(), 2 * 3 * 4);
+        let tasks: Vec<_> = plan.runs[..6].iter().map(|run| run.task).collect();
+        assert_eq!(tasks, [0, 0, 1, 2, 2, 3]);
+        assert_eq!(plan.runs[6].name, "one/three+none/seed-1");
+        assert_eq!(plan.runs[6].config.seed, 1);
+        let digests: BTreeSet<_> = plan.runs[..18].iter().map(|run| run.config.digest()).collect();
+        assert_eq!(digests.len(), 18);
+    }
+
+    /// The factors of the command and of a value are multiplied, and what is set by hand wins.
+    #[test]
+    fn a_schedule_can_be_longer_or_shorter() {
+        let folder = tempfile::tempdir().unwrap();
+        let axes = LAMBDAS.replace("name = \"strong\"", "name = \"strong\", schedule = 0.5");
+        let scene = folder.path().join("scene");
+        std::fs::create_dir(&scene).unwrap();
+        let overrides = vec!["train.coarse_iterations=7".to_owned()];
+        let options = PlanOptions { schedule: Some(0.1), overrides, ..options(&scene) };
+        let plan = Plan::new(study(&axes), &options).unwrap();
+        let usual = Config::load("dnerf-cpu", &[]).unwrap().train.fine_iterations;
+        let fine = |run: usize| plan.runs[run].config.train.fine_iterations;
+        assert_eq!([fine(0), fine(2)], [usual / 10, usual / 20]);
+        assert!(plan.runs.iter().all(|run| run.config.train.coarse_iterations == 7));
+        let error = Plan::new(study(&axes), &PlanOptions { schedule: Some(-1.0), ..options }).unwrap_err().to_string();
+        assert!(error.contains("--schedule is -1"), "{error}");
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_refused_before_it_begins() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("scene");
+        std::fs::create_dir(&scene).unwrap();
+        let refused = |study: Study, options: PlanOptions, words: &[&str]| {
+            let error = Plan::new(study, &options).unwrap_err().to_string();
+            words.iter().for_each(|word| assert!(error.contains(word), "`{word}` is not in: {error}"));
+        };
+        let good = options(&scene);
+        refused(study(LAMBDAS), PlanOptions { seeds: 0, ..good.clone() }, &["--seeds"]);
+        refused(study(LAMBDAS), PlanOptions { scenes: vec![], ..good.clone() }, &["scene"]);
+        refused(study(LAMBDAS), PlanOptions { scenes: vec![folder.path().join("no")], ..good.clone() }, &["no"]);
+        refused(study(LAMBDAS), PlanOptions { scenes: vec![scene.clone(); 2], ..good.clone() }, &["two scenes"]);
+        let alike = vec!["compression.rate.lambda=0.1".to_owned()];
+        refused(study(LAMBDAS), PlanOptions { overrides: alike, ..good.clone() }, &["none", "strong", "--set"]);
+        let wrong = study(&LAMBDAS.replace("lambda=0.05", "lambda=-1"));
+        refused(wrong, good.clone(), &["strong", "compression.rate.lambda", "must be 0 to"]);
+        refused(study(&LAMBDAS.replace("rate.lambda=0.05", "rate.lamda=0.05")), good.clone(), &["strong", "lambda"]);
+        refused(study(&format!("reference = \"weak\"\n{LAMBDAS}")), good.clone(), &["weak", "one of none"]);
+        refused(study(LAMBDAS), PlanOptions { config: "dnerf-{scene}".into(), ..good }, &["dnerf-scene"]);
+    }
+
+    #[test]
+    fn every_study_of_the_program_has_a_plan() {
+        let folder = tempfile::tempdir().unwrap();
+        let scene = folder.path().join("flag");
+        std::fs::create_dir(&scene).unwrap();
+        for name in super::super::catalog::NAMES {
+            for config in ["dnerf-{scene}-cpu", "dnerf-{scene}"] {
+                let options = PlanOptions { config: config.into(), ..options(&scene) };
+                let plan = Plan::new(Study::load(name).unwrap(), &options).unwrap_or_else(|e| panic!("{name}: {e}"));
+                assert!(!plan.runs.is_empty(), "{name}");
+            }
+        }
+    }
+}

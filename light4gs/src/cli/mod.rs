@@ -1,0 +1,172 @@
+//! The command line: one file for each command.
+
+mod bench;
+mod compare;
+mod container;
+mod export;
+mod gpu_errors;
+mod import;
+mod limits;
+mod output;
+mod prepare;
+mod quickstart;
+mod render;
+mod signals;
+mod study;
+mod synth;
+mod train;
+mod view;
+mod wishes;
+
+use std::path::Path;
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use light4gs_train::error::TrainError;
+use light4gs_train::run::belongs_to_run;
+use tracing_subscriber::filter::{LevelFilter, Targets};
+use tracing_subscriber::layer::{Layer, SubscriberExt};
+use tracing_subscriber::util::SubscriberInitExt;
+
+/// Learns dynamic scenes as deformable 3D Gaussians and stores each as one .l4gs file.
+#[derive(Debug, Parser)]
+#[command(name = "light4gs", version, arg_required_else_help = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Make a small synthetic scene, train on it, write the file and the report.
+    #[command(after_help = "Example:\n  light4gs quickstart --out runs/quickstart")]
+    Quickstart(quickstart::Quickstart),
+    /// Make a dataset from one or several videos: frames by ffmpeg, poses by colmap.
+    #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
+                            middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
+    Prepare(prepare::Prepare),
+    /// Train on a dataset.
+    #[command(
+        after_help = "Example:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing"
+    )]
+    Train(train::Train),
+    /// Continue a run from its last checkpoint, to the same result as if it had not been interrupted.
+    #[command(after_help = "Example:\n  light4gs resume runs/bouncing")]
+    Resume(train::Resume),
+    /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
+    ///
+    /// Where the dataset has masks of what moves, PSNR and SSIM are also given for moving and for still pixels; docs/metrics.md
+    /// explains every column.
+    #[command(after_help = "Example:\n  light4gs eval runs/bouncing --json")]
+    Eval(train::Eval),
+    /// Render a file over time along a camera path, to a GIF, an MP4 or PNG frames.
+    #[command(after_help = "Example:\n  light4gs render runs/bouncing/scene.l4gs --out bouncing.gif --frames 60")]
+    Render(render::Render),
+    /// Show a file or a run in the browser, and follow a run that is still training.
+    #[command(after_help = "Example:\n  light4gs view runs/bouncing --open")]
+    View(view::View),
+    /// Import a scene that another program has trained: a checkpoint of 4DGaussians, or a PLY file of 3DGS.
+    #[command(
+        after_help = "Examples:\n  light4gs import output/bouncing --from 4dgaussians --out runs/bouncing\n  light4gs import scene.ply --from ply --out scene.l4gs"
+    )]
+    Import(import::Import),
+    /// Write the newest checkpoint of a run as a .l4gs file.
+    #[command(after_help = "Example:\n  light4gs encode runs/bouncing --out bouncing.l4gs")]
+    Encode(container::Encode),
+    /// Unpack a .l4gs file to plain arrays (safetensors).
+    #[command(after_help = "Example:\n  light4gs decode bouncing.l4gs --out bouncing.safetensors")]
+    Decode(container::Decode),
+    /// Print the contents of a .l4gs file, with sizes by section.
+    #[command(after_help = "Example:\n  light4gs info bouncing.l4gs --json")]
+    Info(container::Info),
+    /// Write the Gaussians for other programs: PLY files at successive times, a single time as .ply or .glb, the motion
+    /// as .4dgs, that of control nodes as .glb; or the scene as a page that plays it.
+    #[command(
+        after_help = "Examples:\n  light4gs export bouncing.l4gs --out frames --frames 30\n  light4gs export bouncing.l4gs --html bouncing.html"
+    )]
+    Export(export::Export),
+    /// Write the procedural scene of the quickstart as a D-NeRF dataset.
+    #[command(after_help = "Example:\n  light4gs synth data/synthetic --resolution 200")]
+    Synth(synth::Synth),
+    /// Make a table or a figure of the paper: train a scene several times with variants, and compare them.
+    #[command(
+        after_help = "Example:\n  light4gs study context-model data/dnerf/flag --config dnerf-flag-cpu --seeds 3 --out runs/context"
+    )]
+    Study(study::Study),
+    /// Write a study's tables and report again from the runs that are finished, and name those that are missing.
+    #[command(after_help = "Example:\n  light4gs gather runs/context")]
+    Gather(study::Gather),
+    /// One task of a study, as its launcher starts it.
+    #[command(hide = true)]
+    StudyTask(study::StudyTask),
+    /// Print what differs between runs: program and machine, configuration, results.
+    #[command(after_help = "Example:\n  light4gs compare runs/one runs/other")]
+    Compare(compare::Compare),
+    /// Time every part of a training step on one or more devices.
+    #[command(after_help = "Example:\n  light4gs bench --device ndarray,flex,wgpu --gaussians 20000 --size 400")]
+    Bench(bench::Bench),
+}
+
+impl Cli {
+    /// Runs the command.
+    pub fn run(self) -> Result<(), TrainError> {
+        match self.command {
+            Command::Quickstart(command) => command.run(),
+            Command::Prepare(command) => command.run(),
+            Command::Train(command) => command.run(),
+            Command::Resume(command) => command.run(),
+            Command::Eval(command) => command.run(),
+            Command::Render(command) => command.run(),
+            Command::View(command) => command.run(),
+            Command::Import(command) => command.run(),
+            Command::Encode(command) => command.run(),
+            Command::Decode(command) => command.run(),
+            Command::Info(command) => command.run(),
+            Command::Export(command) => command.run(),
+            Command::Synth(command) => command.run(),
+            Command::Study(command) => command.run(),
+            Command::Gather(command) => command.run(),
+            Command::StudyTask(command) => command.run(),
+            Command::Compare(command) => command.run(),
+            Command::Bench(command) => command.run(),
+        }
+    }
+}
+
+/// Parses the arguments of this process, runs the command, and reports an error on stderr. Exit codes: 0 done, 2 wrong
+/// input, 1 a bug, 75 stopped on request (SIGUSR1).
+pub fn main() -> ExitCode {
+    let wanted = std::env::var("RUST_LOG").ok().and_then(|text| text.parse::<Targets>().ok());
+    let filter = wanted.unwrap_or_else(|| Targets::new().with_default(LevelFilter::WARN));
+    tracing_subscriber::registry()
+        .with(tracing_subscriber::fmt::layer().with_writer(std::io::stderr).with_filter(filter))
+        .init();
+    match gpu_errors::catch(|| Cli::parse().run()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            output::tell(format_args!("error: {error}"));
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+/// Refuses an output path before any work is done: if its folder does not exist, if it is a pipe or a device, or if it
+/// would replace the file that the command reads or a file of a run.
+fn check_output(path: &Path, source: &Path) -> Result<(), TrainError> {
+    let refuse = |problem: String| Err(TrainError::Input(format!("cannot write {}: {problem}", path.display())));
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return refuse(format!("the folder {} does not exist; make it first", folder.display()));
+    }
+    if std::fs::metadata(path).is_ok_and(|metadata| !(metadata.is_file() || metadata.is_dir())) {
+        return refuse("it is a pipe, a socket or a device; name a file".to_owned());
+    }
+    let whole = |path: &Path| std::fs::canonicalize(path).ok();
+    if whole(path).is_some_and(|path| whole(source) == Some(path)) {
+        return refuse("the command reads this file; name another".to_owned());
+    }
+    if belongs_to_run(path) {
+        return refuse("the file belongs to a run, which needs it; name another".to_owned());
+    }
+    Ok(())
+}

@@ -1,0 +1,191 @@
+//! `study` and `gather`, and the task that launchers start.
+
+mod gather;
+mod local;
+mod slurm;
+mod task;
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+
+use clap::{Args, ValueEnum};
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::plan::{Plan, PlanOptions};
+use light4gs_lab::study::results::is_finished;
+use light4gs_lab::study::reuse::find_trained;
+use light4gs_lab::study::{Study as Definition, catalog};
+use light4gs_train::config::DeviceName;
+use light4gs_train::error::TrainError;
+use light4gs_train::table::{Align, Table};
+use serde::Serialize;
+
+pub(super) use gather::Gather;
+pub(super) use task::StudyTask;
+
+use super::output::{say, say_json};
+
+/// The launcher of the tasks.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Launcher {
+    /// Processes on this machine.
+    Local,
+    /// A job array on a Slurm cluster; the command returns when it is submitted.
+    Slurm,
+}
+
+#[derive(Debug, Args)]
+pub(super) struct Study {
+    /// A study of the paper (see docs/reproduce.md), or a TOML file of your own; `list` prints the names.
+    name: String,
+    /// Folders of the datasets.
+    scenes: Vec<PathBuf>,
+    /// Folder for the runs, the tables and the report. Finished runs are not repeated, and runs that differ only in how
+    /// the file is written are trained once.
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// The preset or TOML file that every variant starts from; {scene} in it stands for the scene's name.
+    #[arg(long, default_value = "dnerf-cpu", value_name = "PRESET|FILE")]
+    config: String,
+    /// The schedule of every variant this many times as long: 0.25 for a first look.
+    #[arg(long, value_name = "FACTOR")]
+    schedule: Option<f64>,
+    /// Changes one key of every variant's configuration; may be given more than once.
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    overrides: Vec<String>,
+    /// Back end: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    #[arg(long)]
+    device: Option<DeviceName>,
+    /// Runs of each variant on each scene, with different seeds: tables then show mean and standard deviation.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: u64,
+    /// Folder of another study, whose equal trainings are not repeated. May be given more than once.
+    #[arg(long, value_name = "STUDY")]
+    reuse: Vec<PathBuf>,
+    /// Print the runs, without training.
+    #[arg(long)]
+    dry_run: bool,
+    /// The launcher of the tasks.
+    #[arg(long, value_enum, default_value = "local")]
+    launcher: Launcher,
+    /// Tasks at a time.
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    jobs: u32,
+    /// TOML file with partition, account, GPUs a task and wall time; see docs/studies.md.
+    #[arg(long, value_name = "FILE")]
+    slurm: Option<PathBuf>,
+    /// Print the results as JSON.
+    #[arg(long)]
+    json: bool,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl Study {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        if self.name == "list" {
+            return list();
+        }
+        let mut overrides = self.overrides;
+        overrides.extend(self.device.map(|device| format!("device={device}")));
+        let (config, scenes, schedule) = (self.config, self.scenes, self.schedule);
+        let (seeds, reuse) = (self.seeds, self.reuse);
+        let options = PlanOptions { config, scenes, schedule, overrides, seeds, reuse };
+        let plan = Plan::new(Definition::load(&self.name)?, &options)?;
+        for study in &plan.reuse {
+            StudyFolder::open(study)?;
+        }
+        if self.dry_run {
+            return dry_run(&plan, self.out, self.json);
+        }
+        if self.slurm.is_some() && !matches!(self.launcher, Launcher::Slurm) {
+            return Err(TrainError::Input("--slurm is for --launcher slurm; give that too, or leave it out".into()));
+        }
+        let settings = self.slurm.as_deref().map(slurm::Settings::load).transpose()?;
+        let out = self.out.ok_or_else(|| TrainError::Input("--out is missing: the folder for the runs".into()))?;
+        let (folder, manifest) = StudyFolder::create(&out, &plan)?;
+        match self.launcher {
+            Launcher::Local => {
+                local::run_all(&folder, &manifest, self.jobs as usize, self.quiet || self.json)?;
+                gather::gather(&folder, &manifest, self.json)
+            }
+            Launcher::Slurm => slurm::submit(&folder, &manifest, self.jobs, &settings.unwrap_or_default()),
+        }
+    }
+}
+
+/// Prints the names of the built-in studies.
+fn list() -> Result<(), TrainError> {
+    let mut table = Table::new([("study", Align::Left), ("reproduces", Align::Left)]);
+    for name in catalog::NAMES {
+        table.row([(*name).to_owned(), Definition::load(name)?.reproduces]);
+    }
+    say(table)
+}
+
+/// The state of a run of a plan.
+#[derive(Serialize)]
+struct Planned<'a> {
+    task: usize,
+    run: &'a str,
+    state: &'static str,
+    /// Whether another study has trained it.
+    reused: bool,
+    iterations: usize,
+    configuration: String,
+}
+
+fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainError> {
+    let mut trained = BTreeSet::new();
+    let mut rows = Vec::new();
+    for run in &plan.runs {
+        let path = out.as_ref().map(|out| out.join(&run.name));
+        let state = match path {
+            Some(path) if is_finished(&path) => "finished",
+            Some(path) if path.join("run.json").is_file() => "begun",
+            _ => "to do",
+        };
+        let train = &run.config.train;
+        let first = trained.insert(run.task);
+        let reused = first && find_trained(&plan.reuse, &plan.scenes[run.scene].path, &run.config)?.is_some();
+        let iterations = if first && !reused { train.coarse_iterations + train.fine_iterations } else { 0 };
+        rows.push(Planned {
+            task: run.task,
+            run: &run.name,
+            state,
+            reused,
+            iterations,
+            configuration: run.config.digest_text(),
+        });
+    }
+    if json {
+        return say_json(&rows);
+    }
+    let columns = [
+        ("task", Align::Right),
+        ("run", Align::Left),
+        ("state", Align::Left),
+        ("iterations", Align::Right),
+        ("configuration", Align::Left),
+    ];
+    let mut table = Table::new(columns);
+    for row in &rows {
+        let iterations = match row.iterations {
+            0 if row.reused => "reused".to_owned(),
+            0 => "trained above".to_owned(),
+            iterations => iterations.to_string(),
+        };
+        let configuration = row.configuration[..12].to_owned();
+        table.row([row.task.to_string(), row.run.to_owned(), row.state.to_owned(), iterations, configuration]);
+    }
+    say(table)?;
+    let total: usize = rows.iter().map(|row| row.iterations).sum();
+    let finished = rows.iter().filter(|row| row.state == "finished").count();
+    say(format_args!("{} runs in {} tasks, {total} iterations; {finished} runs are finished", rows.len(), plan.tasks()))
+}
+
+/// The tasks with runs that are not finished.
+fn unfinished(folder: &StudyFolder, manifest: &Manifest) -> Vec<usize> {
+    let is_done = |task: usize| manifest.task(task).all(|run| is_finished(&folder.path(&run.name)));
+    (0..manifest.tasks()).filter(|task| !is_done(*task)).collect()
+}

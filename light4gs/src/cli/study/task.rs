@@ -1,0 +1,99 @@
+//! One task: a training, and the runs that differ from it only in how the file is written.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use clap::Args;
+use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::results::is_finished;
+use light4gs_lab::study::reuse::find_trained;
+use light4gs_train::error::TrainError;
+
+use super::super::output::tell;
+use super::super::signals::stop_flag;
+use super::super::train::{RunOutput, train_to_evaluation};
+
+/// Time between two attempts to lock a run that another process holds.
+const PAUSE: Duration = Duration::from_millis(500);
+
+#[derive(Debug, Args)]
+pub(in crate::cli) struct StudyTask {
+    /// Folder of the study.
+    study: PathBuf,
+    /// Number of the task.
+    task: usize,
+    /// No progress bars.
+    #[arg(long)]
+    quiet: bool,
+}
+
+impl StudyTask {
+    pub(in crate::cli) fn run(self) -> Result<(), TrainError> {
+        // Installed first, so that no request is lost.
+        stop_flag();
+        let (folder, manifest) = StudyFolder::open(&self.study)?;
+        if self.task >= manifest.tasks() {
+            let (study, tasks) = (self.study.display(), manifest.tasks());
+            return Err(TrainError::Input(format!(
+                "{study} has tasks 0 to {}, not {}",
+                tasks.saturating_sub(1),
+                self.task
+            )));
+        }
+        let failure = folder.failure(self.task);
+        // The message of an earlier attempt.
+        let _ = std::fs::remove_file(&failure);
+        let result = run_task(&folder, &manifest, self.task, self.quiet);
+        match &result {
+            Ok(()) | Err(TrainError::Stopped(_)) => {}
+            // For the summary. If the message cannot be written, the summary shows only the state of the run.
+            Err(error) => drop(std::fs::write(&failure, format!("{error}\n"))),
+        }
+        result
+    }
+}
+
+fn run_task(folder: &StudyFolder, manifest: &Manifest, task: usize, quiet: bool) -> Result<(), TrainError> {
+    let mut trained: Option<PathBuf> = None;
+    for run in manifest.task(task) {
+        let path = folder.path(&run.name);
+        if !is_finished(&path) {
+            if !quiet {
+                tell(&run.name);
+            }
+            let config = folder.config_of(run)?;
+            let scene = &manifest.scenes[run.scene].path;
+            let output = RunOutput { json: false, quiet, profile: false };
+            if trained.is_none() {
+                trained = find_trained(&manifest.reuse, scene, &config)?;
+            }
+            let train = || train_to_evaluation(config.clone(), scene, &path, trained.as_deref(), &output).map(drop);
+            when_free(&path, train)?;
+        }
+        trained.get_or_insert(path);
+    }
+    Ok(())
+}
+
+/// Runs `train`; while another process holds the run, waits for it. That may be the same task on a node that was lost.
+fn when_free(run: &Path, train: impl Fn() -> Result<(), TrainError>) -> Result<(), TrainError> {
+    let stop = stop_flag();
+    let mut told = false;
+    loop {
+        match train() {
+            Err(error @ (TrainError::RunInUse { .. } | TrainError::RunExists(_))) => {
+                if stop.load(std::sync::atomic::Ordering::Relaxed) {
+                    return Err(TrainError::Stopped(format!("stopped on request: {error}")));
+                }
+                if !std::mem::replace(&mut told, true) {
+                    tell(format_args!("waiting: {error}"));
+                }
+                std::thread::sleep(PAUSE);
+                if is_finished(run) {
+                    return Ok(());
+                }
+            }
+            result => return result,
+        }
+    }
+}

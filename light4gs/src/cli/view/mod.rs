@@ -1,0 +1,170 @@
+//! `view`.
+
+mod server;
+
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::sync::{Mutex, PoisonError};
+
+use clap::Args;
+use light4gs_data::{DataError, Scene, read_regular_file};
+use light4gs_report::cameras_json;
+use light4gs_train::config::{Config, DeviceName};
+use light4gs_train::dataset::load_options;
+use light4gs_train::error::TrainError;
+use light4gs_train::run::RunFolder;
+use light4gs_train::view_source::ViewSource;
+use light4gs_web::page::{Content, PLAYER, TRAINER, TRAINER_PAGE, page};
+use serde_json::json;
+
+use self::server::{Answer, Server};
+use super::output::{say, tell};
+
+/// The player's script.
+const PLAYER_ADDRESS: &str = "light4gs-player.js";
+
+/// More bytes than the program that trains in a browser has.
+const LARGEST_PROGRAM: u64 = 256 << 20;
+
+// Types of content.
+const HTML: &str = "text/html; charset=utf-8";
+const SCRIPT: &str = "text/javascript; charset=utf-8";
+const JSON: &str = "application/json";
+
+/// Most cameras of each split that the player lists.
+const MOST_CAMERAS: usize = 500;
+
+#[derive(Debug, Args)]
+pub(super) struct View {
+    /// A .l4gs file, or the folder of a run: while it trains, the page follows its newest checkpoint.
+    #[arg(value_name = "FILE|RUN", required_unless_present = "trainer")]
+    what: Option<PathBuf>,
+    /// Dataset whose cameras the player offers; by default the run's own.
+    #[arg(long)]
+    scene: Option<PathBuf>,
+    /// In place of a scene, a page that trains one in the browser: the program that bindings/web/build-trainer makes.
+    #[arg(long, value_name = "FILE.wasm", conflicts_with_all = ["what", "scene", "device"])]
+    trainer: Option<PathBuf>,
+    /// Port on this machine; 0 is any free one.
+    #[arg(long, default_value_t = 0)]
+    port: u16,
+    /// Open the page in the browser.
+    #[arg(long)]
+    open: bool,
+    /// Back end for reading checkpoints: ndarray, flex, wgpu, or wgpu with an adapter such as wgpu:0.
+    #[arg(long)]
+    device: Option<DeviceName>,
+}
+
+impl View {
+    pub(super) fn run(self) -> Result<(), TrainError> {
+        match (&self.what, &self.trainer) {
+            (_, Some(program)) => self.train(program),
+            (Some(what), None) => self.play(what),
+            (None, None) => Err(TrainError::Input("name a .l4gs file or the folder of a run".into())),
+        }
+    }
+
+    /// A page that plays a scene.
+    fn play(&self, what: &Path) -> Result<(), TrainError> {
+        let source = if what.is_dir() { ViewSource::run(what, self.device)? } else { ViewSource::file(what)? };
+        let cameras = match (&self.scene, source.dataset()) {
+            (None, Some(dataset)) => cameras_json(dataset, MOST_CAMERAS),
+            _ => dataset_cameras(what, self.scene.as_deref(), MOST_CAMERAS)?,
+        };
+        let content = Content::Served { scene: "scene.l4gs", cameras: "cameras.json", watch: "state.json" };
+        let html = page(&source.title(), content, Some(PLAYER_ADDRESS));
+        let source = Mutex::new(source);
+        self.serve(move |path| match path {
+            "/" => Some(answer(HTML, html.clone().into_bytes())),
+            "/cameras.json" => Some(answer(JSON, cameras.clone().into_bytes())),
+            "/scene.l4gs" => {
+                let source = source.lock().unwrap_or_else(PoisonError::into_inner);
+                (source.version() > 0).then(|| answer("application/octet-stream", source.bytes().to_vec()))
+            }
+            "/state.json" => {
+                let mut source = source.lock().unwrap_or_else(PoisonError::into_inner);
+                let problem = source.refresh().err().map(|error| error.to_string());
+                let status = problem.as_deref().unwrap_or(source.status());
+                let state = json!({ "scene": source.version(), "status": status });
+                Some(answer(JSON, state.to_string().into_bytes()))
+            }
+            _ => None,
+        })
+    }
+
+    /// A page that trains a scene.
+    fn train(&self, program: &Path) -> Result<(), TrainError> {
+        let module = read_regular_file(program, LARGEST_PROGRAM).map_err(DataError::io("read", program))?;
+        if !module.starts_with(b"\0asm") {
+            let program = program.display();
+            return Err(TrainError::Input(format!(
+                "{program} is no WebAssembly module; bindings/web/build-trainer makes one"
+            )));
+        }
+        self.serve(move |path| match path {
+            "/" => Some(answer(HTML, TRAINER_PAGE.as_bytes())),
+            "/light4gs-trainer.js" => Some(answer(SCRIPT, TRAINER.as_bytes())),
+            "/light4gs-web-trainer.wasm" => Some(answer("application/wasm", module.clone())),
+            _ => None,
+        })
+    }
+
+    /// Serves a page with the player's script until the program is ended.
+    fn serve(&self, respond: impl Fn(&str) -> Option<Answer> + Send + Sync + 'static) -> Result<(), TrainError> {
+        let port = self.port;
+        let server = Server::bind(port).map_err(|error| {
+            TrainError::Input(format!(
+                "cannot listen on port {port}: {error}; choose another with --port, or 0 for any"
+            ))
+        })?;
+        let address = server.address().map_err(|error| TrainError::Input(format!("cannot listen: {error}")))?;
+        let address = format!("http://{address}/");
+        say(format_args!("{address}\nPress Ctrl-C to end."))?;
+        if self.open {
+            open_browser(&address);
+        }
+        server.run(move |path| match path.strip_prefix('/') {
+            Some(PLAYER_ADDRESS) => Some(answer(SCRIPT, PLAYER.as_bytes())),
+            _ => respond(path),
+        });
+        Ok(())
+    }
+}
+
+fn answer(content_type: &'static str, body: impl Into<Cow<'static, [u8]>>) -> Answer {
+    Answer { content_type, body: body.into() }
+}
+
+/// The cameras for a file as JSON: those of a named dataset, else those of the run whose folder holds the file, else
+/// none.
+///
+/// # Errors
+/// A named dataset that cannot be read.
+pub(super) fn dataset_cameras(file: &Path, named: Option<&Path>, most: usize) -> Result<String, TrainError> {
+    if let Some(folder) = named {
+        return Ok(cameras_json(&Scene::open(folder, &load_options(&Config::default()))?, most));
+    }
+    // If the dataset of a run no longer exists, its file can be played all the same.
+    let around = file.parent().map(|folder| if folder.as_os_str().is_empty() { Path::new(".") } else { folder });
+    let dataset = around
+        .and_then(|folder| RunFolder::open(folder).ok())
+        .and_then(|(_, record, config)| Scene::open(record.dataset().ok()?, &load_options(&config)).ok());
+    Ok(dataset.map_or_else(|| "[]".to_owned(), |scene| cameras_json(&scene, most)))
+}
+
+/// Asks the system to show a page. The address has been printed already, so a system without a browser is no error.
+fn open_browser(address: &str) {
+    let (program, arguments): (&str, &[&str]) = if cfg!(target_os = "macos") {
+        ("open", &[])
+    } else if cfg!(windows) {
+        ("cmd", &["/c", "start", ""])
+    } else {
+        ("xdg-open", &[])
+    };
+    let quiet = Command::new(program).args(arguments).arg(address).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    if let Err(error) = quiet {
+        tell(format_args!("cannot open a browser ({program}: {error}); open the address yourself"));
+    }
+}
