@@ -30,26 +30,45 @@ fn imports_between_rooms_form_no_circle() {
     assert!(circles.is_empty(), "{}", circles.join("\n"));
 }
 
+/// In ARCHITECTURE.md a crate is an entry of a list, and the folders of its sources are named there.
 #[test]
-fn the_map_has_every_room() {
+fn the_map_has_every_crate_and_its_folders() {
     let map = fs::read_to_string(root().join("ARCHITECTURE.md")).expect("ARCHITECTURE.md");
     let mut lacking = Vec::new();
-    for name in CRATES {
-        // The player's crate has a map of its own, in its documentation.
-        let Some((_, rest)) = map.split_once(&format!("| **{name}/src** |")) else { continue };
-        let part = rest.split_once("| **").map_or(rest, |(part, _)| part);
-        for entry in fs::read_dir(root().join(name).join("src")).expect("sources") {
-            let entry = entry.expect("an entry");
-            let mut room = entry.file_name().into_string().expect("UTF-8");
-            if entry.path().is_dir() {
-                room.push('/');
-            }
-            if !["lib.rs", "main.rs"].contains(&room.as_str()) && !part.contains(&format!("`{room}`")) {
-                lacking.push(format!("{name}/src/{room}"));
+    for name in members() {
+        let Some((_, entry)) = map.split_once(&format!("**`{name}`**")) else {
+            lacking.push(name);
+            continue;
+        };
+        let entry = entry.split("\n- **").next().unwrap_or_default();
+        for folder in folders(&root().join(&name).join("src")) {
+            // `bin` is Cargo's.
+            if folder != "bin" && !entry.contains(&format!("`{folder}/`")) {
+                lacking.push(format!("{name}/src/{folder}/"));
             }
         }
     }
     assert!(lacking.is_empty(), "not in ARCHITECTURE.md: {}", lacking.join(", "));
+}
+
+/// The folders of the crates of the workspace, as the root's `Cargo.toml` lists them.
+fn members() -> Vec<String> {
+    let manifest = fs::read_to_string(root().join("Cargo.toml")).expect("Cargo.toml");
+    let (_, members) = manifest.split_once("members = [").expect("a list of members");
+    let (members, _) = members.split_once(']').expect("the end of the list");
+    // Every second piece is between quotation marks.
+    let members = members.split('"').skip(1).step_by(2).flat_map(|member| match member.strip_suffix("/*") {
+        None => vec![member.to_owned()],
+        Some(parent) => folders(&root().join(parent)).iter().map(|name| format!("{parent}/{name}")).collect(),
+    });
+    members.collect()
+}
+
+/// The names of the folders in a folder; none where it is not there.
+fn folders(folder: &Path) -> Vec<String> {
+    let entries = fs::read_dir(folder).into_iter().flatten().map(|entry| entry.expect("an entry"));
+    let folders = entries.filter(|entry| entry.path().is_dir());
+    folders.map(|entry| entry.file_name().into_string().expect("UTF-8")).collect()
 }
 
 #[test]
