@@ -123,9 +123,7 @@ fn every_key_has_bounds_of_its_type() {
     for Key { path, bounds, .. } in KEYS.iter() {
         let names: Vec<&str> = path.split('.').collect();
         let (last, tables) = names.split_last().expect("a key has a name");
-        let table = tables
-            .iter()
-            .fold(&mut written, |table, name| table[*name].as_table_mut().expect("a table"));
+        let table = tables.iter().fold(&mut written, |table, name| table[*name].as_table_mut().expect("a table"));
         let value = table.remove(*last).unwrap_or_else(|| panic!("{path} is not written"));
         assert!(fits(bounds, &value), "{path}: {bounds:?}");
     }
