@@ -12,7 +12,6 @@ use light4gs::codec::network::Operation;
 use light4gs::codec::plane_layout::{PlaneAxes, PlaneLayout, PlaneShape};
 use light4gs::codec::{Network, PlaneCoding, PlaneSource, decode, plane_distributions};
 use light4gs::data::Scene;
-use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs::model::{
     CenteredPlanes, ContextConfig, ContextModel, DescribedCondition, DescribedPrior, FeaturePlanes, Latent, Passes,
     PlaneConv, PlaneConvConfig, PlaneEntropy, Prior, PriorPart, ShConfig, ShEntropyModel,
@@ -22,6 +21,7 @@ use light4gs::train::dataset::load_options;
 use light4gs::train::error::TrainError;
 use light4gs::train::run::RunFolder;
 use light4gs::train::trainer::Trainer;
+use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 
 /// The place of the plane xz in the list of a hexplane's planes.
 const XZ: usize = 1;
@@ -119,7 +119,7 @@ fn weights(trainer: &Trainer<light4gs::model::BuiltInField, WithProfile>) -> Vec
     models.context.profile.conv.to_layer().weight
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.compression.rate.lambda = 0.03;

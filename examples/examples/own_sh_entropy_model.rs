@@ -9,7 +9,6 @@ use burn::module::Module;
 use burn::tensor::{Device, Tensor};
 use light4gs::codec::{Network, ShPrior, ShSource, decode, network::Operation};
 use light4gs::data::Scene;
-use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 use light4gs::model::{
     BuiltInField, ContextConfig, ContextModel, DynamicScene, PlaneTensors, SH_CHANNELS, ShConfig, ShEntropy, ShKnown,
     ShNetwork, channels_first, channels_last, gaussian_bits, round_around,
@@ -19,6 +18,7 @@ use light4gs::train::config::FileProfile;
 use light4gs::train::dataset::load_options;
 use light4gs::train::error::TrainError;
 use light4gs::train::trainer::Trainer;
+use light4gs_examples::{Outcome, tiny_config, tiny_scene};
 
 /// From a Gaussian's values that a decoder already has to a normal distribution for each of its 45 coefficients.
 #[derive(Module, Debug)]
@@ -92,7 +92,7 @@ fn known(scene: &DynamicScene) -> ShKnown {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     // All degrees of the harmonics early, and the rate as soon as Gaussians are no longer added or removed.
