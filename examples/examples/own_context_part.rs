@@ -119,7 +119,7 @@ fn weights(trainer: &Trainer<light4gs::model::BuiltInField, WithProfile>) -> Vec
     models.context.profile.conv.to_layer().weight
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.compression.rate.lambda = 0.03;

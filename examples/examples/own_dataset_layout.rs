@@ -80,7 +80,7 @@ fn read_line(root: &Path, line: &str, options: &LoadOptions) -> Result<(Split, F
     Ok((split, frame))
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let root = tiny_scene(folder.path())?;
     let options = LoadOptions { resolution: Resolution::MaxSide(32), ..LoadOptions::default() };

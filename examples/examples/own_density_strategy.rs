@@ -76,7 +76,7 @@ impl DensityStrategy for Relocation {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let config = tiny_config()?;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;

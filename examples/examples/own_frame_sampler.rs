@@ -72,7 +72,7 @@ fn trainer(config: &Config, data: &Scene, folder: RunFolder, sampler: &GrowingWi
     Ok(Trainer::builder(config.clone(), data.clone()).sampler(sampler.clone()).run_folder(folder).resume()?)
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.train.checkpoint_interval = 30;

@@ -97,7 +97,7 @@ fn lifetimes(gaussians: &GaussianArrays) -> Vec<f32> {
     gaussians.attribute(LIFETIME).expect("every Gaussian has one").values.to_vec()
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.train.checkpoint_interval = 25;

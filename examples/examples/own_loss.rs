@@ -43,7 +43,7 @@ fn outline_error(scene: &DynamicScene, data: &Scene, device: &Device) -> Outcome
     Ok(sum / data.test.len() as f32)
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let config = tiny_config()?;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;

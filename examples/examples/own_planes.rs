@@ -119,7 +119,7 @@ impl DeformationField for TriPlaneField {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.compression.rate.lambda = 0.03;

@@ -32,7 +32,7 @@ impl<F: DeformationField> Regularizer<F> for Roundness {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let config = tiny_config()?;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;

@@ -382,7 +382,7 @@ fn widening_window(request: &BatchRequest) -> Vec<usize> {
     (0..request.batch_size).map(|_| seen[random.random_range(0..seen.len())]).collect()
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     config.train.checkpoint_interval = 50;

@@ -92,7 +92,7 @@ fn known(scene: &DynamicScene) -> ShKnown {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     // All degrees of the harmonics early, and the rate as soon as Gaussians are no longer added or removed.

@@ -29,7 +29,7 @@ impl SignificanceScore for MeanWeight {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let mut config = tiny_config()?;
     // Cloning ends at iteration 60; at 80 a pass of pruning drops 30 % of the Gaussians.

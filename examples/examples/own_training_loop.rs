@@ -32,7 +32,7 @@ impl MovingGaussians {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let options = LoadOptions { random_points: 500, ..LoadOptions::default() };
     let scene = Scene::open(&tiny_scene(folder.path())?, &options)?;

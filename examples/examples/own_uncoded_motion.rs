@@ -34,7 +34,7 @@ impl DeformationField for Turntable {
     }
 }
 
-fn main() -> Outcome {
+pub(crate) fn main() -> Outcome {
     let folder = tempfile::tempdir()?;
     let config = tiny_config()?;
     let data = Scene::open(&tiny_scene(folder.path())?, &load_options(&config))?;

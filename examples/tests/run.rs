@@ -1,10 +1,58 @@
-//! Runs every example. `cargo test -p light4gs-examples` builds them beside the tests, and they are found there.
+//! Runs every example, as a module of this program: programs of their own would each be linked with Burn.
 
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
-/// The names of the examples: the files in `examples/`.
-fn names() -> Vec<String> {
+use light4gs_examples::Outcome;
+
+/// Makes a module, a test and an entry of [`EXAMPLES`] of each file in `examples/`.
+macro_rules! examples {
+    ($($name:ident)*) => {
+        #[path = "../examples"]
+        mod examples {
+            $(pub(crate) mod $name;)*
+        }
+
+        const EXAMPLES: &[&str] = &[$(stringify!($name)),*];
+
+        $(
+            #[test]
+            fn $name() -> Outcome {
+                alone(examples::$name::main)
+            }
+        )*
+    };
+}
+
+examples! {
+    own_context_part
+    own_dataset_layout
+    own_deformation_field
+    own_density_strategy
+    own_frame_sampler
+    own_gaussian_attribute
+    own_loss
+    own_planes
+    own_regularizer
+    own_rigid_motion
+    own_sh_entropy_model
+    own_significance_score
+    own_training_loop
+    own_uncoded_motion
+}
+
+/// One example at a time. Burn has one random generator for the whole process: another example would draw from it in
+/// between, and a resumed run would not give the same bits.
+fn alone(example: fn() -> Outcome) -> Outcome {
+    static RUNNING: Mutex<()> = Mutex::new(());
+    let _running = RUNNING.lock().unwrap_or_else(PoisonError::into_inner);
+    example()
+}
+
+/// The list above, the index of the examples and the table of docs/extending.md name each file in `examples/`, and only
+/// those.
+#[test]
+fn no_example_is_left_out() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
     let files = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
     let mut names: Vec<String> = files
@@ -12,43 +60,17 @@ fn names() -> Vec<String> {
         .map(|path| path.file_stem().unwrap().to_string_lossy().into_owned())
         .collect();
     names.sort();
-    names
-}
-
-/// `target/PROFILE/examples`: this program is in `target/PROFILE/deps`.
-fn folder_of_programs() -> PathBuf {
-    std::env::current_exe().unwrap().parent().unwrap().parent().unwrap().join("examples")
-}
-
-#[test]
-fn every_example_succeeds() {
-    let mut failures = Vec::new();
-    for name in names() {
-        let program = folder_of_programs().join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
-        assert!(program.is_file(), "{} is missing: cargo test -p light4gs-examples builds it", program.display());
-        let output = Command::new(&program).output().unwrap();
-        let text = String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr);
-        println!("{name}: {}\n{text}", output.status);
-        if !output.status.success() {
-            failures.push(format!("{name} ({}):\n{text}", output.status));
-        }
-    }
-    assert!(failures.is_empty(), "{}", failures.join("\n"));
-}
-
-/// The index of the examples names each of them, and only those; the table of docs/extending.md has a row for each.
-#[test]
-fn the_index_is_complete() {
+    assert_eq!(names, EXAMPLES);
     let index = include_str!("../README.md");
     let table = include_str!("../../docs/extending.md");
-    for name in names() {
+    for name in EXAMPLES {
         assert!(index.contains(&format!("(examples/{name}.rs)")), "examples/README.md does not name {name}");
         assert!(
             table.contains(&format!("[{name}](../examples/examples/{name}.rs)")),
             "docs/extending.md has no row for {name}"
         );
     }
-    assert_eq!(index.matches("(examples/").count(), names().len());
+    assert_eq!(index.matches("(examples/").count(), EXAMPLES.len());
 }
 
 /// Code that docs/extending.md quotes from an example stands in that example, line for line.
