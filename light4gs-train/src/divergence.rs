@@ -158,8 +158,8 @@ pub(super) fn unusual_key(config: &Config) -> Option<Remedy> {
     (ratio > SUSPICIOUS).then_some(remedy)
 }
 
-/// What to change so that the training does not diverge again: an unusual key, or else the learning rate of what is not
-/// finite.
+/// A change that may keep the training from diverging again: an unusual key, or else the learning rate of the parameter
+/// that is not finite.
 pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
     if let Some(remedy) = unusual_key(config) {
         return remedy;

@@ -1,4 +1,4 @@
-//! What is shown: a file, or the newest state of a run.
+//! The scene that a viewer shows: a file, or the newest state of a run.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;

@@ -62,12 +62,12 @@ pub struct CodedPart {
 }
 
 impl CodedPart {
-    /// Whether anything of it is in the file under a trained model.
+    /// Whether a trained model codes any of it.
     pub fn is_modeled(&self) -> bool {
         self.coded > 0.0 || self.expected.round() > 0.0
     }
 
-    /// The difference as a share of the bits in the file. If there are none, there is no share.
+    /// The difference as a share of the bits in the file, as text; a word instead of a share if the file has none.
     pub fn difference(&self) -> String {
         match (self.coded > 0.0, self.expected.round() > 0.0) {
             (true, _) => format!("{:+.2} %", (self.expected - self.coded) / self.coded * 100.0),
@@ -276,8 +276,8 @@ fn coded_bits<C: PlaneEntropy, S: ShModel>(
     let gaussians = file.info.sections.iter().filter(|section| section.kind == Kind::GaussiansExplicit);
     let gaussians: u64 = gaussians.map(|section| section.bytes).sum();
     let harmonics = file.attribute_bytes(&SH_REST.name);
-    // Spherical harmonics that are coded as other attributes are among these, unless training had a model for them, which
-    // says nothing about this coding.
+    // Spherical harmonics that are coded as an attribute count as one. If training had a model for them, they are left out:
+    // that model says nothing about this coding.
     let (sh, with_sh) = match (file.sh_is_an_attribute(), compression.sh.is_some()) {
         (true, true) => (0, 0),
         (true, false) => (0, harmonics),

@@ -212,6 +212,10 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 
 /// The input for the codec to compress a scene, with the attribute steps of the configuration. `data` is the scene as
 /// plain arrays.
+///
+/// # Errors
+/// [`TrainError::Config`] if the configuration has a step for an attribute that the Gaussians do not have;
+/// [`TrainError::Codec`] if the codec refuses a model of the planes or of the spherical harmonics.
 pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     compression: &mut Compression<C, S>,
     scene: &DynamicScene<F>,
@@ -319,8 +323,8 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 }
 
-/// Whether the `compact` profile codes spherical harmonics without this model: what neighbors tell about them is worth more
-/// than a density that is the same for all Gaussians.
+/// Whether the `compact` profile codes spherical harmonics without this model: prediction from neighbors saves more than a
+/// density that is the same for all Gaussians.
 pub(super) fn is_superseded(sh: &impl ShModel) -> bool {
     sh.tables().is_some()
 }

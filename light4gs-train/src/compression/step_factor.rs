@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::TrainError;
 
-/// Steps become finer by at most this factor: beyond it, more bytes show nothing.
+/// Steps become finer by at most this factor: more bytes than that do not show.
 const FINEST: f32 = 0.25;
 /// Steps become coarser by at most this factor: beyond it, nothing can be recognized.
 const COARSEST: f32 = 16.0;
@@ -21,12 +21,12 @@ const ABOVE: f64 = 0.01;
 /// Files that are tried: the factor is then known to 0.1 %.
 const TRIES: usize = 12;
 
-/// A quality that a file does not have although it was wished, dB.
+/// A wished quality that a file does not reach, PSNR in dB.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MissedQuality {
-    /// What was wished.
+    /// The wished PSNR.
     pub wished: f64,
-    /// What the file with the finest steps has.
+    /// The PSNR of the file with the finest steps.
     pub reached: f64,
 }
 
@@ -78,7 +78,7 @@ impl ScaledFile {
     }
 }
 
-/// What a try says about the factor.
+/// The verdict on a factor that was tried.
 enum Verdict {
     /// The file is as wished; one with finer or coarser steps may be better.
     Fits { coarser: bool, well: bool },
@@ -113,8 +113,8 @@ pub(super) fn encode_to_size(
     })
 }
 
-/// The smallest file whose decoded scene has at least `target` dB; `psnr` measures one. If none has, the one with the finest
-/// steps, and what it has.
+/// The smallest file whose decoded scene has at least `target` dB; `psnr` measures a scene. If no file has that, the one with
+/// the finest steps, and its quality.
 ///
 /// # Errors
 /// What the codec refuses, and what `psnr` returns.

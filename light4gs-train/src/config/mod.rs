@@ -86,11 +86,21 @@ pub fn keys_as_markdown() -> String {
 
 impl Config {
     /// Reads a TOML file, with everything that it extends, and validates the result.
+    ///
+    /// # Errors
+    /// - [`ConfigError::Read`] for a file that cannot be read, [`ConfigError::Syntax`] for one that is not TOML
+    /// - [`ConfigError::UnknownKey`], [`ConfigError::WrongType`], [`ConfigError::Value`] for a key that does not exist, and
+    ///   for a value that does not fit
+    /// - [`ConfigError::UnknownPreset`], [`ConfigError::Cycle`] for a wrong `extends`
+    /// - [`ConfigError::Invalid`] for values out of range
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self, ConfigError> {
         layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[], &[])
     }
 
     /// The built-in preset called `name` (see [`preset_names`]), validated.
+    ///
+    /// # Errors
+    /// [`ConfigError::UnknownPreset`] with the nearest name.
     pub fn from_preset(name: &str) -> Result<Self, ConfigError> {
         layers::resolve(&Origin::Preset(name.to_owned()), &[], &[])
     }
@@ -109,6 +119,10 @@ impl Config {
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
     /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a
     /// file that exists may itself have a `+` in it.
+    ///
+    /// # Errors
+    /// As [`Config::from_file`] and [`Overrides::parse`]; [`ConfigError::LayerExtends`] if a name after a `+` extends
+    /// another configuration.
     pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
         let mut names = layers::split(name_or_path).into_iter().map(|name| layers::named(name, None));
         let first = names.next().expect("splitting gives at least one part");
@@ -116,6 +130,9 @@ impl Config {
     }
 
     /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.
+    ///
+    /// # Errors
+    /// As [`Config::from_file`].
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, ConfigError> {
         layers::resolve_text(text, origin)
     }
@@ -155,6 +172,9 @@ impl Config {
     }
 
     /// Checks every range. All problems are reported at once.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] with all of them.
     pub fn validate(&self) -> Result<(), ConfigError> {
         validate::validate(self)
     }
