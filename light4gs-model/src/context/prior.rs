@@ -1,4 +1,4 @@
-//! What a part of the context model computes for a plane, and what it may read.
+//! The interface of a part of the context model: the planes that it may read, and the prior that it computes.
 
 use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};

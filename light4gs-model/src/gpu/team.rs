@@ -17,8 +17,8 @@ pub enum Communication {
     SubgroupOfFew,
     /// Through subgroup operations; sums are taken by halves, which is best for large teams.
     SubgroupOfMany,
-    /// As [`Communication::SubgroupOfFew`], for Mesa's software driver, where a barrier takes long: that control flow is the
-    /// same in a subgroup is not proved to the compiler. Browsers take such a kernel only after `diagnostic(off,
+    /// As [`Communication::SubgroupOfFew`], for Mesa's software driver, on which a barrier takes long. The kernel omits the
+    /// proof for the compiler that control flow is uniform in a subgroup. Browsers take it only after `diagnostic(off,
     /// subgroup_uniformity);`.
     SubgroupOfMesa,
 }

@@ -119,7 +119,8 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
         });
     }
     check.that("compression.target_db", !wishes.iter().all(|(_, wished)| *wished), || {
-        "is set beside compression.target_bytes; a file can have only one of the two targets: set the other to 0".to_owned()
+        "is set beside compression.target_bytes; a file can have only one of the two targets: set the other to 0"
+            .to_owned()
     });
     let float32 = compression.profile == FileProfile::Float32;
     check.that("compression.layers", compression.layers == 1 || !float32, || {

@@ -36,7 +36,7 @@ pub(super) struct SkinningGradients {
     pub(super) nodes: Vec<f32>,
 }
 
-/// Numbers of eight Gaussians that every node reads.
+/// Numbers of eight Gaussians that every node reads in the second half of the backward pass.
 struct Handed<const W: usize> {
     mean: [Block; 3],
     /// Affinities, behind the stillness, which no node reads.
