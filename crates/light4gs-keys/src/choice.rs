@@ -1,6 +1,6 @@
 //! The macro `choice!`: enums whose variants have a name in TOML, and parts with keys that are chosen by such a name.
 
-/// Declares what a key can choose by name.
+/// Declares the names among which a key chooses.
 ///
 /// Plain names: an enum with `NAMES` and `name`. `Display` and serde write the name, `FromStr` and serde read it. An
 /// unknown name is an [`UnknownChoice`] with the nearest one. A key of this type has the bounds `PartKind::BOUNDS`.

@@ -19,7 +19,7 @@ pub struct PlanOptions {
     pub config: String,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
-    /// How many times as long the schedule of every run is as the configuration's, see [`SCHEDULES`](super::definition::SCHEDULES).
+    /// Length of the schedule of every run, divided by the configuration's; see [`SCHEDULES`](super::definition::SCHEDULES).
     pub schedule: Option<f64>,
     /// Overrides of every run.
     pub overrides: Vec<String>,

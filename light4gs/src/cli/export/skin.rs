@@ -57,7 +57,7 @@ impl NodesMotion<'_> {
         influences
     }
 
-    /// How far a skin has Gaussians from where the scene has them, at the keyframes and halfway between them.
+    /// The distances between the Gaussians of a skin and those of the scene, at the keyframes and halfway between them.
     pub(super) fn distances(&self, skin: &Skin) -> Distances {
         let at_rest = rows(self.scene.gaussians.means.val());
         let moments = 2 * self.keyframes - 1;
