@@ -22,8 +22,8 @@ pub struct Rendering {
     /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the image; -1 for Gaussians that are not
     /// finite or have no orientation, which are not drawn.
     pub radii: Tensor<1, Int>,
-    /// `[1]`: pairs of a Gaussian and a cell of the image that it touches; how large cells are, a back end chooses. If there was
-    /// room for fewer ([`Splatter::with_room_for`]), the image is incomplete.
+    /// `[1]`: number of pairs of a Gaussian and a cell of the image that it touches; the back end chooses the size of cells. If
+    /// there was room for fewer ([`Splatter::with_room_for`]), the image is incomplete.
     pub intersections: Tensor<1, Int>,
 }
 

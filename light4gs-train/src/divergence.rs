@@ -20,7 +20,7 @@ pub struct Divergence {
     pub stage: Stage,
     /// Its iteration, from 1.
     pub iteration: usize,
-    /// What is not finite.
+    /// The number that is not finite.
     pub found: NotFinite,
     /// The newest checkpoint. A checkpoint with such numbers is never written.
     pub checkpoint: Option<PathBuf>,
@@ -46,7 +46,7 @@ impl fmt::Display for Remedy {
     }
 }
 
-/// What is not finite.
+/// A number that is not finite.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NotFinite {
     /// The loss, while all parameters are finite.

@@ -22,7 +22,7 @@ pub struct ViewSource {
     shown: Option<(PathBuf, SystemTime)>,
     /// A `.l4gs` stream.
     bytes: Vec<u8>,
-    /// How often the scene has changed.
+    /// Number of changes of the scene.
     version: u64,
     status: String,
 }
@@ -101,7 +101,7 @@ impl ViewSource {
         &self.bytes
     }
 
-    /// How often the scene has changed; 0 as long as there is none.
+    /// Number of changes of the scene; 0 as long as there is none.
     pub fn version(&self) -> u64 {
         self.version
     }

@@ -7,9 +7,9 @@
 ///
 /// ```
 /// light4gs_keys::choice! {
-///     /// What is chosen among.
+///     /// The parts by name.
 ///     pub enum PartKind: "part" {
-///         /// What the name means, for rustdoc and for docs/configuration.md.
+///         /// The meaning of the name, for rustdoc and for docs/configuration.md.
 ///         First = "first",
 ///         /// The other one.
 ///         Second = "second",
@@ -33,7 +33,7 @@
 /// }
 ///
 /// keys! {
-///     /// What the part does. It is the meaning of its name, unless the list of names has another one.
+///     /// The effect of the part. It is the meaning of its name, unless the list of names has another one.
 ///     pub struct Whole {
 ///         /// Its size.
 ///         size: f32 = 0.5; SHARE, "ours";
@@ -47,7 +47,7 @@
 /// }
 ///
 /// choice! {
-///     /// What is chosen among.
+///     /// The parts by name.
 ///     pub enum PartKind: "part" {
 ///         Whole = whole: Whole,
 ///     }
@@ -223,7 +223,7 @@ mod tests {
     keys! {
         /// Has a share. It is small.
         pub struct Left {
-            /// What it has.
+            /// Its share.
             share: f32 = 0.25; SHARE, "ours";
         }
     }

@@ -31,12 +31,14 @@ impl CenteredPlanes {
         self.planes.layout()
     }
 
-    /// The plane over the same axes one scale below, if there is one.
+    /// The plane `[M, h, w]` over the same axes one scale below, if there is one, in original units with the center
+    /// subtracted.
     pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
         Some(self.planes[self.layout().one_scale_below(plane)?].clone())
     }
 
-    /// The plane over other axes in the same scale as `plane`, if there is one.
+    /// The plane `[M, H, W]` over other axes in the same scale as `plane`, if there is one, in original units with the center
+    /// subtracted.
     pub fn in_same_scale(&self, plane: usize, axes: PlaneAxes) -> Option<Tensor<3>> {
         Some(self.planes[self.layout().in_same_scale(plane, axes)?].clone())
     }

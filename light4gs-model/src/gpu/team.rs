@@ -86,7 +86,7 @@ pub(super) fn wanted() -> Option<Team> {
 }
 
 /// Runs operations, whose images on this thread are blended by this team and not by the one that suits the adapter: for
-/// checks of teams that the adapter would not choose. What an adapter that cannot run the team draws is undefined.
+/// checks of teams that the adapter would not choose. On an adapter that cannot run the team, the image is undefined.
 pub fn with_team<R>(team: Team, run: impl FnOnce() -> R) -> R {
     let before = WANTED.replace(Some(team));
     let result = run();

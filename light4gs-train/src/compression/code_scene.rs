@@ -139,7 +139,7 @@ pub struct CodedScene {
     pub bytes: Vec<u8>,
     /// The scene that a decoder gets from it, bit for bit.
     pub decoded: SceneData,
-    /// What the file holds.
+    /// The contents of the file.
     pub info: StreamInfo,
     /// How it was coded, and the bit maps of its planes; `None` in the `float32` profile.
     pub coding: Option<(CodingRecord, Vec<BitMap>)>,
@@ -156,7 +156,12 @@ impl CodedScene {
 /// are fitted first; `progress` is called with the number of iterations done and their total.
 ///
 /// # Errors
-/// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
+/// - [`TrainError::Codec`] if the codec refuses the scene, for example for values that are not finite
+/// - [`TrainError::Model`] if the field cannot be written to a file, or read from one
+/// - [`TrainError::Data`] for an image that cannot be read
+/// - [`TrainError::Input`] for a `compression.target_bytes` that is too small, or a `compression.target_db` without images
+/// - [`TrainError::Diverged`] if the entropy models cannot be fitted
+/// - the error of `progress`
 pub fn code_scene<F: DeformationField, E: EntropyModels>(
     trained: &TrainedScene<F, E>,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,

@@ -44,7 +44,7 @@ impl fmt::Display for MissedQuality {
 
 /// A file, and how it was made. It has not been verified.
 pub(super) struct ScaledFile {
-    /// By how much steps are coarser than the given ones.
+    /// The steps, divided by the given ones.
     pub(super) factor: f32,
     /// The coding of the harmonics with these steps.
     pub(super) sh: ShCoding,
@@ -56,7 +56,7 @@ impl ScaledFile {
     /// The file with the given steps.
     ///
     /// # Errors
-    /// What the codec refuses.
+    /// A scene or coding that the codec refuses.
     pub(super) fn unscaled(compressor: &Compressor, given: &CompressionInput) -> Result<Self, CodecError> {
         let encoded = compressor.encode(&given.attributes, &given.sh)?;
         Ok(Self { factor: 1.0, sh: given.sh.clone(), encoded })
@@ -89,7 +89,8 @@ enum Verdict {
 /// The largest file of at most `target` bytes.
 ///
 /// # Errors
-/// What the codec refuses, and a scene that takes more bytes even with the coarsest steps.
+/// [`TrainError::Codec`] if the codec refuses the scene; [`TrainError::Input`] if it takes more bytes even with the coarsest
+/// steps.
 pub(super) fn encode_to_size(
     compressor: &Compressor,
     given: &CompressionInput,
@@ -117,7 +118,7 @@ pub(super) fn encode_to_size(
 /// the finest steps, and its quality.
 ///
 /// # Errors
-/// What the codec refuses, and what `psnr` returns.
+/// [`TrainError::Codec`] if the codec refuses the scene; the error of `psnr`.
 pub(super) fn encode_to_quality(
     compressor: &Compressor,
     given: &CompressionInput,

@@ -12,7 +12,7 @@ keys! {
     /// The form of the file, and what is trained to make it small (paper III-C to III-E,
     /// [design](design.md#compression)).
     pub struct CompressionConfig {
-        /// What is quantized and entropy coded.
+        /// The parts of the file that are quantized and entropy coded.
         profile: FileProfile = FileProfile::Compact;
             FileProfile::BOUNDS,
             "ours; paper";
@@ -43,7 +43,7 @@ keys! {
 }
 
 choice! {
-    /// What is entropy coded in a file.
+    /// The parts of a file that are entropy coded.
     pub enum FileProfile: "profile" {
         /// Everything.
         Compact = "compact",

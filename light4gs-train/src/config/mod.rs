@@ -63,15 +63,15 @@ keys! {
         /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
         device: DeviceName = DeviceName::default();
             Parsed { names: DEVICES, also: "wgpu also with an adapter" }, "ours";
-        /// What is trained on.
+        /// The training data.
         data: DataConfig;
-        /// What is trained.
+        /// The model.
         model: ModelConfig;
-        /// How it is trained.
+        /// The training.
         train: TrainConfig;
-        /// How small it becomes.
+        /// The compression.
         compression: CompressionConfig;
-        /// How it is measured.
+        /// The measurements.
         eval: EvalConfig;
     }
 }
@@ -113,8 +113,8 @@ impl Config {
         presets::of_layout(layout.name()).ok_or_else(|| ConfigError::NoPreset { layout: layout.name() })
     }
 
-    /// What a command line gives: a preset's name or a file's path, and overrides as [`Overrides::parse`] takes them,
-    /// such as `train.fine_iterations=200`.
+    /// The configuration for the arguments of a command line: a preset's name or a file's path, and overrides as
+    /// [`Overrides::parse`] takes them, such as `train.fine_iterations=200`.
     ///
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
     /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a

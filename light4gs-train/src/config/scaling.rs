@@ -1,7 +1,7 @@
 //! A configuration for other images, another length of training or a file of a certain size: methods that change its
 //! values.
 //!
-//! What a user sets by hand wins. So either the overrides are laid over the result, or the method gets them and leaves
+//! Keys that a user sets by hand win. So either the overrides are laid over the result, or the method gets them and leaves
 //! their keys alone.
 
 use super::{Config, Overrides};
@@ -146,7 +146,7 @@ mod tests {
         }
     }
 
-    /// What is legal stays legal at every length: pruning after densification, cloning after it has begun.
+    /// A legal configuration stays legal at every length: pruning after densification, cloning after it has begun.
     #[test]
     fn every_preset_can_be_longer_and_shorter() {
         for preset in preset_names() {

@@ -1,4 +1,4 @@
-//! Density strategies decide how many Gaussians there are: when they are cloned, split and pruned.
+//! Density strategies decide when Gaussians are cloned, split and pruned.
 //!
 //! For Gaussians that are added or removed by another rule, write a [`DensityStrategy`]; it changes them with a
 //! [`GaussianEditor`]. For another order of pruning alone, write a [`SignificanceScore`].
@@ -83,7 +83,7 @@ pub trait DensityConfig {
         None
     }
 
-    /// What is wrong with the keys as a whole, if anything: one of the keys, and the problem.
+    /// The fault of the keys as a whole, if there is one: one of the keys, and the problem.
     fn problem(&self) -> Option<(&'static str, String)> {
         None
     }
@@ -131,7 +131,7 @@ pub struct ViewStatistics {
     pub radii: Tensor<1, Int>,
 }
 
-/// Decides how many Gaussians there are. The trainer calls the hooks in this order in every iteration:
+/// Decides when Gaussians are added and removed. The trainer calls the hooks in this order in every iteration:
 /// [`after_backward`](Self::after_backward), the optimizer's step, [`after_step`](Self::after_step).
 ///
 /// A strategy keeps its own statistics. State that must be in checkpoints is returned by [`state`](Self::state) and set

@@ -1,4 +1,4 @@
-//! How long a training takes on this machine, from a dozen iterations of each kind.
+//! The time of a training on this machine, estimated from a dozen iterations of each kind.
 //!
 //! An iteration becomes slower as Gaussians are added, and slower again when it has a rate. So the run's own scene is
 //! trained for a moment, in memory: with the Gaussians of the beginning, then with the most Gaussians at each size of the

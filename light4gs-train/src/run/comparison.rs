@@ -1,4 +1,4 @@
-//! What differs between runs: program, machine and data, configuration, results.
+//! Differences between runs: program, machine and data, configuration, results.
 
 use std::path::{Path, PathBuf};
 

@@ -217,7 +217,7 @@ mod tests {
         Trainer::builder(config(&KEYS).unwrap(), data).images(images).build().unwrap()
     }
 
-    /// What the scene shows at a time, `[SIZE, SIZE, 3]`.
+    /// The image of the scene at a time, `[SIZE, SIZE, 3]`.
     fn seen(trainer: &Trainer, time: f32) -> Vec<f32> {
         let scene = trainer.scene().valid();
         let camera = &trainer.data().train[0].camera;

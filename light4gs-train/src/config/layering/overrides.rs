@@ -5,7 +5,7 @@ use toml::{Table, Value};
 use super::super::{ConfigError, Origin};
 use super::schema;
 
-/// What a user has set by hand: layers, each of one line, that are laid over a configuration last.
+/// Keys that a user has set by hand: layers, each of one line, that are laid over a configuration last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides(Vec<(Origin, Table)>);
 

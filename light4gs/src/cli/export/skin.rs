@@ -8,7 +8,7 @@ use light4gs_train::error::TrainError;
 /// Gaussians whose weights of all nodes are in memory at once.
 const ROWS: usize = 1 << 14;
 
-/// A scene that control nodes move, and how often it is sampled.
+/// A scene that control nodes move, and the rate of its samples.
 pub(super) struct NodesMotion<'a> {
     pub(super) scene: &'a DynamicScene,
     /// The scene's own.

@@ -1,4 +1,4 @@
-//! `--limits`: how much memory and time a file may take, and how much output a command may make.
+//! `--limits`: the memory and the time that a file may take, and the most output of a command.
 
 pub(super) mod most;
 
