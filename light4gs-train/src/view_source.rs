@@ -45,7 +45,7 @@ impl ViewSource {
     /// A `.l4gs` file.
     ///
     /// # Errors
-    /// A file that is damaged.
+    /// [`TrainError::Codec`] for a file that is damaged, or cannot be read.
     pub fn file(path: &Path) -> Result<Self, TrainError> {
         read_info(path)?;
         Self::new(Kind::File(path.to_owned()))
@@ -54,7 +54,8 @@ impl ViewSource {
     /// A run: its newest checkpoint while it trains, and its file when that has been written.
     ///
     /// # Errors
-    /// A folder without a run; a dataset that does not exist.
+    /// [`TrainError::Input`] for a folder without a run, or a device that this machine does not have;
+    /// [`TrainError::Data`] for a dataset that cannot be read.
     pub fn run(root: &Path, device: Option<DeviceName>) -> Result<Self, TrainError> {
         let (folder, record, config) = RunFolder::open(root)?;
         let device = device::open(device.unwrap_or(config.device))?.autodiff();
@@ -71,7 +72,8 @@ impl ViewSource {
     /// Looks for a newer state, and reads it.
     ///
     /// # Errors
-    /// A file or checkpoint that cannot be read; the state shown before is kept.
+    /// [`TrainError::Data`] for a file, [`TrainError::Checkpoint`] for a checkpoint that cannot be read. The state shown before
+    /// is kept.
     pub fn refresh(&mut self) -> Result<(), TrainError> {
         let newest = match &self.kind {
             Kind::File(path) => Some(path.clone()),

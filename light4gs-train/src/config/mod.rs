@@ -140,7 +140,7 @@ impl Config {
     /// This configuration with overrides laid over it, validated.
     ///
     /// # Errors
-    /// A value that does not fit into its field, values out of range.
+    /// [`ConfigError::Value`] for a value that does not fit into its field, [`ConfigError::Invalid`] for values out of range.
     pub fn with(&self, overrides: &Overrides) -> Result<Self, ConfigError> {
         layers::lay_over(self, overrides)
     }

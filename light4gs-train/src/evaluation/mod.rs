@@ -113,8 +113,8 @@ impl<F: DeformationField> DecodedScene<F> {
     /// Reads a file onto a device, within the default [`Limits`].
     ///
     /// # Errors
-    /// [`TrainError::Data`] for a file that cannot be read; [`TrainError::Codec`] for one that the codec refuses;
-    /// [`TrainError::Model`] if `F` cannot be made from its parts.
+    /// [`TrainError::Codec`] for a file that cannot be read, or that the codec refuses; [`TrainError::Model`] if `F` cannot
+    /// be made from its parts.
     pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
         Self::open_with_limits(path, &Limits::default(), device)
     }

@@ -217,7 +217,7 @@ impl RunFolder {
     /// it. Does nothing if that run's dataset differs from this one.
     ///
     /// # Errors
-    /// If the other folder holds no run; a file that cannot be read or written.
+    /// [`TrainError::Input`] if the other folder holds no run; [`TrainError::Data`] for a file that cannot be read or written.
     pub fn adopt(&self, other: &Path, data: &Scene) -> Result<(), TrainError> {
         let (other, trained_by, _) = Self::open(other)?;
         let dataset: Option<DatasetDigest> = other.read_json(DATASET)?;

@@ -416,7 +416,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// some quality. NaN for a split without views.
     ///
     /// # Errors
-    /// An image that cannot be read.
+    /// [`TrainError::Data`] for an image that cannot be read.
     pub fn psnr(&self, split: Split) -> Result<f64, TrainError> {
         let (stage, iteration) = self.position();
         self.mean_psnr(self.data.frames(split).iter(), stage, iteration)

@@ -138,7 +138,7 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     /// taken.
     ///
     /// # Errors
-    /// Shapes that the field cannot have.
+    /// [`ModelError::Motion`] for shapes that the field cannot have.
     fn resize(&mut self, shapes: &BTreeMap<String, Vec<usize>>) -> Result<(), ModelError> {
         let _ = shapes;
         Ok(())
