@@ -20,7 +20,7 @@ pub enum GpuError {
         kernel: &'static str,
         /// Name of the runtime.
         adapter: String,
-        /// What the driver or the shader compiler says.
+        /// The message of the driver or the shader compiler.
         reason: String,
     },
     /// Results cannot be read: the device is lost, out of memory, or an earlier operation failed.
@@ -31,7 +31,7 @@ pub enum GpuError {
     Device {
         /// The operation that was waited for.
         operation: &'static str,
-        /// What the driver says.
+        /// The message of the driver.
         reason: String,
     },
     /// A buffer is larger than the adapter can bind.
@@ -84,7 +84,7 @@ impl GpuError {
     /// ```
     ///
     /// # Errors
-    /// What the device says.
+    /// [`GpuError::Device`] with the message of the driver.
     pub fn read(operation: &'static str, tensors: Transaction) -> Result<Vec<TensorData>, Self> {
         tensors.try_execute().map_err(|error| Self::Device { operation, reason: first_lines(&error.to_string()) })
     }
@@ -109,7 +109,7 @@ impl GpuError {
     /// ```
     ///
     /// # Errors
-    /// What the GPU refused.
+    /// The error with which an operation panicked.
     pub fn catch<T>(run: impl FnOnce() -> T) -> Result<T, Self> {
         std::panic::catch_unwind(std::panic::AssertUnwindSafe(run))
             .map_err(|payload| Self::from_panic(payload).unwrap_or_else(|other| std::panic::resume_unwind(other)))

@@ -1,4 +1,4 @@
-//! How much the images change when a Gaussian is taken away, by which Gaussians are pruned.
+//! The change of the images without a Gaussian: a score for pruning.
 
 use burn::tensor::Tensor;
 use light4gs_data::Camera;
@@ -10,11 +10,10 @@ use crate::splatter::Splatter;
 /// Squared changes of the images without each of `N` Gaussians, summed over pixels and color channels.
 ///
 /// A color `C` is linear in the alpha of each Gaussian, and alpha is its opacity `o` times its falloff. So without the Gaussian,
-/// the color changes by `o dC/do`, however far that is: what it hides comes to light. (It is exact but for alpha's largest value
-/// of 0.99.) SpeeDe3DGS (Tu et al. 2025) and Speedy-Splat (Hanson et al. 2024) sum squares of such a derivative in a backward pass
-/// of their own. Here the pass of training does it: with a random sign for each color, the square of the opacity's gradient has
-/// the sum of squares as its mean (Hutchinson 1990). Over a hundred views its standard deviation is a seventh of
-/// the sum.
+/// the color changes by `o dC/do`, also where it hides others. (This is exact up to alpha's largest value, 0.99.) SpeeDe3DGS
+/// (Tu et al. 2025) and Speedy-Splat (Hanson et al. 2024) sum squares of such a derivative in a backward pass of their own.
+/// Here the pass of training does it: with a random sign for each color, the square of the opacity's gradient has the sum
+/// of squares as its mean (Hutchinson 1990). Over a hundred views its standard deviation is a seventh of the sum.
 ///
 /// ```
 /// use burn::tensor::Device;

@@ -10,7 +10,7 @@ use crate::ops::columns::columns;
 use crate::ops::splat::{SplatInputs, SplatOps, SplatView};
 use crate::scene::gaussians::{ActivatedGaussians, GaussianTensors};
 
-/// An image, and what training needs besides.
+/// An image, and further results that training needs.
 #[derive(Clone, Debug)]
 pub struct Rendering {
     /// `[H, W, 3]`, over the background; not clamped above.
@@ -22,8 +22,8 @@ pub struct Rendering {
     /// `[N]` in pixels: three standard deviations, rounded up; 0 outside the image; -1 for Gaussians that are not
     /// finite or have no orientation, which are not drawn.
     pub radii: Tensor<1, Int>,
-    /// `[1]`: pairs of a Gaussian and a cell of the image that it touches; how large cells are, a back end chooses. If there was
-    /// room for fewer ([`Splatter::with_room_for`]), the image is incomplete.
+    /// `[1]`: number of pairs of a Gaussian and a cell of the image that it touches; the back end chooses the size of cells. If
+    /// there was room for fewer ([`Splatter::with_room_for`]), the image is incomplete.
     pub intersections: Tensor<1, Int>,
 }
 
@@ -33,7 +33,7 @@ impl Rendering {
         self.radii.clone().greater_elem(0)
     }
 
-    /// How many Gaussians could not be drawn because they are not finite or have no orientation.
+    /// The number of Gaussians that were not drawn because they are not finite or have no orientation.
     pub fn invalid_count(&self) -> usize {
         self.radii.clone().equal_elem(-1).int().sum().into_scalar::<i64>() as usize
     }
@@ -68,9 +68,9 @@ impl Splatter {
         Self { background, sh_degree, room: None }
     }
 
-    /// Reserves room for so many [`Rendering::intersections`]. A GPU then need not tell the host how many there are before the
-    /// host goes on, but an image with more is incomplete, with its gradients: whoever sets this looks at that number, and
-    /// draws such an image again. Other back ends have room for all.
+    /// Reserves room for this number of [`Rendering::intersections`], so that the host need not wait until a GPU has counted
+    /// them. An image with more intersections is incomplete, and so are its gradients: the caller compares the numbers, and
+    /// draws such an image again. CPU back ends always have room for all.
     pub fn with_room_for(self, intersections: usize) -> Self {
         Self { room: Some(intersections), ..self }
     }

@@ -20,7 +20,7 @@ pub struct Divergence {
     pub stage: Stage,
     /// Its iteration, from 1.
     pub iteration: usize,
-    /// What is not finite.
+    /// The number that is not finite.
     pub found: NotFinite,
     /// The newest checkpoint. A checkpoint with such numbers is never written.
     pub checkpoint: Option<PathBuf>,
@@ -46,7 +46,7 @@ impl fmt::Display for Remedy {
     }
 }
 
-/// What is not finite.
+/// A number that is not finite.
 #[derive(Clone, Debug, PartialEq)]
 pub enum NotFinite {
     /// The loss, while all parameters are finite.
@@ -158,8 +158,8 @@ pub(super) fn unusual_key(config: &Config) -> Option<Remedy> {
     (ratio > SUSPICIOUS).then_some(remedy)
 }
 
-/// What to change so that the training does not diverge again: an unusual key, or else the learning rate of what is not
-/// finite.
+/// A change that may keep the training from diverging again: an unusual key, or else the learning rate of the parameter
+/// that is not finite.
 pub(crate) fn remedy(found: &NotFinite, config: &Config) -> Remedy {
     if let Some(remedy) = unusual_key(config) {
         return remedy;

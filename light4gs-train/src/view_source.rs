@@ -1,4 +1,4 @@
-//! What is shown: a file, or the newest state of a run.
+//! The scene that a viewer shows: a file, or the newest state of a run.
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -22,7 +22,7 @@ pub struct ViewSource {
     shown: Option<(PathBuf, SystemTime)>,
     /// A `.l4gs` stream.
     bytes: Vec<u8>,
-    /// How often the scene has changed.
+    /// Number of changes of the scene.
     version: u64,
     status: String,
 }
@@ -45,7 +45,7 @@ impl ViewSource {
     /// A `.l4gs` file.
     ///
     /// # Errors
-    /// A file that is damaged.
+    /// [`TrainError::Codec`] for a file that is damaged, or cannot be read.
     pub fn file(path: &Path) -> Result<Self, TrainError> {
         read_info(path)?;
         Self::new(Kind::File(path.to_owned()))
@@ -54,7 +54,8 @@ impl ViewSource {
     /// A run: its newest checkpoint while it trains, and its file when that has been written.
     ///
     /// # Errors
-    /// A folder without a run; a dataset that does not exist.
+    /// [`TrainError::Input`] for a folder without a run, or a device that this machine does not have;
+    /// [`TrainError::Data`] for a dataset that cannot be read.
     pub fn run(root: &Path, device: Option<DeviceName>) -> Result<Self, TrainError> {
         let (folder, record, config) = RunFolder::open(root)?;
         let device = device::open(device.unwrap_or(config.device))?.autodiff();
@@ -71,7 +72,8 @@ impl ViewSource {
     /// Looks for a newer state, and reads it.
     ///
     /// # Errors
-    /// A file or checkpoint that cannot be read; the state shown before is kept.
+    /// [`TrainError::Data`] for a file, [`TrainError::Checkpoint`] for a checkpoint that cannot be read. The state shown before
+    /// is kept.
     pub fn refresh(&mut self) -> Result<(), TrainError> {
         let newest = match &self.kind {
             Kind::File(path) => Some(path.clone()),
@@ -101,7 +103,7 @@ impl ViewSource {
         &self.bytes
     }
 
-    /// How often the scene has changed; 0 as long as there is none.
+    /// Number of changes of the scene; 0 as long as there is none.
     pub fn version(&self) -> u64 {
         self.version
     }

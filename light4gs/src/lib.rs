@@ -1,22 +1,27 @@
 //! The libraries of Light4GS under one name, and the command line of the program `light4gs`.
 //!
-//! Which of them do you need?
+//! # Which of these do I need?
 //!
-//! | to | use |
+//! | task | use |
 //! |---|---|
 //! | read, write or check `.l4gs` files, without Burn and without a GPU | [`codec`] |
 //! | read datasets, cameras, images and point clouds | [`data`] |
 //! | draw a decoded scene on the CPU, without Burn | [`render`] |
 //! | differentiate: dynamic scenes, splatting and entropy models as Burn modules | [`model`] |
 //! | train, evaluate, or plug in a part of your own | [`train`] |
+//! | run the program from a program of your own | `cli`, with the feature `cli` |
 //!
-//! A crate that extends Light4GS needs one line, without the command line and with the back ends that it wants:
+//! The front page of each says which of its parts serve which task. A crate that extends Light4GS needs one line in its
+//! `Cargo.toml`, without the command line and with the back ends that it wants: `flex` and `ndarray` compute on the
+//! processor, `wgpu` on a graphics adapter.
 //!
 //! ```toml
 //! light4gs = { version = "0.1", default-features = false, features = ["flex"] }
 //! ```
 //!
-//! Four Gaussians that follow a deformation field, and their file:
+//! # Example
+//!
+//! This line gives all libraries: four Gaussians that follow a deformation field, and their file.
 //!
 //! ```
 //! use light4gs::codec::{self, SceneMeta};

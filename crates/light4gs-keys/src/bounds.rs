@@ -18,14 +18,14 @@ pub enum Bounds {
     Parsed {
         /// Texts that are legal.
         names: &'static [&'static str],
-        /// What else is, in words.
+        /// Other legal texts, in words.
         also: &'static str,
     },
     /// A name that is looked up when a run begins, or an empty text.
     NameOrNone {
         /// The thing that is named.
         what: &'static str,
-        /// What an empty text means.
+        /// The meaning of an empty text.
         none: &'static str,
         /// The known names.
         names: fn() -> Vec<&'static str>,

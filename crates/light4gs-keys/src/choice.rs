@@ -1,15 +1,15 @@
 //! The macro `choice!`: enums whose variants have a name in TOML, and parts with keys that are chosen by such a name.
 
-/// Declares what a key can choose by name.
+/// Declares the names among which a key chooses.
 ///
 /// Plain names: an enum with `NAMES` and `name`. `Display` and serde write the name, `FromStr` and serde read it. An
 /// unknown name is an [`UnknownChoice`] with the nearest one. A key of this type has the bounds `PartKind::BOUNDS`.
 ///
 /// ```
 /// light4gs_keys::choice! {
-///     /// What is chosen among.
+///     /// The parts by name.
 ///     pub enum PartKind: "part" {
-///         /// What the name means, for rustdoc and for docs/configuration.md.
+///         /// The meaning of the name, for rustdoc and for docs/configuration.md.
 ///         First = "first",
 ///         /// The other one.
 ///         Second = "second",
@@ -33,7 +33,7 @@
 /// }
 ///
 /// keys! {
-///     /// What the part does. It is the meaning of its name, unless the list of names has another one.
+///     /// The effect of the part. It is the meaning of its name, unless the list of names has another one.
 ///     pub struct Whole {
 ///         /// Its size.
 ///         size: f32 = 0.5; SHARE, "ours";
@@ -47,7 +47,7 @@
 /// }
 ///
 /// choice! {
-///     /// What is chosen among.
+///     /// The parts by name.
 ///     pub enum PartKind: "part" {
 ///         Whole = whole: Whole,
 ///     }
@@ -223,7 +223,7 @@ mod tests {
     keys! {
         /// Has a share. It is small.
         pub struct Left {
-            /// What it has.
+            /// Its share.
             share: f32 = 0.25; SHARE, "ours";
         }
     }

@@ -64,15 +64,15 @@ pub fn has_no_keys<T: KeyTable>(_: &T) -> bool {
 /// use light4gs_keys::{Bounds, keys};
 ///
 /// keys! {
-///     /// What the inner table is about.
+///     /// The subject of the inner table.
 ///     pub struct InnerConfig {
-///         /// What the key does: for rustdoc and for docs/configuration.md.
+///         /// The effect of the key: for rustdoc and for docs/configuration.md.
 ///         weight: f32 = 0.5; Bounds::Number { least: 0.0, most: 1.0 }, "ours";
 ///     }
 /// }
 ///
 /// keys! {
-///     /// What the table is about.
+///     /// The subject of the table.
 ///     pub struct ExampleConfig {
 ///         /// A table in the table: its type is declared by `keys!`, too.
 ///         inner: InnerConfig;

@@ -2,18 +2,32 @@
 //!
 //! A part of Light4GS that has settings declares them beside itself, with two macros:
 //!
-//! - [`keys!`] makes a struct of settings. This struct is the table in TOML, and it is what the part is built from.
+//! - [`keys!`] makes a struct of settings. This struct is the table in TOML, and the part is built from it.
 //! - [`choice!`] makes an enum of names, among which a key chooses: plain words, or parts with keys of their own.
 //!
-//! What follows from the declarations: the values that a key may have ([`Bounds`]), checked on the typed values
-//! ([`KeyTable::problems`]), the list of all keys ([`list`]), and the tables of `docs/configuration.md` ([`markdown`]).
 //! This crate contains no key.
+//!
+//! # Which of these do I need?
+//!
+//! | task | use |
+//! |---|---|
+//! | declare a table of keys | [`keys!`] |
+//! | declare a key that chooses by name | [`choice!`] |
+//! | bound the values of a key | [`Bounds`], or one of the constants such as [`SHARE`], [`WEIGHT`], [`ITERATIONS`] |
+//! | use a type of your own for a key | [`KeyValue`] |
+//! | let a key be absent | `Option`, with `#[serde(with = "optional")]`: [`optional`] |
+//! | have numbers under names that are not known here | [`ByName`] |
+//! | check all values of a table | [`KeyTable::problems`] |
+//! | list all keys, or print them as tables of Markdown | [`list`], [`markdown`] |
+//! | suggest the nearest name for a mistyped one | [`nearest`], [`UnknownChoice`] |
+//!
+//! # Example
 //!
 //! ```
 //! use light4gs_keys::{Bounds, KeyTable, choice, keys};
 //!
 //! choice! {
-//!     /// Which end of a list is taken.
+//!     /// An end of a list.
 //!     pub enum End: "end" {
 //!         /// The first entry.
 //!         First = "first",
@@ -23,7 +37,7 @@
 //! }
 //!
 //! keys! {
-//!     /// How a list is read.
+//!     /// The reading of a list.
 //!     pub struct ListConfig {
 //!         /// The end at which reading begins.
 //!         end: End = End::First; End::BOUNDS, "ours";

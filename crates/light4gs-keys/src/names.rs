@@ -1,13 +1,13 @@
 //! Names among which a key chooses, and the error for a name that is none of them.
 
-/// What a key chooses among.
+/// The names among which a key chooses.
 #[derive(Debug)]
 pub struct Choices {
     /// The thing that is chosen, for messages.
     pub what: &'static str,
     /// The names.
     pub names: &'static [&'static str],
-    /// What each name means, in lines.
+    /// The meaning of each name, in lines.
     pub meanings: &'static [&'static [&'static str]],
 }
 
@@ -17,7 +17,7 @@ impl Choices {
         (!self.names.contains(&name)).then(|| UnknownChoice::new(self.what, name, self.names))
     }
 
-    /// Each name with the first sentence of what it means.
+    /// Each name with the first sentence of its meaning.
     pub(crate) fn explained(&self) -> String {
         let explained = self.names.iter().zip(self.meanings).map(|(name, meaning)| {
             let meaning = joined(meaning);

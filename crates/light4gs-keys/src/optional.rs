@@ -4,6 +4,9 @@
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// Writes a value, or the default of its type for none.
+///
+/// # Errors
+/// Those of the serializer.
 pub fn serialize<T, S>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error>
 where
     T: Serialize + Default + Clone,
@@ -13,6 +16,9 @@ where
 }
 
 /// Reads a value, and takes the default of its type as none.
+///
+/// # Errors
+/// Those of the deserializer: a value of another type.
 pub fn deserialize<'de, T, D>(deserializer: D) -> Result<Option<T>, D::Error>
 where
     T: Deserialize<'de> + Default + PartialEq,

@@ -1,4 +1,4 @@
-//! What is generated from the declarations: the list of all keys, and the tables of `docs/configuration.md`.
+//! The texts that are generated from the declarations: the list of all keys, and the tables of `docs/configuration.md`.
 
 use serde::Serialize;
 
@@ -114,7 +114,7 @@ pub fn markdown<T: KeyTable + Default + Serialize>() -> String {
             let key = if path.is_empty() { name.to_owned() } else { format!("{path}.{name}") };
             let meaning = [joined(meaning)].into_iter().chain(choices(&bounds)).collect::<Vec<_>>().join(" ");
             let bounds = match bounds {
-                // Every name is in the documentation of what is named.
+                // The documentation of the named things lists their names.
                 Bounds::NameOrNone { what, .. } => format!("empty, or the name of a {what}"),
                 _ => bounds.to_string(),
             };
@@ -124,7 +124,7 @@ pub fn markdown<T: KeyTable + Default + Serialize>() -> String {
     text
 }
 
-/// What the names among which a key chooses mean.
+/// The meanings of the names among which a key chooses.
 fn choices(bounds: &Bounds) -> Option<String> {
     match bounds {
         Bounds::Name(choices) => Some(choices.explained()),

@@ -11,20 +11,20 @@ use crate::{Bounds, nearest};
 pub struct Problem {
     /// Full path of the key, such as `train.prune.fraction`.
     pub key: String,
-    /// What is wrong and what would be right.
+    /// The fault, and the legal values.
     pub message: String,
 }
 
 /// A type that a key may have.
 pub trait KeyValue {
-    /// What is wrong with the value, if it is out of bounds. A type whose every value is legal, such as that of a
-    /// choice, does without.
+    /// The fault of a value that is out of bounds. A type whose every value is legal, such as that of a choice, keeps the
+    /// default.
     fn problem(&self, bounds: &Bounds) -> Option<String> {
         let _ = bounds;
         None
     }
 
-    /// Appends what is wrong with the value of a key, which is named by its full path.
+    /// Appends the fault of the value of a key, if it has one. `key` is its full path.
     fn check(&self, bounds: &Bounds, key: &str, into: &mut Vec<Problem>) {
         into.extend(self.problem(bounds).map(|message| Problem { key: key.to_owned(), message }));
     }

@@ -1,4 +1,4 @@
-//! How the planes and the spherical harmonics were coded: expected and actual bits, every plane, and maps of the bits
+//! The coding of planes, spherical harmonics and attributes: expected and actual bits, every plane, and maps of the bits
 //! (the paper's figure "bitrate allocation").
 
 use std::fmt::Write as _;

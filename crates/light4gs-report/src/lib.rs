@@ -2,6 +2,29 @@
 //!
 //! Style, script, charts (SVG) and images (PNG) are all inside, and the page forbids all requests. It can be read
 //! without its script, in light and dark mode, on paper and with a screen reader.
+//!
+//! # Which of these do I need?
+//!
+//! | task | start with |
+//! |---|---|
+//! | measure a finished run, and write its report | [`evaluate_run`] |
+//! | write a report from results at hand | [`write_report`] with a [`Report`]; parts that are empty are left out |
+//! | write another page in the same style | [`page_of`] |
+//! | embed an image in HTML | [`data_uri`], with [`escape`] for texts and [`inferno`] for maps |
+//! | give the player the cameras of a dataset | [`cameras_json`] |
+//!
+//! # Example
+//!
+//! ```
+//! use light4gs_report::{Report, SummaryTile, write_report};
+//!
+//! # let folder = tempfile::tempdir().unwrap();
+//! let path = folder.path().join("report.html");
+//! let tile = SummaryTile { label: "Test PSNR".into(), value: "33.1 dB".into(), ..Default::default() };
+//! write_report(&path, &Report { title: "bouncing".into(), summary: vec![tile], ..Default::default() })?;
+//! assert!(std::fs::read_to_string(&path).unwrap().contains("33.1 dB"));
+//! # Ok::<(), light4gs_data::DataError>(())
+//! ```
 
 mod cameras;
 mod chart;

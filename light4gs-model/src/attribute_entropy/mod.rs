@@ -1,12 +1,13 @@
 //! The bits of the attributes of Gaussians, and their learned quantization steps (docs/design.md).
 //!
-//! The codec codes attributes adaptively, from neighbors and from channels before (`light4gs_codec::attributes`). No
-//! such coder has a gradient. In training each channel is predicted from the same values by a linear prediction, and a
-//! density of what is left stands for the coder: so the scene learns to be predictable. For positions stands the
-//! information of a set of points, of which only the step has a gradient; an evaluation counts what the codec writes (its
-//! splitting of counts, Devillers and Gandoin 2000, takes a fifth less, since points cluster). Every
-//! attribute has one learned step. A rate on all attributes with learned steps is after HAC++ (Chen et al. 2025), which
-//! modulates the steps of each Gaussian besides.
+//! The codec codes attributes adaptively, from neighbors and from earlier channels (`light4gs_codec::attributes`). Such
+//! a coder has no gradient. Training replaces it by a linear prediction of each channel from the same values, and a
+//! density of the residual: so the scene learns to be predictable. Positions take the bits of a set of points that are
+//! uniform in their box; these have a gradient by the step only. An evaluation counts the bits that the codec writes
+//! for positions: its splitting of counts (Devillers and Gandoin 2000) takes a fifth less, since points cluster.
+//!
+//! Every attribute has one learned step. A rate on all attributes with learned steps is after HAC++ (Chen et al. 2025),
+//! which also modulates the steps of each Gaussian.
 
 mod prediction;
 
@@ -44,8 +45,8 @@ pub struct CodedAttribute {
 /// Densities and steps of the quantized attributes.
 #[derive(Module, Debug)]
 pub struct AttributeEntropy {
-    /// The densities of what predictions leave: a channel for each number of each attribute except the positions, in the
-    /// order of the attributes.
+    /// The densities of the residuals: a channel for each number of each attribute except the positions, in the order of
+    /// the attributes.
     pub mixture: LogisticMixture,
     /// The predictions.
     pub prediction: ChannelPrediction,
@@ -53,7 +54,7 @@ pub struct AttributeEntropy {
     pub log_steps: Param<Tensor<1>>,
     /// `[1]`, not trained: the typical size of the Gaussians that the model was started from, world units; 0 before.
     pub size: Param<Tensor<1>>,
-    /// `[A]`, not trained: how many times the bits that its density expects each attribute counts.
+    /// `[A]`, not trained: factors of the bits that the densities expect of each attribute.
     pub corrections: Param<Tensor<1>>,
     #[module(skip)]
     attributes: Vec<CodedAttribute>,
@@ -79,8 +80,8 @@ impl AttributeEntropy {
         }
     }
 
-    /// Begins at the values of these Gaussians: the best predictions, densities as wide as what these leave, and positions
-    /// in units of the Gaussians' size.
+    /// Begins at the values of these Gaussians: the best predictions, densities as wide as the residuals, and positions in
+    /// units of the Gaussians' size.
     pub fn start_from(&mut self, gaussians: &GaussianTensors) {
         let size = Tensor::from_floats([size_of(gaussians)], &off_tape(self.size.val()).device());
         replace(&mut self.size, size);
@@ -144,7 +145,7 @@ impl AttributeEntropy {
     }
 
     /// Bits of each attribute, `[A]`, from all rows: of noisy Gaussians in training, of quantized ones in an evaluation.
-    /// Differentiable in the same.
+    /// Differentiable in the same inputs as [`AttributeEntropy::bits`].
     pub fn bits_of_each(&self, gaussians: GaussianTensors) -> Tensor<1> {
         let places = self.places(gaussians.means.clone());
         let (positions, channels) = self.bits_of_parts(gaussians, &places, None);
@@ -187,7 +188,7 @@ impl AttributeEntropy {
         (positions, bits * corrections * share)
     }
 
-    /// Looks at positions `[N, 3]`, on the host. On a GPU this waits for them.
+    /// Finds neighbors and box of positions `[N, 3]`, on the host, which waits for a GPU.
     ///
     /// # Panics
     /// With a [`GpuError`] if they cannot be read.
@@ -211,9 +212,9 @@ impl AttributeEntropy {
         GaussianPlaces { order: CodingOrder::new(means, step).ok(), extent }
     }
 
-    /// What the codec writes for the positions of `count` Gaussians, if that is given; else what a set of points takes that
-    /// are uniform in their box: their cells one by one, without the order. The derivative is that of the second: one bit an
-    /// axis for half the step.
+    /// Bits of the positions of `count` Gaussians, `[1]`: `coded`, the bits in a file, if they are given. Otherwise those of
+    /// a set of points that are uniform in their box: the cell of each point, less the order of the points. The derivative
+    /// is always that of the set: half the step takes one bit more for each axis.
     fn position_bits(&self, extent: [f32; 3], count: usize, coded: Option<u64>) -> Tensor<1> {
         let log_steps = self.log_steps.val();
         let Some(place) = self.place(&MEANS.name) else { return Tensor::zeros([1], &log_steps.device()) };
@@ -241,8 +242,8 @@ impl AttributeEntropy {
             .clamped()
     }
 
-    /// Each attribute counts so many times as much as before, in the order of [`AttributeEntropy::attributes`]. Positions always
-    /// count once: they have no density.
+    /// Multiplies the expected bits of each attribute by its factor, in the order of [`AttributeEntropy::attributes`]. The
+    /// factor of positions has no effect: they have no density.
     ///
     /// # Panics
     /// If there are not as many factors as attributes.
@@ -304,11 +305,10 @@ impl AttributeEntropy {
     }
 }
 
-/// What the positions of Gaussians say about their bits: which ones are neighbors, and how large their box is.
+/// The neighbors of Gaussians, and the size of their box, on which their bits depend.
 #[derive(Clone, Debug)]
 pub struct GaussianPlaces {
-    /// The order in which the codec would code them; `None` where positions are not finite: the trainer stops for them,
-    /// after this.
+    /// The order in which the codec would code them; `None` if positions are not finite. The trainer reports these later.
     order: Option<CodingOrder>,
     /// Of their box, in units of the Gaussians' size.
     extent: [f32; 3],

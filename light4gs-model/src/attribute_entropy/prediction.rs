@@ -1,4 +1,4 @@
-//! What the numbers of a Gaussian are predicted from, as the codec predicts them (`light4gs_codec::attributes`).
+//! Linear predictions of the numbers of a Gaussian, from the same values as in the codec (`light4gs_codec::attributes`).
 
 use burn::module::{Module, Param};
 use burn::tensor::{Device, Tensor};
@@ -13,8 +13,8 @@ const RIDGE: f64 = 1e-3;
 /// the Gaussian itself and for those of its neighbors that are coded before it.
 #[derive(Module, Debug)]
 pub struct ChannelPrediction {
-    /// `[C, 3 C]`: how much of each channel of the Gaussian, of its mean over the neighbors, and of that of the nearest
-    /// neighbor is in the prediction.
+    /// `[C, 3 C]`: for each channel, the weights of the Gaussian's own channels, of their means over the neighbors, and of
+    /// the channels of the nearest neighbor.
     pub weights: Param<Tensor<2>>,
     /// The channels before each in its attribute.
     #[module(skip)]
@@ -29,7 +29,7 @@ impl ChannelPrediction {
         Self { weights: Param::from_tensor(weights), before }
     }
 
-    /// What the prediction leaves of channels, `[C, M]`. `inputs`, `[3 C, M]`, are the channels of each Gaussian, their means
+    /// The residuals of the channels, `[C, M]`. `inputs`, `[3 C, M]`, are the channels of each Gaussian, their means
     /// over its neighbors, and those of the nearest one, as
     /// [`neighborhoods`](crate::ops::neighborhoods::neighborhoods) finds them.
     pub fn residuals(&self, inputs: Tensor<2>) -> Tensor<2> {

@@ -19,7 +19,8 @@ use crate::planes::PlaneTensors;
 /// first as its [`base`](Self::base), and adds its own part to the [`parts`](Self::parts); the other methods need no
 /// change. Training finds the parameters of both, since a composition is a Burn module.
 pub trait PlaneEntropy: Module + ModuleDisplay + 'static {
-    /// What the parts share: centers, checkerboard, hyperprior, and the network that turns priors into distributions.
+    /// The components that the parts share: centers, checkerboard, hyperprior, and the network that turns priors into
+    /// distributions.
     fn base(&self) -> &ContextModel;
 
     /// [`Self::base`], for setting initial values and updating quantiles.

@@ -1,7 +1,15 @@
 //! The multiscale hexplane context model, MHCM (paper III-C): a normal distribution for every value of every plane, and so
-//! what it costs in the file.
+//! its bits in the file.
 //!
-//! One set of weights for all planes, from the lowest scale up. Which part applies to a plane:
+//! | task | use |
+//! |---|---|
+//! | the paper's model | [`ContextModelConfig::compact`], or [`ContextModelConfig::reference`] for the sizes of the authors' code |
+//! | an ablation | the same with fewer [`ContextPart`]s |
+//! | bits in a loss, or of a finished scene | [`PlaneEntropy::rate`] |
+//! | a part of your own | a [`PriorPart`], and a [`PlaneEntropy`] that holds it beside a [`ContextModel`] |
+//! | the data for the codec | [`PlaneEntropy::to_arrays`], [`PlaneEntropy::latent_symbols`] |
+//!
+//! One set of weights serves all planes, from the lowest scale up. The part that applies to a plane:
 //!
 //! | plane | parameters | then |
 //! |---|---|---|
@@ -9,7 +17,7 @@
 //! | lowest scale, space-only | [`InterPlane`], from the decoded space-time planes | [`Checkerboard`] |
 //! | higher scales | [`InterScale`], from the decoded plane one scale below | all at once |
 //!
-//! Where a part is left out, or the planes that it reads do not exist, the next one that applies takes its place:
+//! If a part is left out, or the planes that it reads do not exist, the next one that applies takes its place:
 //! inter-scale, inter-plane, hyperprior, then a constant. [`EntropyParameters`] turns the output of a part into the distribution.
 //!
 //! The parts of the paper's model are listed in this file and nowhere else. A new one is a file of its own with a
@@ -104,7 +112,7 @@ impl ContextConfig {
     /// The model of planes with this number of channels.
     pub fn model(&self, channels: usize) -> ContextModelConfig {
         let sizes = match self.architecture {
-            // The composition is what the list of parts says; the reference's centers and start belong to its sizes.
+            // The list of parts gives the composition; the reference's centers and start belong to its sizes.
             ContextArchitecture::Reference => ContextModelConfig::reference(channels),
             ContextArchitecture::Compact => ContextModelConfig::compact(channels),
         };

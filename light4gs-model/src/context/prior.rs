@@ -1,4 +1,4 @@
-//! What a part of the context model computes for a plane, and what it may read.
+//! The interface of a part of the context model: the planes that it may read, and the prior that it computes.
 
 use burn::tensor::Tensor;
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
@@ -31,12 +31,14 @@ impl CenteredPlanes {
         self.planes.layout()
     }
 
-    /// The plane over the same axes one scale below, if there is one.
+    /// The plane `[M, h, w]` over the same axes one scale below, if there is one, in original units with the center
+    /// subtracted.
     pub fn one_scale_below(&self, plane: usize) -> Option<Tensor<3>> {
         Some(self.planes[self.layout().one_scale_below(plane)?].clone())
     }
 
-    /// The plane over other axes in the same scale as `plane`, if there is one.
+    /// The plane `[M, H, W]` over other axes in the same scale as `plane`, if there is one, in original units with the center
+    /// subtracted.
     pub fn in_same_scale(&self, plane: usize, axes: PlaneAxes) -> Option<Tensor<3>> {
         Some(self.planes[self.layout().in_same_scale(plane, axes)?].clone())
     }

@@ -110,9 +110,8 @@ impl EntropyBottleneck {
         self.quantiles = Param::from_tensor(Tensor::<1>::from_floats(values.as_slice(), &device).reshape(shape));
     }
 
-    /// `[1]`: how far the densities at the quantiles are from the values that they should have. Its gradient changes
-    /// only the quantiles. For programs that train them, as CompressAI does; [`Self::update_quantiles`] computes them
-    /// directly.
+    /// `[1]`: the distance of the distribution functions at the quantiles from their target values. Its gradient changes only
+    /// the quantiles. For programs that train them, as CompressAI does; [`Self::update_quantiles`] computes them directly.
     pub fn auxiliary_loss(&self) -> Tensor<1> {
         let channels = self.density.channels();
         let logits = self.density.logits_of_frozen(self.quantiles.val().reshape([channels, 3]));

@@ -182,8 +182,7 @@ impl ShiftedCopies {
             };
         }
         let before = kernel / 2;
-        // How far the last tap extends, in strides. One more row is needed, since the last run extends into it by its
-        // padding.
+        // The reach of the last tap, in strides. One more row is needed, since the last run extends into it by its padding.
         let reach = kernel.div_ceil(stride) - 1;
         let [padded_rows, padded_columns] = [rows + reach + 1, columns + reach];
         let after = |length: usize, padded: usize| (padded * stride).saturating_sub(length + before);

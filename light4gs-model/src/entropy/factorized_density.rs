@@ -67,7 +67,7 @@ impl FactorizedDensity {
         self.logits_with(x, |parameter| parameter.val())
     }
 
-    /// [`Self::logits`] without gradients to the density's own parameters.
+    /// [`Self::logits`] `[C, N]` at `x [C, N]`, without gradients to the density's own parameters.
     pub fn logits_of_frozen(&self, x: Tensor<2>) -> Tensor<2> {
         self.logits_with(x, |parameter| parameter.val().set_require_grad(false))
     }

@@ -20,7 +20,7 @@ pub struct LogisticMixtureConfig {
     /// Initial scale of the narrowest logistic, in the units of the values.
     #[config(default = 0.02)]
     pub narrowest: f64,
-    /// How many times as wide as the one before each other logistic is at the beginning.
+    /// Initial scale of each further logistic, divided by that of the one before.
     #[config(default = 4.0)]
     pub ratio: f64,
 }

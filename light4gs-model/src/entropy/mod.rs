@@ -1,8 +1,14 @@
 //! Building blocks of entropy models: densities, bits of a symbol, quantization steps, convolutions over planes.
 //!
-//! [`FactorizedDensity`], [`LogisticMixture`] and [`EntropyBottleneck`] learn a density for each channel. [`gaussian_conditional`] gives the
-//! bits of a value whose mean and scale are predicted. [`PlaneSteps`] and [`AdaptiveQuantization`] (paper III-D) say
-//! how finely planes are rounded.
+//! | values | use |
+//! |---|---|
+//! | whose mean and scale a network predicts | [`gaussian_conditional`] |
+//! | of a channel with one density, in a loss that must be fast | [`LogisticMixture`] |
+//! | of a channel with one density of any shape | [`FactorizedDensity`] |
+//! | of a latent, which is also rounded around medians | [`EntropyBottleneck`] |
+//! | of planes, which are rounded to multiples of a step | [`PlaneSteps`]; learned: [`AdaptiveQuantization`] (paper III-D) |
+//!
+//! [`PlaneConv`] and [`PlaneDeconv`] are the layers of the networks, which the codec can run too.
 
 pub(crate) mod adaptive_quantization;
 pub(crate) mod bottleneck;

@@ -1,4 +1,4 @@
-//! How many kernels are launched: on a GPU each launch costs the host some microseconds, whatever the kernel does.
+//! Counts launches of kernels: on a GPU each launch costs the host some microseconds, whatever the kernel does.
 
 use std::collections::BTreeMap;
 use std::fmt;

@@ -1,5 +1,5 @@
-//! What the operations share on the wgpu back end, the host side of the WGSL in `shaders/`: devices and buffers, kernels and their
-//! launches, sorting, teams of invocations.
+//! The shared code of the operations on the wgpu back end, the host side of the WGSL in `shaders/`: devices and buffers, kernels and
+//! their launches, sorting, teams of invocations.
 //!
 //! Public are kernels as text ([`Kernel`]; [`ops::kernels`](crate::ops::kernels) has all of them) and launches as data ([`record`]),
 //! so that compilers and adapters other than those of this machine can be tried: `.ci/webgpu` does; and the number of launches

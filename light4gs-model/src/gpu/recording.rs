@@ -1,5 +1,4 @@
-//! Launches as data: what a kernel was given and what it made of it, so that other implementations of WebGPU can run the
-//! same and compare.
+//! Launches as data: inputs and outputs of kernels, so that other implementations of WebGPU can run the same and compare.
 
 use std::cell::RefCell;
 
@@ -8,7 +7,7 @@ use super::kernel::Kernel;
 /// One buffer of a launch.
 #[derive(Clone, Debug)]
 pub struct RecordedBuffer {
-    /// Its bytes before the launch. What a kernel only writes begins with whatever the memory held.
+    /// Its bytes before the launch; arbitrary for a buffer that the kernel only writes.
     pub before: Vec<u8>,
     /// Its bytes after the launch; `None` where the kernel only reads.
     pub after: Option<Vec<u8>>,

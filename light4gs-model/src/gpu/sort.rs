@@ -17,8 +17,8 @@ const SORT_BLOCK: usize = 1024;
 /// Invocations of such a workgroup, each with a counter for every digit: 16 KiB of workgroup memory.
 const SORT_GROUP: u32 = 32;
 const RADIX_BITS: u32 = 7;
-/// Blocks up to which each one adds up the entries of a pass's table that it needs. With more of them, each would read too much of
-/// the table, and a prefix sum replaces it first.
+/// Most blocks that each add up the entries that they need of a pass's table. With more blocks that would be too many
+/// reads, so prefix sums replace the table first.
 const BLOCKS_ALONE: usize = 128;
 /// Passes over the widest keys.
 const MOST_PASSES: u32 = u32::BITS.div_ceil(RADIX_BITS);

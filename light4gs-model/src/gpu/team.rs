@@ -17,8 +17,8 @@ pub enum Communication {
     SubgroupOfFew,
     /// Through subgroup operations; sums are taken by halves, which is best for large teams.
     SubgroupOfMany,
-    /// As [`Communication::SubgroupOfFew`], for Mesa's software driver, where a barrier takes long: that control flow is the
-    /// same in a subgroup is not proved to the compiler. Browsers take such a kernel only after `diagnostic(off,
+    /// As [`Communication::SubgroupOfFew`], for Mesa's software driver, on which a barrier takes long. The kernel omits the
+    /// proof for the compiler that control flow is uniform in a subgroup. Browsers take it only after `diagnostic(off,
     /// subgroup_uniformity);`.
     SubgroupOfMesa,
 }
@@ -86,7 +86,7 @@ pub(super) fn wanted() -> Option<Team> {
 }
 
 /// Runs operations, whose images on this thread are blended by this team and not by the one that suits the adapter: for
-/// checks of teams that the adapter would not choose. What an adapter that cannot run the team draws is undefined.
+/// checks of teams that the adapter would not choose. On an adapter that cannot run the team, the image is undefined.
 pub fn with_team<R>(team: Team, run: impl FnOnce() -> R) -> R {
     let before = WANTED.replace(Some(team));
     let result = run();

@@ -8,9 +8,9 @@
 //! | `shaders/<operation>/` | its kernels in WGSL |
 //!
 //! The trait of the operation itself is dispatched at run time to the device's back end and recorded by autodiff. A differentiable
-//! operation also has a trait with the kernels that a back end implements for both directions. What is in this folder beside the
-//! operations is what they share: access to the memory of CPU tensors (`host.rs`), fusion streams (`fusion.rs`), checks (`sample.rs`);
-//! what they share on a GPU is in `gpu/`.
+//! operation also has a trait with the kernels that a back end implements for both directions. The other files of this folder serve
+//! all operations: access to the memory of CPU tensors (`host.rs`), fusion streams (`fusion.rs`), checks (`sample.rs`). The shared
+//! code for GPUs is in `gpu/`.
 
 // Burn 0.22 deprecates its `ndarray` back end in favor of `flex`; we serve both.
 #![allow(deprecated)]

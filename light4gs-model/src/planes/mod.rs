@@ -1,5 +1,4 @@
-//! Feature planes: what a field has learned about points in space and time, as maps over pairs of axes (K-Planes,
-//! HexPlane, 4DGS).
+//! Feature planes: learned features of points in space and time, as maps over pairs of axes (K-Planes, HexPlane, 4DGS).
 //!
 //! [`FeaturePlanes`] is a list of planes at several scales. A
 //! [`PlaneLayout`](light4gs_codec::plane_layout::PlaneLayout) says which planes there are: a plane over each pair of

@@ -59,7 +59,7 @@ impl PlaneTensors {
         &self.layout
     }
 
-    /// The tensors.
+    /// The tensors `[C, H, W]`, in the order of the layout.
     pub fn into_tensors(self) -> Vec<Tensor<3>> {
         self.planes
     }

@@ -146,7 +146,8 @@ impl FeaturePlanes {
     /// From plain arrays.
     ///
     /// # Errors
-    /// Planes that are no layout, or whose length does not follow from their size.
+    /// [`ModelError::Planes`] if there are none, if they are no layout, or if a plane has another number of values than
+    /// follows from its size.
     pub fn from_arrays(arrays: &FeaturePlaneArrays, device: &Device) -> Result<Self, ModelError> {
         let wrong = |problem: String| Err(ModelError::Planes(problem));
         if arrays.planes.is_empty() {
@@ -167,10 +168,10 @@ impl FeaturePlanes {
 }
 
 impl<F: DeformationField> DynamicScene<F> {
-    /// Copies the model to what a `.l4gs` file holds.
+    /// Copies the model to the contents of a `.l4gs` file.
     ///
     /// # Errors
-    /// A field whose coding has not been implemented.
+    /// [`ModelError::NoStreamForm`] for a field whose coding has not been implemented.
     pub fn to_arrays(&self, meta: SceneMeta) -> Result<SceneData, ModelError> {
         Ok(SceneData { motion: self.field.to_arrays()?, ..self.to_arrays_at_rest(meta) })
     }
@@ -189,8 +190,11 @@ impl<F: DeformationField> DynamicScene<F> {
     /// The model of a decoded file, on any device.
     ///
     /// # Errors
-    /// Planes or layers that do not fit together, or are not those that this kind of field needs; an attribute without
-    /// which the scene would look wrong, and of which it is not known what it does.
+    /// - [`ModelError::UnknownAttribute`] for an attribute of unknown effect, without which the scene would look wrong
+    /// - [`ModelError::MotionKind`] for another kind of field
+    /// - [`ModelError::Planes`], [`ModelError::Motion`] for planes or layers that do not fit together, or are not those that
+    ///   this kind of field needs
+    /// - [`ModelError::NoStreamForm`] for a field whose decoding has not been implemented
     pub fn from_arrays(data: &SceneData, device: &Device) -> Result<Self, ModelError> {
         data.check_attributes_are_known().map_err(|error| ModelError::UnknownAttribute(error.to_string()))?;
         if !F::KINDS.contains(&data.motion.kind.as_str()) {

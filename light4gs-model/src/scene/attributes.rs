@@ -37,7 +37,7 @@ pub struct Attribute {
     pub start: Start,
     /// The function from the trained numbers to those that are used.
     pub activation: Activation,
-    /// How fast it is learned, unless the training's configuration names it.
+    /// Its learning rate, unless the training's configuration names it.
     pub learning_rate: AttributeRate,
     /// How a file stores it.
     pub coding: Coding,
@@ -94,7 +94,7 @@ pub struct AttributeRate {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Coding {
     /// In multiples of this step, where the file is quantized, unless the training's configuration names the attribute.
-    /// That of the positions is a share of the typical Gaussian's size.
+    /// The step of the positions is a share of the typical Gaussian's size.
     Quantized(f64),
     /// As float32, whatever else is quantized.
     Float32,

@@ -131,7 +131,7 @@ impl GaussianTensors {
     /// The Gaussians of some rows, with all attributes.
     ///
     /// # Panics
-    /// If there are not so many rows.
+    /// If the range reaches beyond the last row.
     pub fn rows(self, rows: Range<usize>) -> Self {
         struct Rows(Range<usize>);
         impl AttributeMapper for Rows {

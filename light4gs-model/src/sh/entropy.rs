@@ -1,4 +1,4 @@
-//! The interface of an entropy model of the spherical harmonics, and what a decoder knows before it evaluates one.
+//! The interface of an entropy model of the spherical harmonics, and the values that a decoder has before it evaluates one.
 
 use std::ops::RangeInclusive;
 

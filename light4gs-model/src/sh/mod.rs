@@ -7,6 +7,10 @@
 //! | [`ShAutoregressive`] | the color and the lower degrees of the same Gaussian | layers |
 //! | [`ShHexPlaneCoupled`] | the space-only planes at the Gaussian's position | layers |
 //!
+//! The first is the paper's choice and the default. Scenes in the `compact` profile use the first two in training only,
+//! since the codec predicts harmonics from neighbors instead. [`ShConfig`] chooses a model by name; a model of your own
+//! implements [`ShEntropy`]. Without any model, [`counted_sh_coding`] makes tables from frequencies.
+//!
 //! The models are listed in this file and nowhere else: a new one is a file of its own and a row in the list here.
 //!
 //! A channel is `coefficient * 3 + rgb` of `sh_rest [N, 15, 3]`; there are 45.
@@ -129,7 +133,7 @@ built_in_models! {
 }
 
 impl ShKind {
-    /// Whether it looks at the planes of the deformation field.
+    /// Whether it reads the planes of the deformation field.
     pub fn needs_planes(self) -> bool {
         self == Self::HexPlaneCoupled
     }
@@ -139,8 +143,8 @@ keys! {
     /// The model of the spherical harmonics beyond degree 0.
     pub struct ShConfig {
         /// Entropy model of the spherical harmonics beyond degree 0. It is trained for degree 3. Scenes of a lower degree
-        /// have none. The file in the `compact` profile does without the models of single channels, `"factorized"` and
-        /// `"mixture_of_logistics"`: there neighbors tell more.
+        /// have none. In the `compact` profile the file does not use `"factorized"` and `"mixture_of_logistics"`, whose
+        /// densities are the same for all Gaussians: prediction from neighbors saves more.
         model: ShKind = ShKind::Factorized; ShKind::BOUNDS, "paper";
         /// Quantization step of the spherical harmonics beyond degree 0.
         step: f64 = 0.02; QUANTIZATION_STEP, "paper";

@@ -35,9 +35,9 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
         models.attributes().iter().map(|attribute| &attribute.name).zip(bits.iter()).map(record).collect()
     }
 
-    /// Has the model expect for each attribute of a scene what the coder has written for it in the scene's file. A density
-    /// knows neither what the coder spends on learning its statistics nor all that these learn. `device`, with autodiff or
-    /// without, is where the bits are computed.
+    /// Scales the model's bits of each attribute so that they agree with those of the scene's `file`. A density alone does
+    /// not: the adaptive coder spends bits on learning its statistics, and saves others by them. The bits are computed on
+    /// `device`, with autodiff or without.
     pub fn correct_expected_bits(&mut self, file: &Encoded, device: &Device) {
         let decoded = Gaussians::from_arrays(&file.decoded.gaussians, &device.clone().inner());
         let factor = |record: &AttributeRecord| match record.coded_bits / record.estimated_bits {

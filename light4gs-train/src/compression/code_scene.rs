@@ -62,12 +62,12 @@ pub struct CodedPart {
 }
 
 impl CodedPart {
-    /// Whether anything of it is in the file under a trained model.
+    /// Whether a trained model codes any of it.
     pub fn is_modeled(&self) -> bool {
         self.coded > 0.0 || self.expected.round() > 0.0
     }
 
-    /// The difference as a share of the bits in the file. If there are none, there is no share.
+    /// The difference as a share of the bits in the file, as text; a word instead of a share if the file has none.
     pub fn difference(&self) -> String {
         match (self.coded > 0.0, self.expected.round() > 0.0) {
             (true, _) => format!("{:+.2} %", (self.expected - self.coded) / self.coded * 100.0),
@@ -139,7 +139,7 @@ pub struct CodedScene {
     pub bytes: Vec<u8>,
     /// The scene that a decoder gets from it, bit for bit.
     pub decoded: SceneData,
-    /// What the file holds.
+    /// The contents of the file.
     pub info: StreamInfo,
     /// How it was coded, and the bit maps of its planes; `None` in the `float32` profile.
     pub coding: Option<(CodingRecord, Vec<BitMap>)>,
@@ -156,7 +156,12 @@ impl CodedScene {
 /// are fitted first; `progress` is called with the number of iterations done and their total.
 ///
 /// # Errors
-/// What the codec refuses, such as values that are not finite; an image that cannot be read; what `progress` returns.
+/// - [`TrainError::Codec`] if the codec refuses the scene, for example for values that are not finite
+/// - [`TrainError::Model`] if the field cannot be written to a file, or read from one
+/// - [`TrainError::Data`] for an image that cannot be read
+/// - [`TrainError::Input`] for a `compression.target_bytes` that is too small, or a `compression.target_db` without images
+/// - [`TrainError::Diverged`] if the entropy models cannot be fitted
+/// - the error of `progress`
 pub fn code_scene<F: DeformationField, E: EntropyModels>(
     trained: &TrainedScene<F, E>,
     progress: &mut dyn FnMut(usize, usize) -> Result<(), TrainError>,
@@ -276,8 +281,8 @@ fn coded_bits<C: PlaneEntropy, S: ShModel>(
     let gaussians = file.info.sections.iter().filter(|section| section.kind == Kind::GaussiansExplicit);
     let gaussians: u64 = gaussians.map(|section| section.bytes).sum();
     let harmonics = file.attribute_bytes(&SH_REST.name);
-    // Spherical harmonics that are coded as other attributes are among these, unless training had a model for them, which
-    // says nothing about this coding.
+    // Spherical harmonics that are coded as an attribute count as one. If training had a model for them, they are left out:
+    // that model says nothing about this coding.
     let (sh, with_sh) = match (file.sh_is_an_attribute(), compression.sh.is_some()) {
         (true, true) => (0, 0),
         (true, false) => (0, harmonics),

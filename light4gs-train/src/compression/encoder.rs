@@ -86,7 +86,9 @@ pub struct SearchImages<'a> {
 /// decoded again and compared.
 ///
 /// # Errors
-/// What the codec refuses; an image that cannot be read; a file that cannot be as small as `compression.target_bytes`.
+/// - [`TrainError::Codec`] if the codec refuses the scene
+/// - [`TrainError::Input`] if no file is as small as `compression.target_bytes`
+/// - [`TrainError::Data`] for an image that cannot be read
 pub fn encode<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
     data: &SceneData,
@@ -144,10 +146,10 @@ fn wished_file(
 }
 
 /// A scene's file as it stands, with the steps that training has learned so far. No step is searched for, and the file is
-/// not verified: it is measured, not kept.
+/// not verified, since it is measured and not kept.
 ///
 /// # Errors
-/// What the codec refuses.
+/// [`TrainError::Codec`] if the codec refuses the scene; [`TrainError::Model`] if the field cannot be written to a file.
 pub fn encoded_so_far<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
     compression: &Compression<C, S>,
@@ -179,7 +181,7 @@ const FREEZING_ROUNDS: usize = 8;
 /// Planes depend neither on Gaussians nor on their motion, so the scene that is encoded here has neither.
 ///
 /// # Errors
-/// What the codec refuses: values that are not finite, or beyond its range of symbols.
+/// [`TrainError::Codec`] if the codec refuses the planes: values that are not finite, or beyond its range of symbols.
 pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     scene: &DynamicScene<F>,
     compression: &Compression<C, S>,
@@ -212,6 +214,10 @@ pub fn freeze_planes<F: DeformationField, C: PlaneEntropy, S: ShModel>(
 
 /// The input for the codec to compress a scene, with the attribute steps of the configuration. `data` is the scene as
 /// plain arrays.
+///
+/// # Errors
+/// [`TrainError::Config`] if the configuration has a step for an attribute that the Gaussians do not have;
+/// [`TrainError::Codec`] if the codec refuses a model of the planes or of the spherical harmonics.
 pub fn compression_input<F: DeformationField, C: PlaneEntropy, S: ShModel>(
     compression: &mut Compression<C, S>,
     scene: &DynamicScene<F>,
@@ -319,8 +325,8 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 }
 
-/// Whether the `compact` profile codes spherical harmonics without this model: what neighbors tell about them is worth more
-/// than a density that is the same for all Gaussians.
+/// Whether the `compact` profile codes spherical harmonics without this model: prediction from neighbors saves more than a
+/// density that is the same for all Gaussians.
 pub(super) fn is_superseded(sh: &impl ShModel) -> bool {
     sh.tables().is_some()
 }

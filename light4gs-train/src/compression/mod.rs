@@ -1,15 +1,25 @@
 //! The entropy models of a scene, and the rate in the loss that follows from them (paper III-C to III-E).
 //!
+//! | task | use |
+//! |---|---|
+//! | make the file of a trained scene | [`code_scene`], or `Trainer::encode`, which calls it |
+//! | make the file with models and steps at hand, without a configuration of a run | [`encode`] |
+//! | put the rate into a loss of your own | [`Compression::noisy`], then [`Compression::rate`] |
+//! | train models of your own | [`EntropyModels`] |
+//! | fit models to a scene that was trained without them | [`fit`](fn@fit) |
+//!
+//! The files:
+//!
 //! - this file: the entropy models and the quantization steps that are trained beside a scene
 //! - `models`: the choice of entropy models
 //! - `rate`: noise in place of rounding, and the estimated size of the file
 //! - `fit`: models for a scene that was trained without them
 //! - `encoder`: from a scene and its models to the bytes of a file
 //! - `code_scene`: from a trained scene to a file, with a record of expected and written bits
-//! - `attribute_bits`: expected and written bits of each attribute, and how the first follow the second
+//! - `attribute_bits`: expected and written bits of each attribute; corrects the first by the second
 //! - `attribute_step_search`: the coarsest steps of the other attributes
 //! - `plane_and_sh_step_search`: the coarsest steps of planes and harmonics that were trained without noise
-//! - `step_factor`, `quality`: a file of a wished size or quality; what the quality is
+//! - `step_factor`, `quality`: a file of a wished size or quality, and the measurement of the quality
 
 mod attribute_bits;
 mod attribute_step_search;

@@ -18,7 +18,7 @@ pub fn measured_views(data: &Scene) -> &[Frame] {
 /// Mean PSNR over views, dB, of 8-bit renderings as an evaluation measures it. `device` is one without autodiff.
 ///
 /// # Errors
-/// An image that cannot be read.
+/// [`TrainError::Model`] if `F` cannot be made from `data`; [`TrainError::Data`] for an image that cannot be read.
 pub fn mean_psnr<'f, F: DeformationField>(
     data: &SceneData,
     views: impl IntoIterator<Item = &'f Frame>,

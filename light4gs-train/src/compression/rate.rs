@@ -122,8 +122,8 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
     }
 
     /// Estimates the rate on a random share of the planes and of the Gaussians. It is unbiased: over many draws, the
-    /// mean is the rate of everything. `places` are what the noisy positions say
-    /// ([`light4gs_model::AttributeEntropy::places`]); without them it looks itself, for which a GPU waits.
+    /// mean is the rate of everything. `places` are those of the noisy positions
+    /// ([`light4gs_model::AttributeEntropy::places`]). With `None` they are read here, and the host waits for the GPU.
     pub fn rate<F: DeformationField>(
         &self,
         noisy: &NoisyScene<F>,
@@ -155,7 +155,7 @@ impl<C: PlaneEntropy, S: ShModel> Compression<C, S> {
             let rows: Vec<i64> = rows.into_iter().map(i64::from).collect();
             let rows = Tensor::<1, Int>::from_data(TensorData::new(rows, [count]), &sh_rest.device());
             let known = match sh.tables() {
-                // Models with tables need none of these, and what is not computed does not stay on the tape.
+                // Models with tables need none of these; values that are not computed do not stay on the tape.
                 Some(_) => ShKnown::nothing(&rows.device()),
                 None => known(scene, planes, Some(rows.clone())),
             };
@@ -197,8 +197,8 @@ impl<F: DeformationField> NoisyScene<F> {
         self.steps.as_ref().is_some_and(|steps| steps.of(0).is_require_grad())
     }
 
-    /// The gradients of a backward pass for the steps, each `[1]`; `None` for steps that are not learned, or that it
-    /// does not depend on. The part through the noise is not included.
+    /// The gradients of a backward pass for the steps, each `[1]`, without the part through the noise. `None` for steps
+    /// that are not learned, and for those on which the loss does not depend.
     pub fn step_gradients(&self, gradients: &Gradients) -> Vec<Option<Tensor<1>>> {
         let planes = 0..self.scene.planes().map_or(0, |planes| planes.planes.len());
         planes.map(|plane| self.steps.as_ref()?.of(plane).grad(gradients)).collect()

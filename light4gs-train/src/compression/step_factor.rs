@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::TrainError;
 
-/// Steps become finer by at most this factor: beyond it, more bytes show nothing.
+/// Steps become finer by at most this factor: more bytes than that do not show.
 const FINEST: f32 = 0.25;
 /// Steps become coarser by at most this factor: beyond it, nothing can be recognized.
 const COARSEST: f32 = 16.0;
@@ -21,12 +21,12 @@ const ABOVE: f64 = 0.01;
 /// Files that are tried: the factor is then known to 0.1 %.
 const TRIES: usize = 12;
 
-/// A quality that a file does not have although it was wished, dB.
+/// A wished quality that a file does not reach, PSNR in dB.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MissedQuality {
-    /// What was wished.
+    /// The wished PSNR.
     pub wished: f64,
-    /// What the file with the finest steps has.
+    /// The PSNR of the file with the finest steps.
     pub reached: f64,
 }
 
@@ -44,7 +44,7 @@ impl fmt::Display for MissedQuality {
 
 /// A file, and how it was made. It has not been verified.
 pub(super) struct ScaledFile {
-    /// By how much steps are coarser than the given ones.
+    /// The steps, divided by the given ones.
     pub(super) factor: f32,
     /// The coding of the harmonics with these steps.
     pub(super) sh: ShCoding,
@@ -56,7 +56,7 @@ impl ScaledFile {
     /// The file with the given steps.
     ///
     /// # Errors
-    /// What the codec refuses.
+    /// A scene or coding that the codec refuses.
     pub(super) fn unscaled(compressor: &Compressor, given: &CompressionInput) -> Result<Self, CodecError> {
         let encoded = compressor.encode(&given.attributes, &given.sh)?;
         Ok(Self { factor: 1.0, sh: given.sh.clone(), encoded })
@@ -78,7 +78,7 @@ impl ScaledFile {
     }
 }
 
-/// What a try says about the factor.
+/// The verdict on a factor that was tried.
 enum Verdict {
     /// The file is as wished; one with finer or coarser steps may be better.
     Fits { coarser: bool, well: bool },
@@ -89,7 +89,8 @@ enum Verdict {
 /// The largest file of at most `target` bytes.
 ///
 /// # Errors
-/// What the codec refuses, and a scene that takes more bytes even with the coarsest steps.
+/// [`TrainError::Codec`] if the codec refuses the scene; [`TrainError::Input`] if it takes more bytes even with the coarsest
+/// steps.
 pub(super) fn encode_to_size(
     compressor: &Compressor,
     given: &CompressionInput,
@@ -113,11 +114,11 @@ pub(super) fn encode_to_size(
     })
 }
 
-/// The smallest file whose decoded scene has at least `target` dB; `psnr` measures one. If none has, the one with the finest
-/// steps, and what it has.
+/// The smallest file whose decoded scene has at least `target` dB; `psnr` measures a scene. If no file has that, the one with
+/// the finest steps, and its quality.
 ///
 /// # Errors
-/// What the codec refuses, and what `psnr` returns.
+/// [`TrainError::Codec`] if the codec refuses the scene; the error of `psnr`.
 pub(super) fn encode_to_quality(
     compressor: &Compressor,
     given: &CompressionInput,

@@ -1,5 +1,5 @@
-//! The keys of the configuration that concern the attributes of the Gaussians: numbers by the attributes' names, in place
-//! of those in the table of attributes.
+//! Keys with a number for each attribute of the Gaussians, by its name. They replace the numbers in the table of
+//! attributes.
 
 use light4gs_codec::attributes::AttributeSteps;
 use light4gs_keys::{ByName, nearest};

@@ -12,15 +12,15 @@ keys! {
     /// The form of the file, and what is trained to make it small (paper III-C to III-E,
     /// [design](design.md#compression)).
     pub struct CompressionConfig {
-        /// What is quantized and entropy coded.
+        /// The parts of the file that are quantized and entropy coded.
         profile: FileProfile = FileProfile::Compact;
             FileProfile::BOUNDS,
             "ours; paper";
-        /// The file has at most so many bytes, and hardly fewer: the weight of the rate follows while training, and at last
-        /// the steps of the attributes. 0: lambda and steps alone say how large it becomes.
+        /// The most bytes of the file, of which it uses nearly all: training adapts the weight of the rate, and the encoder
+        /// adapts the steps of the attributes. 0: no bound; the size follows from lambda and the steps.
         target_bytes: usize = 0; Whole { least: 0, most: 1_000_000_000_000 }, "ours";
-        /// The decoded file has at least this PSNR on the test views (on those of training where there are none), and is hardly
-        /// better: as with `target_bytes`, weight and steps follow. 0: no such wish.
+        /// The least PSNR of the decoded file on the test views (on the training views if there are none), in dB. The file is
+        /// hardly better than that: weight and steps are adapted as with `target_bytes`. 0: no bound.
         target_db: f64 = 0.0; DECIBELS, "ours";
         /// Layers of Gaussians in the file, the most significant ones first: with more than 1 a player shows a coarse scene
         /// after the first few bytes. Each layer has twice as many as the one before. More layers take some percent more
@@ -43,7 +43,7 @@ keys! {
 }
 
 choice! {
-    /// What is entropy coded in a file.
+    /// The parts of a file that are entropy coded.
     pub enum FileProfile: "profile" {
         /// Everything.
         Compact = "compact",
@@ -72,7 +72,7 @@ keys! {
         /// the finished scene.
         lambda: f64 = 0.0;
             WEIGHT, "ours; the reference's log of *bouncing balls* has 0.001 per symbol";
-        /// What lambda weighs.
+        /// The unit of the rate that lambda multiplies.
         weighting: RateWeighting = RateWeighting::Megabytes;
             RateWeighting::BOUNDS, "ours; paper";
         /// The rate of the planes has a gradient with respect to the planes. Off: their entropy model is trained, but
@@ -85,7 +85,7 @@ keys! {
         /// Spherical harmonics of degree 1 or 2 are among them. Off: the encoder searches for their steps. Only the
         /// `compact` profile quantizes them in the file; the `paper` profile quantizes only the spherical harmonics.
         attributes: bool = false; Flag, "ours, after HAC++";
-        /// What a megabyte of these attributes weighs in the loss.
+        /// Weight of a megabyte of these attributes in the loss.
         attribute_lambda: f64 = 0.03; WEIGHT, "ours";
         /// Iterations from one that has the rate in its loss to the next such iteration.
         interval: usize = 3; Whole { least: 1, most: 1000 }, "paper";
@@ -102,7 +102,7 @@ keys! {
 }
 
 choice! {
-    /// What `compression.rate.lambda` weighs.
+    /// The unit of the rate that `compression.rate.lambda` multiplies.
     pub enum RateWeighting: "weighting" {
         /// Megabytes (10^6 bytes) of the file, so that one lambda trades bytes for distortion.
         Megabytes = "megabytes",
@@ -114,7 +114,7 @@ choice! {
 keys! {
     /// Parts and sizes of the context model.
     pub struct ContextTraining {
-        /// What it is.
+        /// Its parts and sizes.
         #[serde(flatten)]
         model: ContextConfig;
         /// Learning rate of the context model at the first step.
@@ -132,7 +132,7 @@ keys! {
         /// The steps at the start.
         #[serde(flatten)]
         initial: AdaptiveQuantizationConfig;
-        /// The steps are learned: they become coarser than at the start where that pays, but not finer, which would help
+        /// The steps are learned. They become coarser than at the start where that pays, but never finer: finer steps help
         /// training frames only ([results](results/hexplane.md#learned-quantization-steps)).
         adaptive: bool = true; Flag, "paper; dropped by the reference";
         /// Iteration of the fine stage from which the steps are learned.
@@ -148,7 +148,7 @@ keys! {
 keys! {
     /// The model of the spherical harmonics beyond degree 0.
     pub struct ShTraining {
-        /// What it is.
+        /// The model and its step.
         #[serde(flatten)]
         entropy: ShConfig;
         /// Learning rate of that model, and of the densities of other attributes, at the first step.
@@ -193,7 +193,7 @@ keys! {
 fn bits(precision: WeightPrecision) -> u8 {
     match precision {
         WeightPrecision::Bits(bits) => bits,
-        // With so many bits nothing that matters is lost.
+        // At this precision rounding loses nothing that matters.
         WeightPrecision::Step(_) => MOST_WEIGHT_BITS,
     }
 }

@@ -33,7 +33,7 @@ keys! {
         memory_limit_mib: u64 = 2048; Whole { least: 16, most: 1 << 24 }, "ours";
         /// Number of Gaussians at the start, where the dataset has no point cloud.
         initial_points: usize = 2000; Whole { least: 4, most: MOST_GAUSSIANS }, "reference, D-NeRF";
-        /// They are scattered in a cube that reaches from minus this to plus this on every axis, in world units.
+        /// Half the side of the cube around the origin in which they are scattered, world units.
         initial_box: f32 = 1.3; Number { least: 1e-6, most: 1e6 }, "reference, D-NeRF";
     }
 }

@@ -44,7 +44,7 @@ pub enum ConfigError {
         origin: Origin,
         /// Line, from 1, where known.
         line: Option<usize>,
-        /// What the parser says.
+        /// The message of the parser.
         message: String,
     },
     /// A key that does not exist.
@@ -68,7 +68,7 @@ pub enum ConfigError {
         line: Option<usize>,
         /// Full path of the key.
         key: String,
-        /// What the key holds.
+        /// The type of the key's values.
         expected: String,
         /// What was given.
         found: String,
@@ -78,7 +78,7 @@ pub enum ConfigError {
     Value {
         /// Where.
         origin: Origin,
-        /// What the deserializer says, with the key.
+        /// The message of the deserializer, with the key.
         message: String,
     },
     /// A preset that does not exist.
@@ -114,7 +114,7 @@ pub enum ConfigError {
     Override {
         /// The override.
         text: String,
-        /// What is wrong with it.
+        /// The fault.
         message: String,
     },
     /// Values out of range.

@@ -7,7 +7,7 @@ use light4gs_keys::Bounds::{Flag, List, Text, Whole};
 use light4gs_keys::{ITERATION, choice, keys};
 
 keys! {
-    /// What is measured, on the decoded file.
+    /// Measurements of the decoded file.
     pub struct EvalConfig {
         /// Splits to measure. A split that the dataset does not have is skipped.
         splits: Vec<EvalSplit> = vec![EvalSplit::Test, EvalSplit::Val];

@@ -63,15 +63,15 @@ keys! {
         /// number), `wgpu:discrete`, `wgpu:integrated`, `wgpu:cpu` (software driver).
         device: DeviceName = DeviceName::default();
             Parsed { names: DEVICES, also: "wgpu also with an adapter" }, "ours";
-        /// What is trained on.
+        /// The training data.
         data: DataConfig;
-        /// What is trained.
+        /// The model.
         model: ModelConfig;
-        /// How it is trained.
+        /// The training.
         train: TrainConfig;
-        /// How small it becomes.
+        /// The compression.
         compression: CompressionConfig;
-        /// How it is measured.
+        /// The measurements.
         eval: EvalConfig;
     }
 }
@@ -86,11 +86,21 @@ pub fn keys_as_markdown() -> String {
 
 impl Config {
     /// Reads a TOML file, with everything that it extends, and validates the result.
+    ///
+    /// # Errors
+    /// - [`ConfigError::Read`] for a file that cannot be read, [`ConfigError::Syntax`] for one that is not TOML
+    /// - [`ConfigError::UnknownKey`], [`ConfigError::WrongType`], [`ConfigError::Value`] for a key that does not exist, and
+    ///   for a value that does not fit
+    /// - [`ConfigError::UnknownPreset`], [`ConfigError::Cycle`] for a wrong `extends`
+    /// - [`ConfigError::Invalid`] for values out of range
     pub fn from_file(path: impl AsRef<Path>) -> Result<Self, ConfigError> {
         layers::resolve(&Origin::File(path.as_ref().to_path_buf()), &[], &[])
     }
 
     /// The built-in preset called `name` (see [`preset_names`]), validated.
+    ///
+    /// # Errors
+    /// [`ConfigError::UnknownPreset`] with the nearest name.
     pub fn from_preset(name: &str) -> Result<Self, ConfigError> {
         layers::resolve(&Origin::Preset(name.to_owned()), &[], &[])
     }
@@ -103,12 +113,16 @@ impl Config {
         presets::of_layout(layout.name()).ok_or_else(|| ConfigError::NoPreset { layout: layout.name() })
     }
 
-    /// What a command line gives: a preset's name or a file's path, and overrides as [`Overrides::parse`] takes them,
-    /// such as `train.fine_iterations=200`.
+    /// The configuration for the arguments of a command line: a preset's name or a file's path, and overrides as
+    /// [`Overrides::parse`] takes them, such as `train.fine_iterations=200`.
     ///
     /// A name without a folder and without `.toml` is a preset, unless only a file has that name. More presets or files
     /// may follow, each after a `+`, as in `dnerf-lego-cpu+medium`: they are laid on top in that order. The path of a
     /// file that exists may itself have a `+` in it.
+    ///
+    /// # Errors
+    /// As [`Config::from_file`] and [`Overrides::parse`]; [`ConfigError::LayerExtends`] if a name after a `+` extends
+    /// another configuration.
     pub fn load(name_or_path: &str, overrides: &[String]) -> Result<Self, ConfigError> {
         let mut names = layers::split(name_or_path).into_iter().map(|name| layers::named(name, None));
         let first = names.next().expect("splitting gives at least one part");
@@ -116,6 +130,9 @@ impl Config {
     }
 
     /// Reads a configuration from text, for example from a checkpoint. `origin` names it in errors.
+    ///
+    /// # Errors
+    /// As [`Config::from_file`].
     pub fn from_toml(text: &str, origin: &str) -> Result<Self, ConfigError> {
         layers::resolve_text(text, origin)
     }
@@ -123,7 +140,7 @@ impl Config {
     /// This configuration with overrides laid over it, validated.
     ///
     /// # Errors
-    /// A value that does not fit into its field, values out of range.
+    /// [`ConfigError::Value`] for a value that does not fit into its field, [`ConfigError::Invalid`] for values out of range.
     pub fn with(&self, overrides: &Overrides) -> Result<Self, ConfigError> {
         layers::lay_over(self, overrides)
     }
@@ -155,6 +172,9 @@ impl Config {
     }
 
     /// Checks every range. All problems are reported at once.
+    ///
+    /// # Errors
+    /// [`ConfigError::Invalid`] with all of them.
     pub fn validate(&self) -> Result<(), ConfigError> {
         validate::validate(self)
     }

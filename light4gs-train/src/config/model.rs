@@ -8,7 +8,7 @@ use light4gs_model::{
 };
 
 keys! {
-    /// What is trained.
+    /// The model: the Gaussians and their motion.
     pub struct ModelConfig {
         /// Highest degree of the spherical harmonics, 0 to 3.
         sh_degree: u8 = 3; Whole { least: 0, most: 3 }, "3DGS";

@@ -1,27 +1,27 @@
 //! A configuration for other images, another length of training or a file of a certain size: methods that change its
 //! values.
 //!
-//! What a user sets by hand wins. So either the overrides are laid over the result, or the method gets them and leaves
+//! Keys that a user sets by hand win. So either the overrides are laid over the result, or the method gets them and leaves
 //! their keys alone.
 
 use super::{Config, Overrides};
 use crate::density::gaussians_for_images;
 
-/// Bytes for each Gaussian that may be trained, with which a file has the next two values on the measured hull
-/// (docs/results.md, sizes). Fewer bytes come from fewer Gaussians and from a dearer byte together.
+/// Bytes of a file per Gaussian of `max_gaussians` at the reference point of the measured hull (docs/results.md, sizes). The
+/// formulas below give weight and pruning at `r` times these bytes: for a smaller file both are larger.
 const BYTES_A_GAUSSIAN: f64 = 6.4;
-/// Weight of a megabyte of attributes in the loss, and how it falls as there are more bytes.
+/// Weight of a megabyte of attributes in the loss: the first number times `r` to the power of the second.
 const MEGABYTE: (f64, f64) = (0.03, -2.0);
-/// Share of the Gaussians that a pass of pruning drops, and how it falls with the logarithm of the bytes; both bounded.
+/// Share of the Gaussians that a pass of pruning drops: the first number plus the second times `ln r`, within the bounds.
 const PRUNED: (f64, f64) = (0.3, -0.17);
 const PRUNED_BOUNDS: [f64; 2] = [0.1, 0.6];
 
 impl Config {
-    /// For images whose longer side has `pixels` pixels in place of those of this configuration: the resolution, and more
-    /// or fewer Gaussians. `longest` is the longer side of the images in their files; they are never enlarged.
+    /// For images whose longer side has `pixels` pixels: changes the resolution and the numbers of Gaussians. `longest` is
+    /// the longer side of the images in their files; they are never enlarged.
     ///
-    /// The numbers of Gaussians must be those that are meant for this configuration's resolution, and so without a
-    /// user's overrides: [`Config::with`] lays them over the result.
+    /// The numbers of Gaussians must fit this configuration's resolution. So it must not contain a user's overrides yet;
+    /// [`Config::with`] lays them over the result.
     pub fn for_pixels(&self, pixels: u32, longest: u32) -> Self {
         let mut config = self.clone();
         let before = f64::from(self.data.resolution.unwrap_or(longest));
@@ -34,8 +34,8 @@ impl Config {
         config
     }
 
-    /// For a file of at most `bytes`: how many Gaussians stay, and what a byte weighs at first. The trainer corrects the
-    /// weight as it goes. Keys that are set `by_hand` stay as they are.
+    /// For a file of at most `bytes`: sets the target, the share of pruned Gaussians, and the initial weight of a byte,
+    /// which the trainer corrects as it goes. Keys that are set `by_hand` stay as they are.
     pub fn for_target_bytes(&self, bytes: usize, by_hand: &Overrides) -> Self {
         let mut config = self.with_a_rate(by_hand);
         let Self { train, compression, .. } = &mut config;
@@ -48,7 +48,8 @@ impl Config {
             let weight = (MEGABYTE.0 * ratio.powf(MEGABYTE.1)).clamp(1e-4, 1.0);
             let lambda = &mut compression.rate.attribute_lambda;
             by_hand.unless_set("compression.rate.attribute_lambda", lambda, rounded(weight, 1e5));
-            // A short schedule of one's own may have left pruning, which is off, behind its end.
+            // In a short schedule of the user's, the iterations of pruning may lie behind its end. They are legal there only
+            // as long as pruning is off.
             if train.prune.iterations.iter().all(|pass| *pass <= train.fine_iterations) {
                 by_hand.unless_set("train.prune.fraction", &mut train.prune.fraction, rounded(pruned, 1e3));
             }
@@ -64,7 +65,7 @@ impl Config {
         config
     }
 
-    /// Without a rate in the loss, there is no weight that could follow a wish.
+    /// The configuration with a rate in the loss: a wish needs its weight.
     fn with_a_rate(&self, by_hand: &Overrides) -> Self {
         let mut config = self.clone();
         let lambda = &mut config.compression.rate.lambda;
@@ -145,7 +146,7 @@ mod tests {
         }
     }
 
-    /// What is legal stays legal at every length: pruning after densification, cloning after it has begun.
+    /// A legal configuration stays legal at every length: pruning after densification, cloning after it has begun.
     #[test]
     fn every_preset_can_be_longer_and_shorter() {
         for preset in preset_names() {

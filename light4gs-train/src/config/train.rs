@@ -91,13 +91,13 @@ keys! {
     }
 }
 
-/// Smaller images keep at least so many pixels on their shorter side, the size for which the presets' numbers were chosen. At
-/// 126 pixels, `neu3d_mini` lost a decibel.
+/// Least shorter side of a reduced image, pixels: the size for which the presets' numbers were chosen. At 126 pixels,
+/// `neu3d_mini` lost a decibel.
 const FEWEST_PIXELS: u32 = 200;
 
 impl CoarseToFineConfig {
-    /// Images of this camera have `1 / factor` of their width and height when this share of the fine stage is over; in
-    /// the coarse stage that is 0.
+    /// The number by which width and height of this camera's images are divided: 4, 2 or 1. `progress` is the share of
+    /// the fine stage that is over, 0 in the coarse stage.
     pub fn factor(&self, progress: f64, camera: &Camera) -> u32 {
         let most = camera.width.min(camera.height) / FEWEST_PIXELS;
         match () {

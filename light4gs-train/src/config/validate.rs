@@ -66,7 +66,7 @@ fn train(check: &mut Check, train: &TrainConfig) {
     });
 }
 
-/// What is there for a moment only needs a lifetime.
+/// Guided sampling adds Gaussians with a short life, so the attribute `lifetime` must be there.
 fn guided_sampling(check: &mut Check, config: &Config) {
     const KEY: &str = "train.guided_sampling.iterations";
     let (iterations, most) = (&config.train.guided_sampling.iterations, config.train.fine_iterations);
@@ -119,7 +119,8 @@ fn compression(check: &mut Check, compression: &CompressionConfig) {
         });
     }
     check.that("compression.target_db", !wishes.iter().all(|(_, wished)| *wished), || {
-        "is set beside compression.target_bytes; a file follows one of both, set the other to 0".to_owned()
+        "is set beside compression.target_bytes; a file can have only one of the two targets: set the other to 0"
+            .to_owned()
     });
     let float32 = compression.profile == FileProfile::Float32;
     check.that("compression.layers", compression.layers == 1 || !float32, || {

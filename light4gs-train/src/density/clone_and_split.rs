@@ -42,7 +42,8 @@ impl DensifyMasks {
     }
 }
 
-/// The least of the `count` largest gradients: a threshold that so many reach, or more if some are equal. Infinite for none, 0 for all.
+/// The `count`-th largest gradient, `count` from 1: a threshold that `count` Gaussians reach, or more if some gradients are
+/// equal. Infinite for a `count` of 0, and 0 if there are at most `count` gradients.
 pub fn least_of_largest(gradients: &[f32], count: usize) -> f32 {
     match count {
         0 => f32::INFINITY,

@@ -1,4 +1,7 @@
-//! Density strategies decide how many Gaussians there are: when they are cloned, split and pruned.
+//! Density strategies decide when Gaussians are cloned, split and pruned.
+//!
+//! For Gaussians that are added or removed by another rule, write a [`DensityStrategy`]; it changes them with a
+//! [`GaussianEditor`]. For another order of pruning alone, write a [`SignificanceScore`].
 //!
 //! - this file: [`DensityStrategy`], the trainer's interface to a strategy, and [`DensityKind`], the built-in ones by
 //!   name
@@ -74,13 +77,13 @@ pub trait DensityConfig {
     /// The last iteration of the fine stage after which Gaussians are added; 0 if they never are.
     fn end(&self) -> usize;
 
-    /// The most Gaussians that there may be with whole images, for the estimate of a training's time; `None` if they stay those of the
-    /// cloud, or nobody knows.
+    /// Upper bound of the number of Gaussians at whole images, for the estimate of the training time. `None` if it stays
+    /// that of the cloud, or if there is no bound.
     fn max_gaussians(&self) -> Option<usize> {
         None
     }
 
-    /// What is wrong with the keys as a whole, if anything: one of the keys, and the problem.
+    /// The fault of the keys as a whole, if there is one: one of the keys, and the problem.
     fn problem(&self) -> Option<(&'static str, String)> {
         None
     }
@@ -97,7 +100,7 @@ pub struct TrainingPosition {
     pub image_factor: u32,
     /// Extent of the scene, world units: 1.1 times the largest distance of a training camera from their mean.
     pub extent: f32,
-    /// Of the run.
+    /// Seed of the run.
     pub(crate) seed: u64,
 }
 
@@ -109,11 +112,11 @@ impl TrainingPosition {
     }
 }
 
-/// How the number of Gaussians grows with the side of the images. A surface seen at twice the size shows less than four
-/// times the detail; 1.4 makes 41 000 Gaussians at 480 pixels of 12 000 at 200, about what was chosen by hand.
+/// The number of Gaussians grows with the side of the images to this power: at twice the size, a surface shows less than
+/// four times the detail. From 12 000 Gaussians at 200 pixels it makes 41 000 at 480, about the number chosen by hand.
 const GAUSSIANS_BY_SIDE: f64 = 1.4;
 
-/// How many Gaussians show in images of `ratio` times the side what `count` show now; at least 1.
+/// The number of Gaussians for images of `ratio` times the side, if `count` suit the present ones; at least 1.
 pub(crate) fn gaussians_for_images(count: usize, ratio: f64) -> usize {
     (count as f64 * ratio.powf(GAUSSIANS_BY_SIDE)).round().max(1.0) as usize
 }
@@ -128,7 +131,7 @@ pub struct ViewStatistics {
     pub radii: Tensor<1, Int>,
 }
 
-/// Decides how many Gaussians there are. The trainer calls the hooks in this order in every iteration:
+/// Decides when Gaussians are added and removed. The trainer calls the hooks in this order in every iteration:
 /// [`after_backward`](Self::after_backward), the optimizer's step, [`after_step`](Self::after_step).
 ///
 /// A strategy keeps its own statistics. State that must be in checkpoints is returned by [`state`](Self::state) and set

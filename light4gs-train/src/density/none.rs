@@ -9,7 +9,7 @@ use super::{DensityConfig, DensityStrategy, GaussianEditor, TrainingPosition, Vi
 use crate::stage::Stage;
 
 keys! {
-    /// The Gaussians of the initial cloud are trained as they are: none comes, and none goes but by `train.prune`.
+    /// The Gaussians of the initial cloud are trained as they are: none is added, and only `train.prune` removes some.
     pub struct NoDensityControl {}
 }
 

@@ -17,7 +17,7 @@ keys! {
         iterations: Vec<usize> = vec![15_001, 20_000];
             List { element: &INTERVAL, length: None },
             "paper: mid-way and near the end";
-        /// What a pixel adds to the score of a Gaussian that it blends.
+        /// The addend of a pixel to the score of each Gaussian that it blends.
         score: PruneScore = PruneScore::Transmittance;
             PruneScore::BOUNDS, "paper; the reference sums the opacity";
         /// Factor of the volume V.
@@ -31,7 +31,7 @@ keys! {
 }
 
 choice! {
-    /// What a pixel adds to the significance of a Gaussian that it blends.
+    /// The addend of a pixel to the score of each Gaussian that it blends.
     pub enum PruneScore: "score" {
         /// Transmittance before the Gaussian times its opacity: the paper's.
         Transmittance = "transmittance",
@@ -86,7 +86,7 @@ impl GaussianContributions {
     }
 }
 
-/// Computes how much each Gaussian contributes to the training views; those with the smallest scores are pruned.
+/// Scores the contribution of each Gaussian to the training views. Those with the smallest scores are pruned.
 pub trait SignificanceScore: Send {
     /// `[N]`: the larger, the more it contributes. Must be finite.
     fn scores(&self, contributions: &GaussianContributions) -> Vec<f64>;

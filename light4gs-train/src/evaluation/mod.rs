@@ -111,12 +111,19 @@ pub struct DecodedScene<F: DeformationField = BuiltInField> {
 
 impl<F: DeformationField> DecodedScene<F> {
     /// Reads a file onto a device, within the default [`Limits`].
+    ///
+    /// # Errors
+    /// [`TrainError::Codec`] for a file that cannot be read, or that the codec refuses; [`TrainError::Model`] if `F` cannot
+    /// be made from its parts.
     pub fn open(path: &Path, device: &Device) -> Result<Self, TrainError> {
         Self::open_with_limits(path, &Limits::default(), device)
     }
 
     /// As [`DecodedScene::open`], within the given limits; for a file that you made yourself they may be
     /// [`Limits::large`].
+    ///
+    /// # Errors
+    /// As [`DecodedScene::open`].
     pub fn open_with_limits(path: &Path, limits: &Limits, device: &Device) -> Result<Self, TrainError> {
         let begin = Instant::now();
         let decode = |bytes: &[u8]| OpenStream::with_limits(bytes, limits)?.decode();
@@ -159,7 +166,13 @@ impl<F: DeformationField> DecodedScene<F> {
         count as f64 / begin.elapsed().as_secs_f64()
     }
 
-    /// Measures the splits that `eval` names (those that the dataset has).
+    /// Measures the splits that `eval` names (those that the dataset has). Also returns every rendered view.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`] for weights of LPIPS, an image or a mask that cannot be read.
+    ///
+    /// # Panics
+    /// If the dataset has neither test nor training frames.
     pub fn evaluate(
         &self,
         scene: &Scene,

@@ -18,8 +18,9 @@ use crate::run::RunFolder;
 /// rendered views. Returns the results and the views.
 ///
 /// # Errors
-/// A device that this machine does not have; a file, an image or a record of the run that cannot be read; a folder in
-/// which nothing can be written.
+/// - [`TrainError::Input`] for a device that this machine does not have, or a damaged record of the run
+/// - as [`DecodedScene::open`] for the run's file, and as [`DecodedScene::evaluate`] for images
+/// - [`TrainError::Data`] for a folder in which nothing can be written
 pub fn measure_run<F: DeformationField>(
     folder: &RunFolder,
     config: &Config,

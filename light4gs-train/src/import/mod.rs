@@ -39,7 +39,7 @@ impl ImportedScene {
     /// The configuration of a run with this model, starting from a base.
     ///
     /// # Errors
-    /// Sizes that a run cannot have, such as planes whose resolution is no multiple of 4.
+    /// [`TrainError::Config`] for sizes that a run cannot have, such as planes whose resolution is no multiple of 4.
     pub fn config(&self, base: &Config) -> Result<Config, TrainError> {
         let mut config = base.clone();
         let planes = HexPlaneConfig::of(&self.scene.field.hexplane).expect("what is imported has a hexplane");
@@ -69,7 +69,7 @@ impl ImportedScene {
     /// Writes a run that ends with this model. `encode` then makes the file, and `eval` measures it.
     ///
     /// # Errors
-    /// As [`ImportedScene::config`] and [`RunFolder::create`].
+    /// As [`ImportedScene::config`] and [`RunFolder::create`]; [`TrainError::Checkpoint`] for numbers that are not finite.
     pub fn write_run(
         self,
         root: &Path,

@@ -33,7 +33,8 @@ const TIME_MULTIPLE: usize = 4;
 /// taken.
 ///
 /// # Errors
-/// A file that is missing or damaged, by name; a network of another structure, by the name of the tensor that shows it.
+/// [`TrainError::Data`] with the file that is missing or damaged, or with the tensor that shows another structure of the
+/// network.
 pub fn read(folder: &Path, device: &Device) -> Result<ImportedScene, TrainError> {
     let folder = iteration_folder(folder)?;
     let settings = match find_settings(&folder) {

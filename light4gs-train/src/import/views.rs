@@ -21,7 +21,7 @@ const DISTANCE: f32 = 2.5;
 /// The scene as a dataset of cameras without images, which stand around the middle of the Gaussians and look at it.
 ///
 /// # Errors
-/// If there are no Gaussians.
+/// [`TrainError::Data`] if there are no Gaussians.
 pub fn scene_around(gaussians: &GaussianArrays, root: &Path, background: [f32; 3]) -> Result<Scene, TrainError> {
     let middle = |axis: usize| quantile(gaussians.means.iter().map(|mean| mean[axis]).collect(), 0.5);
     let center = Vec3::new(middle(0), middle(1), middle(2));

@@ -1,7 +1,8 @@
 //! Losses: how a rendered image is compared with the training image.
 //!
-//! - this file: [`Loss`], the trainer's interface to a loss, and [`LossKind`], the built-in ones by name
-//! - `photometric`: one file for each
+//! [`PhotometricLoss`] is built in: L1, D-SSIM, and the squared difference in the first iterations. Any function of a
+//! [`LossInput`] is a [`Loss`] too. [`LossKind`] has the built-in ones by name. For a term that does not compare images see
+//! [`regularizer`](crate::regularizer).
 
 mod photometric;
 

@@ -3,7 +3,7 @@
 use burn::tensor::Tensor;
 use light4gs_data::PixelMask;
 
-/// One pixel in this many is among the worst: 5 %.
+/// The worst pixels are one in 20: 5 %.
 const WORST_PART: usize = 20;
 
 /// `[H, W]` numbers, row-major.

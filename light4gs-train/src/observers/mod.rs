@@ -44,40 +44,58 @@ pub trait SceneInTraining {
     fn gaussians_at(&self, time: f32) -> GaussianTensors;
 }
 
-/// Is called when something happens in a run. By default every method does nothing. The trainer waits until it returns;
-/// an error ends the run.
+/// Is called when something happens in a run. By default every method does nothing. The trainer waits until it returns.
+/// An error of a method ends the run, and [`Trainer::step`](crate::trainer::Trainer::step) returns it.
 pub trait Observer: Send {
     /// A stage begins, or continues after `done` of its `iterations`.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_stage(&mut self, stage: Stage, done: usize, iterations: usize) -> Result<(), TrainError> {
         let _ = (stage, done, iterations);
         Ok(())
     }
 
     /// An iteration is over.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_step(&mut self, step: &StepReport, scene: &dyn SceneInTraining) -> Result<(), TrainError> {
         let _ = (step, scene);
         Ok(())
     }
 
     /// A line of metrics is due: every `train.log_interval` iterations, and at the end of a stage.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_log(&mut self, record: &MetricsRecord) -> Result<(), TrainError> {
         let _ = record;
         Ok(())
     }
 
     /// A checkpoint has been written.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_checkpoint(&mut self, path: &Path) -> Result<(), TrainError> {
         let _ = path;
         Ok(())
     }
 
     /// A stage has ended.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_stage_end(&mut self, stage: Stage) -> Result<(), TrainError> {
         let _ = stage;
         Ok(())
     }
 
     /// A warning about the training for the user.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_warning(&mut self, warning: &str) -> Result<(), TrainError> {
         let _ = warning;
         Ok(())
@@ -85,6 +103,9 @@ pub trait Observer: Send {
 
     /// Entropy models are being fitted to a finished scene that was trained without them; `done` of `iterations` are
     /// over.
+    ///
+    /// # Errors
+    /// Any error that should end the run.
     fn on_fit(&mut self, done: usize, iterations: usize) -> Result<(), TrainError> {
         let _ = (done, iterations);
         Ok(())

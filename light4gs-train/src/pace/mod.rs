@@ -1,9 +1,9 @@
-//! How long a training takes on this machine, from a dozen iterations of each kind.
+//! The time of a training on this machine, estimated from a dozen iterations of each kind.
 //!
 //! An iteration becomes slower as Gaussians are added, and slower again when it has a rate. So the run's own scene is
-//! trained for a moment in memory: with as many Gaussians as in the beginning, with as many as there may be and images of each size,
-//! and with the rate. They get the sizes that trained Gaussians have, on which the time depends more than on anything
-//! else. Nothing of it is kept.
+//! trained for a moment, in memory: with the Gaussians of the beginning, then with the most Gaussians at each size of the
+//! images, then with the rate. All Gaussians get the sizes of trained ones, since the time depends on these more than on
+//! anything else. Only the times are kept.
 
 mod typical_gaussians;
 
@@ -24,19 +24,19 @@ use typical_gaussians::TypicalGaussians;
 const COARSE: usize = 6;
 /// Iterations of the fine stage with the Gaussians of the beginning, and with all at each size of the images.
 const PLAIN: usize = 9;
-/// Every so many of the last iterations have the rate, however seldom it is due in the run.
+/// Iterations from one with the rate to the next, in the last part of the moment; in the run the rate may be rarer.
 const RATE_INTERVAL: usize = 3;
-// So that the last of every `RATE_INTERVAL` iterations after the plain ones has it.
+// The last of every `RATE_INTERVAL` iterations after the plain ones has the rate.
 const _: () = assert!(PLAIN.is_multiple_of(RATE_INTERVAL));
-/// So many of them are measured.
+/// Measured iterations with the rate.
 const RATE_ROUNDS: usize = 4;
-/// Training views that are looked at, spread over all of them: their images are decoded once.
+/// Training views of the moment, spread over all of them: their images are decoded once.
 const VIEWS: usize = 12;
-/// Rounds of cloning after which the most Gaussians are reached, as measured on `hypernerf_mini` (iteration 1200, rounds from 200
-/// on, one in 100 iterations).
+/// Rounds of cloning until the most Gaussians are reached, measured on `hypernerf_mini` (iteration 1200, rounds from 200 on,
+/// one in 100 iterations).
 const ROUNDS: f64 = 10.0;
-/// Under a squared loss gradients are small, so that few Gaussians are cloned. Of all that are added, a round adds this share,
-/// as measured on *dancer*, *flag*, *bouncing* and *lego* (0.4 to 0.8 in 38 rounds).
+/// Share of all added Gaussians that a round adds under a squared loss: its small gradients clone few. Measured on *dancer*,
+/// *flag*, *bouncing* and *lego* (0.4 to 0.8 in 38 rounds).
 const ADDED_UNDER_SQUARES: f64 = 0.016;
 /// The same once the squared loss has ended.
 const ADDED_AFTER_SQUARES: f64 = 0.2;
@@ -50,7 +50,7 @@ pub struct Pace {
     pub first: Iteration,
     /// One with the most Gaussians, at each of the run's image sizes; the last is that of whole images.
     pub full: Vec<Iteration>,
-    /// What a rate adds to an iteration after densification, in the mean, where every few of them have one.
+    /// Seconds that the rate adds to an iteration after densification: the mean over iterations with and without it.
     pub rate: f64,
     /// The most Gaussians that guided sampling adds at a time.
     pub guided: usize,
@@ -61,7 +61,7 @@ pub struct Pace {
 pub struct Iteration {
     /// Gaussians in it.
     pub gaussians: usize,
-    /// How long it takes.
+    /// Its duration.
     pub seconds: f64,
 }
 
@@ -100,7 +100,7 @@ impl Pace {
         Ok(Self { guided, ..Self::of(config, coarse, &fine) })
     }
 
-    /// From the seconds of a moment's coarse iterations, and its fine ones, without guided sampling.
+    /// From the seconds of the moment's coarse iterations, and from its fine ones. Guided sampling is left at 0.
     fn of(config: &Config, coarse: Vec<f64>, fine: &[Iteration]) -> Self {
         let (first, rest) = fine.split_at(PLAIN);
         let (sizes, rate) = rest.split_at(PLAIN * sizes(config).len());
@@ -111,15 +111,15 @@ impl Pace {
         let seconds = |iterations: Vec<(usize, &Iteration)>| {
             median(iterations.into_iter().map(|(_, iteration)| iteration.seconds).collect())
         };
-        // What one iteration with the rate takes beyond those with noise alone, and what the noise takes.
+        // The seconds of the rate, divided among the iterations of its interval, and those of the noise in each.
         let whole = full.last().expect("whole images are one of the sizes").seconds;
         let noisy = seconds(without);
         let rate = (seconds(with) - noisy) / config.compression.rate.interval as f64 + noisy - whole;
         Self { coarse: median(coarse), first: typical(first), full, rate: rate.max(0.0), guided: 0 }
     }
 
-    /// Seconds that the training of a configuration takes, without coding and measuring. It has the image sizes of that
-    /// which was measured.
+    /// Seconds that the training of a configuration takes, without coding and measuring. Its image sizes must be those of
+    /// the measured configuration.
     pub fn training_seconds(&self, config: &Config) -> f64 {
         let train = &config.train;
         let adaptive = &train.densify.strategies.adaptive;
@@ -136,7 +136,7 @@ impl Pace {
         let [from, until] = [adaptive.from, adaptive.until].map(|iteration| iteration.min(end) as f64);
         let squared = (train.losses.photometric.l2_until as f64).min(until);
         let interval = adaptive.interval.max(1) as f64;
-        // The share of the Gaussians to be added that an iteration has.
+        // The share of all Gaussians to be added that is there at an iteration.
         let reached = |iteration: f64| {
             let rounds = |since: f64, until: f64| ((iteration.min(until) - since) / interval).max(0.0);
             let reached = match squared > from {
@@ -163,7 +163,7 @@ impl Pace {
             let plain = (full.seconds + growth * (count - full.gaussians as f64)).max(0.0);
             if iteration >= rate_from as f64 { plain + rate * count / full_count.max(1) as f64 } else { plain }
         };
-        // A thousand samples say it as well as every iteration.
+        // A thousand samples are exact enough.
         let samples = end.clamp(1, 1000);
         let fine: f64 = (0..samples).map(|sample| seconds_at((sample as f64 + 0.5) / samples as f64)).sum();
         fine * end as f64 / samples as f64 + train.coarse_iterations as f64 * self.coarse
@@ -189,8 +189,8 @@ fn fine_iterations(config: &Config) -> usize {
     plain_iterations(config) + RATE_ROUNDS * RATE_INTERVAL
 }
 
-/// The configuration of the moment that is measured: the beginning of a training in which the expected bits are not
-/// corrected so early. That takes longer than an iteration, and a run does it a dozen times only.
+/// The configuration of the measured moment: the beginning of a training that is so long that the expected bits are not
+/// corrected yet. A correction takes longer than an iteration, and a run has only a dozen.
 fn moment_of(config: &Config) -> Config {
     let mut moment = config.clone();
     let train = &mut moment.train;

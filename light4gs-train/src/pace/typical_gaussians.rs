@@ -1,5 +1,5 @@
-//! Gaussians as a training leaves them, made without one: so many, and together so large, that what is seen lies under as
-//! much of them.
+//! Gaussians with the number and the sizes of trained ones, without a training: the most that the run may have, of such a
+//! size that the visible pixels are covered by [`DEPTH`] layers of disks.
 
 use std::collections::BTreeMap;
 
@@ -14,15 +14,16 @@ use crate::density::{DensityStrategy, GaussianEditor, TrainingPosition, ViewStat
 use crate::error::TrainError;
 use crate::stage::Stage;
 
-/// Disks of one standard deviation that lie over each other where something is seen, in the mean, all Gaussians counted.
+/// Mean number of disks over a pixel that shows something. The disk of a Gaussian has a radius of one standard deviation.
 const DEPTH: f64 = 3.0;
 /// Images in which the pixels that show something are counted.
 const COUNTED: usize = 4;
-/// No Gaussian is nearer to a camera than this share of the scene's extent: one beside a camera would have no size at all.
+/// Least distance of a Gaussian from a camera as a share of the scene's extent: beside a camera it would have no size.
 const NEAREST: f32 = 1e-3;
 
-/// The density of a timed moment: after the first iteration the Gaussians are as small as trained ones, and half opaque. After
-/// the first one with each size of the images there are as many as the run may have for it, and smaller.
+/// The density strategy of a timed moment. After the first iteration it makes the Gaussians as small as trained ones, and
+/// half opaque. After the first iteration at each size of the images it adds Gaussians, up to the most that the run may
+/// have at this size, and makes all of them smaller.
 pub(super) struct TypicalGaussians {
     cameras: Vec<Eye>,
     /// Pixels of a whole image that show something, in the mean.
@@ -37,7 +38,7 @@ pub(super) struct TypicalGaussians {
     nearest: f32,
 }
 
-/// What a camera makes of lengths.
+/// A camera, as far as the sizes of Gaussians in its image depend on it.
 struct Eye {
     center: Vec3,
     /// Pixels of a whole image.
@@ -45,7 +46,7 @@ struct Eye {
 }
 
 impl TypicalGaussians {
-    /// Of a run's scene, in a moment that has `interval` iterations with each size of the images and adds no Gaussians
+    /// For the scene of a run. The moment has `interval` iterations with each size of the images, and adds no Gaussians
     /// after iteration `until`.
     pub(super) fn new(config: &Config, data: &Scene, interval: usize, until: usize) -> Result<Self, TrainError> {
         let most = config.train.densify.chosen().max_gaussians().unwrap_or(0);
@@ -141,7 +142,7 @@ mod tests {
         TypicalGaussians { cameras, seen, most: 10, interval: 3, until: 9, nearest: 1e-3 }
     }
 
-    /// Wherever they are, and however many: their disks have a few times the area of what is seen.
+    /// The disks have a few times the visible area, wherever the Gaussians are and however many there are.
     #[test]
     fn gaussians_cover_what_is_seen() {
         let seen = 5000.0;

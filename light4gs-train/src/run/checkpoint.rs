@@ -40,7 +40,7 @@ pub struct Checkpoint<F: DeformationField = BuiltInField, E: EntropyModels = Con
     pub iteration: usize,
     /// Seconds of training so far.
     pub seconds: f64,
-    /// By how much the rate counts more in the loss than the configuration says, where the file shall have a certain size; 1 else.
+    /// Factor of the configured weight of the rate, by which training reaches a wished size or quality; 1 without a wish.
     pub rate_weight: f64,
 }
 

@@ -1,4 +1,4 @@
-//! What differs between runs: program, machine and data, configuration, results.
+//! Differences between runs: program, machine and data, configuration, results.
 
 use std::path::{Path, PathBuf};
 
@@ -44,7 +44,7 @@ impl Comparison {
     /// Compares the runs, of which there must be at least one.
     ///
     /// # Errors
-    /// A folder that holds no run, or a damaged one.
+    /// [`TrainError::Input`] for a folder that holds no run, or a damaged one.
     pub fn new(runs: &[PathBuf]) -> Result<Self, TrainError> {
         let all = runs.iter().map(|run| leaves_of(run)).collect::<Result<Vec<_>, _>>()?;
         let part = |pick: fn(&RunLeaves) -> &Leaves| differences(&all.iter().map(pick).collect::<Vec<_>>());

@@ -217,7 +217,7 @@ impl RunFolder {
     /// it. Does nothing if that run's dataset differs from this one.
     ///
     /// # Errors
-    /// If the other folder holds no run; a file that cannot be read or written.
+    /// [`TrainError::Input`] if the other folder holds no run; [`TrainError::Data`] for a file that cannot be read or written.
     pub fn adopt(&self, other: &Path, data: &Scene) -> Result<(), TrainError> {
         let (other, trained_by, _) = Self::open(other)?;
         let dataset: Option<DatasetDigest> = other.read_json(DATASET)?;
@@ -251,7 +251,10 @@ impl RunFolder {
         self.path("scene.l4gs")
     }
 
-    /// Writes a file whole or not at all.
+    /// Writes a file of the folder, whole or not at all.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`] naming the file that cannot be written.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
         let path = self.path(name);
         Ok(write_atomically(&path, |file| file.write_all(bytes))?)
@@ -272,8 +275,8 @@ impl RunFolder {
             }
             let run = self.root.display();
             return Err(TrainError::Input(format!(
-                "the dataset {} is not what it was when the run {run} began: {}. Bring back what it was, or go on with what \
-                 it is by `light4gs resume {run} --accept-changed-dataset`",
+                "the dataset {} has changed since the run {run} began: {}. Restore it, or go on with the changed dataset by \
+                 `light4gs resume {run} --accept-changed-dataset`",
                 data.root.display(),
                 changes.join("; ")
             )));
@@ -282,6 +285,9 @@ impl RunFolder {
     }
 
     /// Reads a JSON file of the run that `resume` writes; `None` if it does not exist.
+    ///
+    /// # Errors
+    /// [`TrainError::Input`] for a damaged file; [`TrainError::Data`] for one that cannot be read.
     pub fn read_json<T: serde::de::DeserializeOwned>(&self, name: &str) -> Result<Option<T>, TrainError> {
         self.read_described(name, &format!("`light4gs resume {}` writes it anew", self.root.display()))
     }
@@ -302,7 +308,10 @@ impl RunFolder {
         }
     }
 
-    /// Writes pretty JSON.
+    /// Writes a value as indented JSON, whole or not at all.
+    ///
+    /// # Errors
+    /// As [`RunFolder::write`].
     pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), TrainError> {
         let mut text = serde_json::to_string_pretty(value).expect("plain data has a JSON form");
         text.push('\n');

@@ -1,8 +1,12 @@
 //! Samplers choose the training frames of an iteration.
 //!
-//! - this file: [`FrameSampler`], the trainer's interface to a sampler, and [`SamplerKind`], the built-in ones by name
-//! - `shuffled`, `widening_window`: one file each
-//! - `candidates`: the frames among which they choose
+//! | frames | sampler |
+//! |---|---|
+//! | any | [`Shuffled`], the default |
+//! | with objects that move too fast to be followed from one random time to another | [`WideningWindow`] |
+//! | by a rule of your own | a function of a [`BatchRequest`], or another [`FrameSampler`] |
+//!
+//! [`SamplerKind`] has the built-in ones by name. [`CandidateFrames`] lists the frames by time.
 
 mod candidates;
 mod shuffled;
@@ -44,7 +48,7 @@ pub struct BatchRequest<'a> {
     pub iteration: usize,
     /// Iterations of the stage.
     pub iterations: usize,
-    /// Of the run.
+    /// Seed of the run.
     pub(crate) seed: u64,
 }
 

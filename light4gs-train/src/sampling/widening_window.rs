@@ -8,9 +8,9 @@ use super::{BatchRequest, FrameSampler, Shuffled};
 use crate::stage::Stage;
 
 keys! {
-    /// Frames of a window of time that widens until it holds all. Fast objects then move little between what is known and
-    /// what is new. On request all times are seen first, so that the field finds where objects are: a survey. The coarse stage sees
-    /// what the fine stage begins with.
+    /// Frames of a window of time that widens until it holds all times. Fast objects then move little from the known times
+    /// to the new ones. A survey (`survey`) shows all times first, so that the field finds where objects are. The coarse
+    /// stage sees the times with which the fine stage begins.
     pub struct WideningWindow {
         /// The share of the fine stage for which all times are seen before the first window.
         survey: f64 = 0.0; SHARE, "ours";
@@ -24,13 +24,13 @@ keys! {
         open: f64 = 0.6; SHARE, "ours";
         /// The share of the draws that go to the newest times while the window widens.
         newest: f64 = 0.3; SHARE, "ours";
-        /// How many times on each side are the newest.
+        /// Number of times at each end of the window that count as the newest.
         newest_times: usize = 4; Whole { least: 1, most: 1_000_000 }, "ours";
     }
 }
 
 impl WideningWindow {
-    /// How far the window is open, between the first one (0) and all (1).
+    /// The opening of the window: 0 for the first window, 1 for all times.
     fn share(&self, request: &BatchRequest) -> f64 {
         let done = match request.stage {
             Stage::Coarse => 0.0,
@@ -56,7 +56,7 @@ impl WideningWindow {
         let first_half = 0.5 * (self.times as f64 - 1.0);
         let half = first_half + (center.max(end as f64 - center) - first_half).max(0.0) * self.share(request);
         let (first, last) = ((center - half).ceil().max(0.0) as usize, ((center + half).floor() as usize).min(end));
-        // A window between two times has none.
+        // A window that lies between two times holds neither: it takes the one before it.
         if first <= last { [first, last] } else { [last, last] }
     }
 

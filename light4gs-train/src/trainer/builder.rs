@@ -195,8 +195,11 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
     /// Begins a run.
     ///
     /// # Errors
-    /// A configuration out of range; a device that does not exist; a dataset without frames; logs that cannot be
-    /// opened; a folder into which another process writes.
+    /// - [`TrainError::Config`] for a configuration out of range
+    /// - [`TrainError::Input`] for a device that does not exist, a dataset without training frames, or one that has changed
+    /// - [`TrainError::Codec`], [`TrainError::Model`] for a scene that the encoder would refuse at the end
+    /// - [`TrainError::Data`] for logs that cannot be opened
+    /// - [`TrainError::RunInUse`] for a folder into which another process writes
     pub fn build(mut self) -> Result<Trainer<F, E>, TrainError> {
         let device = self.open_device()?;
         self.begin(device)

@@ -1,4 +1,4 @@
-//! What training learns from its file as it stands. One file for all that is due after an iteration.
+//! Corrections of the training by the file of its scene so far, which is encoded once for all of them.
 
 use light4gs_model::DeformationField;
 
@@ -8,7 +8,7 @@ use crate::dataset::scene_meta;
 use crate::error::TrainError;
 
 impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
-    /// Corrects the expected bits and the weight of the rate, where that is due. Neither changes the file.
+    /// Corrects the expected bits and the weight of the rate, where that is due. Neither changes the file of this scene.
     ///
     /// # Errors
     /// A test image that cannot be read.

@@ -20,9 +20,9 @@ use crate::stage::Stage;
 const LEAST_ERROR: f32 = 0.0075;
 /// Smallest alpha at which a pixel has a depth.
 const LEAST_ALPHA: f32 = 0.1;
-/// New Gaussians are a little nearer than what is seen, since they have to cover it.
+/// Depth of a new Gaussian as a share of the rendered depth: it has to cover the surface there.
 const SHARE_OF_DEPTH: f32 = 0.97;
-/// Standard deviations on the screen for new Gaussians that lie side by side, as a share of their distance, and its bounds in pixels.
+/// Standard deviation of a new Gaussian on the screen as a share of the mean distance to the next one; bounds in pixels.
 const SHARE_OF_DISTANCE: f32 = 0.6;
 const DEVIATIONS: [f32; 2] = [0.7, 4.0];
 /// Logit of their opacity.
@@ -67,8 +67,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(())
     }
 
-    /// Seeds at pixels of a frame, drawn by their squared differences: `first` in [0, 1) is where the first one of equally spaced
-    /// places in their running sum lies.
+    /// Seeds at pixels of a frame, drawn in proportion to their squared differences: at equal steps of the running sum. The
+    /// first is at `first` in [0, 1) of a step.
     fn seeds_of(&self, frame: &Frame, iteration: usize, first: f32, seeds: &mut Vec<Seed>) -> Result<(), TrainError> {
         // Without a tape, which would keep every view's tensors until the next backward pass.
         let scene = self.state.scene.valid();
@@ -217,7 +217,7 @@ mod tests {
         Trainer::builder(config(&KEYS).unwrap(), data).images(images).build().unwrap()
     }
 
-    /// What the scene shows at a time, `[SIZE, SIZE, 3]`.
+    /// The image of the scene at a time, `[SIZE, SIZE, 3]`.
     fn seen(trainer: &Trainer, time: f32) -> Vec<f32> {
         let scene = trainer.scene().valid();
         let camera = &trainer.data().train[0].camera;

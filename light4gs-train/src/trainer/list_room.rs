@@ -1,4 +1,4 @@
-//! Room for the lists of splats in the cells of an image: what a GPU would have to tell before the host can go on.
+//! Room for the lists of splats in the cells of an image. Without it the host would wait until the GPU tells their length.
 //!
 //! A step tells the number of splats when it reads its loss, so the next step reserves somewhat more and waits for nothing. A
 //! step is computed again if its lists did not fit, which is rare.

@@ -223,7 +223,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// entropy models, they are fitted first.
     ///
     /// # Errors
-    /// What the codec refuses, such as values that are not finite; an image that cannot be read.
+    /// As [`code_scene`]; [`TrainError::Stopped`] if that was requested; the error of an observer.
     pub fn encode(&mut self) -> Result<CodedScene, TrainError> {
         let trained = TrainedScene {
             scene: &self.state.scene,
@@ -416,7 +416,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     /// some quality. NaN for a split without views.
     ///
     /// # Errors
-    /// An image that cannot be read.
+    /// [`TrainError::Data`] for an image that cannot be read.
     pub fn psnr(&self, split: Split) -> Result<f64, TrainError> {
         let (stage, iteration) = self.position();
         self.mean_psnr(self.data.frames(split).iter(), stage, iteration)

@@ -1,4 +1,4 @@
-//! `--profile`: the time of each part of a training step on any back end, and how many threads are busy in it.
+//! `--profile`: the time of each part of a training step on any back end, and the number of busy threads in it.
 
 use std::cell::RefCell;
 use std::time::Instant;

@@ -79,7 +79,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         iteration >= from && self.density.is_over(Stage::Fine, iteration - 1)
     }
 
-    /// Begins to look at the noisy positions, where the rate is due and counts their bits.
+    /// Begins to read the noisy positions; `None` if the rate is not due, or does not include the Gaussians.
     pub(super) fn begin_places(&self, noisy: &NoisyScene<F>, iteration: usize) -> Option<Pending<GaussianPlaces>> {
         let due = iteration.is_multiple_of(self.config.compression.rate.interval);
         let attributes = self.state.compression.as_ref()?.attributes.as_ref()?;
@@ -107,7 +107,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
             return None;
         }
         let mut generator = generator(self.config.seed, Purpose::Rate, Stage::Fine, iteration);
-        // Not what was drawn before: a step may be computed again.
+        // Seeded here, so that a step that is computed again draws the same.
         seed_device(&self.device, self.config.seed, Purpose::Latents, Stage::Fine, iteration);
         let apart = (!config.planes || !config.sh).then(|| noisy.with_detached(!config.planes, !config.sh));
         let (noisy_or_apart, places) = (apart.as_ref().unwrap_or(noisy), places.map(Pending::wait));
@@ -162,9 +162,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
     }
 }
 
-/// A term whose gradient is the whole gradient of the steps: that of the rate (`direct`, by plane), and that through
-/// the noisy planes, which is the noise, in steps, times the gradient of the noisy planes. `None` where no step is
-/// learned.
+/// A term with the whole gradient of the steps: that of the rate (`direct`, by plane), plus that through the noisy planes,
+/// `Σ noise / step · gradient of the noisy plane`. `None` if no step is learned.
 fn steps_term<F: DeformationField, C: Module, S: Module>(
     noisy: &NoisyScene<F>,
     scene: &DynamicScene<F>,
@@ -190,8 +189,8 @@ fn steps_term<F: DeformationField, C: Module, S: Module>(
     terms.reduce(|sum, term| sum + term)
 }
 
-/// The gradient of the logarithms of the attributes' steps through the noise, `[A]`: the noise, which is in proportion
-/// to the step, times the gradient of the noisy values. `gradients` are those of views and rate.
+/// The gradient of the logarithms of the attributes' steps through the noise, `[A]`: `Σ noise · gradient of the noisy
+/// values`, since the noise is proportional to the step. `gradients` are those of views and rate.
 fn gradient_through_noise<F: DeformationField>(
     noisy: &NoisyScene<F>,
     scene: &DynamicScene<F>,

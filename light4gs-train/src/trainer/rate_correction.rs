@@ -1,4 +1,4 @@
-//! The bits that are expected of each attribute follow those that the coder writes.
+//! Corrects the expected bits of each attribute by those that the coder writes.
 
 use light4gs_codec::Encoded;
 use light4gs_model::DeformationField;

@@ -1,4 +1,4 @@
-//! The weight of the rate follows the size or the quality of the file, where the file shall have a certain one.
+//! Steers the weight of the rate so that the file gets a wished size or quality.
 
 use light4gs_codec::Encoded;
 use light4gs_model::DeformationField;
@@ -15,10 +15,11 @@ const POWER: f64 = 0.7;
 /// A correction multiplies the weight by this for each dB above the wished PSNR. A dB is a factor of 20 to 50 in the
 /// weight, which the scene follows slowly.
 const FACTOR_OF_A_DECIBEL: f64 = 2.0;
-/// A quality is steered to in this last share of the fine stage: before, a scene is not yet nearly as good as it will be.
+/// Share of the fine stage, at its end, in which the weight follows a wished quality. Before, the scene still becomes much
+/// better.
 const STEERED_BY_QUALITY: f64 = 0.4;
-/// The weight becomes smaller than the configured one in this last share only: until then a scene that is not good enough
-/// may still become so.
+/// Share of the fine stage, at its end, in which the weight may fall below the configured one. Before, a scene that is not
+/// good enough may still become so.
 const RELIEVED: f64 = 0.15;
 /// Every n-th view is measured, n = views / this, rounded down: a few views may be some tenths of a dB better or worse than all.
 const VIEWS: usize = 100;
@@ -54,7 +55,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(())
     }
 
-    /// The share of the fine stage after an iteration.
+    /// The share of the fine stage that is left after an iteration.
     fn share_left(&self, iteration: usize) -> f64 {
         1.0 - iteration as f64 / self.config.train.fine_iterations as f64
     }

@@ -18,7 +18,7 @@ use crate::regularizer::RegularizerInput;
 use crate::sampling::BatchRequest;
 use crate::stage::Stage;
 
-/// What a step has computed before anything changes.
+/// The results of a step before anything changes.
 struct Differentiated {
     views: Vec<View>,
     /// Of the loss with respect to all parameters.
@@ -28,8 +28,11 @@ struct Differentiated {
 }
 
 impl Differentiated {
-    /// The loss, and the intersections of each view. Together, since a GPU waits for each: this is all that a plain iteration
-    /// reads back from the device, and where it hears of an operation that failed.
+    /// Reads the loss and the number of intersections of each view, in one transfer: the host waits for each. A plain
+    /// iteration reads nothing else from the device.
+    ///
+    /// # Errors
+    /// An operation of the step that failed on the GPU.
     fn read(&self) -> Result<(f32, Vec<usize>), GpuError> {
         let read = Transaction::default().register(self.loss.clone());
         let read = self.views.iter().fold(read, |read, view| read.register(view.intersections.clone()));
@@ -89,7 +92,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
     }
 
-    /// The loss of a step with its gradients. The same again gives the same.
+    /// The loss of a step with its gradients. A second call gives the same result.
     fn differentiate(
         &self,
         stage: Stage,
@@ -101,8 +104,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let pass = self.view_pass(stage, iteration, indices.len());
         let pass = ViewPass { splatter: self.list_room.reserve(pass.splatter), ..pass };
         let seen = noisy.map_or(&self.state.scene, |noisy| &noisy.scene);
-        // On a processor the rate, which hardly occupies more than one thread, is differentiated beside the views. On a GPU
-        // only what it waits for is: the positions.
+        // On a processor the rate is differentiated beside the views, since it hardly occupies more than one thread. On a GPU
+        // only the positions are read beside them, for which the host would wait.
         let places = noisy.and_then(|noisy| self.begin_places(noisy, iteration));
         let rate = || noisy.and_then(|noisy| self.rate(noisy, places, iteration));
         let (mut views, rate) = pass.run(seen, &frames, &self.view_pools, &self.profile, rate)?;
@@ -149,7 +152,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         )))
     }
 
-    /// What the sampler is asked for an iteration.
+    /// The request to the sampler for an iteration.
     pub(super) fn batch_request(&self, stage: Stage, iteration: usize) -> BatchRequest<'_> {
         let train = &self.config.train;
         BatchRequest {

@@ -46,10 +46,10 @@ pub(super) struct Encode {
     /// steps that were learned in training are not used.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// The file has at most so many bytes, such as 300k or 2M, and hardly fewer: steps of attributes become coarser or finer.
+    /// The most bytes of the file, such as 300k or 2M; nearly all of them are used: the steps of attributes are adapted.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// The decoded file has at least this PSNR on the test views, dB, and is hardly larger than that takes.
+    /// The least PSNR of the decoded file on the test views, dB: the smallest file that has it is written.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
     /// Layers of Gaussians, the most significant ones first: with more than 1, such as 4, a player shows a coarse scene after the

@@ -55,7 +55,7 @@ enum Command {
     Resume(train::Resume),
     /// Measure the decoded file of a run: PSNR, SSIM, FPS, bytes by section.
     ///
-    /// Where the dataset has masks of what moves, PSNR and SSIM are also given for moving and for still pixels; docs/metrics.md
+    /// If the dataset has masks of moving pixels, PSNR and SSIM are also given for moving and for still pixels; docs/metrics.md
     /// explains every column.
     #[command(after_help = "Example:\n  light4gs eval runs/bouncing --json")]
     Eval(train::Eval),
@@ -109,6 +109,9 @@ enum Command {
 
 impl Cli {
     /// Runs the command.
+    ///
+    /// # Errors
+    /// The error of the command; [`TrainError::exit_code`] is the exit code for it.
     pub fn run(self) -> Result<(), TrainError> {
         match self.command {
             Command::Quickstart(command) => command.run(),

@@ -1,4 +1,4 @@
-//! `--pixels`, `--minutes`, `--target-bytes` and `--target-db`: what a user wishes, as changes of the configuration.
+//! `--pixels`, `--minutes`, `--target-bytes` and `--target-db`: wishes of a user, as changes of the configuration.
 
 use std::path::Path;
 
@@ -28,11 +28,11 @@ pub(super) struct Wishes {
     /// follows.
     #[arg(long, value_name = "NUMBER", value_parser = minutes)]
     minutes: Option<f64>,
-    /// The file shall have at most so many bytes, such as 300k or 2M, and hardly fewer. How many Gaussians stay, and what a
-    /// byte weighs in the loss, follow.
+    /// The most bytes of the file, such as 300k or 2M; nearly all of them are used. The number of Gaussians and the weight
+    /// of a byte in the loss follow.
     #[arg(long, value_name = "NUMBER", value_parser = bytes)]
     target_bytes: Option<usize>,
-    /// The decoded file shall have at least this PSNR on the test views, dB, and hardly more. What a byte weighs in the loss
+    /// The least PSNR of the decoded file on the test views, dB; it becomes hardly better. The weight of a byte in the loss
     /// follows, in the last part of training.
     #[arg(long, value_name = "NUMBER", value_parser = decibels, conflicts_with = "target_bytes")]
     target_db: Option<f64>,
@@ -42,6 +42,9 @@ impl Wishes {
     /// The configuration that presets, wishes and overrides give; the overrides win. Where the preset is `automatic`,
     /// the number of Gaussians follows the images even without a wish. Says how long the training will take, unless it
     /// is short or `quiet`.
+    ///
+    /// # Errors
+    /// A configuration or a dataset that cannot be used; a wish that cannot be met.
     pub(super) fn config(
         &self,
         preset: &str,
@@ -50,31 +53,53 @@ impl Wishes {
         automatic: bool,
         quiet: bool,
     ) -> Result<Config, TrainError> {
-        let mut config = Config::load(preset, overrides)?;
+        let config = Config::load(preset, overrides)?;
         let by_hand = Overrides::parse(overrides)?;
-        if let Some(pixels) = self.pixels.or(config.data.resolution.filter(|_| automatic)) {
-            // Without overrides, which may name a number of Gaussians that is meant for this size.
-            let presets = Config::load(preset, &[])?;
-            let longest = longest_side(&Scene::open(scene, &load_options(&config))?);
-            config = presets.for_pixels(pixels, longest).with(&by_hand)?;
-        }
+        let config = self.sized(config, preset, &by_hand, scene, automatic)?;
+        let config = self.targeted(config, &by_hand)?;
+        self.timed(config, &by_hand, scene, quiet)
+    }
+
+    /// The configuration for the wished size of the images.
+    fn sized(
+        &self,
+        config: Config,
+        preset: &str,
+        by_hand: &Overrides,
+        scene: &Path,
+        automatic: bool,
+    ) -> Result<Config, TrainError> {
+        let Some(pixels) = self.pixels.or(config.data.resolution.filter(|_| automatic)) else { return Ok(config) };
+        // Without overrides, which may name a number of Gaussians that is meant for this size.
+        let presets = Config::load(preset, &[])?;
+        let longest = longest_side(&Scene::open(scene, &load_options(&config))?);
+        Ok(presets.for_pixels(pixels, longest).with(by_hand)?)
+    }
+
+    /// The configuration for the wished size or quality of the file, validated.
+    fn targeted(&self, mut config: Config, by_hand: &Overrides) -> Result<Config, TrainError> {
         if let Some(bytes) = self.target_bytes {
-            config = config.for_target_bytes(bytes, &by_hand);
+            config = config.for_target_bytes(bytes, by_hand);
         }
         if let Some(quality) = self.target_db {
-            config = config.for_target_db(quality, &by_hand);
+            config = config.for_target_db(quality, by_hand);
         }
         config.validate()?;
+        Ok(config)
+    }
+
+    /// The configuration for the wished length of the training. Measures this machine if the length is wished, or is to be
+    /// announced.
+    fn timed(&self, mut config: Config, by_hand: &Overrides, scene: &Path, quiet: bool) -> Result<Config, TrainError> {
         let estimated = !quiet && config.train.coarse_iterations + config.train.fine_iterations >= FEWEST_ESTIMATED;
         if self.minutes.is_none() && !estimated {
             return Ok(config);
         }
-
         let data = Scene::open(scene, &load_options(&config))?;
         let camera = data.train.first().map(|frame| frame.camera);
         let pace = Pace::measure(&config, data)?;
         if let Some(minutes) = self.minutes {
-            config = in_minutes(minutes, &pace, |factor| config.for_schedule(factor, &by_hand))?;
+            config = in_minutes(minutes, &pace, |factor| config.for_schedule(factor, by_hand))?;
             config.validate()?;
         }
         if !quiet && let Some(camera) = camera {
@@ -89,7 +114,11 @@ fn longest_side(data: &Scene) -> u32 {
     data.train.iter().map(|frame| frame.source_width.max(frame.source_height)).max().unwrap_or(0).max(1)
 }
 
-/// Of the schedules that `scaled` gives for a factor, the one whose training takes this many minutes.
+/// The schedule whose training takes this many minutes; `scaled` gives the configuration with a schedule `factor` times as
+/// long.
+///
+/// # Errors
+/// [`TrainError::Input`] if even the shortest schedule takes longer, or the longest one less.
 fn in_minutes(minutes: f64, pace: &Pace, scaled: impl Fn(f64) -> Config) -> Result<Config, TrainError> {
     let minutes_of = |factor: f64| pace.training_seconds(&scaled(factor)) / 60.0;
     let [least, most] = [SHORTEST, LONGEST].map(minutes_of);
@@ -99,8 +128,8 @@ fn in_minutes(minutes: f64, pace: &Pace, scaled: impl Fn(f64) -> Config) -> Resu
              between them, or another --pixels"
         )));
     }
-    // Not in proportion: in a short schedule there is no time for as many Gaussians. So it is bisected, in the
-    // logarithm, until the factor is known to a thousandth.
+    // The time is not proportional to the factor: in a short schedule fewer Gaussians are added. So the logarithm of the
+    // factor is bisected, until the factor is known to a thousandth.
     let [mut below, mut above] = [SHORTEST, LONGEST];
     while above / below > 1.001 {
         let middle = (below * above).sqrt();

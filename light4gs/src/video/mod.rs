@@ -133,7 +133,7 @@ fn with_alpha(frame: RgbImage8) -> io::Result<RgbaImage> {
     RgbaImage::from_raw(frame.width, frame.height, pixels).ok_or_else(|| io::Error::other("a frame lacks pixels"))
 }
 
-/// How long frame `index` is shown, in whole hundredths of a second that on average give the rate.
+/// The time for which frame `index` is shown: whole hundredths of a second, whose mean gives the rate.
 fn delay(index: usize, fps: f32) -> Delay {
     let end = |count: usize| (count as f64 * 100.0 / f64::from(fps)).round() as u32;
     Delay::from_numer_denom_ms((end(index + 1) - end(index)) * 10, 1)

@@ -19,7 +19,7 @@ use rand_chacha::ChaCha8Rng;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 
-/// Gaussians of the scene: as many as the paper keeps of *bouncing balls*.
+/// Gaussians of the scene: the number that the paper keeps of *bouncing balls*.
 const GAUSSIANS: usize = 12_000;
 
 /// Best time of one part.
@@ -59,6 +59,9 @@ fn scene(config: &Config, device: &Device) -> DynamicScene {
 }
 
 /// Times every coder; each time is the best of `repeats`.
+///
+/// # Errors
+/// [`TrainError::Input`] if this build has no back end.
 pub fn codec_benchmark(repeats: usize) -> Result<Vec<CoderTime>, TrainError> {
     let device = light4gs_train::device::any()?;
     let config = Config::from_preset("dnerf")?;

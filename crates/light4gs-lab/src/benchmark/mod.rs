@@ -76,6 +76,9 @@ impl BenchScene {
 
     /// Reads a scene file: `means`, `log_scales`, `quats_wxyz`, `raw_opacities`, `sh_coeffs`, `background`,
     /// `image_wh`, `K`, `viewmat` (see `docs/benchmarks.md`).
+    ///
+    /// # Errors
+    /// [`TrainError::Data`] for a file that cannot be read, or with the tensor that is missing or has another type or shape.
     pub fn open(path: &Path) -> Result<Self, TrainError> {
         let bytes =
             std::fs::read(path).map_err(|source| DataError::Io { action: "read", path: path.to_owned(), source })?;
@@ -177,12 +180,12 @@ impl BenchScene {
 pub struct Timing {
     /// Its name.
     pub name: String,
-    /// What it takes.
+    /// Its cost.
     #[serde(flatten)]
     pub cost: Cost,
 }
 
-/// What a part takes.
+/// The cost of a part.
 #[derive(Clone, Debug, Serialize)]
 pub struct Cost {
     /// Median over the repetitions.
@@ -222,7 +225,7 @@ struct Meter<'a> {
 }
 
 impl Meter<'_> {
-    /// What `run` takes; `prepare` does not count.
+    /// The cost of `run`; `prepare` does not count.
     fn measure<T, R>(&self, mut prepare: impl FnMut() -> T, mut run: impl FnMut(T) -> R) -> Cost {
         let mut times = Vec::with_capacity(self.repeats);
         let mut launches = BTreeMap::new();
@@ -249,7 +252,8 @@ fn median_of(mut times: Vec<f64>) -> f64 {
     times[times.len() / 2]
 }
 
-/// Gaussians and nodes in a box, a node's radius 0.6 times what would fill it; with gradients on a device that records them.
+/// `count` Gaussians and `nodes` nodes in a box `[-1, 1]³`, with gradients on an autodiff device. The radius of a node is 0.6
+/// of the side of a cube that has the node's share of the box.
 pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningInputs {
     let leaf = |tensor: Tensor<2>| if device.is_autodiff() { tensor.require_grad() } else { tensor };
     let random =
@@ -265,7 +269,10 @@ pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningI
     }
 }
 
-/// Times every part on every scene.
+/// Times every part on every scene, `repeats` times each, on a device without autodiff.
+///
+/// # Errors
+/// [`TrainError`] if a trainer for a scene cannot be made, or a step of it fails.
 pub fn benchmark(
     name: DeviceName,
     device: &Device,
@@ -386,8 +393,8 @@ pub fn table(results: &[DeviceTimes]) -> String {
     adapters.fold(table.to_string() + &launches, |text, (device, adapter)| format!("{text}\n{device}: {adapter}"))
 }
 
-/// The launches of each part on devices that have any; a scene changes little about them (the passes of a
-/// sort, and which planes the rate sees), so the first is shown.
+/// The launches of each part on devices that have any. They hardly depend on the scene (passes of a sort, planes in the
+/// rate), so those of the first one are shown.
 fn launch_table(results: &[DeviceTimes]) -> Option<String> {
     let launching: Vec<(&str, &SceneTimes)> = results
         .iter()

@@ -30,8 +30,8 @@ const FRAMES: usize = 8;
 /// The time at which a trained scene is rendered.
 const TIME: f32 = 0.3;
 
-/// Every iteration is like the one before: one view at full size, all degrees of the harmonics, Gaussians that are neither
-/// added nor dropped, no end that comes near.
+/// Every iteration is like the one before: one view at full size, all degrees of the harmonics, no Gaussian added or
+/// dropped, and an end that is far away.
 const STEADY: [&str; 13] = [
     "train.coarse_iterations=1",
     "train.fine_iterations=1000000",
@@ -106,19 +106,19 @@ impl TimedField {
     }
 }
 
-/// What a step of a new trainer takes.
+/// The cost of a step of a new trainer.
 fn step_with(scene: &BenchScene, config: Config, meter: &Meter) -> Result<Cost, TrainError> {
     step(&mut trainer(scene, config, meter.device)?, meter)
 }
 
-/// What a step takes.
+/// The cost of a step.
 fn step(trainer: &mut Trainer, meter: &Meter) -> Result<Cost, TrainError> {
     let mut failed = None;
     let cost = meter.measure(|| (), |()| failed = failed.take().or(trainer.step().err()));
     failed.map_or(Ok(cost), Err)
 }
 
-/// What the optimizer takes of a step, by the trainer's profile; of the step's launches, those of its kernel.
+/// The cost of the optimizer in a step: its time by the trainer's profile, and the launches of its kernel.
 fn adam(trainer: &mut Trainer, step: &Cost, meter: &Meter) -> Result<Cost, TrainError> {
     trainer.measure_stages();
     while trainer.profile().laps("Adam").len() < meter.repeats {
@@ -130,7 +130,7 @@ fn adam(trainer: &mut Trainer, step: &Cost, meter: &Meter) -> Result<Cost, Train
     Ok(Cost { milliseconds: 1e3 * seconds, launches })
 }
 
-/// What an image of the trained scene takes.
+/// The cost of an image of the trained scene.
 fn render(scene: &BenchScene, trainer: &Trainer, meter: &Meter) -> Cost {
     let splatter = Splatter::new(scene.background, trainer.config().model.sh_degree.into());
     let trained = trainer.scene().valid();
@@ -170,7 +170,7 @@ fn trainer(scene: &BenchScene, config: Config, device: &Device) -> Result<Traine
     Ok(trainer)
 }
 
-/// Gaussians that take the place of those of the cloud after the first iteration. From then on none comes and none goes.
+/// Gaussians that replace those of the cloud after the first iteration. Afterwards none is added or removed.
 struct GivenGaussians(Option<GaussianTensors>);
 
 impl DensityStrategy for GivenGaussians {

@@ -35,7 +35,7 @@ use super::measure::{Column, Measure, default_columns};
 /// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;
 
-/// How many times as long a schedule may be.
+/// Legal factors of the length of a schedule.
 pub const SCHEDULES: RangeInclusive<f64> = 0.001..=1000.0;
 
 /// Says that a factor is not in [`SCHEDULES`], if so; to be put behind its name.
@@ -45,7 +45,7 @@ pub(super) fn schedule_problem(factor: f64) -> Option<String> {
     (!SCHEDULES.contains(&factor)).then(problem)
 }
 
-/// What varies, and what is shown.
+/// The definition of a study: the axes that vary, and the outputs.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Study {
@@ -119,7 +119,7 @@ pub struct AxisValue {
     /// Presets or files, which are laid on top in this order.
     #[serde(default)]
     pub presets: Vec<String>,
-    /// How many times as long the schedule is as that of the presets, see [`SCHEDULES`].
+    /// Length of the schedule, divided by that of the presets; see [`SCHEDULES`].
     #[serde(default)]
     pub schedule: Option<f64>,
     /// Overrides, as for `--set`.
@@ -150,13 +150,13 @@ choice! {
 pub struct Curves {
     /// Name of the axis whose values are the points of a curve. Each combination of the other axes' values is a curve.
     pub along: String,
-    /// What a point costs.
+    /// The cost of a point.
     #[serde(default)]
     pub over: Cost,
 }
 
 choice! {
-    /// What a point of a curve costs.
+    /// The cost of a point of a curve.
     #[derive(Default)]
     pub enum Cost: "cost" {
         /// Bytes of the file.

@@ -28,7 +28,7 @@ const MAX_BYTES: u64 = 1 << 28;
 pub struct Manifest {
     /// Version of the program that planned it.
     pub version: String,
-    /// What varies, and what is shown.
+    /// The definition of the study.
     pub study: Study,
     /// Name and absolute path of every dataset.
     pub scenes: Vec<ManifestScene>,
@@ -258,14 +258,20 @@ impl StudyFolder {
         self.path(LOGS).join(format!("task-{task}.failed"))
     }
 
-    /// Writes pretty JSON.
+    /// Writes a value as indented JSON into a file of the folder, whole or not at all.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`] naming the file.
     pub fn write_json(&self, name: &str, value: &impl Serialize) -> Result<(), TrainError> {
         let mut text = serde_json::to_string_pretty(value).expect("plain data has a JSON form");
         text.push('\n');
         self.write(name, text.as_bytes())
     }
 
-    /// Writes a file whole or not at all.
+    /// Writes a file of the folder, whole or not at all.
+    ///
+    /// # Errors
+    /// [`TrainError::Data`] naming the file.
     pub fn write(&self, name: &str, bytes: &[u8]) -> Result<(), TrainError> {
         let path = self.path(name);
         Ok(write_atomically(&path, |file| file.write_all(bytes))?)

@@ -1,4 +1,7 @@
-//! Studies: the paper's tables and figures, each a TOML file that says what varies and what is shown of it.
+//! Studies: the paper's tables and figures, each a TOML file with the axes that vary and the outputs.
+//!
+//! From a file to a report: [`Study`], [`Plan`], [`Manifest`], [`results::Results`], then [`table`], [`quality_curves`] and
+//! [`figures`].
 //!
 //! - [`definition`]: such a file; [`catalog`]: those of the paper, embedded in the program
 //! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs with equal training are trained once

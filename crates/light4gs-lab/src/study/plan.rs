@@ -19,7 +19,7 @@ pub struct PlanOptions {
     pub config: String,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
-    /// How many times as long the schedule of every run is as the configuration's, see [`SCHEDULES`](super::definition::SCHEDULES).
+    /// Length of the schedule of every run, divided by the configuration's; see [`SCHEDULES`](super::definition::SCHEDULES).
     pub schedule: Option<f64>,
     /// Overrides of every run.
     pub overrides: Vec<String>,
@@ -87,8 +87,8 @@ impl Plan {
     /// The runs of a study. Every configuration is made and checked; datasets are not opened.
     ///
     /// # Errors
-    /// A configuration that is wrong, with its variant; two variants or scenes that would be the same; a scene that
-    /// does not exist.
+    /// [`TrainError::Input`] with the variant whose configuration is wrong, for two variants or scenes that would be the
+    /// same, and for options out of range; [`TrainError::Data`] for a folder that does not exist.
     pub fn new(study: Study, options: &PlanOptions) -> Result<Self, TrainError> {
         if options.seeds == 0 {
             return Err(TrainError::Input("--seeds is 0; at least one run of each variant is needed".into()));

@@ -12,7 +12,7 @@ use super::table::over_seeds;
 /// Curves over one or more scenes.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct QualityCurves {
-    /// What a point costs.
+    /// The cost of a point.
     pub over: Cost,
     /// Name of the scene, or that it is a mean over scenes.
     pub heading: String,

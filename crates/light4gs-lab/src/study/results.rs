@@ -1,7 +1,7 @@
 //! The results of the runs so far.
 //!
-//! `results.json` and `results.csv` hold what is the same in every repetition of the study, `times.csv` what depends on
-//! the machine and its load.
+//! `results.json` and `results.csv` hold figures that are the same in every repetition of the study, `times.csv` those that
+//! depend on the machine and its load.
 
 use std::path::Path;
 
@@ -64,7 +64,7 @@ pub struct RunResult {
     pub device: String,
 }
 
-/// What studies show of a split's quality. None where it was not measured.
+/// The figures of a split's quality that studies show; `None` if they were not measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
     /// Mean PSNR, dB.

@@ -22,7 +22,7 @@ pub enum Difference {
 }
 
 impl Difference {
-    /// Of two numbers that differ by this.
+    /// The difference as it is counted, from the signed one.
     fn of(self, difference: f32) -> f32 {
         match self {
             Self::Absolute => difference.abs(),

@@ -129,7 +129,7 @@ impl Component {
         let cosh_width = of_width.mul(one.add(shrunk));
         let cosh_distance = of_distance.mul(one.add(shrunk_distance));
         let inverse = one.div(cosh_width.add(cosh_distance));
-        // What is not a number stays so.
+        // NaN stays NaN.
         let mass = of_width.mul(L::splat(self.rest)).mul(inverse).add(distance.sub(distance));
         let sinh_distance = of_distance.mul(one.sub(shrunk_distance)).mul(inverse);
         let toward = zero.at_least(distance).select(sinh_distance, zero.sub(sinh_distance));
@@ -180,7 +180,7 @@ impl LaneKernel for BitsOfChannel<'_> {
         let mut bits = 0.0;
         for (values, count) in blocks(self.values) {
             let mut likelihoods = [0.0; LANES];
-            // In this order, what is not a number stays so.
+            // In this order, NaN stays NaN.
             L::splat(self.bound).max(self.mixture.masses(L::load(&values)).0).store(&mut likelihoods);
             bits -= likelihoods[..count].iter().map(|likelihood| f64::from(likelihood.log2())).sum::<f64>();
         }

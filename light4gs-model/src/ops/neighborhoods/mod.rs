@@ -32,7 +32,7 @@ struct Chosen {
     rows: Vec<u32>,
     /// Rows of the table.
     count: usize,
-    /// What a GPU makes of the rows in the forward pass, for the backward pass.
+    /// The rows on a GPU: uploaded in the forward pass, used again in the backward pass.
     #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
     made: OnceLock<Box<dyn Any + Send + Sync>>,
     places: OnceLock<Places>,

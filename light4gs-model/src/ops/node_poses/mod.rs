@@ -96,13 +96,13 @@ impl<B: NodePoseOps + NodePoseKernels, C: CheckpointStrategy> NodePoseOps for Au
 /// The parameters of B control nodes. Lengths are shares of the unit.
 #[derive(Clone, Debug)]
 pub struct NodeParameters {
-    /// `[B, 3]`: where the nodes are at rest.
+    /// `[B, 3]`: places of the nodes at rest.
     pub anchors: Tensor<2>,
-    /// `[B, 1]`: logarithms of how far they reach.
+    /// `[B, 1]`: logarithms of their radii.
     pub log_radii: Tensor<2>,
-    /// `[K, 3 B]`: knots of how far they are moved, the three numbers of a node behind each other; K is 4 or more.
+    /// `[K, 3 B]`: knots of their translations, the three numbers of a node behind each other; K is 4 or more.
     pub translations: Tensor<2>,
-    /// `[K, 4 B]`: knots of how they are turned, the four numbers of a node behind each other: quaternions (w, x, y, z), of any
+    /// `[K, 4 B]`: knots of their rotations, the four numbers of a node behind each other: quaternions (w, x, y, z), of any
     /// length, less (1, 0, 0, 0).
     pub rotations: Tensor<2>,
     /// `[B, H]`: their own affinities, if Gaussians have any.

@@ -1,4 +1,4 @@
-//! How a control node is moved and turned at a time, and from the gradient of that to those of its knots.
+//! Translation and rotation of a control node at a time, and their gradients by the knots.
 
 use glam::{Mat3, Vec3};
 use light4gs_render::rotation::{normalization_backward, rotation_backward, rotation_matrix};
@@ -61,7 +61,7 @@ impl NodeMotion {
     }
 }
 
-/// Adds to the gradients of knots `[K, columns]` what follows from the `gradient` of the spline at one node.
+/// Passes the `gradient` of the spline at one node on to those of its knots `[K, columns]`: adds it to them.
 pub(crate) fn add_to_knots<const C: usize>(
     of_knots: &mut [f32],
     columns: usize,

@@ -1,16 +1,16 @@
 //! Uniform cubic B-splines over the scene's time: the trajectories of control nodes.
 
-/// The four knots that count at a time.
+/// The four knots that have a weight at a time.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Spline {
     /// The first of them.
     pub(crate) first: usize,
-    /// How much each counts; they sum to 1.
+    /// Their weights; they sum to 1.
     pub(crate) weights: [f32; 4],
 }
 
 impl Spline {
-    /// The four of `knots` knots, 4 or more, that count at a time in [0, 1].
+    /// At a time in [0, 1], of `knots` knots, 4 or more.
     pub(crate) fn at(time: f32, knots: usize) -> Self {
         let place = time * (knots - 3) as f32;
         let first = (place.max(0.0) as usize).min(knots - 4);

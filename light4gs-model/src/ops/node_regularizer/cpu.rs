@@ -39,7 +39,8 @@ struct Node {
 }
 
 impl Node {
-    /// The weight of a neighbor, where this node sees it off its place, and the neighbor's offset at rest.
+    /// The weight of a neighbor, its offset from the place where this node expects it, and its offset from this node at
+    /// rest.
     fn sees(&self, neighbor: &Node) -> (f32, Vec3, Vec3) {
         let before = neighbor.anchor - self.anchor;
         let weight = (before.length_squared() * self.sharpness).exp();
@@ -57,7 +58,7 @@ struct Sums {
     of_turn: [f32; 4],
 }
 
-/// The terms in which a node sees a neighbor, and those in which a neighbor sees it.
+/// The sums of the terms in which a node expects a neighbor somewhere, and of those in which a neighbor expects the node.
 fn strain_of(own: &Node, all: &[Node]) -> Sums {
     let mut sums = Sums::default();
     let mut of_rotation = Mat3::ZERO;

@@ -50,9 +50,9 @@ impl<B: Backend> RegularizedTensors<B> {
 /// Weights of the terms, and the time of the poses.
 #[derive(Clone, Copy, Debug)]
 pub struct Regularization {
-    /// Of how far nodes are from where their neighbors see them.
+    /// Weight of the distances of nodes from the places where their neighbors expect them.
     pub rigidity: f32,
-    /// Of the bend of their trajectories.
+    /// Weight of the bend of their trajectories.
     pub smoothness: f32,
     /// In [0, 1].
     pub time: f32,
@@ -106,8 +106,8 @@ impl<B: NodeRegularizerOps + NodeRegularizerKernels, C: CheckpointStrategy> Node
     }
 }
 
-/// The loss `[1]` of control nodes: how far nodes are from where their neighbors see them (as rigid as possible, Sorkine and Alexa,
-/// SGP 2007), and how much their trajectories bend.
+/// The loss `[1]` of control nodes: the distances of nodes from the places where their neighbors expect them (as rigid as
+/// possible, Sorkine and Alexa, SGP 2007), and the bend of their trajectories.
 ///
 /// ```text
 /// rigidity · Σ w_ij |(p_j - p_i) - R_i (a_j - a_i)|² / Σ w_ij,   w_ij = exp(-|a_j - a_i|² / (4 r_i²))

@@ -8,9 +8,9 @@
 //! gradient of w_b = F · P_b,   of its logit  w_b (F · P_b - F · P)
 //! ```
 //!
-//! A task has a range of Gaussians. Chunk by chunk it works out `F`; then each node in turn meets all Gaussians of the chunk, with
-//! weights worked out anew, which is faster than fetching them. What a task adds to the gradients of the nodes has its own place, and
-//! the places are added up in order: the same sums whatever the number of threads.
+//! A task has a range of Gaussians. Chunk by chunk it computes `F`; then each node in turn meets all Gaussians of the chunk, with
+//! weights computed anew, which is faster than fetching them. Each task has its own sums for the gradients of the nodes, and these
+//! are added in the order of the tasks: the result does not depend on the number of threads.
 
 use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
@@ -36,7 +36,7 @@ pub(super) struct SkinningGradients {
     pub(super) nodes: Vec<f32>,
 }
 
-/// Numbers of eight Gaussians that every node reads.
+/// Numbers of eight Gaussians that every node reads in the second half of the backward pass.
 struct Handed<const W: usize> {
     mean: [Block; 3],
     /// Affinities, behind the stillness, which no node reads.

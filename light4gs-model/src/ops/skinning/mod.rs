@@ -109,8 +109,8 @@ pub struct SkinningInputs {
     /// `[N, H]`: each Gaussian's affinities, H up to [`MOST_AFFINITIES`].
     pub affinities: Option<Tensor<2>>,
     /// `[B, 20 + H]`, the nodes, such as [`pose`](super::node_poses::pose) gives them: where each is at rest (3), world units;
-    /// `1 / (2 r²)` of its radius r; what it does to the space around it: a matrix R row by row (9) and an offset t (3), so that x
-    /// goes to `R x + t`, and R's quaternion (w, x, y, z); its own affinities.
+    /// `1 / (2 r²)` of its radius r (1); the motion of the space around it, `x` to `R x + t`: the matrix R row by row (9), the
+    /// offset t (3), R's quaternion (w, x, y, z) (4); its own affinities (H).
     pub nodes: Tensor<2>,
 }
 
@@ -125,7 +125,8 @@ pub struct SkinningInputs {
 ///
 /// A weight of less than 2⁻⁶⁴ of the largest is 0 on the CPU.
 ///
-/// All inputs get gradients. Weights take the means as constants: what moves a Gaussian does not pull it to another node.
+/// All inputs get gradients. Weights take the means as constants: the gradient that moves a Gaussian does not pull it to
+/// another node.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};

@@ -72,8 +72,8 @@ impl Frame {
         floats.iter().flatten().map(|value| value.to_bits()).chain(words.into_iter().flatten()).collect()
     }
 
-    /// An error if what this buffer depends on has failed. A caller that has reserved room does not want to wait: it hears of
-    /// it when it reads something.
+    /// An error if an operation has failed on which this buffer depends. A caller that has reserved room does not wait here:
+    /// it gets the error when it reads a result.
     fn check(&self, gpu: &Gpu, operation: &'static str, buffer: &Handle) -> Result<(), GpuError> {
         if self.room.is_some() { Ok(()) } else { gpu.check(operation, &[buffer]) }
     }
@@ -176,7 +176,7 @@ fn intersect(gpu: &Gpu, frame: &Frame, splats: Handle, depth_keys: &Handle) -> R
     let total = prefix_sum(gpu, &first_places, gaussian_count)?;
     let count = match frame.room {
         _ if gaussian_count == 0 => 0,
-        // No Gaussian is in a cell's list twice. Room that the adapter does not have may not be needed either.
+        // No Gaussian is in a cell's list twice. Room that the adapter cannot hold may not be needed: then they are counted.
         Some(room) if gpu.holds(room.saturating_mul(SUMS)) => room.min(gaussian_count.saturating_mul(frame.cells())),
         // The only read-back of an image: all further buffers have the size that it gives.
         _ => gpu.read_word("the number of intersections", &total)? as usize,

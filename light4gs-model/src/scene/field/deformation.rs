@@ -195,7 +195,7 @@ impl Deformation {
     /// The inverse of [`Self::to_motion`], for features of a known length.
     ///
     /// # Errors
-    /// A network of another structure.
+    /// [`ModelError::Motion`] for a network of another structure.
     pub fn from_motion(motion: &MotionNetwork, feature_size: usize, device: &Device) -> Result<Self, ModelError> {
         let has = |output| motion.outputs.contains(&output);
         let layers: Vec<&Layer> = motion.network.layers().collect();

@@ -1,5 +1,15 @@
 //! What moves the Gaussians: one trait, which every deformation field implements.
 //!
+//! | scene | field |
+//! |---|---|
+//! | the paper's method; any motion, also of colors and opacities | [`HexPlaneField`](crate::HexPlaneField) |
+//! | objects that are nearly rigid, in few bytes | [`NodesField`](crate::NodesField) |
+//! | nothing moves | [`StillField`](crate::StillField) |
+//! | the name is known only when the program runs, or is in a file | [`BuiltInField`](crate::BuiltInField): one of these three |
+//! | a motion of your own | another [`DeformationField`] |
+//!
+//! The files:
+//!
 //! - this file: [`DeformationField`], and its inputs
 //! - `hexplane`, `deformation`: the paper's field, and its network
 //! - `nodes`: control nodes, which Gaussians follow
@@ -128,7 +138,7 @@ pub trait DeformationField: Module + ModuleDisplay + 'static {
     /// taken.
     ///
     /// # Errors
-    /// Shapes that the field cannot have.
+    /// [`ModelError::Motion`] for shapes that the field cannot have.
     fn resize(&mut self, shapes: &BTreeMap<String, Vec<usize>>) -> Result<(), ModelError> {
         let _ = shapes;
         Ok(())
@@ -176,7 +186,7 @@ pub struct SceneAtRest<'a> {
     pub extent: f32,
 }
 
-/// When something is there that comes and goes: a bell curve over time.
+/// The time around which a short-lived Gaussian exists: a bell curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moment {
     /// Its middle, in [0, 1].

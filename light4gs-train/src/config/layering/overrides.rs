@@ -5,7 +5,7 @@ use toml::{Table, Value};
 use super::super::{ConfigError, Origin};
 use super::schema;
 
-/// What a user has set by hand: layers, each of one line, that are laid over a configuration last.
+/// Keys that a user has set by hand: layers, each of one line, that are laid over a configuration last.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overrides(Vec<(Origin, Table)>);
 
@@ -14,7 +14,8 @@ impl Overrides {
     /// set the same key, the later one applies.
     ///
     /// # Errors
-    /// A text that is not `key=value`, an unknown key, a value of the wrong type.
+    /// [`ConfigError::Override`] for a text that is not `key=value`, [`ConfigError::UnknownKey`],
+    /// [`ConfigError::WrongType`].
     pub fn parse(texts: &[String]) -> Result<Self, ConfigError> {
         texts.iter().map(|text| parse(text)).collect::<Result<_, _>>().map(Self)
     }

@@ -1,4 +1,4 @@
-//! LPIPS (Zhang et al. 2018), version 0.1: how far apart two images are in the features of a network trained on photographs.
+//! LPIPS (Zhang et al. 2018), version 0.1: the distance of two images in the features of a network trained on photographs.
 //!
 //! The weights were published by others and are no part of this program; [`Lpips::load`] reads them from files that the user
 //! names.

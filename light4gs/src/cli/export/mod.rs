@@ -35,9 +35,9 @@ pub(super) struct Export {
     /// The .l4gs file.
     file: PathBuf,
     /// A folder for `0000.ply`, `0001.ply`, ... (a name without a suffix or with a slash at its end, or an existing
-    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs,
-    /// or as a .zip with the same PLY files as the folder. A scene of
-    /// control nodes becomes a .glb with its whole motion (skin and animation), unless --time asks for a single time.
+    /// folder), or a file: a single time as .ply or .glb (KHR_gaussian_splatting), the whole motion as .4dgs, or as a .zip
+    /// with the same PLY files as the folder. A scene of control nodes becomes a .glb with its whole motion (skin and
+    /// animation), unless --time asks for a single time.
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
     /// One file that plays the scene in a browser without any other file.
@@ -192,7 +192,7 @@ impl Export {
     }
 }
 
-/// A text with the attributes that a file of another program cannot hold: all but those that it has in another way.
+/// A text with the attributes that a file of another program cannot hold: all but the `held` ones.
 fn left_out(gaussians: &GaussianArrays, held: &[&str]) -> String {
     let names = gaussians.further.iter().map(|attribute| attribute.name.as_str());
     let names: Vec<&str> = names.filter(|name| !held.contains(name)).collect();

@@ -8,7 +8,7 @@ use light4gs_train::error::TrainError;
 /// Gaussians whose weights of all nodes are in memory at once.
 const ROWS: usize = 1 << 14;
 
-/// A scene that control nodes move, and how often it is sampled.
+/// A scene that control nodes move, and the rate of its samples.
 pub(super) struct NodesMotion<'a> {
     pub(super) scene: &'a DynamicScene,
     /// The scene's own.
@@ -57,7 +57,7 @@ impl NodesMotion<'_> {
         influences
     }
 
-    /// How far a skin has Gaussians from where the scene has them, at the keyframes and halfway between them.
+    /// The distances between the Gaussians of a skin and those of the scene, at the keyframes and halfway between them.
     pub(super) fn distances(&self, skin: &Skin) -> Distances {
         let at_rest = rows(self.scene.gaussians.means.val());
         let moments = 2 * self.keyframes - 1;

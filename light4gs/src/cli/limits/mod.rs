@@ -1,4 +1,4 @@
-//! `--limits`: how much memory and time a file may take, and how much output a command may make.
+//! `--limits`: the memory and the time that a file may take, and the most output of a command.
 
 pub(super) mod most;
 
@@ -8,7 +8,7 @@ use light4gs_codec::Limits;
 /// An argument of commands that open a file.
 #[derive(Clone, Copy, Debug, Args)]
 pub(super) struct LimitsArgument {
-    /// How much memory and time reading the file may take.
+    /// The memory and the time that reading the file may take.
     #[arg(long, value_enum, default_value = "default", value_name = "LIMITS")]
     limits: Choice,
 }

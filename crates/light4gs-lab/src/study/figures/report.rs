@@ -14,7 +14,7 @@ use crate::study::table::{StudyTable, legend};
 /// Writes `report.html` and the files of all figures.
 ///
 /// # Errors
-/// What cannot be written, or shown.
+/// [`TrainError::Input`] for a plot or an image that cannot be shown; [`TrainError::Data`] for a file that cannot be written.
 pub fn write_report(
     folder: &StudyFolder,
     manifest: &Manifest,

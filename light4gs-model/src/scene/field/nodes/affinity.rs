@@ -1,15 +1,16 @@
-//! Which nodes a Gaussian follows beyond its place: neighbors at rest need not move together, such as a foot and the floor.
+//! Affinities: a Gaussian follows some nodes more than its distance from them says. Neighbors at rest need not move
+//! together, such as a foot and the floor.
 
 use burn::tensor::{Device, Tensor};
 
 use super::tensor;
 use crate::scene::Attribute;
 
-/// The attribute by which a Gaussian says which nodes it follows beyond its place, `[N, H]`: its inner product with a node's
-/// own affinities is added to the logit of the node's weight. After the learned coordinates of SC-GS (Huang et al., CVPR 2024).
+/// The attribute with the affinities of a Gaussian, `[N, H]`: their inner product with a node's own affinities is added to
+/// the logit of the node's weight. After the learned coordinates of SC-GS (Huang et al., CVPR 2024).
 pub const AFFINITY: &str = "affinity";
 
-/// How fast affinities are learned, and their step in a file.
+/// Learning rate of affinities, and their step in a file.
 const RATE: f64 = 0.01;
 const STEP: f64 = 0.5;
 

@@ -1,4 +1,4 @@
-//! What comes and goes: a Gaussian's opacity times a bell curve over time, for what no rigid body can follow.
+//! Lifetimes: a Gaussian's opacity times a bell curve over time, for motion that no rigid body can follow.
 
 use burn::tensor::{Tensor, s};
 use light4gs_codec::network::{Network, Operation, Value};
@@ -7,13 +7,14 @@ use super::stream::affine;
 use crate::scene::Attribute;
 use crate::scene::field::Moment;
 
-/// The attribute by which a Gaussian says when it is there, `[N, 2]`: the middle, and the logarithm of the standard deviation,
-/// in the scene's time.
+/// The attribute with the lifetime of a Gaussian, `[N, 2]`: the middle, and the logarithm of the standard deviation, in the
+/// scene's time.
 pub const LIFETIME: &str = "lifetime";
 
-/// The middle of the scene's time and so long that nothing fades yet: at the ends of time 98 % are left.
+/// The middle of the scene's time, and a deviation at which nothing fades yet: 98 % of the opacity is left at both ends of
+/// time.
 const START: [f32; 2] = [0.5, 1.0];
-/// How fast a lifetime is learned, and its step in a file.
+/// Learning rate of lifetimes, and their step in a file.
 const RATE: f64 = 0.005;
 const STEP: f64 = 0.03;
 
@@ -21,7 +22,7 @@ pub(super) fn attribute() -> Attribute {
     Attribute::new(LIFETIME, 2).with_start(START.to_vec()).constant().with_learning_rate(RATE).with_step(STEP)
 }
 
-/// The lifetime of what is there around a moment.
+/// The lifetime around a moment.
 pub(super) fn of(moment: &Moment) -> Vec<f32> {
     vec![moment.time, moment.deviation.ln()]
 }

@@ -1,20 +1,20 @@
 //! Control nodes: few rigid bodies with a trajectory each, and Gaussians that follow those around them.
 //!
 //! A node has a place (its anchor), a radius, and a rotation and translation over time. A Gaussian follows the nodes by linear
-//! blend skinning, weighted by its distance from their anchors before anything moves; a share of it that it learns itself
-//! stands still. Textures turn with their object, and motion costs the same bytes however many Gaussians there are. After
+//! blend skinning, weighted by its distance from their anchors before anything moves; a learned share of it stands still.
+//! Textures turn with their object, and motion costs the same bytes however many Gaussians there are. After
 //! SC-GS (Huang et al., CVPR 2024), with splines in place of its network.
 //!
-//! | file | what |
+//! | file | contents |
 //! |---|---|
-//! | `trajectory` | trajectories over time, and where nodes are on them |
-//! | `placement` | where the nodes are when motion begins |
-//! | `survey` | what all times have shown before a window widens |
-//! | `affinity` | which nodes a Gaussian follows beyond its place |
-//! | `lifetime` | what comes and goes |
+//! | `trajectory` | trajectories over time, and the places of nodes on them |
+//! | `placement` | the places of the nodes when motion begins |
+//! | `survey` | the ways of objects, found at all times before a window widens |
+//! | `affinity` | nodes that a Gaussian follows more than its distance says |
+//! | `lifetime` | Gaussians that come and go |
 //! | `stream` | the same as operations of the codec, in a file |
 //! | `plain` | nodes, Gaussians and poses as plain numbers |
-//! | `weights` | how much each Gaussian follows each node, as numbers |
+//! | `weights` | the weights of the skinning, as numbers |
 
 mod affinity;
 mod lifetime;
@@ -46,7 +46,7 @@ use crate::ops::skinning::{SkinningInputs, skin};
 use crate::planes::FeaturePlanes;
 use crate::scene::{Attribute, GaussianTensors, ModelError};
 
-/// The attribute by which a Gaussian says how still it stands, `[N, 1]`: the logit of a node that never moves.
+/// The attribute for the share of a Gaussian that stands still, `[N, 1]`: the logit of a node that never moves.
 pub const STILLNESS: &str = "stillness";
 
 /// Most nodes of a field.
@@ -54,7 +54,7 @@ pub const MOST_NODES: usize = 512;
 /// Most knots of a trajectory.
 pub const MOST_KNOTS: usize = 512;
 
-/// How fast a Gaussian's stillness is learned, and its step in a file.
+/// Learning rate of stillness, and its step in a file.
 const STILLNESS_RATE: f64 = 0.02;
 const STILLNESS_STEP: f64 = 0.25;
 /// A logit of standing still whose weight is next to 1.
@@ -67,33 +67,33 @@ const FACTOR: Bounds = Number { least: 0.0, most: 1e3 };
 keys! {
     /// Control nodes, and their trajectories.
     pub struct NodesFieldConfig {
-        /// Nodes, or as many as there are Gaussians if those are fewer.
+        /// Number of nodes; never more than Gaussians.
         count: usize = 32; Whole { least: 1, most: MOST_NODES as u64 }, "ours; SC-GS: 512";
         /// Training times between two knots of a trajectory.
         times_a_knot: f64 = 4.0; Number { least: 0.1, most: 1e6 }, "ours";
         /// A node's radius at the beginning, as a share of the distance to the nearest other one.
         radius: f64 = 0.6; Number { least: 0.01, most: 100.0 }, "ours";
-        /// Nodes are placed where Gaussians are at least so opaque.
+        /// Nodes are placed at Gaussians with at least this opacity.
         opacity: f64 = 0.15; Number { least: 1e-4, most: 0.999 }, "ours";
-        /// Every Gaussian learns how still it stands.
+        /// Every Gaussian learns which share of it stands still.
         stillness: bool = true; Flag, "ours";
         /// The logit of standing still at the beginning, where 0 is that of a node's own place.
         stillness_start: f64 = -4.0; Number { least: -30.0, most: 30.0 }, "ours";
-        /// Every Gaussian learns when it is there: its opacity is multiplied by a bell curve over time. From the iteration on
-        /// at which the sampler's window holds all times.
+        /// Every Gaussian learns a lifetime: its opacity is multiplied by a bell curve over time, from the iteration on at
+        /// which the sampler's window holds all times.
         lifetime: bool = false; Flag, "ours";
-        /// Numbers by which every Gaussian learns which nodes it follows beyond its place: a foot and the floor under it need
-        /// not move together.
+        /// Number of affinities: learned numbers by which a Gaussian follows some nodes more than its distance from them says.
+        /// So a foot and the floor under it need not move together.
         affinities: usize = 0; Whole { least: 0, most: MOST_AFFINITIES as u64 }, "after SC-GS";
-        /// Weight of the term that keeps neighboring nodes in place as seen from each other.
+        /// Weight of the term that keeps each node where its neighbors expect it (as rigid as possible).
         rigidity: f64 = 1.0; WEIGHT, "ours; SC-GS: 1e-4 to 0";
         /// Weight of the squared second differences of trajectories.
         smoothness: f64 = 0.1; WEIGHT, "ours";
-        /// How much faster than the deformation's rate translations are learned, as shares of the scene's extent.
+        /// Learning rate of translations, in shares of the scene's extent, as a multiple of the deformation's rate.
         translation_rate: f64 = 2.0; FACTOR, "ours";
-        /// How much faster than the deformation's rate rotations are learned.
+        /// Learning rate of rotations as a multiple of the deformation's rate.
         rotation_rate: f64 = 8.0; FACTOR, "ours";
-        /// How much faster than the deformation's rate the nodes' places and radii are learned.
+        /// Learning rate of the nodes' places and radii as a multiple of the deformation's rate.
         anchor_rate: f64 = 5.0; FACTOR, "ours";
     }
 }
@@ -116,11 +116,11 @@ keys! {
 pub struct NodesField {
     /// `[B, 3]`.
     anchors: Param<Tensor<2>>,
-    /// `[B, 1]`: logarithms of how far a node reaches.
+    /// `[B, 1]`: logarithms of the radii.
     log_radii: Param<Tensor<2>>,
-    /// `[K, 3 B]`, the three of a node behind each other: how far it is moved.
+    /// `[K, 3 B]`, the three of a node behind each other: its translation.
     translations: Param<Tensor<2>>,
-    /// `[K, 4 B]`, the four of a node behind each other: how it is turned, a quaternion (w, x, y, z) less (1, 0, 0, 0).
+    /// `[K, 4 B]`, the four of a node behind each other: its rotation, a quaternion (w, x, y, z) less (1, 0, 0, 0).
     rotations: Param<Tensor<2>>,
     /// `[B, H]`: the nodes' own affinities, where Gaussians have any.
     affinities: Option<Param<Tensor<2>>>,
@@ -130,7 +130,7 @@ pub struct NodesField {
     unit: Param<Tensor<1>>,
     #[module(skip)]
     config: NodesFieldConfig,
-    /// Whether Gaussians may come and go: before all times are seen, what is lost shall be followed, not fade.
+    /// Whether lifetimes apply. Before all times are seen, an object that is lost shall be found again, not fade.
     #[module(skip)]
     fades: bool,
 }
@@ -186,7 +186,7 @@ impl NodesField {
         })
     }
 
-    /// Knots that so many training times ask for.
+    /// The number of knots for `times` different training times.
     fn knots_of(config: &NodesFieldConfig, times: usize) -> usize {
         let segments = (times as f64 / config.times_a_knot).ceil() as usize;
         (segments + 3).clamp(4, MOST_KNOTS)
@@ -229,8 +229,8 @@ impl DeformationField for NodesField {
         *self = self.placed(scene, position);
     }
 
-    /// Knots that the window does not show go on as those before them did, on the ways that objects were found on if all times
-    /// were shown before.
+    /// Continues the knots that the window does not show: on the ways of the survey, or, without a survey, in the direction
+    /// of the knots that it does show.
     fn begin_step(&mut self, scene: &SceneAtRest<'_>, position: &FinePosition) {
         self.fades = position.shows_all();
         if self.fades {

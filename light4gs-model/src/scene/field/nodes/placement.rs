@@ -1,4 +1,4 @@
-//! Where the nodes are when motion begins: spread over what is there.
+//! The places of the nodes when motion begins: spread over the visible Gaussians.
 
 use burn::module::Param;
 
@@ -33,7 +33,7 @@ impl NodesField {
         placed
     }
 
-    /// Positions of Gaussians that one can see; the most opaque tenth where these are few.
+    /// Positions of visible Gaussians; of the most opaque tenth if few are visible.
     fn matter(&self, scene: &SceneAtRest<'_>) -> Vec<[f32; 3]> {
         let means = numbers(scene.gaussians.means.val());
         let logits = numbers(scene.gaussians.opacity_logits.val());
@@ -52,7 +52,7 @@ pub(super) fn square(a: &[f32; 3], b: &[f32; 3]) -> f32 {
     a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum()
 }
 
-/// Of points, some that are far from each other: the first is the nearest to the middle, and each next one the farthest from
+/// `count` of the points, far from each other: the first is the nearest to the middle, and each next one the farthest from
 /// those before.
 fn spread_out(points: &[[f32; 3]], count: usize) -> Vec<[f32; 3]> {
     let middle = std::array::from_fn(|axis| points.iter().map(|point| point[axis]).sum::<f32>() / points.len() as f32);

@@ -1,4 +1,4 @@
-//! Gaussians, nodes and poses as plain numbers, for what is done now and then while training and takes more decisions than
+//! Gaussians, nodes and poses as plain numbers, for steps of training that are rare and consist of decisions more than of
 //! arithmetic.
 
 use super::placement::square;
@@ -18,7 +18,7 @@ pub(super) struct Skinned {
     stillness: Vec<f32>,
     anchors: Vec<[f32; 3]>,
     precisions: Vec<f32>,
-    /// Affinities, none or so many of each Gaussian and of each node.
+    /// Number of affinities of each Gaussian and of each node; 0 for none.
     affinities: usize,
     of_gaussians: Vec<f32>,
     of_nodes: Vec<f32>,

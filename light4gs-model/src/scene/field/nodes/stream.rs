@@ -64,7 +64,8 @@ impl Description {
         self.node(Operation::Select(channels), &[value])
     }
 
-    /// So many channels that count up from a number. They double from step to step: a network has few nodes.
+    /// `count` channels with the numbers `first`, `first + 1` and so on. Each node of the network doubles the channels, since
+    /// a network may have few nodes.
     fn count_from(&mut self, first: f32, any: Value, count: usize) -> Value {
         let mut numbers = self.node(affine(0.0, first), &[any]);
         let mut so_far = 1;
@@ -76,7 +77,7 @@ impl Description {
         self.channels(numbers, 0..count)
     }
 
-    /// How much each knot counts: from `|t - knot|` in knots, the difference of two truncated cubes.
+    /// The weights of the knots: from `|t - knot|` in knots, the difference of two truncated cubes.
     fn basis(&mut self, time: Value, knots: usize) -> Value {
         let time = self.node(affine((knots - 3) as f32, 0.0), &[time]);
         let times = self.channels(time, vec![0; knots]);
@@ -152,7 +153,7 @@ impl Description {
         self.channels(all, channels)
     }
 
-    /// The logits with the inner products of a Gaussian's affinities and those of the nodes, `[B, H]` row by row.
+    /// The logits plus the inner products of a Gaussian's affinities and those of the nodes, `[B, H]` row by row.
     fn liked(&mut self, logits: Value, affinity: Value, of_nodes: Vec<f32>) -> Value {
         let layer = Layer::linear(of_nodes, vec![0.0; self.nodes]);
         let liking = self.network.layer(affinity, layer);
@@ -206,7 +207,7 @@ impl Part {
         if found != expected {
             return Some(format!("outputs, biases and weights of the {name} are {found:?}, expected {expected:?}"));
         }
-        // What is not kept must not do anything in the codec either.
+        // The field does not keep these numbers, so they must be without effect in the codec too.
         let (unused, numbers) = if in_weights { ("biases", &layer.bias) } else { ("weights", &layer.weight) };
         let number = numbers.iter().find(|number| **number != 0.0)?;
         Some(format!("one of the {unused} of the {name} is {number}, expected 0"))
@@ -311,7 +312,7 @@ impl NodesField {
         (anchors, description.poses(basis, anchors, translations, rotations))
     }
 
-    /// The field that a file describes. What it was trained with is not in a file.
+    /// The field that a file describes. The settings of its training are not in a file.
     ///
     /// # Errors
     /// Any other network than one that [`Self::describe`] makes.

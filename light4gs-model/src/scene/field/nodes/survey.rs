@@ -1,9 +1,9 @@
-//! What is known of objects once all times have been shown, before a window of time widens: where they are, though not how they
-//! are turned.
+//! The survey: all times are shown before a window of time widens. It finds the ways of objects, though not their rotations.
 //!
-//! An object that turns fast is found at every time, but its texture is a mean over wrong turns. Its way is worth keeping: in a
-//! window, texture and turns are learned anew, and knots beyond the window go on turning while the middle of their object
-//! stays on the way that was found. Without that, what bounces is lost: it does not go on as before.
+//! An object that turns fast is found at every time, but its texture is a mean over wrong rotations. Its way is worth
+//! keeping: in a window, texture and rotations are learned anew. Knots beyond the window continue the rotation, while the
+//! middle of their object stays on the way that was found. Without that way, objects that bounce would be lost, since
+//! they do not move on as before.
 
 use burn::module::Param;
 use burn::tensor::{Tensor, s};
@@ -13,13 +13,14 @@ use super::trajectory::{knot_at, knots_through, not_damped, rotation_matrices, t
 use super::{NodesField, tensor};
 use crate::scene::field::SceneAtRest;
 
-/// How different the displacements of a node and of a Gaussian of its object are: a standard deviation, as a share of the extent.
+/// Standard deviation of the difference between the displacements of a node and of a Gaussian of its object, as a share of
+/// the extent.
 const ALIKE: f32 = 0.04;
 /// Smallest weight with which a Gaussian counts.
 const LEAST_WEIGHT: f32 = 1e-3;
 
 impl NodesField {
-    /// Finds the objects' ways, takes back all turns, and goes on with those of the knot in the middle of a window.
+    /// Finds the objects' ways, and gives all knots the rotation of the knot in the middle of a window.
     pub(super) fn survey(&mut self, scene: &SceneAtRest<'_>, [low, high]: [f32; 2]) {
         self.ways = Some(Param::from_tensor(self.ways_of_objects(scene)).set_require_grad(false));
         let knots = self.knots();
@@ -31,8 +32,8 @@ impl NodesField {
         }
     }
 
-    /// The translations `[K, 3 B]` with which objects go around the middles of their ways, given how nodes are turned. None:
-    /// there was no survey.
+    /// The translations `[K, 3 B]` that keep the middles of objects on their ways, for the present rotations. `None` if there
+    /// was no survey.
     fn translations_on_ways(&self) -> Option<Tensor<2>> {
         let ways = self.ways.as_ref()?.val();
         let (knots, nodes) = (self.knots(), self.nodes());
@@ -46,8 +47,8 @@ impl NodesField {
         Some(ways.slice(s![1.., ..]) - anchors - turned)
     }
 
-    /// Translations `[K, 3 B]` of which those that a window does not touch follow their object's way, from where it is at the
-    /// window's end. None: there was no survey.
+    /// The translations `[K, 3 B]`, where knots that a window does not touch follow their object's way, from its place at the
+    /// window's end. `None` if there was no survey.
     pub(super) fn translations_beyond(&self, low: f32, high: f32) -> Option<Tensor<2>> {
         let on_ways = self.translations_on_ways()?;
         let translations = self.translations.val();
@@ -56,7 +57,7 @@ impl NodesField {
         let first = if low > 0.0 { first } else { 0 };
         let last = if high < 1.0 { last } else { knots - 1 };
         let off = translations.clone() - on_ways.clone();
-        // What is off at the window's end is so beyond it, ever less.
+        // An offset from the way at the window's end shrinks from knot to knot beyond it.
         let beyond = |knot: usize, end: usize| {
             let row = |tensor: &Tensor<2>, at: usize| tensor.clone().slice(s![at..at + 1, ..]);
             row(&on_ways, knot) + row(&off, end) * not_damped(knot.abs_diff(end))

@@ -1,4 +1,4 @@
-//! Trajectories: uniform cubic B-splines over time, and where the nodes are on them.
+//! Trajectories: uniform cubic B-splines over time, and the places of nodes on them.
 
 use std::ops::Range;
 
@@ -13,7 +13,7 @@ pub(super) const FACTORS: [[usize; 9]; 2] = [[1, 2, 3, 1, 2, 1, 0, 0, 0], [1, 2,
 pub(super) const DIAGONAL: [[usize; 3]; 2] = [[1, 0, 0], [2, 2, 1]];
 /// The other elements are 2 (a - b) and 2 (a + b) of these.
 pub(super) const OTHERS: [[usize; 3]; 2] = [[3, 4, 5], [6, 7, 8]];
-/// Where the nine elements, row by row, stand behind diagonal, differences and sums.
+/// The nine elements, row by row, as indices into diagonal, differences and sums, one behind the other.
 pub(super) const ELEMENTS: [usize; 9] = [0, 3, 8, 6, 1, 4, 5, 7, 2];
 
 /// Columns of a tensor by their numbers.
@@ -22,27 +22,28 @@ pub(super) fn columns(tensor: &Tensor<2>, numbers: &[usize]) -> Tensor<2> {
     tensor.clone().select(1, Tensor::<1, Int>::from_data(TensorData::from(&numbers[..]), &tensor.device()))
 }
 
-/// How much of the last difference between two knots there is in the next one, where a trajectory is continued.
+/// A continued trajectory: the difference between two successive knots, divided by the difference before.
 const DAMPING: f32 = 0.9;
 
-/// The first and the last of so many knots that the times from `low` to `high` touch, but for the outermost two: these have next
-/// to no weight at the ends, so they are continued as well.
+/// The first and the last of `knots` knots that the times from `low` to `high` touch. The outermost two do not count as
+/// touched: they have next to no weight at `low` and `high`.
 pub(super) fn touched(knots: usize, low: f32, high: f32) -> (usize, usize) {
     let segment = |time: f32| ((time.clamp(0.0, 1.0) * (knots - 3) as f32) as usize).min(knots - 4);
     (segment(low) + 1, segment(high) + 2)
 }
 
-/// How much of what there is at a knot is left so many knots farther on.
+/// Share of a quantity that is left `knots` knots farther on.
 pub(super) fn not_damped(knots: usize) -> f32 {
     DAMPING.powi(knots as i32)
 }
 
-/// The knot that counts most at a time.
+/// The knot with the largest weight at a time.
 pub(super) fn knot_at(time: f32, knots: usize) -> usize {
     (time.clamp(0.0, 1.0) * (knots - 3) as f32 + 1.0).round() as usize
 }
 
-/// Knots `[K, C]` of which only those count that the times from `low` to `high` touch: the others continue them, ever slower.
+/// Replaces the knots `[K, C]` that the times from `low` to `high` do not touch (see [`touched`]): they continue the others,
+/// slower from knot to knot.
 pub(super) fn continued(knots: Tensor<2>, low: f32, high: f32) -> Tensor<2> {
     let [count, _] = knots.dims();
     let (first, last) = touched(count, low, high);
@@ -84,13 +85,14 @@ pub(super) fn knots_through(values: &[f32]) -> Vec<f32> {
 }
 
 impl NodesField {
-    /// `[B, 3]`: where the nodes are before anything moves, world units.
+    /// `[B, 3]`: the places of the nodes before anything moves, world units.
     pub fn world_anchors(&self) -> Tensor<2> {
         self.anchors.val() * self.unit.val().unsqueeze()
     }
 
-    /// Where the nodes are at a time, `[B, 3]`, world units, and how they are turned, `[B, 4]`: unit quaternions (w, x, y, z). What is
-    /// at x before anything moves goes with a node from the [anchor](Self::world_anchors) a to the place p as `R (x - a) + p`.
+    /// At a time in [0, 1], the places of the nodes, `[B, 3]`, world units, and their rotations, `[B, 4]`: unit quaternions (w,
+    /// x, y, z). A node with the [anchor](Self::world_anchors) `a`, the place `p` and the rotation `R` takes a point from `x`,
+    /// before anything moves, to `R (x - a) + p`.
     pub fn places(&self, time: f32) -> (Tensor<2>, Tensor<2>) {
         let nodes = pose(self.parameters(), time);
         let part = |columns: Range<usize>| nodes.clone().slice(s![.., columns]);

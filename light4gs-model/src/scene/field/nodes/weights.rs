@@ -1,4 +1,4 @@
-//! How much each Gaussian follows each node, as numbers: for programs that do the skinning themselves.
+//! The weights of the skinning as numbers, for programs that do the skinning themselves.
 
 use std::ops::Range;
 
@@ -15,7 +15,7 @@ const GROUP: usize = 3;
 const QUATERNION: Range<usize> = PLACE + 12..POSED;
 
 impl NodesField {
-    /// `[N, B + 1]`: how much each Gaussian follows each node, and in the last column how much it stands still. Rows sum to 1.
+    /// `[N, B + 1]`: the weight of each node for each Gaussian, and in the last column that of standing still. Rows sum to 1.
     /// They do not depend on the time.
     ///
     /// ```
@@ -33,8 +33,8 @@ impl NodesField {
         let (count, nodes, device) = (canonical.means.dims()[0], self.nodes(), self.device());
         let unturned = Tensor::from_floats([[1.0, 0.0, 0.0, 0.0]], &device).repeat_dim(0, count);
         let unturned = GaussianTensors { quats: unturned, ..canonical.clone() };
-        // The kernel that skins is asked, so that there is one softmax: if three nodes have the imaginary units as quaternions
-        // and all others 0, the blended quaternion has their weights, and before them that of standing still.
+        // The skinning kernel computes them, so that there is one softmax. If three nodes have the imaginary units as
+        // quaternions and all others 0, the blended quaternion consists of the weight of standing still and of theirs.
         let at_rest = pose(self.parameters(), 0.0);
         let blended = |first: usize| {
             let mut quats = vec![0.0; nodes * QUATERNION.len()];
