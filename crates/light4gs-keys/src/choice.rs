@@ -217,6 +217,7 @@ macro_rules! chosen {
 }
 
 #[cfg(test)]
+#[allow(unreachable_pub, reason = "the macro declares public items")]
 mod tests {
     use crate::{Bounds, KeyTable, Problem, SHARE, keys};
 

@@ -7,7 +7,7 @@ use light4gs_model::DeformationField;
 use light4gs_train::compression::BitMap;
 use light4gs_train::config::Config;
 use light4gs_train::error::TrainError;
-use light4gs_train::evaluation::{Evaluation, RenderedView, measure_run};
+use light4gs_train::evaluation::{Evaluation, measure_run};
 use light4gs_train::metrics::{Metric, RegionMetric};
 use light4gs_train::observers::metrics_log::read_metrics;
 use light4gs_train::run::RunFolder;

@@ -41,7 +41,7 @@ impl FurtherParameters {
     }
 
     /// The attributes.
-    pub fn attributes(&self) -> impl Iterator<Item = &Attribute> {
+    pub fn attributes(&self) -> impl Iterator<Item = &Attribute> + Clone {
         self.list.iter().map(|(attribute, _)| &**attribute)
     }
 

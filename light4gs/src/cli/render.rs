@@ -14,7 +14,7 @@ use super::check_output;
 use super::limits::LimitsArgument;
 use super::limits::most::{MOST_FRAMES, MOST_SIDE, image_size};
 use super::output::say;
-use crate::video::{Looping, write_gif, write_mp4, write_png_sequence};
+use crate::video::{write_gif, write_mp4, write_png_sequence};
 
 /// Radius in world units and elevation in degrees of the orbit, those of the D-NeRF video path.
 const ORBIT: (f32, f32) = (4.0, 30.0);
@@ -86,7 +86,7 @@ impl Render {
         let has_extension = |name: &str| self.out.extension().is_some_and(|e| e.eq_ignore_ascii_case(name));
         if has_extension("gif") || has_extension("mp4") {
             let count = match has_extension("gif") {
-                true => write_gif(&self.out, images, self.fps, Looping::Forever)?,
+                true => write_gif(&self.out, images, self.fps)?,
                 false => write_mp4(&self.out, images, self.fps)?,
             };
             say(format_args!("wrote {} ({count} frames)", self.out.display()))?;

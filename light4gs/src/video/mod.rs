@@ -15,16 +15,6 @@ use light4gs_data::{DataError, RgbImage8};
 
 pub(crate) use mp4::write_mp4;
 
-/// How often a GIF plays.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) enum Looping {
-    /// Without end.
-    #[default]
-    Forever,
-    /// Once.
-    Once,
-}
-
 /// GIFs with a higher rate play slowly: a GIF counts in hundredths of a second, and players take a delay of less than
 /// two of them for a mistake.
 pub(crate) const MAX_GIF_FPS: f32 = 50.0;
@@ -32,7 +22,7 @@ pub(crate) const MAX_GIF_FPS: f32 = 50.0;
 /// Effort of the color quantizer, 1 (best) to 30 (fast).
 const GIF_SPEED: i32 = 10;
 
-/// Writes frames as an animated GIF and returns their number. All frames must be of one size.
+/// Writes frames as an animated GIF that plays without end, and returns their number. All frames must be of one size.
 ///
 /// The first error of `frames` ends the work and is returned; `E` is its type.
 ///
@@ -43,7 +33,6 @@ pub(crate) fn write_gif<E: From<DataError>>(
     path: &Path,
     frames: impl IntoIterator<Item = Result<RgbImage8, E>>,
     fps: f32,
-    looping: Looping,
 ) -> Result<usize, E> {
     if !(fps > 0.0 && fps <= MAX_GIF_FPS) {
         return Err(E::from(DataError::Field {
@@ -58,12 +47,7 @@ pub(crate) fn write_gif<E: From<DataError>>(
     let written = write_atomically(path, |out| {
         let mut size = None;
         let mut encoder = GifEncoder::new_with_speed(out, GIF_SPEED);
-        encoder
-            .set_repeat(match looping {
-                Looping::Forever => Repeat::Infinite,
-                Looping::Once => Repeat::Finite(0),
-            })
-            .map_err(io::Error::other)?;
+        encoder.set_repeat(Repeat::Infinite).map_err(io::Error::other)?;
         for frame in frames {
             let checked = frame.and_then(|frame| check(path, &frame, &mut size).map(|()| frame).map_err(E::from));
             let frame = match checked {
@@ -154,7 +138,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.gif");
         let frames = (0..30).map(|i| Ok::<_, DataError>(frame(8, 6, i * 8)));
-        assert_eq!(write_gif(&path, frames, 30.0, Looping::Forever).expect("a GIF"), 30);
+        assert_eq!(write_gif(&path, frames, 30.0).expect("a GIF"), 30);
         let file = io::BufReader::new(std::fs::File::open(&path).expect("a file"));
         let frames = GifDecoder::new(file).expect("a GIF").into_frames().collect_frames().expect("frames");
         assert_eq!(frames.len(), 30);
@@ -169,20 +153,20 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let path = folder.path().join("a.gif");
         let none: [Result<RgbImage8, DataError>; 0] = [];
-        let message = write_gif(&path, none, 10.0, Looping::Once).expect_err("no frame").to_string();
+        let message = write_gif(&path, none, 10.0).expect_err("no frame").to_string();
         assert!(message.contains("no frame"), "{message}");
         let sizes = [frame(4, 4, 0), frame(4, 5, 0)].map(Ok::<_, DataError>);
-        let message = write_gif(&path, sizes, 10.0, Looping::Once).expect_err("sizes").to_string();
+        let message = write_gif(&path, sizes, 10.0).expect_err("sizes").to_string();
         assert!(message.contains("4x5 pixels follows one of 4x4"), "{message}");
         for fps in [0.0, -1.0, f32::NAN, f32::INFINITY, 51.0] {
-            let message = write_gif(&path, [Ok::<_, DataError>(frame(4, 4, 0))], fps, Looping::Once);
+            let message = write_gif(&path, [Ok::<_, DataError>(frame(4, 4, 0))], fps);
             assert!(message.expect_err("a rate").to_string().contains("fps"));
         }
         let stopped = [
             Ok(frame(4, 4, 0)),
             Err(DataError::Io { action: "read", path: "x".into(), source: io::Error::other("gone") }),
         ];
-        let message = write_gif(&path, stopped, 10.0, Looping::Once).expect_err("stopped").to_string();
+        let message = write_gif(&path, stopped, 10.0).expect_err("stopped").to_string();
         assert!(message.contains("gone"), "{message}");
         assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0);
     }

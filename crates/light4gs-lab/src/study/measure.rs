@@ -66,36 +66,6 @@ choice! {
 }
 
 impl Measure {
-    /// All of them.
-    pub const ALL: [Self; 26] = [
-        Self::Psnr,
-        Self::Ssim,
-        Self::ValPsnr,
-        Self::MovingPsnr,
-        Self::StillPsnr,
-        Self::MovingSsim,
-        Self::StillSsim,
-        Self::WorstPsnr,
-        Self::Bytes,
-        Self::GaussianBytes,
-        Self::ShBytes,
-        Self::PlaneBytes,
-        Self::ContextBytes,
-        Self::MotionBytes,
-        Self::Gaussians,
-        Self::LeastStep,
-        Self::MostStep,
-        Self::Minutes,
-        Self::FitSeconds,
-        Self::EncodeSeconds,
-        Self::DecodeSeconds,
-        Self::RenderMilliseconds,
-        Self::EncodePerFrame,
-        Self::DecodePerFrame,
-        Self::EndToEnd,
-        Self::Fps,
-    ];
-
     /// Heading of a column, with its unit.
     pub fn heading(self) -> &'static str {
         match self {

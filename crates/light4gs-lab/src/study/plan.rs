@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use light4gs_data::DataError;
-use light4gs_train::config::Config;
+use light4gs_train::config::{Config, Overrides};
 use light4gs_train::error::TrainError;
 
 use super::definition::{Axis, Study, schedule_problem};

@@ -182,7 +182,8 @@ impl Results {
     /// `results.csv` (without times) or `times.csv` (only times).
     pub fn to_csv(&self, manifest: &Manifest, times: bool) -> String {
         let variants = manifest.variants();
-        let measures: Vec<Measure> = Measure::ALL.into_iter().filter(|measure| measure.is_time() == times).collect();
+        let measures: Vec<Measure> =
+            Measure::ALL.iter().copied().filter(|measure| measure.is_time() == times).collect();
         let mut heading = vec!["scene".to_owned()];
         heading.extend(manifest.study.axis.iter().map(|axis| axis.name.clone()));
         heading.push("seed".to_owned());

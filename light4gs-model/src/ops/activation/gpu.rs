@@ -54,7 +54,7 @@ impl<B: FusionBackend + ActivationKernels> ActivationKernels for Fusion<B> {
 fn sample(device: &Device) -> Vec<TensorData> {
     let mut numbers = Numbers::new(&device.clone().autodiff());
     let place = numbers.leaf(1, 2600, -13.0, 13.0);
-    let mut values = numbers.with_gradients(sigmoid(place.clone()), &[place.clone()]);
+    let mut values = numbers.with_gradients(sigmoid(place.clone()), std::slice::from_ref(&place));
     values.extend(numbers.with_gradients(bounded_exponential(place.clone()), &[place]));
     values
 }

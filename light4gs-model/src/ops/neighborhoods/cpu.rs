@@ -74,11 +74,11 @@ fn backward_on_cpu<B: HostBackend>(chosen: &Neighborhoods, gradient: FloatTensor
 for_cpu_back_ends! {
     NeighborhoodsKernels {
         fn neighborhoods_forward(table: FloatTensor<Self>, chosen: &Neighborhoods) -> FloatTensor<Self> {
-            forward_on_<Self>(table, chosen)
+            forward_on_cpu::<Self>(table, chosen)
         }
 
         fn neighborhoods_backward(chosen: &Neighborhoods, gradient: FloatTensor<Self>) -> FloatTensor<Self> {
-            backward_on_<Self>(chosen, gradient)
+            backward_on_cpu::<Self>(chosen, gradient)
         }
     }
 }

@@ -80,7 +80,7 @@ fn forward(
     Ok((loss, RegularizedNodes { gradients, nodes: count, knots }))
 }
 
-fn regularize_backward(derivatives: RegularizedNodes, upstream: CubeTensor) -> Result<[CubeTensor; LEARNED], GpuError> {
+fn backward(derivatives: RegularizedNodes, upstream: CubeTensor) -> Result<[CubeTensor; LEARNED], GpuError> {
     let gpu = Gpu::of(&upstream)?;
     let (shapes, places) = places_of(derivatives.nodes, derivatives.knots);
     let scaled = gpu.allocate("gradients of nodes", places.total)?;

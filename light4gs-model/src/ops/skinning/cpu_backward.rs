@@ -205,7 +205,7 @@ fn sums<L: Lanes, const W: usize>(
         let (offset, squared, exponent) = node.reach(&mean, &as_exponents(&stillness));
         let weight = weight(exponent, L::load(&group.largest)).mul(L::load(&group.inverse_sum));
         weight.store(place);
-        let by_weight = inner_product(&group.by_pose, &spread(&node.pose));
+        let by_weight: L = inner_product(&group.by_pose, &spread(&node.pose));
         let by_logit = weight.mul(by_weight.sub(L::load(&group.product)));
         for i in 0..3 {
             offset_sums[i] = by_logit.mul_add(offset[i], offset_sums[i]);

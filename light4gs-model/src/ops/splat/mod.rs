@@ -74,7 +74,7 @@ pub trait SplatKernels: Backend {
 /// Camera, background and active SH degree of one image.
 #[derive(Clone, Copy, Debug)]
 pub struct SplatView {
-    pub(super) view: View,
+    pub(crate) view: View,
     /// Intersections that there is room for; `None`: for all. Only a GPU has to know.
     #[cfg_attr(not(feature = "wgpu"), allow(dead_code))]
     pub(crate) room: Option<usize>,

@@ -5,7 +5,7 @@ mod motion;
 mod survey;
 
 use burn::module::Param;
-use burn::tensor::{Device, Distribution, Tensor, TensorData};
+use burn::tensor::{Device, Distribution, Tensor};
 use glam::{Quat, Vec3};
 use light4gs_codec::network::{Layer, Operation, Value};
 use light4gs_codec::{MotionArrays, MotionEvaluator, MotionNetwork, SceneMeta, decode, encode};
