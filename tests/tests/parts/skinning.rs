@@ -63,13 +63,9 @@ impl Case {
         if self.affinities > 0 {
             nodes.push(anchors.narrow(1, 3, self.affinities));
         }
-        let moved = operation(SkinningInputs {
-            means,
-            quats,
-            affinities: (self.affinities > 0).then(|| columns(stillness.clone(), 1..1 + self.affinities)),
-            stillness: columns(stillness, 0..1),
-            nodes: Tensor::cat(nodes, 1),
-        });
+        let affinities = (self.affinities > 0).then(|| columns(stillness.clone(), 1..1 + self.affinities));
+        let inputs = SkinningInputs::new(means, quats, columns(stillness, 0..1), Tensor::cat(nodes, 1));
+        let moved = operation(SkinningInputs { affinities, ..inputs });
         let weights: Vec<f32> = weights.iter().map(|weight| *weight as f32).collect();
         let weights = Tensor::<2>::from_data(TensorData::new(weights, moved.dims()), &moved.device());
         let gradients = (moved.clone() * weights).sum().backward();
@@ -119,7 +115,7 @@ fn loss_weights(count: usize, random: &mut Random) -> Vec<f64> {
 
 /// The operation in plain ones.
 fn plain(inputs: SkinningInputs) -> Tensor<2> {
-    let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
+    let SkinningInputs { means, quats, stillness, affinities, nodes, .. } = inputs;
     let device = means.device();
     let [places, precisions, poses] =
         [(0, 3), (3, 1), (4, 16)].map(|(first, count)| nodes.clone().narrow(1, first, count));
@@ -307,17 +303,14 @@ fn tensors_may_lie_in_memory_as_they_like() {
     for (name, device) in devices() {
         let expected = case.run(&device, &weights, skin);
         let found = case.run(&device, &weights, |inputs| {
-            let SkinningInputs { means, quats, stillness, affinities, nodes } = inputs;
+            let SkinningInputs { means, quats, stillness, affinities, nodes, .. } = inputs;
             let affinities = affinities.expect("this case has them");
             let gaussians = Tensor::cat(vec![stillness, affinities, means, quats], 1);
             let nodes = Tensor::cat(vec![nodes.clone().transpose(), nodes.transpose()], 0);
-            skin(SkinningInputs {
-                means: gaussians.clone().narrow(1, 3, 3),
-                quats: gaussians.clone().narrow(1, 6, 4),
-                stillness: gaussians.clone().narrow(1, 0, 1),
-                affinities: Some(gaussians.narrow(1, 1, 2)),
-                nodes: nodes.narrow(0, 22, 22).transpose(),
-            })
+            let columns = |first, count| gaussians.clone().narrow(1, first, count);
+            let nodes = nodes.narrow(0, 22, 22).transpose();
+            let inputs = SkinningInputs::new(columns(3, 3), columns(6, 4), columns(0, 1), nodes);
+            skin(SkinningInputs { affinities: Some(columns(1, 2)), ..inputs })
         });
         assert!(found == expected, "{name}");
     }

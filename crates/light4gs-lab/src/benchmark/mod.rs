@@ -260,13 +260,12 @@ pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningI
         |rows: usize, columns: usize| Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device);
     let radius = 0.6 * 2.0 / (nodes as f32).cbrt();
     let precisions = Tensor::full([nodes, 1], 0.5 / (radius * radius), device);
-    SkinningInputs {
-        means: leaf(random(count, 3)),
-        quats: leaf(random(count, 4)),
-        stillness: leaf(random(count, 1)),
-        affinities: None,
-        nodes: leaf(Tensor::cat(vec![random(nodes, 3), precisions, random(nodes, 16)], 1)),
-    }
+    SkinningInputs::new(
+        leaf(random(count, 3)),
+        leaf(random(count, 4)),
+        leaf(random(count, 1)),
+        leaf(Tensor::cat(vec![random(nodes, 3), precisions, random(nodes, 16)], 1)),
+    )
 }
 
 /// Times every part on every scene, `repeats` times each, on a device without autodiff.

@@ -169,13 +169,12 @@ impl<B: FusionBackend + SkinningKernels> SkinningKernels for Fusion<B> {
 fn sample(device: &Device, affinities: usize) -> Vec<TensorData> {
     let mut numbers = Numbers::new(&device.clone().autodiff());
     let (gaussians, nodes) = (777, 21);
-    let inputs = SkinningInputs {
-        means: numbers.leaf(gaussians, 3, -1.0, 1.0),
-        quats: numbers.leaf(gaussians, 4, -1.0, 1.0),
-        stillness: numbers.leaf(gaussians, 1, -3.0, 1.0),
-        affinities: (affinities > 0).then(|| numbers.leaf(gaussians, affinities, -3.0, 1.0)),
-        nodes: numbers.leaf(nodes, 20 + affinities, 0.0, 1.0),
-    };
+    let mut of_gaussians = |columns, low, high| numbers.leaf(gaussians, columns, low, high);
+    let [means, quats] = [3, 4].map(|columns| of_gaussians(columns, -1.0, 1.0));
+    let stillness = of_gaussians(1, -3.0, 1.0);
+    let own = (affinities > 0).then(|| of_gaussians(affinities, -3.0, 1.0));
+    let nodes = numbers.leaf(nodes, POSED + affinities, 0.0, 1.0);
+    let inputs = SkinningInputs { affinities: own, ..SkinningInputs::new(means, quats, stillness, nodes) };
     let leaves = [&inputs.means, &inputs.quats, &inputs.stillness, &inputs.nodes].map(Clone::clone);
     let leaves: Vec<_> = leaves.into_iter().chain(inputs.affinities.clone()).collect();
     numbers.with_gradients(skin(inputs), &leaves)

@@ -114,6 +114,13 @@ pub struct SkinningInputs {
     pub nodes: Tensor<2>,
 }
 
+impl SkinningInputs {
+    /// Gaussians without affinities, and nodes `[B, 20]`.
+    pub fn new(means: Tensor<2>, quats: Tensor<2>, stillness: Tensor<2>, nodes: Tensor<2>) -> Self {
+        Self { means, quats, stillness, affinities: None, nodes }
+    }
+}
+
 /// Linear blend skinning of N Gaussians by B nodes and one that stands still (Lewis et al. 2000; for Gaussians SC-GS, Huang et al.
 /// 2024). Returns `[N, 7]`: positions (3) and quaternions (4), which are not normalized.
 ///
@@ -138,17 +145,15 @@ pub struct SkinningInputs {
 /// };
 /// // One node, at the origin, that turns what is near it by a quarter about z and lifts it by 2.
 /// let half = 0.5_f32.sqrt();
-/// let moved = skin(SkinningInputs {
-///     means: rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3),
-///     quats: rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 4),
-///     // The first Gaussian goes with the node, the second stands still.
-///     stillness: rows(&[-60.0, 60.0], 1),
-///     affinities: None,
-///     nodes: rows(&[
-///         0.0, 0.0, 0.0, 1.0,
-///         0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half,
-///     ], 20),
-/// });
+/// let means = rows(&[1.0, 0.0, 0.0, 1.0, 0.0, 0.0], 3);
+/// let quats = rows(&[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], 4);
+/// // The first Gaussian goes with the node, the second stands still.
+/// let stillness = rows(&[-60.0, 60.0], 1);
+/// let nodes = rows(&[
+///     0.0, 0.0, 0.0, 1.0,
+///     0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, half, 0.0, 0.0, half,
+/// ], 20);
+/// let moved = skin(SkinningInputs::new(means, quats, stillness, nodes));
 /// let moved = moved.into_data().to_vec::<f32>().unwrap();
 /// assert_eq!(moved[..7], [0.0, 1.0, 2.0, half, 0.0, 0.0, half]);
 /// assert_eq!(moved[7..], [1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]);

@@ -177,13 +177,8 @@ impl NodesField {
         let stillness = canonical.further(STILLNESS).cloned();
         let stillness = stillness
             .unwrap_or_else(|| Tensor::full([canonical.means.dims()[0], 1], NEVER_STILL, &canonical.means.device()));
-        skin(SkinningInputs {
-            means: canonical.means.clone(),
-            quats: canonical.quats.clone(),
-            stillness,
-            affinities: canonical.further(AFFINITY).cloned(),
-            nodes,
-        })
+        let inputs = SkinningInputs::new(canonical.means.clone(), canonical.quats.clone(), stillness, nodes);
+        skin(SkinningInputs { affinities: canonical.further(AFFINITY).cloned(), ..inputs })
     }
 
     /// The number of knots for `times` different training times.
