@@ -96,7 +96,7 @@ pub unsafe extern "C" fn l4gs_open_bytes(
         if isize::try_from(length).is_err() {
             return Err(Failure::argument("length is more than the memory of this machine can hold"));
         }
-        // SAFETY: not null, not too long, and the caller says that so many bytes are there.
+        // SAFETY: not null, not too long, and the caller promises `length` bytes.
         let bytes = unsafe { std::slice::from_raw_parts(bytes, length) };
         // SAFETY: the caller's words.
         let limits = unsafe { limits_of(limits) };

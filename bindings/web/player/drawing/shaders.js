@@ -1,4 +1,4 @@
-// The renderer's arithmetic: that of light4gs-model/src/cpu/project.rs, Gaussian by Gaussian, and blend.rs, pixel by pixel.
+// The renderer's arithmetic: that of `project.rs`, Gaussian by Gaussian, and `blend.rs`, pixel by pixel, in crates/light4gs-render/src/splatting.
 // Order and colors come from the worker.
 
 import { DILATION, ENTRY, FRUSTUM_MARGIN, MAX_ALPHA, MIN_ALPHA, NEAR, ROW } from "./constants.js";

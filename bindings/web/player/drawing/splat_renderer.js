@@ -150,7 +150,7 @@ export class SplatRenderer {
    * Draws the list that was set, over a background.
    * @param {View} view
    * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
-   * @param {number} [scale]  below 1: a draft of so many of the pixels along each side, in bytes, and enlarged
+   * @param {number} [scale]  below 1: a draft with this share of the pixels along each side, in bytes, and enlarged
    */
   draw(view, background, scale = 1) {
     const { gl, canvas, parts } = this;

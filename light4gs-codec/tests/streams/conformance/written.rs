@@ -319,7 +319,7 @@ fn streams() -> Vec<(&'static str, Vec<u8>)> {
     };
     streams.push(("clusters", compressed(&many, &coding)));
 
-    // Equal Gaussians, and so many of them that zeros fill the section.
+    // Equal Gaussians, enough of them for a section full of zeros.
     let one = clusters(1);
     let equal = GaussianArrays {
         means: vec![one.means[0]; 5000],
