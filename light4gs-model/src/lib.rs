@@ -52,7 +52,7 @@
 //! | [`Splatter`] | differentiable rendering | 3DGS |
 //! | [`Significance`] | the contribution of each Gaussian over views and times | III-B |
 //! | [`context`] | the bits of every value of the planes: the multiscale hexplane [`ContextModel`] | III-C |
-//! | [`sh`] | the bits of every spherical harmonic: four models behind [`ShEntropy`] | III-D |
+//! | [`sh`] | the bits of every spherical harmonic: models behind [`ShEntropy`] | III-D |
 //! | [`AttributeEntropy`] | the bits of the other attributes of Gaussians, and their learned steps | |
 //! | [`entropy`] | the components of these models: densities, convolutions over planes, quantization steps ([`AdaptiveQuantization`]) | III-D |
 //! | [`parameters`] | every float parameter of a module with its path | |

@@ -5,7 +5,7 @@
 //! | the paper's method; any motion, also of colors and opacities | [`HexPlaneField`](crate::HexPlaneField) |
 //! | objects that are nearly rigid, in few bytes | [`NodesField`](crate::NodesField) |
 //! | nothing moves | [`StillField`](crate::StillField) |
-//! | the name is known only when the program runs, or is in a file | [`BuiltInField`](crate::BuiltInField): one of these three |
+//! | the name is known only when the program runs, or is in a file | [`BuiltInField`](crate::BuiltInField): one of these |
 //! | a motion of your own | another [`DeformationField`] |
 //!
 //! The files:
