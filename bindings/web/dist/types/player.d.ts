@@ -58,7 +58,7 @@ export declare class Player extends EventTarget {
     renderer: SplatRenderer;
     camera: Camera;
     home: Camera;
-    /** What the last frames took, in milliseconds. */
+    /** Times of the last frames, milliseconds. */
     timings: {
         evaluate: number;
         sort: number;
@@ -74,7 +74,7 @@ export declare class Player extends EventTarget {
      * @param {PlayerOptions} [options]
      */
     constructor(canvas: HTMLCanvasElement, scene: Scene, options?: PlayerOptions);
-    /** What is seen now. @returns {View} */
+    /** The current view. @returns {View} */
     get view(): View;
     /** Time in [0, 1]. */
     get time(): number;
@@ -85,7 +85,7 @@ export declare class Player extends EventTarget {
     play(): void;
     /** Stops time. */
     pause(): void;
-    /** Back to where the view began. */
+    /** Back to the view at the beginning. */
     resetView(): void;
     /**
      * Takes the place of a camera of the dataset, at its time.
@@ -96,7 +96,7 @@ export declare class Player extends EventTarget {
     cameraMoved(): void;
     /** The training cameras in the order of their times: the path that {@link following} takes. */
     get path(): import("./views/camera.js").DatasetCamera[];
-    /** The share of the canvas's pixels along each side that is drawn while something moves: 1 where there is time for all. */
+    /** The share of the canvas's pixels along each side that is drawn while something moves: 1 if there is time for all. */
     get draftScale(): number;
     /**
      * The level of detail that is drawn while something moves, of {@link Scene.info}'s `levels`: 0 where there is time for all
@@ -114,6 +114,6 @@ export declare class Player extends EventTarget {
      * @returns {Promise<Uint8Array>}
      */
     renderAt(time: number, view: View): Promise<Uint8Array>;
-    /** Stops, and gives back what the graphics card holds. The scene stays open. */
+    /** Stops, and frees the memory of the graphics card. The scene stays open. */
     dispose(): void;
 }

@@ -36,11 +36,11 @@ export declare class SplatRenderer {
     #private;
     canvas: HTMLCanvasElement | OffscreenCanvas;
     gl: WebGL2RenderingContext;
-    /** Whether sums are half floats; bytes lose faint layers. */
+    /** Whether images are summed in half floats. Bytes lose faint layers. */
     halfFloats: boolean;
     /**
-     * Whether the page gives the canvas its size, whatever its pixels are: a draft is a smaller canvas then, and nothing has
-     * to be enlarged here. Not known: null.
+     * Whether the page gives the canvas its size, independent of its pixels: a draft is then a smaller canvas, and nothing has to
+     * be enlarged here. Null before it is known.
      * @type {boolean | null}
      */
     stretched: boolean | null;
@@ -68,16 +68,16 @@ export declare class SplatRenderer {
     /** @param {Float32Array} list  what is drawn, as {@link import("../scene/scene.js").Scene.frame} gives it */
     setList(list: Float32Array): void;
     /**
-     * Draws what was set, over a background.
+     * Draws the list that was set, over a background.
      * @param {View} view
      * @param {ArrayLike<number>} background  red, green, blue in [0, 1]
-     * @param {number} [scale]  below 1: a draft of so many of the pixels along each side, in bytes, and enlarged
+     * @param {number} [scale]  below 1: a draft with this share of the pixels along each side, in bytes, and enlarged
      */
     draw(view: View, background: ArrayLike<number>, scale?: number): void;
-    /** A mark behind everything that was asked for until now. */
+    /** A mark behind all commands so far. */
     fence(): WebGLSync | null;
     /**
-     * Whether the graphics card has come to a mark. Takes the mark away then.
+     * Whether the graphics card has reached a mark. If so, the mark is deleted.
      * @param {WebGLSync | null} fence
      */
     isDone(fence: WebGLSync | null): boolean;
@@ -85,6 +85,6 @@ export declare class SplatRenderer {
     finish(): void;
     /** The picture on the canvas: `[height, width, 4]` bytes from the upper edge. Right after {@link draw}. */
     readPixels(): Uint8Array<ArrayBuffer>;
-    /** Gives everything back. */
+    /** Frees everything on the graphics card. */
     dispose(): void;
 }

@@ -1,12 +1,12 @@
 /**
- * One request at a time. Of what is wanted meanwhile, the newest is asked for next, and the rest never is: so a renderer that is
- * slower than the clock drops times in place of falling behind.
+ * One request at a time. Of the times that are wanted meanwhile, only the newest is asked for next. So a renderer that is slower
+ * than the clock drops times instead of falling behind.
  * @template Wanted  what is asked for, as JSON can hold it: a time, or a time and a viewpoint
  * @template Answer
  */
 export declare class Follower<Wanted, Answer> {
     #private;
-    /** What was applied last. @type {Wanted | null} */
+    /** The request that was applied last. @type {Wanted | null} */
     shown: Wanted | null;
     /**
      * @param {(wanted: Wanted) => Promise<Answer>} ask  such as `(time) => scene.gaussiansAt(time)`
@@ -14,7 +14,7 @@ export declare class Follower<Wanted, Answer> {
      */
     constructor(ask: (wanted: Wanted) => Promise<Answer>, apply: (answer: Answer, wanted: Wanted) => void);
     /**
-     * Says what is wanted now: for each frame, changed or not.
+     * Sets the request. To be called for each frame, changed or not.
      * @param {Wanted} wanted
      * @returns {Promise<void>}  settles when the newest is applied; fails with what `ask` or `apply` throws, and so it stays
      */

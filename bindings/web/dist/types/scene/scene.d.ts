@@ -141,7 +141,7 @@ export declare class Scene extends EventTarget {
     #private;
     /** @type {SceneInfo} */
     info: SceneInfo;
-    /** What decoding took, in milliseconds. */
+    /** Time of decoding, milliseconds. */
     decodeMs: number;
     /** Resolves when the whole file is there; fails with a {@link SceneError} where it does not come. @type {Promise<void>} */
     whole: Promise<void>;
@@ -165,7 +165,7 @@ export declare class Scene extends EventTarget {
      */
     gaussiansAt(time: number): Promise<GaussiansAt>;
     /**
-     * What the renderer draws at a time from a viewpoint.
+     * The list of Gaussians to draw at a time from a viewpoint.
      * @param {number} time  in [0, 1]
      * @param {Viewpoint} viewpoint
      * @param {ArrayBuffer | null} [memory]  to be used again
@@ -179,7 +179,7 @@ export declare class Scene extends EventTarget {
      * @returns {Promise<string>}
      */
     digest(bytes: ArrayBuffer): Promise<string>;
-    /** Ends the worker and frees its memory. What is still asked for fails with a {@link SceneError} `closed`. */
+    /** Ends the worker and frees its memory. Open requests fail with a {@link SceneError} `closed`. */
     close(): void;
 }
 /** Starts a decoder, so that it is ready when the bytes of a file arrive. {@link load} does so itself, but only then. */

@@ -53,9 +53,9 @@ export declare class Camera {
     #private;
     /** World axes of the camera: right, down, forward. @type {[Vector, Vector, Vector]} */
     axes: [Vector, Vector, Vector];
-    /** Where it stands. @type {Vector} */
+    /** Its center, world units. @type {Vector} */
     position: Vector;
-    /** How far ahead the point lies that it turns around. */
+    /** Distance to the point that it turns around, ahead. */
     distance: number;
     /** Upwards in the world. @type {Vector} */
     up: Vector;
@@ -95,14 +95,14 @@ export declare class Camera {
     /** World units that a pixel of the canvas covers at the target. */
     unitsPerPixel(/** @type {number} */ width: number, /** @type {number} */ height: number): number;
     /**
-     * What a canvas of so many pixels shows: all of the lens's image, and more on two sides where the shape differs.
+     * The view on a canvas of `width` × `height` pixels: all of the lens's image, and more on two sides if the shape differs.
      * @param {number} width @param {number} height
      * @returns {View}
      */
     view(width: number, height: number): View;
 }
 /**
- * The direction that most of a dataset's cameras have above them; z where there is none.
+ * The upward direction of most of a dataset's cameras; z without cameras.
  * @param {DatasetCamera[]} cameras
  * @returns {Vector}
  */

@@ -10,11 +10,11 @@ export declare class Controls {
     /** @param {Player} player */
     constructor(player: Player);
     /**
-     * Moves the camera by what is held down. Says whether it moved since the last call.
+     * Moves the camera by the keys that are held down. Returns whether it moved since the last call.
      * @param {number} seconds
      */
     step(seconds: number): boolean;
-    /** Lets nothing go on moving by itself. */
+    /** Ends all movement. */
     rest(): void;
     /** Listens no more. */
     dispose(): void;
