@@ -3,7 +3,7 @@
 /// Declares the names among which a key chooses.
 ///
 /// Plain names: an enum with `NAMES` and `name`. `Display` and serde write the name, `FromStr` and serde read it. An
-/// unknown name is an [`UnknownChoice`] with the nearest one. A key of this type has the bounds `PartKind::BOUNDS`.
+/// unknown name is an [`UnknownChoice`](crate::UnknownChoice) with the nearest one. A key of this type has the bounds `PartKind::BOUNDS`.
 ///
 /// ```
 /// light4gs_keys::choice! {
