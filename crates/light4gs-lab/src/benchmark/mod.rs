@@ -142,13 +142,8 @@ impl BenchScene {
         self.opacity_logits.len()
     }
 
-    /// The camera.
-    pub fn camera(&self) -> &Camera {
-        &self.camera
-    }
-
     /// The Gaussians on a device.
-    pub fn gaussians(&self, device: &Device) -> Gaussians {
+    fn gaussians(&self, device: &Device) -> Gaussians {
         let count = self.count();
         let matrix = |values: &[f32], columns: usize| {
             Tensor::<2>::from_data(TensorData::new(values.to_vec(), [count, columns]), device)
@@ -254,7 +249,7 @@ fn median_of(mut times: Vec<f64>) -> f64 {
 
 /// `count` Gaussians and `nodes` nodes in a box `[-1, 1]³`, with gradients on an autodiff device. The radius of a node is 0.6
 /// of the side of a cube that has the node's share of the box.
-pub fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningInputs {
+fn skinning_inputs(count: usize, nodes: usize, device: &Device) -> SkinningInputs {
     let leaf = |tensor: Tensor<2>| if device.is_autodiff() { tensor.require_grad() } else { tensor };
     let random =
         |rows: usize, columns: usize| Tensor::<2>::random([rows, columns], Distribution::Uniform(-1.0, 1.0), device);
