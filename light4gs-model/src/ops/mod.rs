@@ -30,6 +30,7 @@ pub mod node_poses;
 pub mod node_regularizer;
 pub mod normal_cdf;
 pub mod plane_query;
+pub mod plane_regularizer;
 #[cfg(feature = "wgpu")]
 mod sample;
 pub mod significance;
@@ -66,6 +67,7 @@ pub const ON_GPU: &[GpuOperation] = &[
     node_regularizer::gpu::OPERATION,
     normal_cdf::gpu::OPERATION,
     plane_query::gpu::OPERATION,
+    plane_regularizer::gpu::OPERATION,
     significance::gpu::OPERATION,
     skinning::gpu::OPERATION,
     splat::gpu::OPERATION,

@@ -4,7 +4,7 @@ use burn::module::Param;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
 use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_data::PointCloud;
-use light4gs_model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, PlaneTensors, regularizer};
+use light4gs_model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, PlaneTensors, regularizer::PlaneRegularizer};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_train::density::clone_and_split::{
     DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors,
@@ -112,17 +112,14 @@ fn plane_regularizers() {
                 }
             }
         };
-        let terms = || {
-            let (time, l1) = (regularizer::time_smoothness(&hexplane), regularizer::time_l1(&hexplane));
-            [time, l1, regularizer::plane_smoothness(&hexplane)]
+        let loss = |[time_smoothness, time_l1, plane_smoothness]: [f32; 3]| {
+            PlaneRegularizer { time_smoothness, time_l1, plane_smoothness }.loss(&hexplane)
         };
-        let [time, l1, plane] = terms();
-        check("time_smooth", time);
-        check("l1_time", l1);
-        check("plane_smooth", plane);
+        check("time_smooth", loss([1.0, 0.0, 0.0]));
+        check("l1_time", loss([0.0, 1.0, 0.0]));
+        check("plane_smooth", loss([0.0, 0.0, 1.0]));
         let weights = golden.values("reg.compute_regulation.weights_time_l1_plane");
-        let weighted = terms().into_iter().zip(weights).map(|(term, weight)| term * weight);
-        check("compute_regulation", weighted.reduce(|sum, term| sum + term).unwrap());
+        check("compute_regulation", loss(weights.try_into().expect("three weights")));
     }
 }
 

@@ -10,6 +10,7 @@ macro_rules! studies {
 }
 
 studies![
+    "d-nerf",
     "rate-distortion-curves",
     "composition",
     "context-model",

@@ -35,6 +35,9 @@ use super::measure::{Column, Measure, default_columns};
 /// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;
 
+/// The preset that variants start from, where neither the command nor the study names one.
+pub const DEFAULT_CONFIG: &str = "dnerf-cpu";
+
 /// Legal factors of the length of a schedule.
 pub const SCHEDULES: RangeInclusive<f64> = 0.001..=1000.0;
 
@@ -56,6 +59,9 @@ pub struct Study {
     /// How it differs from that, and what to look for; may be empty.
     #[serde(default)]
     pub notes: String,
+    /// The preset or file that every variant starts from, where the command names none; [`DEFAULT_CONFIG`] if not given.
+    #[serde(default)]
+    pub config: Option<String>,
     /// Presets that are laid on top of the base configuration in every run, before those of the axes.
     #[serde(default)]
     pub presets: Vec<String>,
@@ -185,7 +191,7 @@ impl Cost {
     }
 }
 
-/// Published results on known data. They are shown only if the study has the same scenes and image sizes.
+/// Published results on known data. They are shown where a run of the study has the same scenes, image size and background.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
@@ -197,10 +203,29 @@ pub struct Published {
     pub scenes: Vec<String>,
     /// Width and height of the images.
     pub resolution: [u32; 2],
+    /// Color behind the scene, 0 to 1; white if not given.
+    #[serde(default = "white")]
+    pub background: [f32; 3],
     /// Test PSNR, dB.
     pub psnr: f64,
+    /// Test SSIM.
+    #[serde(default)]
+    pub ssim: Option<f64>,
     /// Size of a file, bytes.
-    pub bytes: f64,
+    #[serde(default)]
+    pub bytes: Option<f64>,
+}
+
+impl Published {
+    /// Whether another row is of the same work, image size and background.
+    pub(super) fn has_conditions_of(&self, other: &Self) -> bool {
+        let conditions = |row: &Self| (row.name.clone(), row.source.clone(), row.resolution, row.background.map(f32::to_bits));
+        conditions(self) == conditions(other)
+    }
+}
+
+fn white() -> [f32; 3] {
+    [1.0; 3]
 }
 
 impl Study {
@@ -277,8 +302,9 @@ impl Study {
             }
         }
         for published in &self.published {
-            if !(published.psnr.is_finite() && published.bytes.is_finite() && published.bytes > 0.0) {
-                return Some(format!("`published` \"{}\" needs a finite psnr, and bytes above 0", published.name));
+            let size = published.bytes.is_none_or(|bytes| bytes.is_finite() && bytes > 0.0);
+            if !(published.psnr.is_finite() && published.ssim.is_none_or(f64::is_finite) && size) {
+                return Some(format!("`published` \"{}\" needs finite figures, and bytes above 0", published.name));
             }
         }
         None

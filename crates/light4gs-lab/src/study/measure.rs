@@ -14,6 +14,10 @@ choice! {
         Psnr = "psnr",
         /// Mean SSIM of the same split.
         Ssim = "ssim",
+        /// Mean MS-SSIM of the same split.
+        MsSsim = "ms_ssim",
+        /// Mean LPIPS (AlexNet) of the same split; only where `eval.lpips` names the weights.
+        Lpips = "lpips",
         /// Mean PSNR of the validation split, dB.
         ValPsnr = "val_psnr",
         /// PSNR of the same split as [`Self::Psnr`] over all pixels that move, dB; only where the dataset has masks.
@@ -71,6 +75,8 @@ impl Measure {
         match self {
             Self::Psnr => "PSNR dB",
             Self::Ssim => "SSIM",
+            Self::MsSsim => "MS-SSIM",
+            Self::Lpips => "LPIPS alex",
             Self::ValPsnr => "val PSNR dB",
             Self::MovingPsnr => "moving dB",
             Self::StillPsnr => "still dB",
@@ -112,13 +118,13 @@ impl Measure {
             Self::Psnr | Self::ValPsnr | Self::MovingPsnr | Self::StillPsnr | Self::WorstPsnr => 2,
             Self::EncodeSeconds | Self::DecodeSeconds | Self::RenderMilliseconds => 2,
             Self::EncodePerFrame | Self::DecodePerFrame | Self::EndToEnd => 2,
-            Self::Ssim | Self::MovingSsim | Self::StillSsim | Self::LeastStep | Self::MostStep => 4,
+            Self::Ssim | Self::MsSsim | Self::Lpips | Self::MovingSsim | Self::StillSsim | Self::LeastStep | Self::MostStep => 4,
         }
     }
 
-    /// Whether it is of a region that only some datasets mark.
-    pub fn needs_masks(self) -> bool {
-        matches!(self, Self::MovingPsnr | Self::StillPsnr | Self::MovingSsim | Self::StillSsim)
+    /// Whether it needs what only some studies have: masks of the dataset, weights of LPIPS.
+    pub fn may_be_absent(self) -> bool {
+        matches!(self, Self::MovingPsnr | Self::StillPsnr | Self::MovingSsim | Self::StillSsim | Self::Lpips)
     }
 
     /// Whether it is a time, which differs in every run.
@@ -148,6 +154,8 @@ impl Measure {
         let value = match self {
             Self::Psnr => run.quality.psnr,
             Self::Ssim => run.quality.ssim,
+            Self::MsSsim => run.quality.ms_ssim,
+            Self::Lpips => run.quality.lpips_alex,
             Self::ValPsnr => run.val_psnr,
             Self::MovingPsnr => run.quality.moving_psnr,
             Self::StillPsnr => run.quality.still_psnr,

@@ -5,10 +5,11 @@
 //!
 //! - [`definition`]: such a file; [`catalog`]: those of the paper, embedded in the program
 //! - [`plan`]: variants x scenes x seeds, each a run with a configuration; runs with equal training are trained once
+//! - [`selection`]: some of these runs, by parts of their names
 //! - [`manifest`]: `study.json`, the plan of a study's folder
 //! - [`measure`]: the measures of a run, and the columns of tables
 //! - [`results`]: the results of the runs so far, `results.json` and the CSV files; [`reuse`]: trainings of other
-//!   studies
+//!   studies; [`remaining`]: the time that missing runs will take
 //! - [`table`]: means, spreads and differences to the reference
 //! - [`quality_curves`]: runs as curves of quality over bytes or minutes
 //! - `plots`, `figures`: plots and images, and the study's `report.html`
@@ -23,8 +24,10 @@ pub mod measure;
 pub mod plan;
 pub mod plots;
 pub mod quality_curves;
+pub mod remaining;
 pub mod results;
 pub mod reuse;
+pub mod selection;
 pub mod spread;
 pub mod table;
 

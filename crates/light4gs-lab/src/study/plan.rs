@@ -7,7 +7,7 @@ use light4gs_data::DataError;
 use light4gs_train::config::{Config, Overrides};
 use light4gs_train::error::TrainError;
 
-use super::definition::{Axis, Study, schedule_problem};
+use super::definition::{Axis, DEFAULT_CONFIG, Study, schedule_problem};
 
 /// In the name of a configuration, it stands for the name of the scene.
 const SCENE_PLACE: &str = "{scene}";
@@ -15,8 +15,8 @@ const SCENE_PLACE: &str = "{scene}";
 /// The options of a study.
 #[derive(Clone, Debug, Default)]
 pub struct PlanOptions {
-    /// The preset or file that every variant starts from; `{scene}` in it stands for the scene's name.
-    pub config: String,
+    /// The preset or file that every variant starts from, in place of the study's; `{scene}` in it stands for the scene's name.
+    pub config: Option<String>,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
     /// Length of the schedule of every run, divided by the configuration's; see [`SCHEDULES`](super::definition::SCHEDULES).
@@ -166,7 +166,8 @@ fn check_reference(study: &Study, variants: &[Variant]) -> Result<(), TrainError
 
 fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOptions) -> Result<Config, TrainError> {
     let chosen = || study.axis.iter().zip(&variant.values).map(|(axis, value)| &axis.value[*value]);
-    let mut names = vec![options.config.replace(SCENE_PLACE, scene)];
+    let base = options.config.as_ref().or(study.config.as_ref()).map_or(DEFAULT_CONFIG, String::as_str);
+    let mut names = vec![base.replace(SCENE_PLACE, scene)];
     names.extend(study.presets.iter().cloned());
     names.extend(chosen().flat_map(|value| value.presets.iter().cloned()));
     let names = names.join("+");
@@ -250,7 +251,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
 
     fn options(scene: &Path) -> PlanOptions {
         PlanOptions {
-            config: "dnerf-cpu".into(),
+            config: Some("dnerf-cpu".into()),
             scenes: vec![scene.into()],
             schedule: None,
             overrides: Vec::new(),
@@ -318,7 +319,7 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         refused(wrong, good.clone(), &["strong", "compression.rate.lambda", "must be 0 to"]);
         refused(study(&LAMBDAS.replace("rate.lambda=0.05", "rate.lamda=0.05")), good.clone(), &["strong", "lambda"]);
         refused(study(&format!("reference = \"weak\"\n{LAMBDAS}")), good.clone(), &["weak", "one of none"]);
-        refused(study(LAMBDAS), PlanOptions { config: "dnerf-{scene}".into(), ..good }, &["dnerf-scene"]);
+        refused(study(LAMBDAS), PlanOptions { config: Some("dnerf-{scene}".into()), ..good }, &["dnerf-scene"]);
     }
 
     #[test]
@@ -327,8 +328,8 @@ value = [{ name = "three", label = "degree 3" }, { name = "one", set = ["model.s
         let scene = folder.path().join("flag");
         std::fs::create_dir(&scene).unwrap();
         for name in super::super::catalog::NAMES {
-            for config in ["dnerf-{scene}-cpu", "dnerf-{scene}"] {
-                let options = PlanOptions { config: config.into(), ..options(&scene) };
+            for config in [Some("dnerf-{scene}-cpu"), Some("dnerf-{scene}"), None] {
+                let options = PlanOptions { config: config.map(str::to_owned), ..options(&scene) };
                 let plan = Plan::new(Study::load(name).unwrap(), &options).unwrap_or_else(|e| panic!("{name}: {e}"));
                 assert!(!plan.runs.is_empty(), "{name}");
             }

@@ -6,9 +6,11 @@
 use std::path::Path;
 
 use light4gs_train::compression::CodingRecord;
+use light4gs_train::config::Config;
 use light4gs_train::error::TrainError;
-use light4gs_train::observers::metrics_log::read_metrics;
+use light4gs_train::observers::metrics_log::{MetricsRecord, read_metrics};
 use light4gs_train::run::RunFolder;
+use light4gs_train::stage::Stage;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::{Manifest, ManifestRun, StudyFolder};
@@ -40,6 +42,8 @@ pub struct RunResult {
     pub gaussians: usize,
     /// Width and height of the measured images.
     pub resolution: [u32; 2],
+    /// Color behind the scene, 0 to 1.
+    pub background: [f32; 3],
     /// Times in the training frames; `None` if the file does not say.
     pub frames: Option<u32>,
     /// Quantization step of every plane; empty if planes are not coded.
@@ -71,6 +75,10 @@ pub struct Quality {
     pub psnr: Option<f64>,
     /// Mean SSIM.
     pub ssim: Option<f64>,
+    /// Mean MS-SSIM.
+    pub ms_ssim: Option<f64>,
+    /// Mean LPIPS by AlexNet.
+    pub lpips_alex: Option<f64>,
     /// PSNR over all pixels that move, dB.
     pub moving_psnr: Option<f64>,
     /// PSNR over all pixels that stand still, dB.
@@ -92,6 +100,12 @@ pub struct MissingRun {
     pub task: usize,
     /// Its state, and the message of its task if that failed.
     pub state: String,
+    /// Share of its iterations that are done, 0 to 1.
+    #[serde(skip)]
+    pub share: f64,
+    /// Seconds of training so far.
+    #[serde(skip)]
+    pub seconds: f64,
 }
 
 /// The results of a study's runs.
@@ -148,14 +162,14 @@ impl Results {
         for run in &manifest.runs {
             let path = folder.path(&run.name);
             if !is_finished(&path) {
-                let state = state(folder, run);
-                results.missing.push(MissingRun { run: run.name.clone(), task: run.task, state });
+                results.missing.push(missing(folder, run));
                 continue;
             }
             let (run_folder, _, config) = RunFolder::open(&path)?;
             if config.digest_text() != run.configuration {
                 let state = "has another configuration than the study planned".to_owned();
-                results.missing.push(MissingRun { run: run.name.clone(), task: run.task, state });
+                let (run, task) = (run.name.clone(), run.task);
+                results.missing.push(MissingRun { run, task, state, share: 0.0, seconds: 0.0 });
                 continue;
             }
             let evaluation: EvaluationFile = run_folder
@@ -164,7 +178,7 @@ impl Results {
             let frames = light4gs_codec::read_info_with_limits(&run_folder.stream(), &light4gs_codec::Limits::large())
                 .ok()
                 .map(|info| info.meta.frame_count);
-            results.runs.push(result(run, evaluation, frames.filter(|count| *count > 0)));
+            results.runs.push(result(run, &config, evaluation, frames.filter(|count| *count > 0)));
         }
         Ok(results)
     }
@@ -210,7 +224,7 @@ fn line(cells: Vec<String>) -> String {
     text
 }
 
-fn result(run: &ManifestRun, evaluation: EvaluationFile, frames: Option<u32>) -> RunResult {
+fn result(run: &ManifestRun, config: &Config, evaluation: EvaluationFile, frames: Option<u32>) -> RunResult {
     let split = |name: &str| evaluation.splits.iter().find(|split| split.split == name);
     let shown = split("test").or(evaluation.splits.first());
     let coding = evaluation.coding.as_ref();
@@ -226,6 +240,7 @@ fn result(run: &ManifestRun, evaluation: EvaluationFile, frames: Option<u32>) ->
         sections: evaluation.sections.iter().map(|section| (section.name.clone(), section.bytes)).collect(),
         gaussians: evaluation.gaussians,
         resolution: evaluation.resolution,
+        background: config.data.background,
         frames,
         steps: coding.map(|coding| coding.planes.iter().map(|p| p.step.into()).collect()).unwrap_or_default(),
         training_seconds: evaluation.training_seconds,
@@ -237,10 +252,24 @@ fn result(run: &ManifestRun, evaluation: EvaluationFile, frames: Option<u32>) ->
     }
 }
 
-/// The state of a run that is not finished.
-fn state(folder: &StudyFolder, run: &ManifestRun) -> String {
+/// A run that is not finished.
+fn missing(folder: &StudyFolder, run: &ManifestRun) -> MissingRun {
     let path = folder.path(&run.name);
     let last = read_metrics(&path.join("metrics.jsonl")).ok().and_then(|records| records.last().cloned());
+    let share = last.as_ref().zip(folder.config_of(run).ok()).map_or(0.0, |(record, config)| {
+        let train = &config.train;
+        let before = if record.stage == Stage::Fine { train.coarse_iterations } else { 0 };
+        let whole = train.coarse_iterations + train.fine_iterations;
+        (before + record.iteration) as f64 / whole.max(1) as f64
+    });
+    let seconds = last.as_ref().map_or(0.0, |record| record.seconds);
+    let state = state(folder, run, last);
+    MissingRun { run: run.name.clone(), task: run.task, state, share, seconds }
+}
+
+/// Its state in words.
+fn state(folder: &StudyFolder, run: &ManifestRun, last: Option<MetricsRecord>) -> String {
+    let path = folder.path(&run.name);
     let mut state = match last {
         _ if path.join("scene.l4gs").is_file() => "trained, not measured".to_owned(),
         Some(record) => format!("{} stage, iteration {}", record.stage, record.iteration),

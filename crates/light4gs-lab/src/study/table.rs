@@ -1,8 +1,11 @@
 //! A study's tables: a row for each variant, means and standard deviations over seeds, differences to the reference.
 
+use std::collections::BTreeSet;
+
 use light4gs_train::table::{Align, Table};
 use serde::Serialize;
 
+use super::definition::Published;
 use super::manifest::Manifest;
 use super::measure::{Column, Form, Measure};
 use super::quality_curves::QualityCurves;
@@ -11,6 +14,9 @@ use super::spread::Spread;
 
 /// Marks a difference that is no larger than its standard deviation over seeds.
 pub const WITHIN_SPREAD: &str = "≈";
+
+/// The text of a cell without a figure.
+const ABSENT: &str = "–";
 
 /// One table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -55,10 +61,16 @@ pub struct Cell {
 pub struct PublishedRow {
     /// For the first column.
     pub label: String,
+    /// Width and height of the images.
+    pub resolution: [u32; 2],
+    /// Color behind the scene.
+    pub background: [f32; 3],
     /// Test PSNR, dB.
     pub psnr: f64,
+    /// Test SSIM.
+    pub ssim: Option<f64>,
     /// Size, bytes.
-    pub bytes: f64,
+    pub bytes: Option<f64>,
     /// Its source.
     pub source: String,
 }
@@ -82,10 +94,10 @@ fn table(manifest: &Manifest, results: &Results, heading: &str, scenes: &[usize]
     let reference = study.reference.as_ref().and_then(|name| variants.iter().position(|variant| variant.name == *name));
     let reference = reference.unwrap_or(0);
     let of = |variant: usize, measure: Measure| by_seed(manifest, results, scenes, variant, measure);
-    // Most datasets have no masks.
+    // Most datasets have no masks, and most machines no weights of LPIPS.
     let is_measured =
         |measure: Measure| (0..variants.len()).any(|index| of(index, measure).iter().any(Option::is_some));
-    let shown = |column: &&Column| !column.measure.needs_masks() || is_measured(column.measure);
+    let shown = |column: &&Column| !column.measure.may_be_absent() || is_measured(column.measure);
     let columns: Vec<&Column> = study.columns.iter().filter(shown).collect();
     let rows = variants.iter().enumerate().map(|(index, variant)| StudyRow {
         label: variant.label.clone(),
@@ -175,23 +187,53 @@ fn difference_cell(own: &[Option<f64>], reference: &[Option<f64>], column: &Colu
     Some(Cell { value, deviation: spread.deviation, within_spread, text })
 }
 
-/// Published figures for the scenes and image size of the runs.
+/// Published figures for the scenes of the table, and for the image size and background of at least one of its runs. Where
+/// only figures of single scenes are known, and of all scenes of the table, the table has their means.
 fn published(manifest: &Manifest, results: &Results, scenes: &[usize]) -> Vec<PublishedRow> {
-    let mut names: Vec<&str> = scenes.iter().map(|scene| manifest.scenes[*scene].name.as_str()).collect();
-    names.sort_unstable();
-    let same_data = |published: &&super::definition::Published| {
-        let mut theirs: Vec<&str> = published.scenes.iter().map(String::as_str).collect();
-        theirs.sort_unstable();
-        let mut ours = results.runs.iter().filter(|run| scenes.contains(&run.scene)).peekable();
-        ours.peek().is_some() && theirs == names && ours.all(|run| run.resolution == published.resolution)
+    let names: BTreeSet<&str> = scenes.iter().map(|scene| manifest.scenes[*scene].name.as_str()).collect();
+    let runs = || results.runs.iter().filter(|run| scenes.contains(&run.scene));
+    let all = &manifest.study.published;
+    let same_scenes = |row: &&Published| row.scenes.iter().map(String::as_str).collect::<BTreeSet<_>>() == names;
+    let whole = all.iter().filter(same_scenes).map(|row| vec![row]);
+    let parts = all.iter().enumerate().filter(|_| names.len() > 1).filter_map(|(index, first)| {
+        let like = |row: &&Published| row.scenes.len() == 1 && row.has_conditions_of(first);
+        if first.scenes.len() != 1 || all[..index].iter().any(|row| like(&row)) {
+            return None;
+        }
+        let rows: Vec<_> = all.iter().filter(like).filter(|row| names.contains(row.scenes[0].as_str())).collect();
+        (rows.len() == names.len()).then_some(rows)
+    });
+    let comparable = |rows: &Vec<&Published>| {
+        runs().any(|run| run.resolution == rows[0].resolution && run.background == rows[0].background)
     };
-    let row = |published: &super::definition::Published| PublishedRow {
-        label: published.name.clone(),
-        psnr: published.psnr,
-        bytes: published.bytes,
-        source: published.source.clone(),
+    whole.chain(parts).filter(comparable).map(|rows| mean_row(&rows)).collect()
+}
+
+/// The mean of published rows; of one row, itself.
+fn mean_row(rows: &[&Published]) -> PublishedRow {
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let mean_of = |value: fn(&Published) -> Option<f64>| {
+        rows.iter().map(|row| value(row)).collect::<Option<Vec<_>>>().map(mean)
     };
-    manifest.study.published.iter().filter(same_data).map(row).collect()
+    let first = rows[0];
+    PublishedRow {
+        label: first.name.clone(),
+        resolution: first.resolution,
+        background: first.background,
+        psnr: mean(rows.iter().map(|row| row.psnr).collect()),
+        ssim: mean_of(|row| row.ssim),
+        bytes: mean_of(|row| row.bytes),
+        source: first.source.clone(),
+    }
+}
+
+/// Name of a color behind the scene.
+fn background_name(color: [f32; 3]) -> String {
+    match color {
+        [1.0, 1.0, 1.0] => "white".to_owned(),
+        [0.0, 0.0, 0.0] => "black".to_owned(),
+        [red, green, blue] => format!("({red}, {green}, {blue})"),
+    }
 }
 
 impl StudyTable {
@@ -201,16 +243,20 @@ impl StudyTable {
             let [done, planned] = row.runs;
             let label =
                 if done == planned { row.label.clone() } else { format!("{} ({done} of {planned} runs)", row.label) };
-            let cells = row.cells.iter().map(|cell| cell.as_ref().map_or_else(|| "–".to_owned(), |c| c.text.clone()));
+            let cells = row.cells.iter().map(|cell| cell.as_ref().map_or_else(|| ABSENT.to_owned(), |c| c.text.clone()));
             std::iter::once(label).chain(cells).collect()
         });
+        let optional = |value: Option<f64>, digits| value.map_or_else(|| ABSENT.to_owned(), |v| format!("{v:.digits$}"));
         let published = self.published.iter().map(|row| {
             let cell = |heading: &String| match heading {
                 heading if heading == Measure::Psnr.heading() => format!("{:.2}", row.psnr),
-                heading if heading == Measure::Bytes.heading() => format!("{:.0}", row.bytes),
-                _ => "–".to_owned(),
+                heading if heading == Measure::Ssim.heading() => optional(row.ssim, Measure::Ssim.digits()),
+                heading if heading == Measure::Bytes.heading() => optional(row.bytes, Measure::Bytes.digits()),
+                _ => ABSENT.to_owned(),
             };
-            let label = format!("published: {} ({})", row.label, row.source);
+            let [width, height] = row.resolution;
+            let background = background_name(row.background);
+            let label = format!("published: {} ({}; {width}×{height} on {background})", row.label, row.source);
             std::iter::once(label).chain(self.columns.iter().map(cell)).collect()
         });
         ours.chain(published).collect()
@@ -283,7 +329,7 @@ pub fn legend(manifest: &Manifest) -> String {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use super::super::manifest::{ManifestRun, ManifestScene};
     use super::super::quality_curves::quality_curves;
     use super::super::results::{MissingRun, Quality, RunResult};
@@ -291,7 +337,7 @@ mod tests {
     use super::*;
 
     /// Two variants on some scenes, with PSNR `psnr(scene, variant, seed)`; `None` for a run that is missing.
-    fn example(scenes: &[&str], seeds: u64, psnr: impl Fn(usize, usize, u64) -> Option<f64>) -> (Manifest, Results) {
+    pub(in crate::study) fn example(scenes: &[&str], seeds: u64, psnr: impl Fn(usize, usize, u64) -> Option<f64>) -> (Manifest, Results) {
         let text = r#"
 title = "Example"
 reproduces = "nothing"
@@ -325,7 +371,13 @@ bytes = 2.2e6
                     manifest.runs.push(ManifestRun { name: run.clone(), scene, variant, seed, task, configuration });
                     match psnr(scene, variant, seed) {
                         Some(psnr) => results.runs.push(result(run, scene, variant, seed, psnr)),
-                        None => results.missing.push(MissingRun { run, task, state: "not begun".into() }),
+                        None => results.missing.push(MissingRun {
+                            run,
+                            task,
+                            state: "not begun".into(),
+                            share: 0.0,
+                            seconds: 0.0,
+                        }),
                     }
                 }
             }
@@ -346,6 +398,7 @@ bytes = 2.2e6
             sections: Vec::new(),
             gaussians: 1,
             resolution: [4, 4],
+            background: [1.0; 3],
             frames: None,
             steps: Vec::new(),
             training_seconds: None,
@@ -369,12 +422,28 @@ bytes = 2.2e6
         assert_eq!(texts(&tables[0], 0), ["one", "20.00", "–", "–", "1000"]);
         assert_eq!(texts(&tables[0], 1), ["two", "21.00", "+1.00", "+5.00", "2000"]);
         // Published figures of the same scene, of the same size.
-        assert_eq!(texts(&tables[0], 2), ["published: theirs (a paper)", "33.00", "–", "–", "2200000"]);
+        assert_eq!(texts(&tables[0], 2), ["published: theirs (a paper; 4×4 on white)", "33.00", "–", "–", "2200000"]);
         let curves = quality_curves(&manifest, &results);
         assert_eq!(curves[0].series.len(), 1);
         assert_eq!(curves[0].hull.len(), 2);
         let text = to_markdown(&manifest, &results, &tables, &curves);
         assert!(text.contains("One run each") && !text.contains("Missing"), "{text}");
+    }
+
+    #[test]
+    fn published_figures_of_single_scenes_have_a_mean() {
+        let (mut manifest, results) = example(&["x", "y"], 1, |_, _, _| Some(20.0));
+        let theirs = manifest.study.published[0].clone();
+        let other = Published { scenes: vec!["y".into()], psnr: 35.0, bytes: None, ..theirs.clone() };
+        manifest.study.published.push(other);
+        let black = Published { name: "on black".into(), background: [0.0; 3], ..theirs };
+        manifest.study.published.push(black);
+        let tables = tables(&manifest, &results);
+        let [mean, x, y] = &tables[..] else { panic!("three tables") };
+        // A size is not known of all scenes, and no run is on black.
+        assert_eq!(texts(mean, 2)[1..], ["34.00", "–", "–", "–"]);
+        assert_eq!([mean, x, y].map(|table| table.published.len()), [1, 1, 1]);
+        assert_eq!((x.published[0].psnr, y.published[0].psnr), (33.0, 35.0));
     }
 
     #[test]

@@ -6,7 +6,9 @@ use clap::Args;
 use light4gs_lab::study::figures::{figures, write_report};
 use light4gs_lab::study::manifest::{Manifest, StudyFolder};
 use light4gs_lab::study::quality_curves::{QualityCurves, quality_curves};
+use light4gs_lab::study::remaining::Remaining;
 use light4gs_lab::study::results::Results;
+use light4gs_lab::study::selection::Selection;
 use light4gs_lab::study::table::{StudyTable, legend, tables, to_markdown};
 use light4gs_train::error::TrainError;
 use serde::Serialize;
@@ -25,7 +27,7 @@ pub(in crate::cli) struct Gather {
 impl Gather {
     pub(in crate::cli) fn run(self) -> Result<(), TrainError> {
         let (folder, manifest) = StudyFolder::open(&self.study)?;
-        gather(&folder, &manifest, self.json)
+        gather(&folder, &manifest, &Selection::all(&manifest), self.json)
     }
 }
 
@@ -41,8 +43,13 @@ struct ResultsFile<'a> {
 /// Writes tables and report from the finished runs, and prints the tables.
 ///
 /// # Errors
-/// [`TrainError::Input`] with the runs that are missing, after everything has been written.
-pub(super) fn gather(folder: &StudyFolder, manifest: &Manifest, json: bool) -> Result<(), TrainError> {
+/// [`TrainError::Input`] if selected runs are missing, after everything has been written.
+pub(super) fn gather(
+    folder: &StudyFolder,
+    manifest: &Manifest,
+    selection: &Selection,
+    json: bool,
+) -> Result<(), TrainError> {
     let results = Results::read(folder, manifest)?;
     let tables = tables(manifest, &results);
     let curves = quality_curves(manifest, &results);
@@ -64,8 +71,12 @@ pub(super) fn gather(folder: &StudyFolder, manifest: &Manifest, json: bool) -> R
     if results.missing.is_empty() {
         return Ok(());
     }
-    for missing in &results.missing {
+    for missing in results.missing.iter().filter(|missing| selection.has(&missing.run)) {
         tell(format_args!("missing: {}: {}", missing.run, missing.state));
+    }
+    tell(Remaining::of(manifest, &results));
+    if !results.missing.iter().any(|missing| selection.has(&missing.run)) {
+        return Ok(());
     }
     Err(TrainError::Input(format!(
         "{} of {} runs are missing; the command that began the study goes on with them",

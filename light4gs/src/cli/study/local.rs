@@ -6,12 +6,11 @@ use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use light4gs_data::DataError;
-use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::manifest::StudyFolder;
 use light4gs_train::error::TrainError;
 
 use super::super::output::tell;
 use super::super::signals::stop_flag;
-use super::unfinished;
 
 /// Time between two checks of the processes.
 const PAUSE: Duration = Duration::from_millis(50);
@@ -22,13 +21,13 @@ struct Running {
     process: Child,
 }
 
-/// Runs every task that is not finished, `jobs` at a time. A task that fails does not stop the others.
+/// Runs tasks, `jobs` at a time. A task that fails does not stop the others.
 ///
 /// # Errors
 /// [`TrainError::Stopped`] if requested; a process that cannot be started.
-pub(super) fn run_all(folder: &StudyFolder, manifest: &Manifest, jobs: usize, quiet: bool) -> Result<(), TrainError> {
+pub(super) fn run_all(folder: &StudyFolder, tasks: Vec<usize>, jobs: usize, quiet: bool) -> Result<(), TrainError> {
     let stop = stop_flag();
-    let mut waiting = unfinished(folder, manifest).into_iter();
+    let mut waiting = tasks.into_iter();
     let mut running: Vec<Running> = Vec::new();
     let mut stopping = false;
     loop {

@@ -9,10 +9,11 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
-use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::manifest::{Manifest, ManifestRun, StudyFolder};
 use light4gs_lab::study::plan::{Plan, PlanOptions};
 use light4gs_lab::study::results::is_finished;
 use light4gs_lab::study::reuse::find_trained;
+use light4gs_lab::study::selection::Selection;
 use light4gs_lab::study::{Study as Definition, catalog};
 use light4gs_train::config::DeviceName;
 use light4gs_train::error::TrainError;
@@ -43,9 +44,10 @@ pub(super) struct Study {
     /// the file is written are trained once.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant starts from; {scene} in it stands for the scene's name.
-    #[arg(long, default_value = "dnerf-cpu", value_name = "PRESET|FILE")]
-    config: String,
+    /// The preset or TOML file that every variant starts from, in place of the study's own (most have dnerf-cpu); {scene} in it
+    /// stands for the scene's name.
+    #[arg(long, value_name = "PRESET|FILE")]
+    config: Option<String>,
     /// The schedule of every variant this many times as long: 0.25 for a first look.
     #[arg(long, value_name = "FACTOR")]
     schedule: Option<f64>,
@@ -61,6 +63,10 @@ pub(super) struct Study {
     /// Folder of another study, whose equal trainings are not repeated. May be given more than once.
     #[arg(long, value_name = "STUDY")]
     reuse: Vec<PathBuf>,
+    /// Only runs whose names SCENE/VALUE+VALUE/seed-K have these parts, such as 400,small,seed-0: one of the scenes, values of an
+    /// axis and seeds that are named. The other runs stay missing.
+    #[arg(long, value_delimiter = ',', value_name = "PART")]
+    only: Vec<String>,
     /// Print the runs, without training.
     #[arg(long)]
     dry_run: bool,
@@ -95,8 +101,10 @@ impl Study {
         for study in &plan.reuse {
             StudyFolder::open(study)?;
         }
+        let names: Vec<String> = plan.scenes.iter().map(|scene| scene.name.clone()).collect();
+        let selection = Selection::new(&self.only, &plan.study, &names, plan.seeds)?;
         if self.dry_run {
-            return dry_run(&plan, self.out, self.json);
+            return dry_run(&plan, &selection, self.out, self.json);
         }
         if self.slurm.is_some() && !matches!(self.launcher, Launcher::Slurm) {
             return Err(TrainError::Input("--slurm is for --launcher slurm; give that too, or leave it out".into()));
@@ -106,10 +114,14 @@ impl Study {
         let (folder, manifest) = StudyFolder::create(&out, &plan)?;
         match self.launcher {
             Launcher::Local => {
-                local::run_all(&folder, &manifest, self.jobs as usize, self.quiet || self.json)?;
-                gather::gather(&folder, &manifest, self.json)
+                let tasks = unfinished(&folder, &manifest, &selection);
+                local::run_all(&folder, tasks, self.jobs as usize, self.quiet || self.json)?;
+                gather::gather(&folder, &manifest, &selection, self.json)
             }
-            Launcher::Slurm => slurm::submit(&folder, &manifest, self.jobs, &settings.unwrap_or_default()),
+            Launcher::Slurm => {
+                let tasks = unfinished(&folder, &manifest, &selection);
+                slurm::submit(&folder, &tasks, self.jobs, &settings.unwrap_or_default())
+            }
         }
     }
 }
@@ -135,10 +147,10 @@ struct Planned<'a> {
     configuration: String,
 }
 
-fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainError> {
+fn dry_run(plan: &Plan, selection: &Selection, out: Option<PathBuf>, json: bool) -> Result<(), TrainError> {
     let mut trained = BTreeSet::new();
     let mut rows = Vec::new();
-    for run in &plan.runs {
+    for run in plan.runs.iter().filter(|run| selection.has(&run.name)) {
         let path = out.as_ref().map(|out| out.join(&run.name));
         let state = match path {
             Some(path) if is_finished(&path) => "finished",
@@ -181,11 +193,12 @@ fn dry_run(plan: &Plan, out: Option<PathBuf>, json: bool) -> Result<(), TrainErr
     say(table)?;
     let total: usize = rows.iter().map(|row| row.iterations).sum();
     let finished = rows.iter().filter(|row| row.state == "finished").count();
-    say(format_args!("{} runs in {} tasks, {total} iterations; {finished} runs are finished", rows.len(), plan.tasks()))
+    let tasks = trained.len();
+    say(format_args!("{} runs in {tasks} tasks, {total} iterations; {finished} runs are finished", rows.len()))
 }
 
-/// The tasks with runs that are not finished.
-fn unfinished(folder: &StudyFolder, manifest: &Manifest) -> Vec<usize> {
-    let is_done = |task: usize| manifest.task(task).all(|run| is_finished(&folder.path(&run.name)));
-    (0..manifest.tasks()).filter(|task| !is_done(*task)).collect()
+/// The tasks with selected runs that are not finished.
+fn unfinished(folder: &StudyFolder, manifest: &Manifest, selection: &Selection) -> Vec<usize> {
+    let is_to_do = |run: &ManifestRun| selection.has(&run.name) && !is_finished(&folder.path(&run.name));
+    (0..manifest.tasks()).filter(|task| manifest.task(*task).any(is_to_do)).collect()
 }

@@ -9,12 +9,11 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use light4gs_data::read_regular_text;
-use light4gs_lab::study::manifest::{Manifest, StudyFolder};
+use light4gs_lab::study::manifest::StudyFolder;
 use light4gs_train::error::TrainError;
 use serde::Deserialize;
 
 use super::super::output::say;
-use super::unfinished;
 
 const TASK_SCRIPT: &str = include_str!("task.sh");
 const GATHER_SCRIPT: &str = include_str!("gather.sh");
@@ -93,14 +92,13 @@ impl Settings {
     }
 }
 
-/// Submits the unfinished tasks, at most `jobs` at a time if that is more than 1.
+/// Submits tasks, at most `jobs` at a time if that is more than 1.
 pub(super) fn submit(
     folder: &StudyFolder,
-    manifest: &Manifest,
+    tasks: &[usize],
     jobs: u32,
     settings: &Settings,
 ) -> Result<(), TrainError> {
-    let tasks = unfinished(folder, manifest);
     let program = std::env::current_exe().map_err(|error| TrainError::Input(format!("this program: {error}")))?;
     let root = std::path::absolute(folder.root()).map_err(|error| TrainError::Input(format!("--out: {error}")))?;
     let script = |name: &str, text: &str| -> Result<PathBuf, TrainError> {
@@ -114,7 +112,7 @@ pub(super) fn submit(
     if !tasks.is_empty() {
         let mut command = Command::new("sbatch");
         command.args(settings.common()).args(settings.of_tasks());
-        command.arg(format!("--array={}{}", ranges(&tasks), if jobs > 1 { format!("%{jobs}") } else { String::new() }));
+        command.arg(format!("--array={}{}", ranges(tasks), if jobs > 1 { format!("%{jobs}") } else { String::new() }));
         command.arg("--job-name=light4gs-study").arg(format!("--output={}", logs.join("task-%a.log").display()));
         command.arg(task_script).arg(&program).arg(&root).arg(settings.restarts.to_string());
         let job = sbatch(command)?;

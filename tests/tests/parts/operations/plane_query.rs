@@ -3,7 +3,7 @@
 
 use burn::tensor::{Device, Distribution, Tensor};
 use light4gs_codec::plane_layout::{PlaneAxes, PlaneLayout};
-use light4gs_model::{FeaturePlanes, PlaneTensors, regularizer};
+use light4gs_model::{FeaturePlanes, PlaneTensors, regularizer::PlaneRegularizer};
 use light4gs_tests::golden::{assert_close, devices, values_of};
 use light4gs_tests::planes::plane_sets;
 
@@ -96,10 +96,13 @@ fn regularizers_by_axes() {
     for (set, layout) in plane_sets() {
         let planes = FeaturePlanes::from_tensors(random_planes(&layout, &device));
         let has = |space_time: bool| layout.planes().iter().any(|plane| plane.axes.is_space_time() == space_time);
+        let loss = |[plane_smoothness, time_smoothness, time_l1]: [f32; 3]| {
+            PlaneRegularizer { plane_smoothness, time_smoothness, time_l1 }.loss(&planes)
+        };
         let terms: [(&str, Tensor<1>, bool); 3] = [
-            ("over space", regularizer::plane_smoothness(&planes), has(false)),
-            ("over time", regularizer::time_smoothness(&planes), has(true)),
-            ("from 1", regularizer::time_l1(&planes), has(true)),
+            ("over space", loss([1.0, 0.0, 0.0]), has(false)),
+            ("over time", loss([0.0, 1.0, 0.0]), has(true)),
+            ("from 1", loss([0.0, 0.0, 1.0]), has(true)),
         ];
         for (term, value, there) in terms {
             assert_eq!(values_of(&value)[0] > 0.0, there, "{set}: {term}");
