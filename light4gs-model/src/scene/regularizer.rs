@@ -32,7 +32,8 @@ impl PlaneRegularizer {
             weighted.iter().any(Option::is_some).then(|| {
                 let weights = weighted.each_ref().map(|plane| plane.as_ref().map(|plane| plane.1).unwrap_or_default());
                 // Without weights, a placeholder has no part in the loss.
-                let planes = weighted.map(|plane| plane.map_or_else(|| Tensor::zeros([1, 1, 1], &device), |plane| plane.0));
+                let planes =
+                    weighted.map(|plane| plane.map_or_else(|| Tensor::zeros([1, 1, 1], &device), |plane| plane.0));
                 regularize(planes, weights)
             })
         };

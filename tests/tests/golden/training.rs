@@ -4,7 +4,9 @@ use burn::module::Param;
 use burn::tensor::{Device, Int, Tensor, TensorData, s};
 use light4gs_codec::plane_layout::PlaneAxes;
 use light4gs_data::PointCloud;
-use light4gs_model::{FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, PlaneTensors, regularizer::PlaneRegularizer};
+use light4gs_model::{
+    FeaturePlanes, GaussianTensors, Gaussians, GaussiansConfig, PlaneTensors, regularizer::PlaneRegularizer,
+};
 use light4gs_tests::golden::{Golden, assert_close, assert_close_relative, devices, values_of};
 use light4gs_train::density::clone_and_split::{
     DensifyMasks, SizeLimit, densify, largest_scales, reset_opacity, survivors,

@@ -35,7 +35,7 @@ use super::measure::{Column, Measure, default_columns};
 /// A study with more runs is taken for a mistake.
 const MOST_VARIANTS: usize = 10_000;
 
-/// The preset that variants start from, where neither the command nor the study names one.
+/// The preset that variants start from, where neither the command nor a value names one.
 pub const DEFAULT_CONFIG: &str = "dnerf-cpu";
 
 /// Legal factors of the length of a schedule.
@@ -59,9 +59,6 @@ pub struct Study {
     /// How it differs from that, and what to look for; may be empty.
     #[serde(default)]
     pub notes: String,
-    /// The preset or file that every variant starts from, where the command names none; [`DEFAULT_CONFIG`] if not given.
-    #[serde(default)]
-    pub config: Option<String>,
     /// Presets that are laid on top of the base configuration in every run, before those of the axes.
     #[serde(default)]
     pub presets: Vec<String>,
@@ -122,6 +119,10 @@ pub struct AxisValue {
     /// For tables and plots; the name if not given.
     #[serde(default)]
     pub label: Option<String>,
+    /// The preset or file that variants with this value start from, where the command names none; [`DEFAULT_CONFIG`] if not
+    /// given. A preset that extends another one can stand only here.
+    #[serde(default)]
+    pub config: Option<String>,
     /// Presets or files, which are laid on top in this order.
     #[serde(default)]
     pub presets: Vec<String>,
@@ -219,7 +220,8 @@ pub struct Published {
 impl Published {
     /// Whether another row is of the same work, image size and background.
     pub(super) fn has_conditions_of(&self, other: &Self) -> bool {
-        let conditions = |row: &Self| (row.name.clone(), row.source.clone(), row.resolution, row.background.map(f32::to_bits));
+        let conditions =
+            |row: &Self| (row.name.clone(), row.source.clone(), row.resolution, row.background.map(f32::to_bits));
         conditions(self) == conditions(other)
     }
 }

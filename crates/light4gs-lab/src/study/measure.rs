@@ -118,7 +118,13 @@ impl Measure {
             Self::Psnr | Self::ValPsnr | Self::MovingPsnr | Self::StillPsnr | Self::WorstPsnr => 2,
             Self::EncodeSeconds | Self::DecodeSeconds | Self::RenderMilliseconds => 2,
             Self::EncodePerFrame | Self::DecodePerFrame | Self::EndToEnd => 2,
-            Self::Ssim | Self::MsSsim | Self::Lpips | Self::MovingSsim | Self::StillSsim | Self::LeastStep | Self::MostStep => 4,
+            Self::Ssim
+            | Self::MsSsim
+            | Self::Lpips
+            | Self::MovingSsim
+            | Self::StillSsim
+            | Self::LeastStep
+            | Self::MostStep => 4,
         }
     }
 

@@ -15,7 +15,7 @@ const SCENE_PLACE: &str = "{scene}";
 /// The options of a study.
 #[derive(Clone, Debug, Default)]
 pub struct PlanOptions {
-    /// The preset or file that every variant starts from, in place of the study's; `{scene}` in it stands for the scene's name.
+    /// The preset or file that every variant starts from, in place of the values' own; `{scene}` in it stands for the scene's name.
     pub config: Option<String>,
     /// Folders of the datasets.
     pub scenes: Vec<PathBuf>,
@@ -166,7 +166,8 @@ fn check_reference(study: &Study, variants: &[Variant]) -> Result<(), TrainError
 
 fn config_of(study: &Study, variant: &Variant, scene: &str, options: &PlanOptions) -> Result<Config, TrainError> {
     let chosen = || study.axis.iter().zip(&variant.values).map(|(axis, value)| &axis.value[*value]);
-    let base = options.config.as_ref().or(study.config.as_ref()).map_or(DEFAULT_CONFIG, String::as_str);
+    let start = chosen().find_map(|value| value.config.as_ref());
+    let base = options.config.as_ref().or(start).map_or(DEFAULT_CONFIG, String::as_str);
     let mut names = vec![base.replace(SCENE_PLACE, scene)];
     names.extend(study.presets.iter().cloned());
     names.extend(chosen().flat_map(|value| value.presets.iter().cloned()));

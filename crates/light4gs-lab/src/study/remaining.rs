@@ -71,7 +71,8 @@ mod tests {
 
     #[test]
     fn a_run_takes_as_long_as_its_like_or_goes_on_at_its_pace() {
-        let (manifest, mut results) = example(&["x", "y"], 1, |scene, variant, _| ((scene, variant) == (0, 0)).then_some(20.0));
+        let (manifest, mut results) =
+            example(&["x", "y"], 1, |scene, variant, _| ((scene, variant) == (0, 0)).then_some(20.0));
         results.runs[0].training_seconds = Some(3600.0);
         assert_eq!(Remaining::of(&manifest, &results), Remaining { trainings: 3, seconds: 3600.0, unknown: 2 });
         let own = results.missing.iter_mut().find(|missing| missing.run == "x/two/seed-0").unwrap();

@@ -5,12 +5,12 @@
 
 use std::path::Path;
 
+use light4gs_train::Stage;
 use light4gs_train::compression::CodingRecord;
 use light4gs_train::config::Config;
 use light4gs_train::error::TrainError;
 use light4gs_train::observers::metrics_log::{MetricsRecord, read_metrics};
 use light4gs_train::run::RunFolder;
-use light4gs_train::stage::Stage;
 use serde::{Deserialize, Serialize};
 
 use super::manifest::{Manifest, ManifestRun, StudyFolder};

@@ -212,9 +212,8 @@ fn published(manifest: &Manifest, results: &Results, scenes: &[usize]) -> Vec<Pu
 /// The mean of published rows; of one row, itself.
 fn mean_row(rows: &[&Published]) -> PublishedRow {
     let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
-    let mean_of = |value: fn(&Published) -> Option<f64>| {
-        rows.iter().map(|row| value(row)).collect::<Option<Vec<_>>>().map(mean)
-    };
+    let mean_of =
+        |value: fn(&Published) -> Option<f64>| rows.iter().map(|row| value(row)).collect::<Option<Vec<_>>>().map(mean);
     let first = rows[0];
     PublishedRow {
         label: first.name.clone(),
@@ -243,10 +242,12 @@ impl StudyTable {
             let [done, planned] = row.runs;
             let label =
                 if done == planned { row.label.clone() } else { format!("{} ({done} of {planned} runs)", row.label) };
-            let cells = row.cells.iter().map(|cell| cell.as_ref().map_or_else(|| ABSENT.to_owned(), |c| c.text.clone()));
+            let cells =
+                row.cells.iter().map(|cell| cell.as_ref().map_or_else(|| ABSENT.to_owned(), |c| c.text.clone()));
             std::iter::once(label).chain(cells).collect()
         });
-        let optional = |value: Option<f64>, digits| value.map_or_else(|| ABSENT.to_owned(), |v| format!("{v:.digits$}"));
+        let optional =
+            |value: Option<f64>, digits| value.map_or_else(|| ABSENT.to_owned(), |v| format!("{v:.digits$}"));
         let published = self.published.iter().map(|row| {
             let cell = |heading: &String| match heading {
                 heading if heading == Measure::Psnr.heading() => format!("{:.2}", row.psnr),
@@ -337,7 +338,11 @@ pub(super) mod tests {
     use super::*;
 
     /// Two variants on some scenes, with PSNR `psnr(scene, variant, seed)`; `None` for a run that is missing.
-    pub(in crate::study) fn example(scenes: &[&str], seeds: u64, psnr: impl Fn(usize, usize, u64) -> Option<f64>) -> (Manifest, Results) {
+    pub(in crate::study) fn example(
+        scenes: &[&str],
+        seeds: u64,
+        psnr: impl Fn(usize, usize, u64) -> Option<f64>,
+    ) -> (Manifest, Results) {
         let text = r#"
 title = "Example"
 reproduces = "nothing"

@@ -74,7 +74,10 @@ fn forward_on_cpu<B: HostBackend>(
     (B::from_values(vec![losses.iter().sum::<f64>() as f32], [1]), gradients.into())
 }
 
-fn backward_on_cpu<B: HostBackend>(derivatives: &[PlaneGradient], gradient: FloatTensor<B>) -> [FloatTensor<B>; PLANES] {
+fn backward_on_cpu<B: HostBackend>(
+    derivatives: &[PlaneGradient],
+    gradient: FloatTensor<B>,
+) -> [FloatTensor<B>; PLANES] {
     let scale = B::to_host(gradient).as_slice()[0];
     std::array::from_fn(|plane| {
         let PlaneGradient { shape, values } = &derivatives[plane];

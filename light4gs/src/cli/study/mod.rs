@@ -44,7 +44,7 @@ pub(super) struct Study {
     /// the file is written are trained once.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// The preset or TOML file that every variant starts from, in place of the study's own (most have dnerf-cpu); {scene} in it
+    /// The preset or TOML file that every variant starts from, in place of dnerf-cpu or the study's own; {scene} in it
     /// stands for the scene's name.
     #[arg(long, value_name = "PRESET|FILE")]
     config: Option<String>,

@@ -93,12 +93,7 @@ impl Settings {
 }
 
 /// Submits tasks, at most `jobs` at a time if that is more than 1.
-pub(super) fn submit(
-    folder: &StudyFolder,
-    tasks: &[usize],
-    jobs: u32,
-    settings: &Settings,
-) -> Result<(), TrainError> {
+pub(super) fn submit(folder: &StudyFolder, tasks: &[usize], jobs: u32, settings: &Settings) -> Result<(), TrainError> {
     let program = std::env::current_exe().map_err(|error| TrainError::Input(format!("this program: {error}")))?;
     let root = std::path::absolute(folder.root()).map_err(|error| TrainError::Input(format!("--out: {error}")))?;
     let script = |name: &str, text: &str| -> Result<PathBuf, TrainError> {
