@@ -105,6 +105,7 @@ pub(crate) fn words(buffer: &Handle, start: usize, count: usize) -> Handle {
 }
 
 /// Several arrays in one buffer, each beginning where it can be bound.
+#[derive(Clone, Debug)]
 pub(crate) struct Places {
     pub(crate) starts: Vec<usize>,
     lengths: Vec<usize>,

@@ -9,7 +9,7 @@
 //!
 //! The trait of the operation itself is dispatched at run time to the device's back end and recorded by autodiff. A differentiable
 //! operation also has a trait with the kernels that a back end implements for both directions. The other files of this folder serve
-//! all operations: access to the memory of CPU tensors (`host.rs`), fusion streams (`fusion.rs`), checks (`sample.rs`). The shared
+//! all operations: access to the memory of CPU tensors (`host.rs`), arguments with any number of tensors (`tensor_list.rs`), fusion streams (`fusion.rs`), checks (`sample.rs`). The shared
 //! code for GPUs is in `gpu/`.
 
 // Burn 0.22 deprecates its `ndarray` back end in favor of `flex`; we serve both.
@@ -18,6 +18,7 @@
 pub mod activation;
 pub mod adam;
 pub mod columns;
+pub mod deformation_network;
 #[cfg(feature = "wgpu")]
 mod fusion;
 mod host;
@@ -36,6 +37,7 @@ mod sample;
 pub mod significance;
 pub mod skinning;
 pub mod splat;
+pub mod tensor_list;
 pub mod uniform_noise;
 
 use std::fmt::Debug;
@@ -59,6 +61,7 @@ pub const ON_GPU: &[GpuOperation] = &[
     activation::gpu::OPERATION,
     adam::gpu::OPERATION,
     columns::gpu::OPERATION,
+    deformation_network::gpu::OPERATION,
     image_difference::gpu::OPERATION,
     lower_bound::gpu::OPERATION,
     mixture_bits::gpu::OPERATION,

@@ -10,6 +10,8 @@ use light4gs_keys::Bounds::{Flag, Whole};
 use light4gs_keys::keys;
 
 use super::Offsets;
+use crate::ops::columns::columns;
+use crate::ops::deformation_network::{NetworkLayout, network};
 use crate::ops::linear::layer;
 use crate::scene::ModelError;
 
@@ -146,18 +148,53 @@ impl Deformation {
         layers.fold(first, |hidden, next| layer(next, relu(hidden)))
     }
 
-    /// Changes of the attributes from features `[N, F]`.
+    /// Changes of the attributes from features `[N, F]`, N > 0.
     pub fn forward(&self, features: Tensor<2>) -> Offsets {
+        let count = features.dims()[0];
+        let [position, scale, rotation, opacity, sh] = match self.layout() {
+            layout if layout.fits() => self.forward_at_once(&layout, features),
+            _ => self.forward_by_layers(features),
+        };
+        Offsets { position, scale, rotation, opacity, sh: sh.map(|sh| sh.reshape([count, 16, 3])) }
+    }
+
+    /// All layers in one operation.
+    fn forward_at_once(&self, layout: &NetworkLayout, features: Tensor<2>) -> [Option<Tensor<2>>; 5] {
+        let parameters = self.layers().into_iter().map(|layer| {
+            let bias = layer.bias.as_ref().expect("a layer with a bias");
+            (layer.weight.val(), bias.val())
+        });
+        let outputs = network(layout, features, parameters);
+        let mut first = 0;
+        self.heads().map(|(_, head)| {
+            head.as_ref().map(|head| {
+                let [_, width] = head.output.weight.dims();
+                first += width;
+                columns(outputs.clone(), first - width..first)
+            })
+        })
+    }
+
+    /// One operation a layer, for a network that is too large for [`Self::forward_at_once`].
+    fn forward_by_layers(&self, features: Tensor<2>) -> [Option<Tensor<2>>; 5] {
         let rectified = relu(self.hidden(features));
-        let run = |head: &Option<DeformationHead>| head.as_ref().map(|head| head.forward(rectified.clone()));
-        let count = rectified.dims()[0];
-        Offsets {
-            position: run(&self.position),
-            scale: run(&self.scale),
-            rotation: run(&self.rotation),
-            opacity: run(&self.opacity),
-            sh: run(&self.sh).map(|sh| sh.reshape([count, 16, 3])),
+        self.heads().map(|(_, head)| head.as_ref().map(|head| head.forward(rectified.clone())))
+    }
+
+    /// All layers: those of the trunk, then the two of each head.
+    fn layers(&self) -> Vec<&Linear> {
+        let heads = self.heads().into_iter().filter_map(|(_, head)| head.as_ref());
+        self.trunk.iter().chain(heads.flat_map(|head| [&head.hidden, &head.output])).collect()
+    }
+
+    fn layout(&self) -> NetworkLayout {
+        let mut layout = NetworkLayout::default();
+        let trunk = self.trunk.iter().fold(None, |input, layer| Some(layout.add(input, layer.weight.dims())));
+        for head in self.heads().into_iter().filter_map(|(_, head)| head.as_ref()) {
+            let hidden = layout.add(trunk, head.hidden.weight.dims());
+            layout.add(Some(hidden), head.output.weight.dims());
         }
+        layout
     }
 
     fn heads(&self) -> [(MotionOutput, &Option<DeformationHead>); 5] {

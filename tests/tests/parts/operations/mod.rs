@@ -1,6 +1,7 @@
 //! Custom operations against the plain ones that they stand for.
 
 mod columns;
+mod deformation_network;
 mod image_difference;
 mod linear;
 mod mixture_bits;
