@@ -1,8 +1,8 @@
 // The forward pass of a deformation network.
 //
 // A workgroup owns ROWS rows, which go through all layers in its memory; an invocation computes four channels of four rows at a
-// time. Reads the features [N, F] and the parameters of all layers. Writes the outputs [N, O], and those of the hidden layers
-// after their ReLU, [N, H], for the backward pass.
+// time. Reads the features [N, F] and the parameters of all layers. Writes the outputs [N, O], and, if `first` is 1, those of the
+// hidden layers after their ReLU, [N, H], for the backward pass.
 //
 // Of each layer, `places` has: where its input begins in the workgroup's memory, where its output does, its first column in the
 // matrix that it is written to, and whether it is hidden.
@@ -68,6 +68,9 @@ fn main(
                     let row = first + 4u * quad + k;
                     if (row < network.rows) {
                         if (place.w == 1u) {
+                            if (network.first == 0u) {
+                                continue;
+                            }
                             hidden[row * network.hidden + place.z + channel + c] = sum[k];
                         } else {
                             outputs[row * network.outputs + place.z + channel + c] = sum[k];

@@ -39,8 +39,8 @@ fn a_step_does_not_launch_more_kernels_than_before() {
         ("nodes, step with noise", 112),
         ("nodes, step with noise and rate", 209),
         ("nodes, render", 20),
-        ("hexplane, training step", 590),
-        ("hexplane, step with noise and rate", 1666),
+        ("hexplane, training step", 180),
+        ("hexplane, step with noise and rate", 1256),
     ] {
         let found = launches(part);
         assert!((1..=bound + more).contains(&found), "{part}: {found} launches, {bound} before; {adapter}");

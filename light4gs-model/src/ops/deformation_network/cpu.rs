@@ -1,7 +1,8 @@
 //! The deformation network on a CPU, block by block.
 //!
-//! A block is [`ROWS`] rows. Its numbers are stored channel by channel, `[channel][ROWS]`, so that vectors hold rows: a weight is
-//! a factor for all lanes, and no layer's width need be a multiple of a vector's.
+//! A block is [`ROWS`] rows. Its numbers are stored channel by channel, `[channel][STRIDE]`, so that vectors hold rows: a weight is
+//! a factor for all lanes, and no layer's width need be a multiple of a vector's. The outputs of the hidden layers are kept in
+//! this form for the backward pass: to compute them again takes longer than to read them.
 //!
 //! Gradients of the parameters are summed within chunks of blocks, whose number depends on that of the rows only; then the
 //! chunks are summed in order. So the result is the same for any number of threads.
@@ -19,6 +20,8 @@ use crate::ops::host::{HostBackend, HostTensor};
 
 /// Rows of a block: the numbers of all layers of 64 channels fit the second-level cache.
 const ROWS: usize = 128;
+/// Numbers from one channel of a block to the next: an odd number of cache lines, so that channels do not displace each other.
+const STRIDE: usize = ROWS + 16;
 /// Vectors of rows of a tile.
 const VECTORS: usize = 2;
 /// Channels of a tile: as many sums as registers hold.
@@ -26,119 +29,159 @@ const CHANNELS: usize = 6;
 /// Most chunks, each of which has its own sums.
 const CHUNKS: usize = 32;
 
-/// A layer's parameters.
+/// A layer's parameters, and where its output is.
 #[derive(Debug)]
 struct Layer {
     layout: LayerLayout,
-    is_hidden: bool,
     /// `[inputs][outputs]`
     weight: HostTensor,
     /// `[outputs][inputs]`
     transposed: Vec<f32>,
     bias: HostTensor,
+    place: Place,
+}
+
+/// The first channel of a layer's output.
+#[derive(Clone, Copy, Debug)]
+enum Place {
+    /// Among those of the hidden layers.
+    Hidden(usize),
+    /// Among those of the network.
+    Output(usize),
 }
 
 /// A network's parameters.
 #[derive(Debug)]
 struct Network {
     layers: Vec<Layer>,
-    layout: NetworkLayout,
+    /// Channels of the features, of all hidden layers, and of the network's output.
+    features: usize,
+    hidden: usize,
+    outputs: usize,
 }
 
 impl Network {
-    fn new(layout: NetworkLayout, parameters: Vec<HostTensor>) -> Self {
+    fn new(layout: &NetworkLayout, parameters: Vec<HostTensor>) -> Self {
         let mut parameters = parameters.into_iter();
         let mut next = || parameters.next().expect("two tensors a layer");
-        let layers = layout.layers().iter().enumerate().map(|(number, &layer)| {
+        let (places, outputs) = layout.places();
+        let mut hidden = 0;
+        let layers = layout.layers().iter().zip(places).map(|(&layer, place)| {
             let [weight, bias] = [next(), next()];
             let transposed = transposed(weight.as_slice(), layer.outputs);
-            Layer { layout: layer, is_hidden: layout.is_hidden(number), weight, transposed, bias }
+            let place = place.map_or_else(
+                || {
+                    hidden += layer.outputs;
+                    Place::Hidden(hidden - layer.outputs)
+                },
+                Place::Output,
+            );
+            Layer { layout: layer, weight, transposed, bias, place }
         });
-        Self { layers: layers.collect(), layout }
+        let layers = layers.collect();
+        Self { layers, features: layout.features(), hidden, outputs }
+    }
+
+    /// The channels that a layer reads, in a block of features or in one of hidden layers.
+    fn input<'a>(&self, layer: &Layer, features: &'a [f32], hidden: &'a [f32]) -> &'a [f32] {
+        match layer.layout.input.map(|input| self.layers[input].place) {
+            Some(Place::Hidden(first)) => channels(hidden, first, layer.layout.inputs),
+            _ => features,
+        }
     }
 
     /// The outputs of all layers for a block of features; of hidden layers after their ReLU.
     #[inline(always)]
-    fn forward<L: Lanes>(&self, features: &[f32], outputs: &mut [Vec<f32>]) {
-        for (number, layer) in self.layers.iter().enumerate() {
-            let (before, own) = outputs.split_at_mut(number);
-            let input = layer.layout.input.map_or(features, |input| &before[input]);
-            product::<L>(input, layer.weight.as_slice(), Some(layer.bias.as_slice()), layer.is_hidden, &mut own[0]);
+    fn forward<L: Lanes>(&self, features: &[f32], hidden: &mut [f32], outputs: &mut [f32]) {
+        for layer in &self.layers {
+            let (weight, bias) = (layer.weight.as_slice(), Some(layer.bias.as_slice()));
+            match layer.place {
+                Place::Hidden(first) => {
+                    // A layer comes after the one that it reads.
+                    let (before, own) = hidden.split_at_mut(first * STRIDE);
+                    let own = &mut own[..layer.layout.outputs * STRIDE];
+                    product::<L>(self.input(layer, features, before), weight, bias, true, own);
+                }
+                Place::Output(first) => {
+                    let own = &mut outputs[first * STRIDE..][..layer.layout.outputs * STRIDE];
+                    product::<L>(self.input(layer, features, hidden), weight, bias, false, own);
+                }
+            }
         }
     }
+}
 
-    /// Memory for the outputs, or the gradients, of all layers.
-    fn block(&self) -> Vec<Vec<f32>> {
-        self.layers.iter().map(|layer| vec![0.0; layer.layout.outputs * ROWS]).collect()
-    }
+/// Some channels of a block.
+fn channels(block: &[f32], first: usize, count: usize) -> &[f32] {
+    &block[first * STRIDE..][..count * STRIDE]
 }
 
 fn transposed(matrix: &[f32], columns: usize) -> Vec<f32> {
     (0..columns).flat_map(|column| matrix.iter().skip(column).step_by(columns).copied()).collect()
 }
 
-/// `out[c] = bias[c] + Σ over k of weight[k][c] input[k]`, where `input [inputs][ROWS]` and `out [outputs][ROWS]`. Without biases,
+/// `out[c] = bias[c] + Σ over k of weight[k][c] input[k]`, where `input [inputs][STRIDE]` and `out [outputs][STRIDE]`. Without biases,
 /// adds to `out`.
 #[inline(always)]
 fn product<L: Lanes>(input: &[f32], weight: &[f32], bias: Option<&[f32]>, rectify: bool, out: &mut [f32]) {
-    let outputs = out.len() / ROWS;
-    let mut first = 0;
-    while first + CHANNELS <= outputs {
-        channels::<L, CHANNELS>(input, weight, bias, rectify, first, out);
-        first += CHANNELS;
-    }
-    match outputs - first {
-        1 => channels::<L, 1>(input, weight, bias, rectify, first, out),
-        2 => channels::<L, 2>(input, weight, bias, rectify, first, out),
-        3 => channels::<L, 3>(input, weight, bias, rectify, first, out),
-        4 => channels::<L, 4>(input, weight, bias, rectify, first, out),
-        5 => channels::<L, 5>(input, weight, bias, rectify, first, out),
-        _ => {}
+    let outputs = out.len() / STRIDE;
+    for row in (0..ROWS).step_by(VECTORS * LANES) {
+        let mut first = 0;
+        while first + CHANNELS <= outputs {
+            tile::<L, CHANNELS>(input, weight, bias, rectify, [row, first], out);
+            first += CHANNELS;
+        }
+        match outputs - first {
+            1 => tile::<L, 1>(input, weight, bias, rectify, [row, first], out),
+            2 => tile::<L, 2>(input, weight, bias, rectify, [row, first], out),
+            3 => tile::<L, 3>(input, weight, bias, rectify, [row, first], out),
+            4 => tile::<L, 4>(input, weight, bias, rectify, [row, first], out),
+            5 => tile::<L, 5>(input, weight, bias, rectify, [row, first], out),
+            _ => {}
+        }
     }
 }
 
-/// [`product`], for channels `first..first + C`.
+/// [`product`], for `C` channels from `first` on, and [`VECTORS`] vectors of rows from `row` on.
 #[inline(always)]
-fn channels<L: Lanes, const C: usize>(
+fn tile<L: Lanes, const C: usize>(
     input: &[f32],
     weight: &[f32],
     bias: Option<&[f32]>,
     rectify: bool,
-    first: usize,
+    [row, first]: [usize; 2],
     out: &mut [f32],
 ) {
-    let outputs = out.len() / ROWS;
-    for row in (0..ROWS).step_by(VECTORS * LANES) {
-        let mut sums = [[L::splat(0.0); VECTORS]; C];
-        for c in 0..C {
-            let out = &out[(first + c) * ROWS + row..][..VECTORS * LANES];
-            for v in 0..VECTORS {
-                sums[c][v] = match bias {
-                    Some(bias) => L::splat(bias[first + c]),
-                    None => L::load(vector(&out[v * LANES..])),
-                };
-            }
+    let outputs = out.len() / STRIDE;
+    let mut sums = [[L::splat(0.0); VECTORS]; C];
+    for c in 0..C {
+        let out = &out[(first + c) * STRIDE + row..][..VECTORS * LANES];
+        for v in 0..VECTORS {
+            sums[c][v] = match bias {
+                Some(bias) => L::splat(bias[first + c]),
+                None => L::load(vector(&out[v * LANES..])),
+            };
         }
-        for (input, weight) in input.chunks_exact(ROWS).zip(weight.chunks_exact(outputs)) {
-            let input = &input[row..row + VECTORS * LANES];
-            let weight = &weight[first..first + C];
-            let mut rows = [L::splat(0.0); VECTORS];
-            for v in 0..VECTORS {
-                rows[v] = L::load(vector(&input[v * LANES..]));
-            }
-            for c in 0..C {
-                let weight = L::splat(weight[c]);
-                for v in 0..VECTORS {
-                    sums[c][v] = rows[v].mul_add(weight, sums[c][v]);
-                }
-            }
+    }
+    for (input, weight) in input.chunks_exact(STRIDE).zip(weight.chunks_exact(outputs)) {
+        let input = &input[row..row + VECTORS * LANES];
+        let weight = &weight[first..first + C];
+        let mut rows = [L::splat(0.0); VECTORS];
+        for v in 0..VECTORS {
+            rows[v] = L::load(vector(&input[v * LANES..]));
         }
         for c in 0..C {
-            let out = &mut out[(first + c) * ROWS + row..][..VECTORS * LANES];
+            let weight = L::splat(weight[c]);
             for v in 0..VECTORS {
-                let sum = if rectify { sums[c][v].max(L::splat(0.0)) } else { sums[c][v] };
-                sum.store(vector_mut(&mut out[v * LANES..]));
+                sums[c][v] = rows[v].mul_add(weight, sums[c][v]);
             }
+        }
+    }
+    for c in 0..C {
+        let out = &mut out[(first + c) * STRIDE + row..][..VECTORS * LANES];
+        for v in 0..VECTORS {
+            let sum = if rectify { sums[c][v].max(L::splat(0.0)) } else { sums[c][v] };
+            sum.store(vector_mut(&mut out[v * LANES..]));
         }
     }
 }
@@ -147,14 +190,14 @@ fn channels<L: Lanes, const C: usize>(
 #[inline(always)]
 fn add_weight_gradient<L: Lanes>(input: &[f32], gradient: &[f32], weight: &mut [f32]) {
     const PAIRS: usize = LANES / 2;
-    let [inputs, outputs] = [input.len() / ROWS, gradient.len() / ROWS];
+    let [inputs, outputs] = [input.len() / STRIDE, gradient.len() / STRIDE];
     let mut k = 0;
     while k + PAIRS <= inputs {
         let mut c = 0;
         while c + 2 <= outputs {
             let mut sums = [L::splat(0.0); LANES];
-            let (first, second) = (&gradient[c * ROWS..][..ROWS], &gradient[(c + 1) * ROWS..][..ROWS]);
-            let rows: [&[f32]; PAIRS] = std::array::from_fn(|j| &input[(k + j) * ROWS..][..ROWS]);
+            let (first, second) = (&gradient[c * STRIDE..][..ROWS], &gradient[(c + 1) * STRIDE..][..ROWS]);
+            let rows: [&[f32]; PAIRS] = std::array::from_fn(|j| &input[(k + j) * STRIDE..][..ROWS]);
             for row in (0..ROWS).step_by(LANES) {
                 let first = L::load(vector(&first[row..]));
                 let second = L::load(vector(&second[row..]));
@@ -173,14 +216,14 @@ fn add_weight_gradient<L: Lanes>(input: &[f32], gradient: &[f32], weight: &mut [
         }
         for j in 0..PAIRS {
             for c in c..outputs {
-                weight[(k + j) * outputs + c] += dot::<L>(&input[(k + j) * ROWS..], &gradient[c * ROWS..]);
+                weight[(k + j) * outputs + c] += dot::<L>(&input[(k + j) * STRIDE..], &gradient[c * STRIDE..]);
             }
         }
         k += PAIRS;
     }
     for k in k..inputs {
         for c in 0..outputs {
-            weight[k * outputs + c] += dot::<L>(&input[k * ROWS..], &gradient[c * ROWS..]);
+            weight[k * outputs + c] += dot::<L>(&input[k * STRIDE..], &gradient[c * STRIDE..]);
         }
     }
 }
@@ -205,23 +248,23 @@ fn vector_mut(values: &mut [f32]) -> &mut [f32; LANES] {
     values.first_chunk_mut().expect("blocks are whole vectors")
 }
 
-/// Some rows as a block `[width][ROWS]`; rows that are missing are zeros.
+/// Some rows as a block `[width][STRIDE]`; rows that are missing are zeros.
 fn gather(rows: &[f32], width: usize, block: &mut [f32]) {
     let count = rows.len() / width;
     for (row, values) in rows.chunks_exact(width).enumerate() {
-        for (channel, value) in values.iter().enumerate() {
-            block[channel * ROWS + row] = *value;
+        for (channel, value) in block.chunks_exact_mut(STRIDE).zip(values) {
+            channel[row] = *value;
         }
     }
-    for channel in block.chunks_exact_mut(ROWS) {
+    for channel in block.chunks_exact_mut(STRIDE) {
         channel[count..].fill(0.0);
     }
 }
 
-/// The inverse of [`gather`], into columns `first..` of rows of `width` numbers.
-fn scatter(block: &[f32], rows: &mut [f32], width: usize, first: usize) {
+/// The inverse of [`gather`].
+fn scatter(block: &[f32], rows: &mut [f32], width: usize) {
     for (row, values) in rows.chunks_exact_mut(width).enumerate() {
-        for (value, channel) in values[first..].iter_mut().zip(block.chunks_exact(ROWS)) {
+        for (value, channel) in values.iter_mut().zip(block.chunks_exact(STRIDE)) {
             *value = channel[row];
         }
     }
@@ -232,6 +275,8 @@ struct Forward<'a> {
     network: &'a Network,
     features: &'a [f32],
     out: &'a mut [f32],
+    /// The hidden layers of each block; empty if they are not kept.
+    hidden: &'a mut [f32],
 }
 
 impl LaneKernel for Forward<'_> {
@@ -239,18 +284,15 @@ impl LaneKernel for Forward<'_> {
 
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let width = self.network.layout.features();
-        let (places, outputs) = self.network.layout.places();
-        let mut features = vec![0.0; width * ROWS];
-        let mut blocks = self.network.block();
-        for (rows, out) in self.features.chunks(ROWS * width).zip(self.out.chunks_mut(ROWS * outputs)) {
-            gather(rows, width, &mut features);
-            self.network.forward::<L>(&features, &mut blocks);
-            for (block, place) in blocks.iter().zip(&places) {
-                if let Some(first) = *place {
-                    scatter(block, out, outputs, first);
-                }
-            }
+        let Self { network, .. } = self;
+        let [mut features, mut outputs, mut passing] =
+            [network.features, network.outputs, network.hidden].map(|channels| vec![0.0; channels * STRIDE]);
+        let mut kept = self.hidden.chunks_exact_mut((network.hidden * STRIDE).max(1));
+        let rows = self.features.chunks(ROWS * network.features).zip(self.out.chunks_mut(ROWS * network.outputs));
+        for (rows, out) in rows {
+            gather(rows, network.features, &mut features);
+            network.forward::<L>(&features, kept.next().unwrap_or(&mut passing), &mut outputs);
+            scatter(&outputs, out, network.outputs);
         }
     }
 }
@@ -259,6 +301,7 @@ impl LaneKernel for Forward<'_> {
 struct Backward<'a> {
     network: &'a Network,
     features: &'a [f32],
+    hidden: &'a [f32],
     upstream: &'a [f32],
     /// Empty if not requested.
     of_features: &'a mut [f32],
@@ -273,55 +316,50 @@ impl LaneKernel for Backward<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) -> Self::Output {
         let Self { network, .. } = self;
-        let width = network.layout.features();
-        let (places, outputs) = network.layout.places();
-        let mut features = vec![0.0; width * ROWS];
-        let mut of_features = if self.of_features.is_empty() { Vec::new() } else { features.clone() };
-        let mut blocks = network.block();
-        let mut gradients = network.block();
-        let mut upstream = vec![0.0; outputs * ROWS];
-        let mut of_features_rows = self.of_features.chunks_mut(ROWS * width);
+        let with_features = !self.of_features.is_empty();
+        let [mut features, mut of_features, mut upstream, mut of_hidden] =
+            [network.features, network.features, network.outputs, network.hidden]
+                .map(|channels| vec![0.0; channels * STRIDE]);
+        let mut kept = self.hidden.chunks_exact((network.hidden * STRIDE).max(1));
+        let mut rows_of_features = self.of_features.chunks_mut(ROWS * network.features);
         let zeros = |layer: &Layer| {
             let LayerLayout { inputs, outputs, .. } = layer.layout;
             [vec![0.0; inputs * outputs], vec![0.0; outputs]]
         };
         let mut sums: Vec<LayerGradients> = network.layers.iter().map(zeros).collect();
-        for (rows, upstream_rows) in self.features.chunks(ROWS * width).zip(self.upstream.chunks(ROWS * outputs)) {
-            gather(rows, width, &mut features);
-            gather(upstream_rows, outputs, &mut upstream);
-            network.forward::<L>(&features, &mut blocks);
-            for (gradient, place) in gradients.iter_mut().zip(&places) {
-                match *place {
-                    Some(first) => {
-                        let length = gradient.len();
-                        gradient.copy_from_slice(&upstream[first * ROWS..][..length]);
-                    }
-                    None => gradient.fill(0.0),
-                }
-            }
+        let rows = self.features.chunks(ROWS * network.features).zip(self.upstream.chunks(ROWS * network.outputs));
+        for (rows, upstream_rows) in rows {
+            gather(rows, network.features, &mut features);
+            gather(upstream_rows, network.outputs, &mut upstream);
+            let hidden = kept.next().unwrap_or_default();
             of_features.fill(0.0);
-            for (number, layer) in network.layers.iter().enumerate().rev() {
-                let (before, own) = gradients.split_at_mut(number);
-                let gradient = &mut own[0];
-                if layer.is_hidden {
-                    rectify::<L>(&blocks[number], gradient);
-                }
-                let [weight, bias] = &mut sums[number];
-                let input = layer.layout.input.map_or(&features, |input| &blocks[input]);
-                add_weight_gradient::<L>(input, gradient, weight);
-                for (bias, channel) in bias.iter_mut().zip(gradient.chunks_exact(ROWS)) {
-                    *bias += total::<L>(channel);
-                }
-                let of_input = match layer.layout.input {
-                    Some(input) => &mut before[input],
-                    None => &mut of_features,
+            of_hidden.fill(0.0);
+            for (layer, [of_weight, of_bias]) in network.layers.iter().zip(&mut sums).rev() {
+                let outputs = layer.layout.outputs;
+                let (before, gradient) = match layer.place {
+                    Place::Hidden(first) => {
+                        let (before, own) = of_hidden.split_at_mut(first * STRIDE);
+                        let own = &mut own[..outputs * STRIDE];
+                        rectify::<L>(channels(hidden, first, outputs), own);
+                        (before, &*own)
+                    }
+                    Place::Output(first) => (&mut of_hidden[..], channels(&upstream, first, outputs)),
                 };
-                if !of_input.is_empty() {
-                    product::<L>(gradient, &layer.transposed, None, false, of_input);
+                add_weight_gradient::<L>(network.input(layer, &features, hidden), gradient, of_weight);
+                for (bias, channel) in of_bias.iter_mut().zip(gradient.chunks_exact(STRIDE)) {
+                    *bias += total::<L>(&channel[..ROWS]);
+                }
+                match layer.layout.input.map(|input| network.layers[input].place) {
+                    Some(Place::Hidden(first)) => {
+                        let of_input = &mut before[first * STRIDE..][..layer.layout.inputs * STRIDE];
+                        product::<L>(gradient, &layer.transposed, None, false, of_input);
+                    }
+                    _ if with_features => product::<L>(gradient, &layer.transposed, None, false, &mut of_features),
+                    _ => {}
                 }
             }
-            if let Some(rows) = of_features_rows.next() {
-                scatter(&of_features, rows, width, 0);
+            if let Some(rows) = rows_of_features.next() {
+                scatter(&of_features, rows, network.features);
             }
         }
         sums
@@ -348,9 +386,9 @@ fn total<L: Lanes>(channel: &[f32]) -> f32 {
     sum.sum()
 }
 
-/// Rows of a chunk for this number of rows.
-fn rows_of_chunk(rows: usize) -> usize {
-    rows.div_ceil(ROWS).div_ceil(CHUNKS).max(1) * ROWS
+/// Blocks of a chunk for this number of rows.
+fn blocks_of_chunk(rows: usize) -> usize {
+    rows.div_ceil(ROWS).div_ceil(CHUNKS).max(1)
 }
 
 /// State of the CPU back ends between forward and backward.
@@ -358,19 +396,37 @@ fn rows_of_chunk(rows: usize) -> usize {
 pub struct CpuNetwork {
     features: HostTensor,
     network: Arc<Network>,
+    /// `[blocks][hidden channels][STRIDE]`, after their ReLU.
+    hidden: Arc<Vec<f32>>,
 }
 
-fn forward_on_cpu<B: HostBackend>(tensors: NetworkTensors<B>, layout: NetworkLayout) -> (FloatTensor<B>, CpuNetwork) {
+/// Pieces of this length, or as many empty ones as there are chunks.
+fn pieces(values: &mut [f32], length: usize, chunks: usize) -> Vec<&mut [f32]> {
+    let mut pieces: Vec<&mut [f32]> = values.chunks_mut(length.max(1)).collect();
+    pieces.resize_with(chunks, Default::default);
+    pieces
+}
+
+fn forward_on_cpu<B: HostBackend>(
+    tensors: NetworkTensors<B>,
+    layout: &NetworkLayout,
+    keep: bool,
+) -> (FloatTensor<B>, CpuNetwork) {
     let count = tensors.features.shape()[0];
     let features = B::to_host(tensors.features);
     let network = Network::new(layout, tensors.parameters.0.into_iter().map(B::to_host).collect());
-    let (_, outputs) = network.layout.places();
-    let chunk = rows_of_chunk(count);
-    let mut out = vec![0.0; count * outputs];
-    out.par_chunks_mut(chunk * outputs)
-        .zip(features.as_slice().par_chunks(chunk * network.layout.features()))
-        .for_each(|(out, features)| dispatch(Forward { network: &network, features, out }));
-    (B::from_values(out, [count, outputs]), CpuNetwork { features, network: Arc::new(network) })
+    let blocks = blocks_of_chunk(count);
+    let chunk = blocks * ROWS;
+    let of_block = network.hidden * STRIDE;
+    let mut hidden = vec![0.0; if keep { count.div_ceil(ROWS) * of_block } else { 0 }];
+    let mut out = vec![0.0; count * network.outputs];
+    let kept = pieces(&mut hidden, blocks * of_block, count.div_ceil(chunk));
+    let rows = (out.par_chunks_mut(chunk * network.outputs), features.as_slice().par_chunks(chunk * network.features));
+    rows.into_par_iter().zip(kept).for_each(|((out, features), hidden)| {
+        dispatch(Forward { network: &network, features, out, hidden });
+    });
+    let outputs = B::from_values(out, [count, network.outputs]);
+    (outputs, CpuNetwork { features, network: Arc::new(network), hidden: Arc::new(hidden) })
 }
 
 fn backward_on_cpu<B: HostBackend>(
@@ -378,23 +434,23 @@ fn backward_on_cpu<B: HostBackend>(
     gradient: FloatTensor<B>,
     with_features: bool,
 ) -> NetworkGradients<B> {
-    let CpuNetwork { features, network } = saved;
-    let (rows, width) = (features.as_slice(), network.layout.features());
-    let (_, outputs) = network.layout.places();
-    let count = rows.len() / width;
-    let chunk = rows_of_chunk(count);
+    let CpuNetwork { features, network, hidden } = saved;
+    let rows = features.as_slice();
+    let count = rows.len() / network.features;
+    let blocks = blocks_of_chunk(count);
+    let chunk = blocks * ROWS;
     let upstream = B::to_host(gradient);
     let mut of_features = vec![0.0; if with_features { rows.len() } else { 0 }];
-    // An empty piece for each chunk where the features' gradient is not requested.
-    let mut pieces: Vec<&mut [f32]> = of_features.chunks_mut(chunk * width).collect();
-    pieces.resize_with(count.div_ceil(chunk), Default::default);
-    let chunks = (rows.par_chunks(chunk * width), upstream.as_slice().par_chunks(chunk * outputs), pieces);
-    let mut sums: Vec<Vec<LayerGradients>> = chunks
-        .into_par_iter()
-        .map(|(features, upstream, of_features)| {
-            dispatch(Backward { network: &network, features, upstream, of_features })
-        })
-        .collect();
+    let of_features_rows = pieces(&mut of_features, chunk * network.features, count.div_ceil(chunk));
+    let of_chunk = blocks * network.hidden * STRIDE;
+    let chunks = (rows.par_chunks(chunk * network.features), upstream.as_slice().par_chunks(chunk * network.outputs));
+    let sums =
+        chunks.into_par_iter().zip(of_features_rows).enumerate().map(|(k, ((features, upstream), of_features))| {
+            let end = hidden.len().min((k + 1) * of_chunk);
+            let hidden = &hidden[k * of_chunk..end];
+            dispatch(Backward { network: &network, features, hidden, upstream, of_features })
+        });
+    let mut sums: Vec<Vec<LayerGradients>> = sums.collect();
     let (first, others) = sums.split_first_mut().expect("at least one row");
     for other in others {
         for (to, from) in first.iter_mut().flatten().flatten().zip(other.iter().flatten().flatten()) {
@@ -406,7 +462,7 @@ fn backward_on_cpu<B: HostBackend>(
         [B::from_values(weight, [inputs, outputs]), B::from_values(bias, [outputs])]
     });
     NetworkGradients {
-        features: with_features.then(|| B::from_values(of_features, [count, width])),
+        features: with_features.then(|| B::from_values(of_features, [count, network.features])),
         parameters: parameters.collect(),
     }
 }
@@ -415,8 +471,12 @@ for_cpu_back_ends! {
     NetworkKernels {
         type Saved = CpuNetwork;
 
-        fn network_forward(tensors: NetworkTensors<Self>, layout: NetworkLayout) -> (FloatTensor<Self>, CpuNetwork) {
-            forward_on_cpu(tensors, layout)
+        fn network_forward(
+            tensors: NetworkTensors<Self>,
+            layout: NetworkLayout,
+            keep: bool,
+        ) -> (FloatTensor<Self>, CpuNetwork) {
+            forward_on_cpu(tensors, &layout, keep)
         }
 
         fn network_backward(

@@ -146,6 +146,7 @@ impl PackedNetwork {
 fn forward(
     tensors: NetworkTensors<CubeBackend>,
     layout: NetworkLayout,
+    keep: bool,
 ) -> Result<(CubeTensor, SavedNetwork), GpuError> {
     let gpu = Gpu::of(&tensors.features)?;
     let rows = tensors.features.shape()[0];
@@ -153,7 +154,7 @@ fn forward(
     let features = buffer_of(tensors.features);
     let (_, width) = packed.layout.places();
     let outputs = gpu.allocate("outputs of a network", rows * width)?;
-    let hidden = gpu.allocate("hidden layers of a network", rows * packed.hidden())?;
+    let hidden = gpu.allocate("hidden layers of a network", if keep { rows * packed.hidden() } else { 0 })?;
     let slots = packed.layout.forward_slots();
     let columns = packed.columns();
     let places = packed.layers().map(|(number, layer)| {
@@ -161,7 +162,7 @@ fn forward(
         let is_hidden = usize::from(packed.layout.is_hidden(number));
         [input, slots.layers[number], columns[number], is_hidden].map(|place| place as u32)
     });
-    let uniform = packed.uniform(&Description { extra: [0, 0], places: places.collect() });
+    let uniform = packed.uniform(&Description { extra: [usize::from(keep), 0], places: places.collect() });
     Launch::new(&gpu.client, with_rows(NETWORK_FORWARD, packed.rows_of_group()))
         .reads(&features)
         .reads(&packed.parameters)
@@ -259,8 +260,8 @@ fn backward(
 impl NetworkKernels for CubeBackend {
     type Saved = SavedNetwork;
 
-    fn network_forward(tensors: NetworkTensors<Self>, layout: NetworkLayout) -> (CubeTensor, SavedNetwork) {
-        forward(tensors, layout).unwrap_or_else(|error| error.raise())
+    fn network_forward(tensors: NetworkTensors<Self>, layout: NetworkLayout, keep: bool) -> (CubeTensor, SavedNetwork) {
+        forward(tensors, layout, keep).unwrap_or_else(|error| error.raise())
     }
 
     fn network_backward(saved: SavedNetwork, gradient: CubeTensor, with_features: bool) -> NetworkGradients<Self> {
@@ -271,10 +272,14 @@ impl NetworkKernels for CubeBackend {
 impl<B: FusionBackend + NetworkKernels> NetworkKernels for Fusion<B> {
     type Saved = B::Saved;
 
-    fn network_forward(tensors: NetworkTensors<Self>, layout: NetworkLayout) -> (FloatTensor<Self>, B::Saved) {
+    fn network_forward(
+        tensors: NetworkTensors<Self>,
+        layout: NetworkLayout,
+        keep: bool,
+    ) -> (FloatTensor<Self>, B::Saved) {
         let parameters = tensors.parameters.0.into_iter().map(resolve::<B>).collect();
         let tensors = NetworkTensors { features: resolve::<B>(tensors.features), parameters: TensorList(parameters) };
-        let (outputs, saved) = B::network_forward(tensors, layout);
+        let (outputs, saved) = B::network_forward(tensors, layout, keep);
         (leaf::<B>(outputs), saved)
     }
 

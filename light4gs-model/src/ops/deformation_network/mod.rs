@@ -1,9 +1,9 @@
 //! The deformation network as one Burn operation (paper III-A): a tree of linear layers with a ReLU between any two, such as a
 //! trunk and its heads, on many rows.
 //!
-//! One operation a layer writes every hidden layer's output of all Gaussians to memory and reads it again, forward and
-//! backward. Here a block of rows goes through all layers while its numbers are in the cache, or in a workgroup's memory; the
-//! backward pass computes them again.
+//! One operation a layer writes every layer's output of all Gaussians to memory, with and without its ReLU, and reads it again. Here a
+//! block of rows goes through all layers while its numbers are in the cache, or in a workgroup's memory. Only what the backward
+//! pass needs is written: the hidden layers after their ReLU.
 
 mod cpu;
 #[cfg(feature = "wgpu")]
@@ -113,8 +113,12 @@ pub trait NetworkKernels: Backend {
     /// What the backward pass needs from the forward pass.
     type Saved: Clone + Debug + Send + 'static;
 
-    /// The outputs `[N, O]`; N > 0.
-    fn network_forward(tensors: NetworkTensors<Self>, layout: NetworkLayout) -> (FloatTensor<Self>, Self::Saved);
+    /// The outputs `[N, O]`; N > 0. A backward pass follows only if `keep`.
+    fn network_forward(
+        tensors: NetworkTensors<Self>,
+        layout: NetworkLayout,
+        keep: bool,
+    ) -> (FloatTensor<Self>, Self::Saved);
 
     /// Gradients of all parameters and, if `with_features`, of the features.
     fn network_backward(saved: Self::Saved, gradient: FloatTensor<Self>, with_features: bool)
@@ -134,7 +138,7 @@ pub trait NetworkOps: Backend {
 for_all_back_ends! {
     NetworkOps with NetworkKernels {
         fn deformation_network(tensors: NetworkTensors<Self>, layout: NetworkLayout) -> FloatTensor<Self> {
-            Self::network_forward(tensors, layout).0
+            Self::network_forward(tensors, layout, false).0
         }
     }
 }
@@ -173,10 +177,12 @@ impl<B: NetworkOps + NetworkKernels, C: CheckpointStrategy> NetworkOps for Autod
             features: features.into_primitive(),
             parameters: TensorList(parameters.0.into_iter().map(|parameter| parameter.into_primitive()).collect()),
         };
-        let (outputs, saved) = B::network_forward(inner, layout);
         match Network.prepare::<C>(parents).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(saved, outputs),
-            OpsKind::UnTracked(prep) => prep.finish(outputs),
+            OpsKind::Tracked(prep) => {
+                let (outputs, saved) = B::network_forward(inner, layout, true);
+                prep.finish(saved, outputs)
+            }
+            OpsKind::UnTracked(prep) => prep.finish(B::deformation_network(inner, layout)),
         }
     }
 }

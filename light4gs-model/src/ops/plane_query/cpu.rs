@@ -90,13 +90,29 @@ fn pack(plane: &[f32], channels: usize) -> Vec<Block> {
     let mut packed = vec![[0.0; LANES]; cells * channels.div_ceil(LANES)];
     for (block, group) in packed.chunks_exact_mut(cells).zip(plane.chunks(cells * LANES)) {
         let rows: Vec<&[f32]> = group.chunks_exact(cells).collect();
-        for (cell, to) in block.iter_mut().enumerate() {
+        // Of whole blocks as many cells as channels at once: a square stays in registers.
+        let mut done = 0;
+        if let Some(rows) = rows.first_chunk::<LANES>() {
+            let (squares, _) = block.as_chunks_mut::<LANES>();
+            done = squares.len() * LANES;
+            let rows = rows.map(|row| row.as_chunks::<LANES>().0);
+            for (k, square) in squares.iter_mut().enumerate() {
+                *square = transposed(&rows.map(|row| row[k]));
+            }
+        }
+        for (cell, to) in block.iter_mut().enumerate().skip(done) {
             for (value, row) in to.iter_mut().zip(&rows) {
                 *value = row[cell];
             }
         }
     }
     packed
+}
+
+/// Rows and columns exchanged.
+#[inline(always)]
+pub(super) fn transposed(square: &[Block; LANES]) -> [Block; LANES] {
+    std::array::from_fn(|column| std::array::from_fn(|row| square[row][column]))
 }
 
 /// The position of a coordinate on an axis.

@@ -4,7 +4,7 @@ use light4gs_render::lanes::{LANES, LaneKernel, Lanes, dispatch};
 use rayon::prelude::*;
 
 use super::PLANES;
-use super::cpu::{Block, CHUNK, Corners, PLANE_AXES, PackedPlanes, corners, samples};
+use super::cpu::{Block, CHUNK, Corners, PLANE_AXES, PackedPlanes, corners, samples, transposed};
 
 /// Cells of the coarse grid by which points are sorted, along each spatial axis.
 const SORT_CELLS: usize = 16;
@@ -204,7 +204,17 @@ fn unpack(blocks: &[&[Block]], channels: usize) -> Vec<f32> {
     let mut plane = vec![0.0; channels * cells];
     for (group, block) in plane.chunks_mut(cells * LANES).zip(blocks) {
         let mut rows: Vec<&mut [f32]> = group.chunks_exact_mut(cells).collect();
-        for (cell, from) in block.iter().enumerate() {
+        let mut done = 0;
+        if let Some(rows) = rows.first_chunk_mut::<LANES>() {
+            let (squares, _) = block.as_chunks::<LANES>();
+            done = squares.len() * LANES;
+            for (k, square) in squares.iter().enumerate() {
+                for (row, values) in rows.iter_mut().zip(transposed(square)) {
+                    row[k * LANES..][..LANES].copy_from_slice(&values);
+                }
+            }
+        }
+        for (cell, from) in block.iter().enumerate().skip(done) {
             for (row, value) in rows.iter_mut().zip(from) {
                 row[cell] = *value;
             }

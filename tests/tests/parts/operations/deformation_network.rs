@@ -99,7 +99,7 @@ fn outputs_and_gradients_are_those_of_the_layers_one_by_one() {
         assert!(case.layout.fits());
         let expected = case.run(&Device::flex(), layer_by_layer);
         for (name, device) in devices() {
-            let found = case.run(&device, |layout, features, parameters| network(layout, features, parameters));
+            let found = case.run(&device, network);
             assert_eq!(found.len(), expected.len());
             for (k, (found, expected)) in found.iter().zip(&expected).enumerate() {
                 let what = format!("{name}, {} rows of {} features, tensor {k}", case.rows, case.features);
