@@ -13,7 +13,7 @@ use std::error::Error;
 use burn::module::Param;
 use burn::tensor::{Device, Gradients, Tensor};
 use light4gs_data::{Camera, PointCloud};
-use light4gs_model::ops::adam::{AdamStep, adam_step};
+use light4gs_model::ops::adam::{AdamStep, SteppedParameter, adam_steps};
 use light4gs_model::ops::lower_bound::lower_bound;
 use light4gs_model::ops::normal_cdf::normal_cdf;
 use light4gs_model::parameters::{ParameterMapper, map_parameters, update_parameters};
@@ -121,12 +121,12 @@ impl ParameterMapper for Adam<'_> {
         let Some(gradient) = parameter.val().grad_remove(&mut self.gradients) else { return parameter };
         let gradient = gradient.flatten::<1>(0, D - 1);
         let zeros = || [gradient.zeros_like(), gradient.zeros_like()];
-        let [first, second] = self.moments.remove(path).unwrap_or_else(zeros);
+        let moments = self.moments.remove(path).unwrap_or_else(zeros);
         let step = AdamStep { learning_rate: 0.01, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: self.time };
         let (id, shape) = (parameter.id, parameter.dims());
         let value = parameter.into_value().inner().flatten(0, D - 1);
-        let [value, first, second] = adam_step([value, first, second], gradient, step);
-        self.moments.insert(path.to_owned(), [first, second]);
+        let (value, moments) = adam_steps(vec![SteppedParameter { value, moments, gradient, step }]).remove(0);
+        self.moments.insert(path.to_owned(), moments);
         Param::initialized(id, Tensor::from_inner(value.reshape(shape)).require_grad())
     }
 }

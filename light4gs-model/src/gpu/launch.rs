@@ -152,7 +152,12 @@ fn overlap(a: &Handle, b: &Handle) -> bool {
         start..start + handle.size_in_used()
     };
     let (of_a, of_b) = (range(a), range(b));
-    std::ptr::eq(a.memory.descriptor(), b.memory.descriptor()) && of_a.start < of_b.end && of_b.start < of_a.end
+    same_memory(a, b) && of_a.start < of_b.end && of_b.start < of_a.end
+}
+
+/// Whether two handles are pieces of one buffer.
+pub(super) fn same_memory(a: &Handle, b: &Handle) -> bool {
+    std::ptr::eq(a.memory.descriptor(), b.memory.descriptor())
 }
 
 #[cfg(test)]

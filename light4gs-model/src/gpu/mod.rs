@@ -5,6 +5,7 @@
 //! so that compilers and adapters other than those of this machine can be tried: `.ci/webgpu` does; and the number of launches
 //! ([`LaunchCounter`]).
 
+mod arena;
 mod context;
 mod counting;
 mod elementwise;
@@ -15,6 +16,7 @@ pub(crate) mod sort;
 mod subgroups;
 mod team;
 
+pub(crate) use arena::Arena;
 #[cfg(test)]
 pub(crate) use context::tests::default_gpu;
 pub(crate) use context::{Gpu, PLACE_ALIGNMENT, Places, buffer_of, first_words};
@@ -29,5 +31,5 @@ pub use team::{Communication, Team, with_team};
 
 /// The kernels that several operations launch.
 pub(crate) fn kernels() -> Vec<Kernel> {
-    [sort::kernels(), subgroups::kernels()].concat()
+    [arena::kernels(), sort::kernels(), subgroups::kernels()].concat()
 }

@@ -1,10 +1,10 @@
 //! Adam with a state for each parameter path, which follows when rows are added and removed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 
-use burn::module::{Module, Param};
-use burn::tensor::{Int, Tensor};
-use light4gs_model::ops::adam::{AdamStep, adam_step};
+use burn::module::{Module, Param, ParamId};
+use burn::tensor::{Device, Int, Shape, Tensor};
+use light4gs_model::ops::adam::{AdamStep, SteppedParameter, adam_steps};
 use light4gs_model::parameters::{ParameterMapper, update_parameters};
 
 use super::gradients::GradientSums;
@@ -38,7 +38,17 @@ impl Adam {
         gradients: &mut GradientSums,
         rate: impl Fn(ParameterGroup, &str) -> Option<f64>,
     ) {
-        update_parameters(module, &mut Step { adam: self, prefix, gradients, rate });
+        let mut take = Take { adam: self, prefix, gradients, rate, names: Vec::new(), begun: Vec::new() };
+        update_parameters(module, &mut take);
+        let Take { names, begun, .. } = take;
+        let times: Vec<u32> = begun.iter().map(|parameter| parameter.step.time).collect();
+        let stepped = names.into_iter().zip(times).zip(adam_steps(begun));
+        let values = stepped.map(|(((name, shape), time), (value, moments))| {
+            self.finish(name.clone(), time, moments);
+            (name, (shape, value))
+        });
+        let values: HashMap<_, _> = values.collect();
+        update_parameters(module, &mut GiveBack { prefix, values });
     }
 
     /// Steps a parameter along its gradient, which has the parameter's shape and no tape.
@@ -49,23 +59,28 @@ impl Adam {
         gradient: Tensor<D>,
         learning_rate: f64,
     ) {
-        let id = parameter.id;
-        // Takes the tensor out, so that it is not shared and the step can be made in place.
-        let empty = Param::initialized(id, Tensor::empty([0; D], &gradient.device()));
-        let value = std::mem::replace(parameter, empty).into_value().inner();
-        let shape = value.dims();
-        let (first, second, time) = match self.states.remove(name) {
-            Some(AdamState { first, second, time }) => (first, second, time + 1),
-            None => {
-                let zeros = || Tensor::zeros([shape.iter().product::<usize>()], &gradient.device());
-                (zeros(), zeros(), 1)
-            }
+        let (id, shape) = (parameter.id, parameter.dims());
+        let value = std::mem::replace(parameter, without_a_value(id, &gradient.device())).into_value().inner();
+        let begun = self.begin(name, value.flatten(0, D - 1), gradient.flatten(0, D - 1), learning_rate);
+        let time = begun.step.time;
+        let (value, moments) = adam_steps(vec![begun]).remove(0);
+        self.finish(name.to_owned(), time, moments);
+        *parameter = with_value(id, value.reshape(shape));
+    }
+
+    /// Takes the moments of a parameter for its next step.
+    fn begin(&mut self, name: &str, value: Tensor<1>, gradient: Tensor<1>, learning_rate: f64) -> SteppedParameter {
+        let (moments, time) = match self.states.remove(name) {
+            Some(AdamState { first, second, time }) => ([first, second], time + 1),
+            None => ([(); 2].map(|()| Tensor::zeros(value.dims(), &gradient.device())), 1),
         };
         let step = AdamStep { learning_rate: learning_rate as f32, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time };
-        let [value, first, second] =
-            adam_step([value.flatten(0, D - 1), first, second], gradient.flatten(0, D - 1), step);
-        self.states.insert(name.to_owned(), AdamState { first, second, time });
-        *parameter = Param::initialized(id, Tensor::from_inner(value.reshape(shape)).require_grad());
+        SteppedParameter { value, moments, gradient, step }
+    }
+
+    /// Keeps the moments after a step.
+    fn finish(&mut self, name: String, time: u32, [first, second]: [Tensor<1>; 2]) {
+        self.states.insert(name, AdamState { first, second, time });
     }
 
     /// Moves the moments with their rows: row k of the result is row `rows[k]`, or zeros where `fresh[k]`. `rows` and
@@ -89,25 +104,62 @@ impl Adam {
     }
 }
 
-struct Step<'a, R> {
+/// A parameter whose tensor is elsewhere, so that it is not shared and a step can be made in place.
+fn without_a_value<const D: usize>(id: ParamId, device: &Device) -> Param<Tensor<D>> {
+    Param::initialized(id, Tensor::empty([0; D], device))
+}
+
+fn with_value<const D: usize>(id: ParamId, value: Tensor<D>) -> Param<Tensor<D>> {
+    Param::initialized(id, Tensor::from_inner(value).require_grad())
+}
+
+/// Takes the parameters that are stepped out of a module.
+struct Take<'a, R> {
     adam: &'a mut Adam,
     prefix: &'a str,
     gradients: &'a mut GradientSums,
     rate: R,
+    /// With their shapes.
+    names: Vec<(String, Vec<usize>)>,
+    begun: Vec<SteppedParameter>,
 }
 
-impl<R: Fn(ParameterGroup, &str) -> Option<f64>> ParameterMapper for Step<'_, R> {
-    fn map<const D: usize>(&mut self, path: &str, mut parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
-        let joined = if self.prefix.is_empty() { path.to_owned() } else { format!("{}.{path}", self.prefix) };
-        if let Some(rate) = ParameterGroup::of(&joined).and_then(|group| (self.rate)(group, &joined))
+fn joined(prefix: &str, path: &str) -> String {
+    if prefix.is_empty() { path.to_owned() } else { format!("{prefix}.{path}") }
+}
+
+impl<R: Fn(ParameterGroup, &str) -> Option<f64>> ParameterMapper for Take<'_, R> {
+    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        let name = joined(self.prefix, path);
+        if let Some(rate) = ParameterGroup::of(&name).and_then(|group| (self.rate)(group, &name))
             && let Some(gradient) = self.gradients.remove(parameter.id)
             // With spherical harmonics of degree 0 alone, `sh_rest` is empty: there is nothing to step, and kernels
             // refuse empty tensors.
             && parameter.shape().num_elements() > 0
         {
-            let gradient = gradient.reshape(parameter.dims());
-            self.adam.step(&joined, &mut parameter, gradient, rate);
+            let (id, shape) = (parameter.id, parameter.dims());
+            let empty = without_a_value(id, &gradient.device());
+            let value = parameter.into_value().inner().flatten(0, D - 1);
+            self.begun.push(self.adam.begin(&name, value, gradient, rate));
+            self.names.push((name, shape.to_vec()));
+            return empty;
         }
         parameter
+    }
+}
+
+/// Puts them back.
+struct GiveBack<'a> {
+    prefix: &'a str,
+    /// By name, with their shapes.
+    values: HashMap<String, (Vec<usize>, Tensor<1>)>,
+}
+
+impl ParameterMapper for GiveBack<'_> {
+    fn map<const D: usize>(&mut self, path: &str, parameter: Param<Tensor<D>>) -> Param<Tensor<D>> {
+        match self.values.remove(&joined(self.prefix, path)) {
+            Some((shape, value)) => with_value(parameter.id, value.reshape::<D, _>(Shape::from(shape))),
+            None => parameter,
+        }
     }
 }

@@ -1,12 +1,11 @@
 //! The fused Adam step: one pass over parameter, gradient and both moments.
 
-use burn::backend::TensorMetadata;
-use burn::backend::tensor::FloatTensor;
 use rayon::prelude::*;
 
 use super::{AdamOps, AdamStep, AdamTensors};
 use crate::ops::for_cpu_back_ends;
-use crate::ops::host::HostBackend;
+use crate::ops::host::{HostBackend, HostTensor};
+use crate::ops::tensor_list::TensorList;
 
 const CHUNK: usize = 1 << 14;
 
@@ -32,30 +31,35 @@ fn adam_step_on_slices(parameter: &mut [f32], gradient: &[f32], first: &mut [f32
         });
 }
 
-fn adam_on_cpu<B: HostBackend>(tensors: AdamTensors<B>, gradient: FloatTensor<B>, step: AdamStep) -> AdamTensors<B> {
-    debug_assert_eq!(tensors.parameter.shape(), gradient.shape());
-    let mut parameter = B::to_host(tensors.parameter);
-    let mut first = B::to_host(tensors.first_moment);
-    let mut second = B::to_host(tensors.second_moment);
-    let gradient = B::to_host(gradient);
-    adam_step_on_slices(
-        parameter.as_mut_slice(),
-        gradient.as_slice(),
-        first.as_mut_slice(),
-        second.as_mut_slice(),
-        step,
-    );
-    AdamTensors {
-        parameter: B::from_host(parameter),
-        first_moment: B::from_host(first),
-        second_moment: B::from_host(second),
+fn adam_on_cpu<B: HostBackend>(
+    tensors: AdamTensors<B>,
+    gradients: TensorList<B>,
+    steps: Vec<AdamStep>,
+) -> AdamTensors<B> {
+    let hosts = |list: TensorList<B>| -> Vec<HostTensor> { list.0.into_iter().map(B::to_host).collect() };
+    let mut parameters = hosts(tensors.parameters);
+    let mut firsts = hosts(tensors.first_moments);
+    let mut seconds = hosts(tensors.second_moments);
+    let moments = firsts.iter_mut().zip(&mut seconds);
+    for (((parameter, (first, second)), gradient), step) in
+        parameters.iter_mut().zip(moments).zip(gradients.0).zip(steps)
+    {
+        let gradient = B::to_host(gradient);
+        let [parameter, first, second] = [parameter, first, second].map(HostTensor::as_mut_slice);
+        adam_step_on_slices(parameter, gradient.as_slice(), first, second, step);
     }
+    let tensors = |hosts: Vec<HostTensor>| TensorList(hosts.into_iter().map(B::from_host).collect());
+    AdamTensors { parameters: tensors(parameters), first_moments: tensors(firsts), second_moments: tensors(seconds) }
 }
 
 for_cpu_back_ends! {
     AdamOps {
-        fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-            adam_on_cpu(tensors, gradient, step)
+        fn adam(
+            tensors: AdamTensors<Self>,
+            gradients: TensorList<Self>,
+            steps: Vec<AdamStep>,
+        ) -> AdamTensors<Self> {
+            adam_on_cpu(tensors, gradients, steps)
         }
     }
 }

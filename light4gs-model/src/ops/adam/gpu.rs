@@ -1,94 +1,165 @@
 //! The fused Adam step on a GPU.
 
 use burn::backend::TensorMetadata;
-use burn::backend::tensor::FloatTensor;
 use burn::tensor::{Device, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
+use cubecl::server::Handle;
 use light4gs_shaders::ADAM;
 
-use super::{AdamOps, AdamStep, AdamTensors, adam_step};
-use crate::gpu::{Gpu, Kernel, Launch, buffer_of};
+use super::{AdamOps, AdamStep, AdamTensors, SteppedParameter, adam_steps};
+use crate::gpu::{Arena, Gpu, Kernel, Launch, PLACE_ALIGNMENT, buffer_of};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
 use crate::ops::sample::{GpuOperation, Numbers};
+use crate::ops::tensor_list::TensorList;
+
+/// Most tensors of a launch.
+const MOST_TENSORS: usize = 64;
 
 /// The operation for checks.
 pub(in crate::ops) const OPERATION: GpuOperation = GpuOperation { name: "adam", kernels, samples: &[sample] };
 
 /// The kernels of this file.
 fn kernels() -> Vec<Kernel> {
-    vec![ADAM.into()]
+    vec![kernel()]
 }
 
-fn step_of(
+fn kernel() -> Kernel {
+    Kernel::new(ADAM).constant("MOST_TENSORS", MOST_TENSORS as u32)
+}
+
+/// A parameter, its first and second moment.
+type Stepped = [CubeTensor; 3];
+
+/// A parameter, its moments, its gradient, and the numbers of its step.
+type Stepping = (Stepped, CubeTensor, AdamStep);
+
+fn steps_of(
     tensors: AdamTensors<CubeBackend>,
-    gradient: CubeTensor,
-    step: AdamStep,
-) -> Result<AdamTensors<CubeBackend>, GpuError> {
-    let gpu = Gpu::of(&tensors.parameter)?;
-    let shape = tensors.parameter.shape();
-    let count = shape.num_elements();
-    if count == 0 {
-        return Ok(tensors);
+    gradients: Vec<CubeTensor>,
+    steps: Vec<AdamStep>,
+) -> Result<Vec<Stepped>, GpuError> {
+    let AdamTensors { parameters, first_moments, second_moments } = tensors;
+    let Some(any) = parameters.0.first() else { return Ok(Vec::new()) };
+    let gpu = Gpu::of(any)?;
+    let moments = first_moments.0.into_iter().zip(second_moments.0);
+    let stepped = parameters.0.into_iter().zip(moments).map(|(parameter, (first, second))| [parameter, first, second]);
+    let mut rest =
+        stepped.zip(gradients).zip(steps).map(|((stepped, gradient), step)| (stepped, gradient, step)).peekable();
+    let mut done = Vec::new();
+    while rest.peek().is_some() {
+        // As many as a table and a buffer hold, but at least one.
+        let (mut batch, mut total): (Vec<Stepping>, usize) = (Vec::new(), 0);
+        while let Some(next) = rest.next_if(|next| {
+            total += next.1.shape().num_elements().next_multiple_of(PLACE_ALIGNMENT);
+            batch.is_empty() || (batch.len() < MOST_TENSORS && gpu.holds(total))
+        }) {
+            batch.push(next);
+        }
+        done.extend(step_at_once(&gpu, batch)?);
     }
-    let AdamStep { beta_1, beta_2, epsilon, .. } = step;
-    let numbers = [
-        beta_1 as f32,
-        (1.0 - beta_1) as f32,
-        beta_2 as f32,
-        (1.0 - beta_2) as f32,
-        step.corrected_learning_rate(),
-        step.root_correction(),
-        epsilon,
-    ];
-    let uniform: Vec<u32> = std::iter::once(count as u32).chain(numbers.map(f32::to_bits)).collect();
-    let new = || gpu.client.empty(4 * count);
-    let (parameter, first, second) = (new(), new(), new());
-    Launch::new(&gpu.client, ADAM)
-        .reads(&buffer_of(tensors.parameter))
-        .reads(&buffer_of(gradient))
-        .reads(&buffer_of(tensors.first_moment))
-        .reads(&buffer_of(tensors.second_moment))
-        .writes(&parameter)
-        .writes(&first)
-        .writes(&second)
-        .uniform(&uniform)
-        .invocations(count)?;
-    Ok(AdamTensors {
-        parameter: gpu.tensor(parameter, shape.clone()),
-        first_moment: gpu.tensor(first, shape.clone()),
-        second_moment: gpu.tensor(second, shape),
-    })
+    Ok(done)
+}
+
+fn step_at_once(gpu: &Gpu, batch: Vec<Stepping>) -> Result<Vec<Stepped>, GpuError> {
+    let lengths: Vec<usize> = batch.iter().map(|(_, gradient, _)| gradient.shape().num_elements()).collect();
+    let shapes: Vec<_> = batch.iter().map(|(_, gradient, _)| gradient.shape()).collect();
+    let steps: Vec<AdamStep> = batch.iter().map(|(_, _, step)| *step).collect();
+    let mut old: [Vec<Handle>; 4] = Default::default();
+    for ([parameter, first, second], gradient, _) in batch {
+        for (list, tensor) in old.iter_mut().zip([parameter, gradient, first, second]) {
+            list.push(buffer_of(tensor));
+        }
+    }
+    let new = [(); 3].map(|()| Arena::new(gpu, "parameters and moments after a step", &lengths));
+    let [parameters, firsts, seconds] = new;
+    let new = [parameters?, firsts?, seconds?];
+    let total = new[0].places.total;
+
+    let mut uniform = vec![steps.len() as u32, total as u32, 0, 0];
+    let row = |numbers: &mut dyn Iterator<Item = [u32; 4]>| {
+        let mut words: Vec<u32> = numbers.flatten().collect();
+        words.resize(4 * MOST_TENSORS, 0);
+        words
+    };
+    uniform.extend(row(&mut steps.iter().enumerate().map(|(k, step)| {
+        let [start, length] = [new[0].places.starts[k], lengths[k]].map(|number| number as u32);
+        [start, length, step.corrected_learning_rate().to_bits(), step.root_correction().to_bits()]
+    })));
+    uniform.extend(row(&mut steps.iter().map(|AdamStep { beta_1, beta_2, .. }| {
+        [*beta_1, 1.0 - beta_1, *beta_2, 1.0 - beta_2].map(|decay| (decay as f32).to_bits())
+    })));
+    uniform.extend(row(&mut steps.iter().map(|step| [step.epsilon.to_bits(), 0, 0, 0])));
+
+    let mut launch = Launch::new(&gpu.client, kernel());
+    for (name, tensors) in ["parameters", "gradients", "first moments", "second moments"].into_iter().zip(&old) {
+        launch = launch.reads(&Arena::of(gpu, name, tensors, &lengths)?.buffer);
+    }
+    let launch = new.iter().fold(launch, |launch, arena| launch.writes(&arena.buffer));
+    launch.uniform(&uniform).invocations(total)?;
+    Ok((0..steps.len()).map(|k| new.each_ref().map(|arena| gpu.tensor(arena.tensor(k), shapes[k].clone()))).collect())
 }
 
 impl AdamOps for CubeBackend {
-    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-        step_of(tensors, gradient, step).unwrap_or_else(|error| error.raise())
+    fn adam(tensors: AdamTensors<Self>, gradients: TensorList<Self>, steps: Vec<AdamStep>) -> AdamTensors<Self> {
+        let stepped = steps_of(tensors, gradients.0, steps).unwrap_or_else(|error| error.raise());
+        let mut lists: [Vec<CubeTensor>; 3] = Default::default();
+        for tensors in stepped {
+            for (list, tensor) in lists.iter_mut().zip(tensors) {
+                list.push(tensor);
+            }
+        }
+        let [parameters, first_moments, second_moments] = lists.map(TensorList);
+        AdamTensors { parameters, first_moments, second_moments }
     }
 }
 
 impl<B: FusionBackend + AdamOps> AdamOps for Fusion<B> {
-    fn adam(tensors: AdamTensors<Self>, gradient: FloatTensor<Self>, step: AdamStep) -> AdamTensors<Self> {
-        let AdamTensors { parameter, first_moment, second_moment } = tensors;
+    fn adam(tensors: AdamTensors<Self>, gradients: TensorList<Self>, steps: Vec<AdamStep>) -> AdamTensors<Self> {
+        let resolved = |list: TensorList<Self>| TensorList(list.0.into_iter().map(resolve::<B>).collect());
         let tensors = AdamTensors {
-            parameter: resolve::<B>(parameter),
-            first_moment: resolve::<B>(first_moment),
-            second_moment: resolve::<B>(second_moment),
+            parameters: resolved(tensors.parameters),
+            first_moments: resolved(tensors.first_moments),
+            second_moments: resolved(tensors.second_moments),
         };
-        let AdamTensors { parameter, first_moment, second_moment } = B::adam(tensors, resolve::<B>(gradient), step);
+        let stepped = B::adam(tensors, resolved(gradients), steps);
+        let leaves = |list: TensorList<B>| TensorList(list.0.into_iter().map(leaf::<B>).collect());
         AdamTensors {
-            parameter: leaf::<B>(parameter),
-            first_moment: leaf::<B>(first_moment),
-            second_moment: leaf::<B>(second_moment),
+            parameters: leaves(stepped.parameters),
+            first_moments: leaves(stepped.first_moments),
+            second_moments: leaves(stepped.second_moments),
         }
     }
 }
 
+/// Two steps of more tensors than a launch takes, the second from where the first has left them.
 fn sample(device: &Device) -> Vec<TensorData> {
     let mut numbers = Numbers::new(device);
-    let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 3 };
-    let parameter =
-        [numbers.matrix(1, 2600, -1.0, 1.0), numbers.matrix(1, 2600, -0.1, 0.1), numbers.matrix(1, 2600, 0.0, 0.1)];
-    adam_step(parameter, numbers.matrix(1, 2600, -13.0, 13.0), step).map(|tensor| tensor.into_data()).into()
+    let mut row = |count: usize, low: f32, high: f32| numbers.matrix(1, count, low, high).flatten::<1>(0, 1);
+    let mut parameters: Vec<SteppedParameter> = (0..MOST_TENSORS + 2)
+        .map(|k| {
+            let count = if k == 1 { 2600 } else { 1 + 7 * k };
+            let step = AdamStep {
+                learning_rate: 0.1 / (1 + k) as f32,
+                beta_1: 0.9,
+                beta_2: 0.999,
+                epsilon: 1e-15,
+                time: 3 + k as u32,
+            };
+            SteppedParameter {
+                value: row(count, -1.0, 1.0),
+                moments: [row(count, -0.1, 0.1), row(count, 0.0, 0.1)],
+                gradient: row(count, -13.0, 13.0),
+                step,
+            }
+        })
+        .collect();
+    let first = adam_steps(parameters.clone());
+    for (parameter, (value, moments)) in parameters.iter_mut().zip(first) {
+        (parameter.value, parameter.moments) = (value, moments);
+        parameter.step.time += 1;
+    }
+    let stepped = adam_steps(parameters).into_iter();
+    stepped.flat_map(|(value, [first, second])| [value, first, second]).map(|tensor| tensor.into_data()).collect()
 }

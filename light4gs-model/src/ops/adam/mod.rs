@@ -1,12 +1,14 @@
-//! One fused Adam step for each tensor (Kingma and Ba, 2015), in place where the tensor is not shared.
+//! One fused Adam step of any number of tensors (Kingma and Ba, 2015). On a CPU it is made in place where a tensor is not shared, on
+//! a GPU all tensors are stepped at once.
 
 mod cpu;
 #[cfg(feature = "wgpu")]
 pub(super) mod gpu;
 
-use burn::backend::tensor::FloatTensor;
 use burn::backend::{Backend, Dispatch, ExtensionType, backend_extension};
 use burn::tensor::Tensor;
+
+use super::tensor_list::TensorList;
 
 /// Numbers of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,53 +37,83 @@ impl AdamStep {
     }
 }
 
-/// A parameter with its moments.
+/// Parameters with their moments, each flattened and not empty.
 #[derive(ExtensionType)]
 pub struct AdamTensors<B: Backend> {
-    /// The parameter, any shape.
-    pub parameter: FloatTensor<B>,
-    /// First moment, in the parameter's shape.
-    pub first_moment: FloatTensor<B>,
-    /// Second moment, in the parameter's shape.
-    pub second_moment: FloatTensor<B>,
+    /// The parameters, `[n]` each.
+    #[extension_type]
+    pub parameters: TensorList<B>,
+    /// First moments, in the parameters' shapes.
+    #[extension_type]
+    pub first_moments: TensorList<B>,
+    /// Second moments, in the parameters' shapes.
+    #[extension_type]
+    pub second_moments: TensorList<B>,
 }
 
 /// The fused step on every back end.
 #[backend_extension(NdArray: cfg(feature = "ndarray"), Flex: cfg(feature = "flex"), Cube: cfg(feature = "wgpu"))]
 pub trait AdamOps: Backend {
-    /// Parameter and moments after one step along `gradient`.
+    /// Parameters and moments after one step along their gradients.
     fn adam(
         #[extension_type] tensors: AdamTensors<Self>,
-        gradient: FloatTensor<Self>,
-        step: AdamStep,
+        #[extension_type] gradients: TensorList<Self>,
+        steps: Vec<AdamStep>,
     ) -> AdamTensors<Self>;
 }
 
-/// Takes one Adam step on tensors without autodiff; returns parameter, first and second moment.
+/// A parameter on its way through a step. All tensors are without autodiff and have one shape.
+#[derive(Clone, Debug)]
+pub struct SteppedParameter {
+    /// The parameter.
+    pub value: Tensor<1>,
+    /// First and second moment.
+    pub moments: [Tensor<1>; 2],
+    /// The gradient.
+    pub gradient: Tensor<1>,
+    /// The step's numbers.
+    pub step: AdamStep,
+}
+
+/// Takes one Adam step of each parameter; returns values and moments in the same order. Parameters must not be empty.
 ///
 /// ```
 /// use burn::tensor::{Device, Tensor};
-/// use light4gs_model::ops::adam::{AdamStep, adam_step};
+/// use light4gs_model::ops::adam::{AdamStep, SteppedParameter, adam_steps};
 ///
 /// let device = Device::flex();
-/// let step = AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 1 };
 /// let zeros = Tensor::<1>::zeros([2], &device);
-/// let gradient = Tensor::from_floats([3.0, -4.0], &device);
-/// let [parameter, _, _] = adam_step([zeros.clone(), zeros.clone(), zeros], gradient, step);
+/// let parameter = SteppedParameter {
+///     value: zeros.clone(),
+///     moments: [zeros.clone(), zeros],
+///     gradient: Tensor::from_floats([3.0, -4.0], &device),
+///     step: AdamStep { learning_rate: 0.1, beta_1: 0.9, beta_2: 0.999, epsilon: 1e-15, time: 1 },
+/// };
+/// let (value, _) = adam_steps(vec![parameter]).remove(0);
 /// // The first step has the size of the learning rate, against the gradient's sign.
-/// let values = parameter.into_data().to_vec::<f32>().unwrap();
+/// let values = value.into_data().to_vec::<f32>().unwrap();
 /// assert!((values[0] + 0.1).abs() < 1e-6 && (values[1] - 0.1).abs() < 1e-6);
 /// ```
-pub fn adam_step<const D: usize>(
-    [parameter, first, second]: [Tensor<D>; 3],
-    gradient: Tensor<D>,
-    step: AdamStep,
-) -> [Tensor<D>; 3] {
+pub fn adam_steps(parameters: Vec<SteppedParameter>) -> Vec<(Tensor<1>, [Tensor<1>; 2])> {
+    if parameters.is_empty() {
+        return Vec::new();
+    }
+    let [mut values, mut firsts, mut seconds, mut gradients] = [(); 4].map(|()| Vec::with_capacity(parameters.len()));
+    let mut steps = Vec::with_capacity(parameters.len());
+    for SteppedParameter { value, moments: [first, second], gradient, step } in parameters {
+        values.push(value.into_dispatch());
+        firsts.push(first.into_dispatch());
+        seconds.push(second.into_dispatch());
+        gradients.push(gradient.into_dispatch());
+        steps.push(step);
+    }
     let tensors = AdamTensors {
-        parameter: parameter.into_dispatch(),
-        first_moment: first.into_dispatch(),
-        second_moment: second.into_dispatch(),
+        parameters: TensorList(values),
+        first_moments: TensorList(firsts),
+        second_moments: TensorList(seconds),
     };
-    let out = Dispatch::adam(tensors, gradient.into_dispatch(), step);
-    [out.parameter, out.first_moment, out.second_moment].map(Tensor::from_dispatch)
+    let out = Dispatch::adam(tensors, TensorList(gradients), steps);
+    let moments = out.first_moments.0.into_iter().zip(out.second_moments.0);
+    let moments = moments.map(|(first, second)| [first, second].map(Tensor::from_dispatch));
+    out.parameters.0.into_iter().map(Tensor::from_dispatch).zip(moments).collect()
 }

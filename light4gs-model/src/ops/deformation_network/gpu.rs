@@ -6,12 +6,12 @@ use burn::tensor::{Device, Shape, Tensor, TensorData};
 use burn_fusion::{Fusion, FusionBackend};
 use burn_wgpu::{CubeBackend, CubeTensor};
 use cubecl::server::Handle;
-use light4gs_shaders::{NETWORK_BACKWARD, NETWORK_FORWARD, NETWORK_GATHER, NETWORK_PACK, NETWORK_WEIGHTS, Shader};
+use light4gs_shaders::{NETWORK_BACKWARD, NETWORK_FORWARD, NETWORK_GATHER, NETWORK_WEIGHTS, Shader};
 
 use super::{
     LayerLayout, MOST_CHANNELS, MOST_LAYERS, NetworkGradients, NetworkKernels, NetworkLayout, NetworkTensors, network,
 };
-use crate::gpu::{Gpu, Kernel, Launch, Places, buffer_of, first_words};
+use crate::gpu::{Arena, Gpu, Kernel, Launch, buffer_of, first_words};
 use crate::gpu_error::GpuError;
 use crate::ops::fusion::{leaf, resolve};
 use crate::ops::sample::{GpuOperation, Numbers};
@@ -21,8 +21,6 @@ use crate::ops::tensor_list::TensorList;
 const MEMORY: usize = 4096;
 /// Rows of a workgroup: more, where the network is narrow enough.
 const ROWS: [usize; 2] = [16, 8];
-/// Tensors that `network_pack` takes.
-const PACKED: usize = 7;
 /// `SIDE` in `network_weights`.
 const SIDE: usize = 32;
 /// Least rows of a part in `network_weights`, and most parts.
@@ -40,7 +38,7 @@ pub(in crate::ops) const OPERATION: GpuOperation =
 fn kernels() -> Vec<Kernel> {
     let by_rows =
         [NETWORK_FORWARD, NETWORK_BACKWARD].into_iter().flat_map(|shader| ROWS.map(|rows| with_rows(shader, rows)));
-    [NETWORK_PACK, NETWORK_GATHER].map(Kernel::from).into_iter().chain([weights_kernel()]).chain(by_rows).collect()
+    [NETWORK_GATHER.into(), weights_kernel()].into_iter().chain(by_rows).collect()
 }
 
 fn with_rows(shader: Shader, rows: usize) -> Kernel {
@@ -56,8 +54,7 @@ fn weights_kernel() -> Kernel {
 #[derive(Clone, Debug)]
 struct PackedNetwork {
     layout: NetworkLayout,
-    parameters: Handle,
-    places: Places,
+    parameters: Arena,
     rows: usize,
 }
 
@@ -70,30 +67,9 @@ struct Description {
 impl PackedNetwork {
     fn new(gpu: &Gpu, layout: NetworkLayout, parameters: Vec<CubeTensor>, rows: usize) -> Result<Self, GpuError> {
         let lengths: Vec<usize> = parameters.iter().map(|parameter| parameter.shape().num_elements()).collect();
-        let places = Places::new(&lengths);
-        let packed = gpu.allocate("parameters of a network", places.total)?;
         let tensors: Vec<Handle> = parameters.into_iter().map(buffer_of).collect();
-        for first in (0..tensors.len()).step_by(PACKED) {
-            let tensors = &tensors[first..tensors.len().min(first + PACKED)];
-            let longest = lengths[first..first + tensors.len()].iter().copied().max().unwrap_or(0);
-            let mut uniform = vec![longest as u32, 0, 0, 0];
-            let mut launch = Launch::new(&gpu.client, NETWORK_PACK);
-            for tensor in 0..PACKED {
-                let (length, start) = match tensors.get(tensor) {
-                    Some(_) => (lengths[first + tensor], places.starts[first + tensor]),
-                    None => (0, 0),
-                };
-                uniform.extend([length as u32, start as u32, 0, 0]);
-                // What is not there is bound as well.
-                launch = match tensors.get(tensor) {
-                    Some(buffer) => launch.reads(buffer),
-                    None => launch.reads(&gpu.allocate("no parameters", 1)?),
-                };
-            }
-            let launch = launch.updates_if(first > 0, &packed).uniform(&uniform);
-            launch.invocations(PACKED * longest)?;
-        }
-        Ok(Self { layout, parameters: packed, places, rows })
+        let parameters = Arena::of(gpu, "parameters of a network", &tensors, &lengths)?;
+        Ok(Self { layout, parameters, rows })
     }
 
     fn rows_of_group(&self) -> usize {
@@ -132,7 +108,7 @@ impl PackedNetwork {
             [self.rows, self.layout.features(), outputs, self.hidden(), self.layout.layers().len(), first, second, 0];
         let mut words: Vec<u32> = counts.iter().map(|count| *count as u32).collect();
         for (number, layer) in self.layers() {
-            let [weight, bias] = [0, 1].map(|k| self.places.starts[2 * number + k]);
+            let [weight, bias] = [0, 1].map(|k| self.parameters.places.starts[2 * number + k]);
             words.extend([layer.inputs, layer.outputs, weight, bias].map(|size| size as u32));
         }
         let gap = 4 * (MOST_LAYERS - self.layout.layers().len());
@@ -165,7 +141,7 @@ fn forward(
     let uniform = packed.uniform(&Description { extra: [usize::from(keep), 0], places: places.collect() });
     Launch::new(&gpu.client, with_rows(NETWORK_FORWARD, packed.rows_of_group()))
         .reads(&features)
-        .reads(&packed.parameters)
+        .reads(&packed.parameters.buffer)
         .writes(&outputs)
         .writes(&hidden)
         .uniform(&uniform)
@@ -212,7 +188,7 @@ fn backward(
     });
     let uniform = packed.uniform(&Description { extra: [slots.features, 0], places: places.collect() });
     Launch::new(&gpu.client, with_rows(NETWORK_BACKWARD, packed.rows_of_group()))
-        .reads(&packed.parameters)
+        .reads(&packed.parameters.buffer)
         .reads(&hidden)
         .reads(&buffer_of(upstream))
         .writes(&gradients)
@@ -222,7 +198,7 @@ fn backward(
 
     let part = rows.div_ceil(MOST_PARTS).max(PART);
     let parts = rows.div_ceil(part);
-    let total = packed.places.total;
+    let total = packed.parameters.places.total;
     let sums = gpu.allocate("sums of a network's gradients", parts * total)?;
     let mut tiles = 0;
     let places = packed.layers().map(|(number, layer)| {
@@ -250,7 +226,7 @@ fn backward(
 
     let parameters = packed.layers().flat_map(|(number, layer)| {
         let shapes = [Shape::from([layer.inputs, layer.outputs]), Shape::from([layer.outputs])];
-        [0, 1].map(|k| gpu.tensor(packed.places.of(&of_parameters, 2 * number + k), shapes[k].clone()))
+        [0, 1].map(|k| gpu.tensor(packed.parameters.places.of(&of_parameters, 2 * number + k), shapes[k].clone()))
     });
     let parameters = parameters.collect();
     let of_features = gpu.tensor(first_words(&of_features, rows * width), Shape::from([rows, width]));

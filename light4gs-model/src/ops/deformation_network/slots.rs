@@ -119,8 +119,8 @@ mod tests {
         assert_eq!((forward.layers[2], forward.layers[4], forward.end), (6, 6, 28));
 
         let backward = trunk_and_heads().backward_slots();
-        // The heads in turn; the trunk's gradient stays between them.
-        assert_eq!(backward.layers, [15, 9, 0, 5, 4, 0]);
-        assert_eq!((backward.features, backward.end), (23, 43));
+        // The heads in turn, where the memory begins; the trunk's gradient stays behind them until its first layer is reached.
+        assert_eq!(backward.layers, [0, 9, 3, 0, 4, 0]);
+        assert_eq!((backward.features, backward.end), (8, 28));
     }
 }

@@ -1,5 +1,4 @@
-// Several tensors one after another, each where its place begins: the parameters of a deformation network, which other kernels
-// read from one buffer.
+// Several tensors in one buffer, each where its place begins.
 //
 // One invocation owns one number. Tensors that do not exist have the length 0.
 
