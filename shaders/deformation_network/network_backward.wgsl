@@ -63,7 +63,11 @@ fn main(
             let quad = own % QUADS;
             let channel = 4u * (own / QUADS);
             let weights = sizes.z + min(vec4(channel) + vec4(0u, 1u, 2u, 3u), vec4(sizes.x - 1u)) * sizes.y;
+            // By the standard it is all zeros in each round; in Chromium it is not.
             var sums: array<vec4<f32>, 4>;
+            for (var k = 0u; k < 4u; k++) {
+                sums[k] = vec4(0.0);
+            }
             for (var c = 0u; c < sizes.y; c++) {
                 let gradient = block[(place.x + c) * QUADS + quad];
                 for (var k = 0u; k < 4u; k++) {

@@ -208,11 +208,11 @@ fn wishes_become_keys() {
     assert_success(&w.train("by-hand", &overrides).args(["--pixels", "16"]).output().unwrap());
     assert_eq!((key("by-hand", "resolution"), key("by-hand", "max_gaussians")), (16.0, 400.0));
 
-    let arguments = ["train", "scene", "--config", "dnerf-cpu+nodes", "--pixels", "16", "--minutes", "0.2"];
+    let arguments = ["train", "scene", "--config", "dnerf-cpu+nodes", "--pixels", "16", "--minutes", "0.3"];
     let output = w.command(arguments).args(["--set", "device=flex", "--out", "short"]).output().unwrap();
     assert_success(&output);
     let told = String::from_utf8_lossy(&output.stderr).into_owned();
-    assert!(told.contains("16×16 pixels") && told.contains("about 0.2 minutes"), "{told}");
+    assert!(told.contains("16×16 pixels") && told.contains("about 0.3 minutes"), "{told}");
     let [coarse, fine] = ["coarse_iterations", "fine_iterations"].map(|name| key("short", name));
     assert!(fine < 12_000.0 && told.contains(&format!("{coarse} + {fine} iterations")), "{told}");
 
