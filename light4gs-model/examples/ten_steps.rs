@@ -134,7 +134,7 @@ impl ParameterMapper for Adam<'_> {
 /// The field's numbers are the same on every back end, whose random numbers are not.
 fn scene(cloud: &PointCloud, device: &Device) -> DynamicScene<HexPlaneField> {
     let hexplane = HexPlaneConfig { channels: 4, resolution: [8, 8, 8, 4], ..Default::default() };
-    // One head: autotuning tries many kernels for each size of a matrix product, which takes long without optimization.
+    // One head is enough here.
     let deformation = DeformationConfig { width: 16, scale: false, rotation: false, ..Default::default() };
     let field = HexPlaneFieldConfig { hexplane, deformation };
     let scene = DynamicSceneConfig::new(GaussiansConfig::new(), field).init(cloud, device);

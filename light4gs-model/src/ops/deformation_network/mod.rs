@@ -62,7 +62,7 @@ impl NetworkLayout {
     }
 
     /// Whether the operation takes such a network: it has at most [`MOST_LAYERS`], and a GPU can keep some rows of what its layers
-    /// give each other in the memory of a workgroup. Two successive layers of 128 fit in any case.
+    /// give each other in the memory of a workgroup.
     pub fn fits(&self) -> bool {
         (1..=MOST_LAYERS).contains(&self.0.len()) && self.channels_at_once() <= MOST_CHANNELS
     }
@@ -167,11 +167,12 @@ impl<B: NetworkOps + NetworkKernels, C: CheckpointStrategy> NetworkOps for Autod
         }
 
         let NetworkTensors { features, parameters } = tensors;
-        // Parents beyond the last parameter are constants.
+        // Parents beyond the last parameter are a constant.
+        let constant = <Self as AutodiffBackend>::from_inner(features.primitive().clone());
         let parents = std::array::from_fn(|parent| match parent.checked_sub(1).map(|place| parameters.0.get(place)) {
             None => features.node(),
             Some(Some(parameter)) => parameter.node(),
-            Some(None) => <Self as AutodiffBackend>::from_inner(features.primitive().clone()).node(),
+            Some(None) => constant.node(),
         });
         let inner = NetworkTensors {
             features: features.into_primitive(),
