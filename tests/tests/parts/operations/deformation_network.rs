@@ -124,7 +124,7 @@ fn constants_get_no_gradient() {
         let parameters = [(weight.clone(), tensor(2).squeeze_dim(0)), (tensor(3), tensor(4).squeeze_dim(0))];
         let gradients = (network(&case.layout, tensor(0), parameters) * tensor(5)).sum().backward();
         let found = values_of(&weight.grad(&gradients).expect("of the only parameter on the tape"));
-        assert_close_relative(&name, &found, &expected[2], 2e-5);
+        assert_close_relative(name, &found, &expected[2], 2e-5);
         assert!(constants.iter().all(|constant| constant.grad(&gradients).is_none()), "{name}");
     }
 }
