@@ -4,6 +4,8 @@ use std::any::Any;
 
 use burn::tensor::{TensorData, Transaction};
 
+use crate::read_backs::ReadBacks;
+
 /// An error of a GPU operation.
 ///
 /// Burn's operations return tensors, not results, so these errors are panics with a `GpuError` as their payload.
@@ -86,7 +88,10 @@ impl GpuError {
     /// # Errors
     /// [`GpuError::Device`] with the message of the driver.
     pub fn read(operation: &'static str, tensors: Transaction) -> Result<Vec<TensorData>, Self> {
-        tensors.try_execute().map_err(|error| Self::Device { operation, reason: first_lines(&error.to_string()) })
+        let failed = |reason: String| Self::Device { operation, reason: first_lines(&reason) };
+        let read = tensors.try_execute().map_err(|error| failed(error.to_string()))?;
+        ReadBacks::count(read.iter().map(|data| data.bytes().len()).sum());
+        Ok(read)
     }
 
     /// The error that is the payload of a panic; any other payload is returned unchanged.

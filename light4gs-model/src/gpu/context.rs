@@ -8,6 +8,7 @@ use cubecl::client::Client;
 use cubecl::server::Handle;
 
 use crate::gpu_error::{GpuError, first_lines};
+use crate::read_backs::ReadBacks;
 
 /// Tensors within a buffer begin at multiples of this many values, where every adapter can bind them.
 pub(crate) const PLACE_ALIGNMENT: usize = 64;
@@ -70,6 +71,7 @@ impl Gpu {
     /// Reads one word, waiting for everything that was launched before.
     pub(crate) fn read_word(&self, operation: &'static str, buffer: &Handle) -> Result<u32, GpuError> {
         let bytes = self.client.read_one(first_words(buffer, 1)).map_err(|error| failed(operation, &error))?;
+        ReadBacks::count(4);
         Ok(u32::from_le_bytes(bytes[..4].try_into().expect("a word has four bytes")))
     }
 

@@ -1,13 +1,17 @@
 //! `bench`: the tables of `light4gs_lab::benchmark` and `light4gs_lab::benchmark::codec`.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 
+use burn::tensor::Device;
 use clap::Args;
 use light4gs_lab::benchmark::codec::{codec_benchmark, codec_table};
+use light4gs_lab::benchmark::host::{host_benchmark, host_table};
 use light4gs_lab::benchmark::{BenchScene, benchmark, table};
 use light4gs_train::config::DeviceName;
 use light4gs_train::device;
 use light4gs_train::error::TrainError;
+use serde::Serialize;
 
 use super::output::{say, say_json};
 
@@ -31,6 +35,9 @@ pub(super) struct Bench {
     /// Time the entropy coders instead, on a scene of the paper's size.
     #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "device"])]
     codec: bool,
+    /// Time the host's part of a step instead: 100 Gaussians at 32×32, with launches and read-backs.
+    #[arg(long, conflicts_with_all = ["scene", "gaussians", "size", "codec"])]
+    host: bool,
     /// Print as JSON.
     #[arg(long)]
     json: bool,
@@ -38,14 +45,14 @@ pub(super) struct Bench {
 
 impl Bench {
     pub(super) fn run(self) -> Result<(), TrainError> {
+        let repeats = self.repeats as usize;
         if self.codec {
-            let times = codec_benchmark(self.repeats as usize)?;
-            if self.json {
-                say_json(&times)?;
-            } else {
-                say(codec_table(&times))?;
-            }
-            return Ok(());
+            return output(self.json, &codec_benchmark(repeats)?, codec_table);
+        }
+        if self.host {
+            let of = |(name, device)| host_benchmark(name, &device, repeats);
+            let times: Result<Vec<_>, _> = self.device.into_iter().map(|name| opened(name).and_then(of)).collect();
+            return output(self.json, &times?, host_table);
         }
         let mut scenes = Vec::new();
         for path in &self.scene {
@@ -65,16 +72,16 @@ impl Bench {
                     .flat_map(|count| sizes.iter().map(move |size| BenchScene::generate(*count, *size))),
             );
         }
-        let mut results = Vec::new();
-        for name in self.device {
-            let device = device::open(name)?;
-            results.push(benchmark(name, &device, &scenes, self.repeats as usize)?);
-        }
-        if self.json {
-            say_json(&results)?;
-        } else {
-            say(table(&results))?;
-        }
-        Ok(())
+        let of = |(name, device)| benchmark(name, &device, &scenes, repeats);
+        let results: Result<Vec<_>, _> = self.device.into_iter().map(|name| opened(name).and_then(of)).collect();
+        output(self.json, &results?, table)
     }
+}
+
+fn opened(name: DeviceName) -> Result<(DeviceName, Device), TrainError> {
+    Ok((name, device::open(name)?))
+}
+
+fn output<T: Serialize, D: Display>(json: bool, results: &Vec<T>, table: fn(&[T]) -> D) -> Result<(), TrainError> {
+    if json { say_json(results) } else { say(table(results)) }
 }

@@ -15,6 +15,22 @@ fn bench_prints_a_table_and_json() {
     assert_eq!(json[0]["device"], "flex");
 }
 
+#[test]
+fn the_host_part_of_a_step_has_a_table_of_its_own() {
+    let w = Workspace::new(PROGRAM);
+    let host = ["bench", "--host", "--device", "flex", "--repeats", "1"];
+    let output = w.run(host);
+    assert_success(&output);
+    let text = String::from_utf8_lossy(&output.stdout);
+    assert!(text.contains("read-backs") && text.contains("nodes, step with noise and rate"), "{text}");
+    let output = w.run(host.into_iter().chain(["--json"]));
+    let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let step = &json[0]["timings"][0];
+    assert_eq!((&step["name"], &step["read_backs"]), (&"hexplane, training step".into(), &1.into()));
+    assert!(step["read_bytes"].as_u64().unwrap() > 0 && step["milliseconds"].as_f64().unwrap() > 0.0);
+    assert_refused(&w.run(["bench", "--host", "--size", "40"]), &["--host", "--size"]);
+}
+
 /// Each launch costs the host some microseconds on any GPU, and software drivers do not show it. Fewer are welcome: then lower
 /// the bound. Steps are the trainer's own, with densification's statistics and the noise of all attributes. Bounds are those of
 /// Mesa's software driver; on SwiftShader a step launches a few more.
@@ -26,10 +42,15 @@ fn a_step_does_not_launch_more_kernels_than_before() {
     assert_success(&output);
     let json: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let timings = json[0]["scenes"][0]["timings"].as_array().unwrap();
+    let row =
+        |part: &str| timings.iter().find(|timing| timing["name"] == part).unwrap_or_else(|| panic!("no row {part}"));
     let launches = |part: &str| -> u64 {
-        let timing = timings.iter().find(|timing| timing["name"] == part).unwrap_or_else(|| panic!("no row {part}"));
-        timing["launches"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum()
+        row(part)["launches"].as_object().unwrap().values().map(|count| count.as_u64().unwrap()).sum()
     };
+    // The loss with the number of intersections; with the rate also the positions, read beside the views.
+    for (part, expected) in [("training step", 1), ("step with noise", 1), ("step with noise and rate", 2)] {
+        assert_eq!(row(&format!("nodes, {part}"))["read_backs"], expected, "{part}");
+    }
     let adapter = json[0]["adapter"].as_str().unwrap();
     let more = if adapter.contains("llvmpipe") { 0 } else { 10 };
     for (part, bound) in [

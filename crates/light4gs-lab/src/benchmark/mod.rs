@@ -1,6 +1,7 @@
 //! Timing of every part of a training step, on scenes that anybody can make.
 
 pub mod codec;
+pub mod host;
 mod launches;
 mod steps;
 
@@ -12,7 +13,7 @@ use burn::tensor::{Device, Distribution, Tensor, TensorData};
 use glam::{Mat3, Quat, Vec3};
 use light4gs_data::{Camera, DataError};
 use light4gs_model::ops::skinning::{SkinningInputs, skin};
-use light4gs_model::{DeformationConfig, GaussianTensors, Gaussians, HexPlaneConfig, Splatter};
+use light4gs_model::{DeformationConfig, GaussianTensors, Gaussians, HexPlaneConfig, ReadBacks, Splatter};
 use light4gs_train::config::DeviceName;
 use light4gs_train::device::adapter_name;
 use light4gs_train::error::TrainError;
@@ -188,6 +189,10 @@ pub struct Cost {
     /// Kernel launches of one repetition, by the kernel's name; empty on devices that launch none.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub launches: BTreeMap<String, u64>,
+    /// Times that the host read from the device in one repetition: it waits for each.
+    pub read_backs: u64,
+    /// Bytes that it read.
+    pub read_bytes: u64,
 }
 
 /// All parts on one scene.
@@ -223,22 +228,24 @@ impl Meter<'_> {
     /// The cost of `run`; `prepare` does not count.
     fn measure<T, R>(&self, mut prepare: impl FnMut() -> T, mut run: impl FnMut(T) -> R) -> Cost {
         let mut times = Vec::with_capacity(self.repeats);
-        let mut launches = BTreeMap::new();
+        let (mut launches, mut read_backs) = (BTreeMap::new(), ReadBacks::default());
         for repetition in 0..WARM_UP + self.repeats {
             let input = prepare();
             // A device that cannot wait has nothing to wait for.
             let _ = self.device.sync();
             self.launches.take();
+            let read = ReadBacks::so_far();
             let begin = Instant::now();
             let output = run(input);
             let _ = self.device.sync();
             if repetition >= WARM_UP {
                 times.push(begin.elapsed().as_secs_f64() * 1e3);
             }
-            launches = self.launches.take();
+            (launches, read_backs) = (self.launches.take(), read.until_now());
             drop(output);
         }
-        Cost { milliseconds: median_of(times), launches }
+        let ReadBacks { count, bytes } = read_backs;
+        Cost { milliseconds: median_of(times), launches, read_backs: count, read_bytes: bytes }
     }
 }
 

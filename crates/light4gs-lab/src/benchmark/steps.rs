@@ -16,7 +16,7 @@ use light4gs_train::error::TrainError;
 use light4gs_train::loss::LossKind;
 use light4gs_train::trainer::Trainer;
 
-use super::{BenchScene, Cost, Meter};
+use super::{BenchScene, Cost, Meter, Timing};
 
 /// The fields, each with the preset whose steps are timed and the changes to it.
 pub(super) const FIELDS: [TimedField; 3] = [
@@ -79,6 +79,14 @@ impl TimedField {
         Ok(Config::load(self.preset, &keys)?)
     }
 
+    /// Times a plain step, and one with noise and rate, on a scene's Gaussians.
+    pub(super) fn steps(&self, scene: &BenchScene, meter: &Meter) -> Result<[Timing; 2], TrainError> {
+        let time = |part: &str, keys: &[&str]| {
+            Ok::<_, TrainError>(Timing { name: self.row(part), cost: step_with(scene, self.config(keys)?, meter)? })
+        };
+        Ok([time("training step", &[])?, time("step with noise and rate", &[NOISE.as_slice(), &[RATE]].concat())?])
+    }
+
     /// Times the steps with the field on a scene's Gaussians.
     pub(super) fn timings(
         &self,
@@ -125,7 +133,7 @@ fn adam(trainer: &mut Trainer, meter: &Meter) -> Result<Cost, TrainError> {
         trainer.step()?;
     }
     let seconds = super::median_of(trainer.profile().laps("Adam"));
-    Ok(Cost { milliseconds: 1e3 * seconds, launches: BTreeMap::new() })
+    Ok(Cost { milliseconds: 1e3 * seconds, launches: BTreeMap::new(), read_backs: 0, read_bytes: 0 })
 }
 
 /// The cost of an image of the trained scene.
