@@ -2,12 +2,13 @@
 //!
 //! `transforms_{train,test,val}.json` hold `camera_angle_x` (radians) and `frames`, each with
 //! `file_path` (with or without extension), `time` and `transform_matrix` (camera to world, OpenGL
-//! axes). Times are divided by the largest of train and test; a later `val` time counts as 1. `val`
+//! axes). The first time of train and test becomes 0, the last one 1; a `val` time outside counts as the nearer one. `val`
 //! may be absent. A `points3d.ply` or `fused.ply` beside the transforms gives the points, otherwise
 //! they are random. `mask/` may have masks of what moves, for measuring: that of the image `test/r_003.png` is
 //! `mask/test/r_003.png`, of the same size, 0 where nothing moves; a split has one for each of its images, or none.
 
 use super::layout::DatasetLayout;
+use super::shared::times::TimeRange;
 use super::shared::{files, json, posed};
 use crate::camera::{Camera, PoseError};
 use crate::error::DataError;
@@ -46,9 +47,9 @@ impl DatasetLayout for DNerf {
         let train = read_split(root, file("train"))?;
         let test = read_split(root, file("test"))?;
         let val = if file("val").is_file() { Some(read_split(root, file("val"))?) } else { None };
-        let timed = train.frames.iter().chain(&test.frames);
-        let last = timed.fold(0.0f64, |last, frame| last.max(frame.time));
-        let frames = |split: &RawSplit| frames(root, split, last, options);
+        let times: Vec<f64> = train.frames.iter().chain(&test.frames).map(|frame| frame.time).collect();
+        let range = TimeRange::of(&train.path, "frames[].time", &times)?;
+        let frames = |split: &RawSplit| frames(root, split, range, options);
         let (train, test) = (frames(&train)?, frames(&test)?);
         let val = val.map_or(Ok(Vec::new()), |val| frames(&val))?;
         let video = video_path(&train[0].camera);
@@ -187,8 +188,8 @@ fn with_suffix(base: &Path) -> PathBuf {
     name.into()
 }
 
-/// Frames with cameras at the wanted size and times in `[0, 1]`; `last` is the time that becomes 1.
-fn frames(root: &Path, split: &RawSplit, last: f64, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
+/// Frames with cameras at the wanted size and times in `[0, 1]`.
+fn frames(root: &Path, split: &RawSplit, range: TimeRange, options: &LoadOptions) -> Result<Vec<Frame>, DataError> {
     let headers = read_headers(split.frames.par_iter().map(|frame| frame.image.as_path()).collect::<Vec<_>>())?;
     let Some(source) = headers.first().map(|header| header.size) else {
         return Ok(Vec::new());
@@ -210,9 +211,9 @@ fn frames(root: &Path, split: &RawSplit, last: f64, options: &LoadOptions) -> Re
     let to_frame = |((i, raw), mask): ((usize, &RawFrame), Option<Mask>)| {
         let camera = Camera::from_camera_to_world_opengl(&raw.pose, split.fov_x, source.0, source.1)
             .map_err(|error| pose_error(&split.path, i, error))?;
-        let time = if last > 0.0 { (raw.time / last).min(1.0) } else { 0.0 };
         let name = raw.image.file_stem().map_or_else(|| i.to_string(), |stem| stem.to_string_lossy().into_owned());
-        let frame = Frame::new(name, camera.resized(width, height), time as f32, raw.image.clone(), source);
+        let frame =
+            Frame::new(name, camera.resized(width, height), range.at(raw.time) as f32, raw.image.clone(), source);
         Ok(Frame { mask, ..frame })
     };
     split.frames.iter().enumerate().zip(masks).map(to_frame).collect()

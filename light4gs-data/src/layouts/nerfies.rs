@@ -7,6 +7,7 @@
 
 use super::layout::DatasetLayout;
 use super::shared::posed::{self, PosedImage};
+use super::shared::times::TimeRange;
 use super::shared::{files, json, npy};
 use crate::camera::Intrinsics;
 use crate::error::DataError;
@@ -160,9 +161,10 @@ fn read_entries(root: &Path) -> Result<Vec<Entry>, DataError> {
         };
         entries.push(Entry { id: id.clone(), time, camera_id, trains, tests });
     }
-    let last = entries.iter().fold(0.0f64, |last, entry| last.max(entry.time));
+    let times: Vec<f64> = entries.iter().map(|entry: &Entry| entry.time).collect();
+    let range = TimeRange::of(&metadata_path, "warp_id", &times)?;
     for entry in &mut entries {
-        entry.time = if last > 0.0 { entry.time / last } else { 0.0 };
+        entry.time = range.at(entry.time);
     }
     Ok(entries)
 }

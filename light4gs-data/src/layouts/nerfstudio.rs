@@ -8,6 +8,7 @@ use super::colmap::{frame_name, split};
 use super::layout::DatasetLayout;
 use super::shared::posed::{self, PosedImage};
 use super::shared::sequence::{Place, held_out, places};
+use super::shared::times::TimeRange;
 use super::shared::{files, json};
 use crate::camera::Intrinsics;
 use crate::error::DataError;
@@ -127,12 +128,11 @@ impl File<'_> {
             let expected = "a finite number, as the other frames have";
             times.push(json::finite(&self.path, &field, entries[*i].get("time"), expected, REMEDY)?);
         }
-        let first = times.iter().copied().fold(f64::INFINITY, f64::min);
-        let last = times.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         // Times in [0, 1] stay as they are; others are mapped to that range.
-        let (from, span) = if first >= 0.0 && last <= 1.0 { (0.0, 1.0) } else { (first, last - first) };
+        let range = TimeRange::of(&self.path, "frames[].time", &times)?;
+        let stay = times.iter().all(|time| (0.0..=1.0).contains(time));
         for (place, time) in found.iter_mut().zip(times) {
-            place.time = if span > 0.0 { (time - from) / span } else { 0.0 };
+            place.time = if stay { time } else { range.at(time) };
         }
         Ok(found)
     }

@@ -1,8 +1,8 @@
 //! Every way in which a D-NeRF folder can be wrong gives an error that names file, field and remedy.
 
 use light4gs_data::{
-    DataError, DatasetDigest, ImageStore, LoadOptions, PointCloud, Region, Resolution, RgbImage8, Scene, ply::Encoding,
-    regions,
+    DataError, DatasetDigest, Frame, ImageStore, LoadOptions, PointCloud, Region, Resolution, RgbImage8, Scene,
+    ply::Encoding, regions,
 };
 use serde_json::{Value, json};
 use std::fs;
@@ -113,6 +113,31 @@ fn times() {
     refuses(|v| drop(v["frames"][3].as_object_mut().unwrap().remove("time")), &with("missing"));
     refuses(|v| v["frames"][3]["time"] = json!("noon"), &with("noon"));
     refuses(|v| v["frames"][3]["time"] = json!(-0.5), &with("-0.5"));
+}
+
+/// In milliseconds, in seconds since 1970, and in nanoseconds since then.
+#[test]
+fn times_in_any_unit_give_the_same_scene() {
+    for (unit, begin) in [(1000.0, 0.0), (1.0, 1.7643e9), (1e9, 1.7643e18)] {
+        let folder = scene();
+        for (split, count) in [("train", 5), ("test", 2), ("val", 2)] {
+            let mut value = transforms(split, count);
+            for (i, frame) in value["frames"].as_array_mut().unwrap().iter_mut().enumerate() {
+                frame["time"] = json!(begin + unit * 0.5 * i as f64);
+            }
+            write(folder.path(), split, &value);
+        }
+        let scene = Scene::open(folder.path(), &LoadOptions::default()).unwrap();
+        let times = |frames: &[Frame]| frames.iter().map(|frame| frame.time).collect::<Vec<f32>>();
+        assert_eq!(times(&scene.train), [0.0, 0.25, 0.5, 0.75, 1.0], "{unit} {begin}");
+        assert_eq!((times(&scene.test), times(&scene.val)), (vec![0.0, 0.25], vec![0.0, 0.25]));
+    }
+}
+
+#[test]
+fn a_time_far_from_all_others_is_refused() {
+    let words = ["transforms_train.json", "frames[].time", "of 5 different times", "in one unit"];
+    refuses(|v| v["frames"][3]["time"] = json!(1e20), &words);
 }
 
 #[test]

@@ -6,3 +6,4 @@ pub(super) mod json;
 pub(super) mod npy;
 pub(super) mod posed;
 pub(super) mod sequence;
+pub(super) mod times;

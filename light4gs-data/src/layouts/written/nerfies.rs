@@ -73,6 +73,21 @@ fn hypernerf_reads_back() {
 }
 
 #[test]
+fn times_begin_at_the_first_image() {
+    let folder = tempfile::tempdir().unwrap();
+    let capture = Capture::moving("", 5, None);
+    write(folder.path(), &capture, &[1, 3]);
+    let path = folder.path().join("metadata.json");
+    let mut metadata: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    for entry in metadata.as_object_mut().unwrap().values_mut() {
+        entry["warp_id"] = json!(entry["warp_id"].as_f64().unwrap() + 1000.0);
+    }
+    fs::write(path, metadata.to_string()).unwrap();
+    let scene = Scene::open(folder.path(), &options()).unwrap();
+    assert_eq!((times(&scene, Split::Train), times(&scene, Split::Test)), (vec![0.0, 0.5, 1.0], vec![0.25, 0.75]));
+}
+
+#[test]
 fn nerfds_reads_back_with_cameras_and_masks() {
     let folder = tempfile::tempdir().unwrap();
     let plan = (0..3).flat_map(|i| {
