@@ -13,8 +13,8 @@ const BLOCKS: u64 = 8;
 const BLOCK: u64 = 4096;
 
 /// Length and hash of a file.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(super) struct Content {
+#[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+pub(crate) struct Content {
     /// Bytes.
     length: u64,
     /// The first 16 bytes of the SHA-256 of the blocks, hexadecimal.
@@ -22,7 +22,7 @@ pub(super) struct Content {
 }
 
 impl Content {
-    pub(super) fn of(path: &Path) -> Result<Self, DataError> {
+    pub(crate) fn of(path: &Path) -> Result<Self, DataError> {
         sampled(path).map_err(DataError::io("read", path))
     }
 }

@@ -6,7 +6,7 @@ mod content;
 use crate::error::DataError;
 use crate::frame::Frame;
 use crate::scene::{Scene, Split};
-use content::Content;
+pub(crate) use content::Content;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};

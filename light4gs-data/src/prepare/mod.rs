@@ -15,7 +15,7 @@ pub use summary::PrepareSummary;
 use crate::error::DataError;
 use crate::layouts::shared::files;
 use crate::programs::colmap::COLMAP;
-use crate::programs::ffmpeg::{FFMPEG, Wanted, extract_frames, video_info};
+use crate::programs::ffmpeg::{FFMPEG, Pace, VideoInfo, Wanted, extract_frames, video_info};
 use record::{Phase, Record, Settings};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -113,26 +113,40 @@ fn frames(
     cameras: &[String],
     progress: &mut dyn FnMut(PrepareProgress),
 ) -> Result<(), DataError> {
-    let total = options.videos.len();
-    // Videos of a rig must have the same rate, or their frames would be of different times.
     let infos = options.videos.iter().map(|video| video_info(video)).collect::<Result<Vec<_>, _>>()?;
-    let longest = infos.iter().fold(0.0f64, |longest, info| longest.max(info.duration));
-    let fastest = infos.iter().fold(0.0f64, |fastest, info| fastest.max(info.rate));
-    let needed = options.frames as f64 / longest.max(1e-3);
-    // Videos of a rig are resampled to one rate, however few frames there are: even at equal nominal rates a phone
-    // drops frames.
-    let rig = infos.len() > 1;
-    let rate = (longest > 0.0 && (needed < 0.99 * fastest || rig)).then_some(needed.min(fastest));
+    let total = options.frames * options.videos.len();
     for (i, (video, camera)) in options.videos.iter().zip(cameras).enumerate() {
-        progress(PrepareProgress { phase: "frames", done: i, total });
+        let before = i * options.frames;
+        progress(PrepareProgress { phase: "frames", done: before, total });
         let folder = options.out.join("images").join(camera);
-        let wanted = Wanted { max_width: Some(options.max_width), rate, count: Some(options.frames), jpeg: true };
+        let count = Some(options.frames);
+        let wanted =
+            Wanted { max_width: Some(options.max_width), pace: pace(&infos, options.frames), count, jpeg: true };
         if !folder.is_dir() || files::images(&folder)?.is_empty() {
-            extract_frames(video, &folder, &wanted)?;
+            let mut done =
+                |done: usize| progress(PrepareProgress { phase: "frames", done: (before + done).min(total), total });
+            extract_frames(video, &infos[i], &folder, &wanted, &mut done)?;
         }
     }
     progress(PrepareProgress { phase: "frames", done: total, total });
     Ok(())
+}
+
+/// Which frames to take. Those of a rig must be of the same times, so its videos are resampled to one rate, however few frames
+/// there are: even at equal nominal rates a phone drops frames. Those of a single camera are frames of the video, and have their
+/// own times.
+fn pace(infos: &[VideoInfo], frames: usize) -> Pace {
+    let shortest = infos.iter().map(|info| info.duration).fold(f64::INFINITY, f64::min);
+    let fastest = infos.iter().map(|info| info.rate).fold(0.0, f64::max);
+    let needed = frames as f64 / shortest;
+    if !(needed.is_finite() && needed > 0.0) {
+        return Pace::All;
+    }
+    match infos {
+        [_] if needed < 0.99 * fastest => Pace::FirstOfEach(needed),
+        [_] => Pace::All,
+        _ => Pace::Resampled(needed.min(fastest)),
+    }
 }
 
 /// The frames of each camera, relative to `images/`, as many as the shortest video has.

@@ -10,6 +10,7 @@ use crate::layouts::colmap::{
 };
 use crate::lens::Distortion;
 use crate::ply::Encoding;
+use crate::programs::ffmpeg::Taken;
 use glam::{DMat3, DVec3};
 use serde_json::{Value, json};
 use std::collections::HashMap;
@@ -28,7 +29,11 @@ pub(super) fn dataset(options: &PrepareOptions, cameras: &[String]) -> Result<Pr
     let posed: HashMap<&str, &ModelImage> = model.images.iter().map(|image| (image.name.as_str(), image)).collect();
     let lists = frame_names(&options.out, cameras)?;
     let stands = cameras.len() > 1 && !options.moving_rig;
-    let last = lists.first().map_or(0, Vec::len).saturating_sub(1).max(1) as f64;
+    let count = lists.first().map_or(0, Vec::len);
+    // Frames of a single camera have the times at which they are shown. Those of a rig were taken evenly.
+    let shown = Taken::read(&options.out.join("images"), count).filter(|_| cameras.len() == 1);
+    let seconds = shown.map_or_else(|| (0..count).map(|i| i as f64).collect(), |taken| taken.seconds);
+    let last = seconds.last().copied().filter(|last| *last > 0.0).unwrap_or(1.0);
     let mut frames = Vec::new();
     let mut used = 0;
     for list in &lists {
@@ -38,7 +43,7 @@ pub(super) fn dataset(options: &PrepareOptions, cameras: &[String]) -> Result<Pr
         for (i, name) in list.iter().enumerate() {
             let image = if stands { of_camera } else { posed.get(name.as_str()) };
             if let Some(image) = image {
-                frames.push(frame(name, i as f64 / last, image, &model.cameras[&image.camera]));
+                frames.push(frame(name, seconds[i] / last, image, &model.cameras[&image.camera]));
             }
         }
         used += usize::from(frames.len() > before);

@@ -49,7 +49,11 @@ pub(crate) fn run(
         }
     }
     arguments(&mut command);
-    COLMAP.stream(&mut command, line, step.attempt, step.remedy)
+    let mut quoted = |text: &str| {
+        line(text);
+        true
+    };
+    COLMAP.stream(&mut command, &mut quoted, step.attempt, step.remedy)
 }
 
 /// The two numbers of `... [3/20]`, as COLMAP counts images.

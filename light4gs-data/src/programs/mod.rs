@@ -86,14 +86,15 @@ impl Program {
         Err(self.error(format!("{attempt} failed ({}): {words}", output.status), remedy))
     }
 
-    /// As [`Self::run`], calling `line` with every line that the program prints while it runs.
+    /// As [`Self::run`], calling `line` with every line that the program prints while it runs. It says whether the line is
+    /// worth to be quoted, should the program fail.
     ///
     /// # Errors
     /// As [`Self::run`].
     pub(crate) fn stream(
         &self,
         command: &mut Command,
-        line: &mut dyn FnMut(&str),
+        line: &mut dyn FnMut(&str) -> bool,
         attempt: &str,
         remedy: &str,
     ) -> Result<(), DataError> {
@@ -118,8 +119,9 @@ impl Program {
         drop(sender);
         let mut last: VecDeque<String> = VecDeque::new();
         for text in lines {
-            line(&text);
-            last.push_back(text);
+            if line(&text) {
+                last.push_back(text);
+            }
             if last.len() > 4 * QUOTED_LINES {
                 last.pop_front();
             }

@@ -3,10 +3,12 @@
 //! `poses_bounds.npy` has a row for each camera, in LLFF's axes. `camXX/images` (or `camXX` itself) holds the frames of
 //! a camera, or `camXX.mp4` its video, from which they are extracted. As in the 4DGS reference, poses are neither
 //! centered nor scaled, the first camera is held out, and the time of frame `i` is `i` divided by the length of the
-//! sequence.
+//! sequence. Frames of videos with different or varying rates have the times at which they are shown.
 
 mod cameras;
+mod frames;
 mod spiral;
+mod taking;
 
 use super::layout::DatasetLayout;
 use super::shared::npy::{self, Array2};
@@ -18,8 +20,9 @@ use crate::options::LoadOptions;
 use crate::points::PointCloud;
 use crate::scene::{Scene, SplitFrames};
 use cameras::CameraFrames;
+use frames::RigFrame;
 use glam::{DMat3, DVec3};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Numbers of a row: a pose of 3 × 5, and the nearest and farthest depth.
 const COLUMNS: usize = 17;
@@ -55,15 +58,24 @@ impl DatasetLayout for Neu3d {
                 cameras.len()
             ));
         }
-        let numbered = cameras::frames(root, &cameras, options.frames, &mut notes)?;
-        let (images, instants) = images(&path, &poses, &cameras, &rows, &numbered, options);
+        let found = frames::find(root, &cameras, options.frames, &mut notes)?;
+        // The instant after the last one.
+        let length = found.iter().flatten().map(|frame| frame.instant + 1.0).fold(1.0, f64::max);
+        let wanted = options.frames.map_or(length, |wanted| wanted as f64);
+        if wanted > length.ceil() {
+            notes.push(format!(
+                "`data.frames` asks for {wanted} frames, but there are {}: times are shares of those",
+                length.ceil()
+            ));
+        }
+        let images = images(&path, &poses, &cameras, &rows, found, length.min(wanted));
         let mut splits = SplitFrames::default();
-        for frame in posed::frames(&images, options)? {
+        for frame in posed::frames(&images, options, &mut notes)? {
             if frame.camera_id == 0 { splits.test.push(frame) } else { splits.train.push(frame) }
         }
         if splits.train.is_empty() {
             let problem =
-                format!("{} camera and {instants} instants found, expected at least 2 cameras", cameras.len());
+                format!("{} camera and {} instants found, expected at least 2 cameras", cameras.len(), length.ceil());
             return Err(DataError::field(root, "camXX", problem, "the first camera is for testing: add another"));
         }
         splits.video = video(&poses, &splits.test[0].camera);
@@ -71,9 +83,8 @@ impl DatasetLayout for Neu3d {
             Some(points) => points,
             None => PointCloud::in_front_of(&splits.train, options),
         };
-        let mut scene = Scene::new(self.name(), root, splits, points, options.background)?;
-        scene.notes = notes;
-        Ok(scene)
+        let scene = Scene::new(self.name(), root, splits, points, options.background)?;
+        Ok(scene.with_notes(notes))
     }
 }
 
@@ -124,36 +135,34 @@ impl Pose {
     }
 }
 
-/// Every frame of every camera, camera by camera, and the number of times.
+/// Every frame of every camera before the end of the sequence, camera by camera.
 fn images(
     path: &Path,
     poses: &[Pose],
     cameras: &[CameraFrames],
     rows: &[usize],
-    frames: &[Vec<(usize, PathBuf)>],
-    options: &LoadOptions,
-) -> (Vec<PosedImage>, usize) {
-    let found = frames.iter().flatten().map(|(instant, _)| instant + 1).max().unwrap_or(1);
-    let length = options.frames.unwrap_or(found);
+    frames: Vec<Vec<RigFrame>>,
+    length: f64,
+) -> Vec<PosedImage> {
     let mut images = Vec::new();
     for (id, ((camera, row), frames)) in cameras.iter().zip(rows).zip(frames).enumerate() {
         let pose = &poses[*row];
-        for (instant, image) in frames.iter().filter(|(instant, _)| *instant < length) {
+        for frame in frames.into_iter().filter(|frame| frame.instant < length) {
             images.push(PosedImage {
-                name: format!("{}_{instant:04}", camera.name),
-                path: image.clone(),
+                name: format!("{}_{:04}", camera.name, frame.number),
+                path: frame.path,
                 mask: None,
                 rotation: pose.world_to_camera(),
                 center: pose.center,
                 intrinsics: pose.intrinsics,
                 lens: None,
                 camera_id: id as u32,
-                time: *instant as f64 / length as f64,
+                time: frame.instant / length,
                 described: (path.to_path_buf(), format!("row {row}")),
             });
         }
     }
-    (images, found)
+    images
 }
 
 /// The reference's spiral through the rig, with the intrinsics of one of its cameras.
