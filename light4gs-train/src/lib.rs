@@ -11,6 +11,7 @@
 //! | keep checkpoints, stop, resume | a [`RunFolder`](run::RunFolder) for the builder, [`TrainerBuilder::resume`](trainer::TrainerBuilder::resume) |
 //! | train images that are in memory | [`MemoryImages`](dataset::MemoryImages), or an [`ImageSource`](dataset::ImageSource) |
 //! | use a loss, frames, densification or pruning of your own | [`Loss`](loss::Loss), [`FrameSampler`](sampling::FrameSampler), [`DensityStrategy`](density::DensityStrategy), [`SignificanceScore`](density::SignificanceScore) |
+//! | correct exposures, poses and times that a dataset has wrong | `train.exposure`, `train.poses`, `train.time_offsets`; [`corrections`] |
 //! | add a term to the loss | [`Regularizer`](regularizer::Regularizer) |
 //! | use another model of motion | [`Trainer::builder_with_field`](trainer::Trainer::builder_with_field) |
 //! | use entropy models of your own | [`EntropyModels`](compression::EntropyModels) |
@@ -62,6 +63,7 @@
 
 pub mod compression;
 pub mod config;
+pub mod corrections;
 pub mod dataset;
 pub mod density;
 pub mod device;

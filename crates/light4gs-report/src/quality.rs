@@ -39,6 +39,11 @@ fn legend(columns: &[Metric]) -> String {
     format!("<p class=\"legend\">{ALWAYS}{motion}{masked}</p>\n")
 }
 
+/// The meaning of the rows of fitted views.
+const FITTED: &str = "<p class=\"legend\">This run has learned an exposure, a pose or a time for each training view or camera. A \
+    view that was not trained on has none, so the plain figures also count how far the dataset is off there. For the rows of \
+    fitted views the same few numbers were fitted to each view, with the scene as it is.</p>\n";
+
 fn heads(html: &mut String, names: &[&str], columns: &[Metric]) {
     html.push_str("<thead><tr>");
     for name in names {
@@ -63,11 +68,17 @@ fn summary(html: &mut String, splits: &[SplitScore]) {
     heads(html, &["Split", "Views"], &columns);
     for split in splits {
         let (name, views) = (escape(&split.split), count(split.views.len() as u64));
-        let _ = write!(html, "<tr><th scope=\"row\">{name}</th><td class=\"number\">{views}</td>");
-        cells(html, &split.scores, &columns);
+        let fitted = split.fitted.as_ref().map(|scores| (format!("{name}, each view fitted"), scores));
+        for (name, scores) in [(name, &split.scores)].into_iter().chain(fitted) {
+            let _ = write!(html, "<tr><th scope=\"row\">{name}</th><td class=\"number\">{views}</td>");
+            cells(html, scores, &columns);
+        }
     }
     html.push_str("</tbody>\n</table></div>\n");
     html.push_str(&legend(&columns));
+    if splits.iter().any(|split| split.fitted.is_some()) {
+        html.push_str(FITTED);
+    }
 }
 
 fn views(html: &mut String, splits: &[SplitScore]) {
@@ -87,6 +98,10 @@ fn views(html: &mut String, splits: &[SplitScore]) {
                 fixed(view.time.into(), 3),
             );
             cells(html, &view.scores, &columns);
+            if let Some(fitted) = &view.fitted {
+                let _ = write!(html, "<tr><th scope=\"row\">{}, fitted</th><td></td><td></td>", escape(&view.name));
+                cells(html, &fitted.scores, &columns);
+            }
         }
     }
     html.push_str("</tbody>\n</table></div></details>\n");

@@ -81,6 +81,10 @@ fn summary(evaluation: &Evaluation) -> Vec<SummaryTile> {
     for split in &evaluation.splits {
         let views = format!("mean over {} views of the decoded file", split.views.len());
         tiles.push(tile(&format!("{} PSNR", split.split), format!("{:.2} dB", split.scores.psnr()), &views));
+        if let Some(fitted) = &split.fitted {
+            let hint = "after a fit of each view's exposure, pose or time, as training views were compared";
+            tiles.push(tile(&format!("{} PSNR, fitted", split.split), format!("{:.2} dB", fitted.psnr()), hint));
+        }
         tiles.push(tile(&format!("{} SSIM", split.split), format!("{:.4}", split.scores.ssim()), &views));
         let of = |region| {
             let metric = Metric::Of(region, RegionMetric::Psnr);

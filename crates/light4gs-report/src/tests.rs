@@ -32,7 +32,7 @@ fn sample() -> Report {
     }
     let measured = [(Metric::Psnr, 31.0), (Metric::Ssim, 0.95), (Metric::Lpips(LpipsNetwork::Alex), 0.05)];
     let scores = Scores::from_values(measured);
-    let view = |name: &str| ViewScore { name: name.into(), time: 0.5, scores: scores.clone() };
+    let view = |name: &str| ViewScore { name: name.into(), time: 0.5, scores: scores.clone(), fitted: None };
     Report {
         title: "<b>bouncing</b> & \"more\" {{style}}".into(),
         created: "today".into(),
@@ -47,6 +47,7 @@ fn sample() -> Report {
         splits: vec![SplitScore {
             split: "test".into(),
             scores: scores.clone(),
+            fitted: None,
             views: vec![view("r_000"), view("r_001")],
         }],
         images: vec![RenderedView {

@@ -6,6 +6,7 @@ use light4gs_keys::{ByName, INTERVAL, ITERATION, ITERATIONS, RATE, SHARE, keys, 
 use light4gs_model::regularizer::PlaneRegularizer;
 
 use super::attributes::built_in;
+use crate::corrections::CorrectionsConfig;
 use crate::density::{DensifyConfig, GuidedSamplingConfig, PruneConfig};
 use crate::loss::{LossKind, Losses};
 use crate::sampling::{SamplerKind, Samplers};
@@ -39,6 +40,9 @@ keys! {
         log_interval: usize = 10; INTERVAL, "ours";
         /// Number of checkpoints that are kept, the newest ones.
         keep_checkpoints: usize = 2; INTERVAL, "ours";
+        /// Exposures, poses and times that the dataset has not quite right.
+        #[serde(flatten)]
+        corrections: CorrectionsConfig;
         /// Smaller images first.
         coarse_to_fine: CoarseToFineConfig;
         /// Learning rates by parameter group.

@@ -5,14 +5,15 @@ mod run;
 use std::path::Path;
 use std::time::Instant;
 
-use burn::tensor::Device;
+use burn::tensor::{Device, Tensor};
 use light4gs_codec::{Decoded, Limits, OpenStream, SceneData, SectionInfo, StreamInfo, read_file_and};
-use light4gs_data::{Frame, RgbImage8, RgbImage32, Scene, Split};
+use light4gs_data::{Camera, Frame, RgbImage8, RgbImage32, Scene, Split};
 use light4gs_model::{BuiltInField, DeformationField, DynamicScene, Splatter};
 use serde::Serialize;
 
 use crate::compression::CodingRecord;
 use crate::config::EvalConfig;
+use crate::corrections::{Fitted, ViewFit};
 use crate::dataset::ImageSource;
 use crate::error::TrainError;
 use crate::metrics::image_tensor;
@@ -30,6 +31,19 @@ pub struct ViewScore {
     /// Its scores.
     #[serde(flatten)]
     pub scores: Scores,
+    /// The same after a fit of what the run corrects in its training views: only where it corrects anything.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<FittedScore>,
+}
+
+/// Quality of one view after a fit of its exposure, pose or time, with the scene as it is.
+#[derive(Clone, Debug, Serialize)]
+pub struct FittedScore {
+    /// The scores.
+    #[serde(flatten)]
+    pub scores: Scores,
+    /// The numbers that were fitted.
+    pub correction: Fitted,
 }
 
 /// Quality of a split.
@@ -40,6 +54,9 @@ pub struct SplitScore {
     /// The scores over the views.
     #[serde(flatten)]
     pub scores: Scores,
+    /// The same after a fit of each view: see [`ViewScore::fitted`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub fitted: Option<Scores>,
     /// Every view.
     pub views: Vec<ViewScore>,
 }
@@ -133,12 +150,21 @@ impl<F: DeformationField> DecodedScene<F> {
         Ok(Self { model, data, info, decode_seconds, device: device.clone() })
     }
 
+    /// A fit to a frame, and the 8-bit image that it gives.
+    fn fitted(&self, fit: &ViewFit, frame: &Frame, truth: &Tensor<3>) -> (Fitted, Tensor<3>) {
+        let splatter = self.splatter();
+        let (fitted, image) = fit.fit(frame, truth, |camera, time| splatter.render(self.model.at(time), camera, None));
+        (fitted, image_tensor(&to_image(image, &frame.camera).to_u8(), &self.device))
+    }
+
+    fn splatter(&self) -> Splatter {
+        Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree))
+    }
+
     /// Renders a frame's camera at its time; values are clamped to [0, 1].
     pub fn render(&self, frame: &Frame) -> RgbImage32 {
-        let splatter = Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree));
-        let rendering = splatter.render(self.model.at(frame.time), &frame.camera, None);
-        let pixels = rendering.image.clamp(0.0, 1.0).into_data().iter::<f32>().collect();
-        RgbImage32 { width: frame.camera.width, height: frame.camera.height, pixels }
+        let rendering = self.splatter().render(self.model.at(frame.time), &frame.camera, None);
+        to_image(rendering.image, &frame.camera)
     }
 
     /// Sections with the header in front.
@@ -148,7 +174,7 @@ impl<F: DeformationField> DecodedScene<F> {
 
     /// Frames per second over a list of frames, after warm-up.
     fn frames_per_second(&self, frames: &[Frame], eval: &EvalConfig) -> f64 {
-        let splatter = Splatter::new(self.data.meta.background, usize::from(self.data.gaussians.sh_degree));
+        let splatter = self.splatter();
         let draw = |k: usize| {
             let frame = &frames[k % frames.len()];
             let image = splatter.render(self.model.at(frame.time), &frame.camera, None).image;
@@ -166,7 +192,8 @@ impl<F: DeformationField> DecodedScene<F> {
         count as f64 / begin.elapsed().as_secs_f64()
     }
 
-    /// Measures the splits that `eval` names (those that the dataset has). Also returns every rendered view.
+    /// Measures the splits that `eval` names (those that the dataset has). Also returns every rendered view. With `fit`, each view
+    /// is measured a second time after a fit of its exposure, pose or time.
     ///
     /// # Errors
     /// [`TrainError::Data`] for weights of LPIPS, an image or a mask that cannot be read.
@@ -178,6 +205,7 @@ impl<F: DeformationField> DecodedScene<F> {
         scene: &Scene,
         images: &dyn ImageSource,
         eval: &EvalConfig,
+        fit: Option<&ViewFit>,
         device_name: &str,
     ) -> Result<(Evaluation, Vec<RenderedView>), TrainError> {
         let lpips = Lpips::load(&eval.lpips, &self.device)?;
@@ -195,14 +223,21 @@ impl<F: DeformationField> DecodedScene<F> {
                 let truth = images.image(frame)?;
                 let image = image_tensor(&render.to_u8(), &self.device);
                 let truth_tensor = image_tensor(&truth, &self.device);
-                let scores = Scores::measure(&image, &truth_tensor, &images.regions(frame)?, &lpips);
+                let regions = images.regions(frame)?;
+                let scores = Scores::measure(&image, &truth_tensor, &regions, &lpips);
+                let fitted = fit.map(|fit| {
+                    let (correction, image) = self.fitted(fit, frame, &truth_tensor);
+                    FittedScore { scores: Scores::measure(&image, &truth_tensor, &regions, &lpips), correction }
+                });
                 let (name, time, psnr) = (frame.name.clone(), frame.time, scores.psnr());
-                views.push(ViewScore { name: name.clone(), time, scores });
+                views.push(ViewScore { name: name.clone(), time, scores, fitted });
                 let (truth, render) = ((*truth).clone(), render.to_u8());
                 rendered.push(RenderedView { split, name, time, psnr, truth, render });
             }
             let scores = Scores::over(views.iter().map(|view| &view.scores));
-            splits.push(SplitScore { split: name.to_string(), scores, views });
+            let fitted = views.iter().filter_map(|view| Some(&view.fitted.as_ref()?.scores));
+            let fitted = fit.map(|_| Scores::over(fitted));
+            splits.push(SplitScore { split: name.to_string(), scores, fitted, views });
         }
         let frames = if scene.test.is_empty() { &scene.train } else { &scene.test };
         let camera = frames[0].camera;
@@ -220,6 +255,12 @@ impl<F: DeformationField> DecodedScene<F> {
         };
         Ok((evaluation, rendered))
     }
+}
+
+/// An image `[H, W, 3]` of a camera; values are clamped to [0, 1].
+fn to_image(image: Tensor<3>, camera: &Camera) -> RgbImage32 {
+    let pixels = image.clamp(0.0, 1.0).into_data().iter::<f32>().collect();
+    RgbImage32 { width: camera.width, height: camera.height, pixels }
 }
 
 /// Sections of a file with the header in front; their sizes add up to that of the file.

@@ -8,6 +8,7 @@ use light4gs_model::DeformationField;
 
 use super::{DecodedScene, Evaluation, RenderedView};
 use crate::config::Config;
+use crate::corrections::Corrections;
 use crate::dataset::image_store;
 use crate::device::{self, describe};
 use crate::error::TrainError;
@@ -29,7 +30,9 @@ pub fn measure_run<F: DeformationField>(
     let device = device::open(config.device)?;
     let decoded = DecodedScene::<F>::open_with_limits(&folder.stream(), &Limits::large(), &device)?;
     let images = image_store(config);
-    let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, &describe(config.device, &device))?;
+    let fit = Corrections::new(&config.train.corrections, scene, 0).fit();
+    let name = describe(config.device, &device);
+    let (mut evaluation, views) = decoded.evaluate(scene, &images, &config.eval, fit.as_ref(), &name)?;
     let metrics = read_metrics(&folder.path("metrics.jsonl"))?;
     evaluation.training_seconds = metrics.last().map(|record| record.seconds);
     evaluation.coding = folder.read_json("coding.json")?;

@@ -85,6 +85,7 @@ impl ImportedScene {
             compression: None,
             adam: Adam::default(),
             density: BTreeMap::new(),
+            corrections: BTreeMap::new(),
             stage: Stage::Fine,
             iteration,
             seconds: 0.0,

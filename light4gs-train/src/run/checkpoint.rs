@@ -34,6 +34,8 @@ pub struct Checkpoint<F: DeformationField = BuiltInField, E: EntropyModels = Con
     pub adam: Adam,
     /// The state of the density strategy, by name: vectors without a tape.
     pub density: BTreeMap<String, Tensor<1>>,
+    /// The corrections of the capture, by name: see [`Corrections`](crate::corrections::Corrections).
+    pub corrections: BTreeMap<String, Vec<f32>>,
     /// The stage that the iteration belongs to.
     pub stage: Stage,
     /// Iterations done in that stage.
@@ -70,6 +72,8 @@ const SECOND: &str = "second.";
 const TIME: &str = "time.";
 /// Prefix of the names of the density strategy's statistics.
 const DENSITY: &str = "density.";
+/// Prefix of the names of the corrections of exposures, poses and times.
+const CORRECTIONS: &str = "corrections.";
 
 /// Key of the weight of the rate, which is stored if it is not 1.
 const RATE_WEIGHT: &str = "rate_weight";
@@ -107,6 +111,10 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
         for (name, tensor) in &self.density {
             entries.insert(format!("{DENSITY}{name}"), entry(tensor.clone()));
         }
+        for (name, values) in &self.corrections {
+            let bytes = values.iter().copied().flat_map(f32::to_le_bytes).collect();
+            entries.insert(format!("{CORRECTIONS}{name}"), (vec![values.len()], bytes));
+        }
         entries
     }
 
@@ -118,7 +126,7 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
     pub fn save(&self, path: &Path) -> Result<(), SaveError> {
         let entries = self.entries();
         for (name, (_, bytes)) in &entries {
-            let moment = [FIRST, SECOND, DENSITY].iter().any(|prefix| name.starts_with(prefix));
+            let moment = [FIRST, SECOND, DENSITY, CORRECTIONS].iter().any(|prefix| name.starts_with(prefix));
             let too_large = || {
                 let found = floats(bytes).enumerate().find(|(_, value)| value.abs() > LARGEST_VALUE);
                 found.filter(|_| !moment)
@@ -219,8 +227,13 @@ impl<F: DeformationField, E: EntropyModels> Checkpoint<F, E> {
             let values = file.take(&stored, &[file.rows(&stored).unwrap_or(0)]).map_err(failed)?;
             density.insert(name, vector(values, &inner));
         }
+        let mut corrections = BTreeMap::new();
+        for name in file.names_after(CORRECTIONS) {
+            let stored = format!("{CORRECTIONS}{name}");
+            corrections.insert(name, file.take(&stored, &[file.rows(&stored).unwrap_or(0)]).map_err(failed)?);
+        }
         file.finish().map_err(failed)?;
-        Ok(Self { scene, compression, adam, density, stage, iteration, seconds, rate_weight })
+        Ok(Self { scene, compression, adam, density, corrections, stage, iteration, seconds, rate_weight })
     }
 }
 
@@ -421,6 +434,7 @@ mod tests {
             compression: None,
             adam: Adam { states: [("gaussians.further.age".to_owned(), state)].into() },
             density: BTreeMap::new(),
+            corrections: BTreeMap::new(),
             stage: Stage::Coarse,
             iteration: 1,
             seconds: 0.0,

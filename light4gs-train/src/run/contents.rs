@@ -17,12 +17,13 @@ pub(super) const RECORD: &str = "run.json";
 pub(super) const DATASET: &str = "dataset.json";
 
 /// Files of a run; `--overwrite` removes them, in this order.
-pub(super) const FILES: [&str; 9] = [
+pub(super) const FILES: [&str; 10] = [
     RECORD,
     "config.toml",
     DATASET,
     "metrics.jsonl",
     "scene.l4gs",
+    "corrections.json",
     "coding.json",
     "bit_maps.json",
     "eval.json",

@@ -18,6 +18,7 @@ use super::profile::Profile;
 use super::views::ViewPools;
 use crate::compression::{Compression, ConfiguredModels, EntropyModels, compression_input};
 use crate::config::Config;
+use crate::corrections::Corrections;
 use crate::dataset::{ImageSource, image_store, scene_meta};
 use crate::density::{DensityStrategy, SignificanceScore, VolumeWeightedScore};
 use crate::device;
@@ -280,6 +281,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             scene,
             adam: Adam::default(),
             density: Default::default(),
+            corrections: Default::default(),
             stage: Stage::Coarse,
             iteration: 0,
             seconds: 0.0,
@@ -326,10 +328,14 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
         let Self { config, data, models, images, folder, observers, stop, .. } = self;
         let Self { loss, sampler, regularizers, mut density, significance, .. } = self;
         let count = state.scene.gaussians.len();
+        let train = &config.train;
+        let iterations = train.coarse_iterations + train.fine_iterations;
+        let mut corrections = Corrections::new(&train.corrections, &data, iterations);
         match checkpoint {
             None => density.begin_stage(count, &device.clone().inner()),
             Some(path) => density
                 .restore(std::mem::take(&mut state.density), count)
+                .and_then(|()| corrections.restore(std::mem::take(&mut state.corrections)))
                 .map_err(|problem| TrainError::Checkpoint { path, problem })?,
         }
         let images = images.unwrap_or_else(|| Box::new(image_store(&config)));
@@ -357,6 +363,7 @@ impl<F: DeformationField, E: EntropyModels> TrainerBuilder<F, E> {
             state,
             models,
             loss,
+            corrections,
             density,
             significance,
             observers: all,

@@ -69,12 +69,17 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
 
     /// Seeds at pixels of a frame, drawn in proportion to their squared differences: at equal steps of the running sum. The
     /// first is at `first` in [0, 1) of a step.
-    fn seeds_of(&self, frame: &Frame, iteration: usize, first: f32, seeds: &mut Vec<Seed>) -> Result<(), TrainError> {
+    fn seeds_of(&self, index: usize, iteration: usize, first: f32, seeds: &mut Vec<Seed>) -> Result<(), TrainError> {
+        let frame: &Frame = &self.data.train[index];
+        let seen = self.as_trained(iteration, index);
         // Without a tape, which would keep every view's tensors until the next backward pass.
         let scene = self.state.scene.valid();
-        let rendering = self.splatter(Stage::Fine, iteration).render(scene.at(frame.time), &frame.camera, None);
+        let rendering = self.splatter(Stage::Fine, iteration).render(scene.at(seen.time), &seen.camera, None);
         let device = self.device.clone().inner();
-        let truth = image_tensor(&*self.images.image(frame)?, &device);
+        let mut truth = image_tensor(&*self.images.image(frame)?, &device);
+        if let Some(correction) = self.correction(Stage::Fine, iteration, index) {
+            truth = correction.radiance(truth);
+        }
         let mut errors = (rendering.image - truth.clone()).powi_scalar(2).sum_dim(2).squeeze_dim::<2>(2);
         if let Some(mask) = self.images.trained_pixels(frame)? {
             errors = errors * mask_tensor(&mask, &device);
@@ -90,7 +95,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let count = self.config.train.guided_sampling.count as f32;
         let [least, most] = DEVIATIONS;
         let deviation = (SHARE_OF_DISTANCE * (area as f32 / count).sqrt()).clamp(least, most);
-        let camera = &frame.camera;
+        let camera = &seen.camera;
         let width = camera.width as usize;
         let (mut sum, mut next) = (0.0, first * total / count);
         for pixel in 0..errors.len() {
@@ -108,7 +113,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
                 mean: camera.rotation.transpose() * (place - camera.translation),
                 log_scale: (deviation * z / camera.fx).ln(),
                 color: std::array::from_fn(|channel| truth[3 * pixel + channel]),
-                time: frame.time,
+                time: seen.time,
             });
         }
         Ok(())

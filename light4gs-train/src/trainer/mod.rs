@@ -44,6 +44,7 @@ pub use builder::TrainerBuilder;
 
 use crate::compression::{CodedScene, CompressionOf, ConfiguredModels, EntropyModels, TrainedScene, code_scene};
 use crate::config::Config;
+use crate::corrections::Corrections;
 use crate::dataset::ImageSource;
 use crate::density::{DensityStrategy, SignificanceScore};
 use crate::divergence::{Divergence, EmptyImageWatch, NotFinite, not_finite_in, remedy, unusual_key};
@@ -120,6 +121,7 @@ pub struct Trainer<F: DeformationField = BuiltInField, E: EntropyModels = Config
     state: Checkpoint<F, E>,
     models: E,
     loss: Box<dyn Loss>,
+    corrections: Corrections,
     density: Box<dyn DensityStrategy>,
     significance: Box<dyn SignificanceScore>,
     observers: Vec<Box<dyn Observer>>,
@@ -187,6 +189,11 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         &self.state.scene
     }
 
+    /// The corrections of exposures, poses and times, as learned so far.
+    pub fn corrections(&self) -> &Corrections {
+        &self.corrections
+    }
+
     /// Entropy models and quantization steps, where the run trains them.
     pub fn compression(&self) -> Option<&CompressionOf<E>> {
         self.state.compression.as_ref()
@@ -212,6 +219,9 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let Some(folder) = self.folder.clone() else { return Ok(None) };
         let coded = self.encode()?;
         folder.write("scene.l4gs", &coded.bytes)?;
+        if let Some(record) = self.corrections.record() {
+            folder.write_json("corrections.json", &record)?;
+        }
         if let Some((record, bit_maps)) = &coded.coding {
             folder.write_json("coding.json", record)?;
             folder.write_json("bit_maps.json", bit_maps)?;
@@ -366,6 +376,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let path = folder.checkpoints().join(checkpoint_name(self.state.stage, self.state.iteration));
         self.state.density = self.density.state();
+        self.state.corrections = self.corrections.state();
         self.state.save(&path).map_err(|error| match error {
             SaveError::NotFinite { tensor: name, index, value } => {
                 let found = NotFinite::Parameter { name, index, value };

@@ -1,5 +1,6 @@
 //! Pruning by significance (STP, paper III-B).
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use burn::module::Module;
@@ -24,6 +25,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let mut sensitivity = self.significance.reads_sensitivity().then(|| Sensitivity::new(count));
         let mut seeds = generator(self.config.seed, Purpose::PruningViews, Stage::Fine, iteration);
         for frame in self.pruning_views(iteration) {
+            let frame = self.as_trained(iteration, frame);
             let gaussians = scene.at(frame.time);
             if let Some(sensitivity) = &mut sensitivity {
                 sensitivity.add(&splatter, gaussians.clone(), &frame.camera, seeds.random());
@@ -42,19 +44,28 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         }
     }
 
-    /// Every training view, or one random view for each time.
-    fn pruning_views(&self, iteration: usize) -> Vec<&Frame> {
-        match self.config.train.prune.one_camera_per_time {
-            true => self.one_view_per_time(Purpose::PruningViews, iteration),
-            false => self.data.train.iter().collect(),
+    /// A training frame with its corrected camera and time after an iteration of the fine stage.
+    pub(super) fn as_trained(&self, iteration: usize, frame: usize) -> Cow<'_, Frame> {
+        let given = &self.data.train[frame];
+        match self.correction(Stage::Fine, iteration, frame) {
+            Some(correction) => Cow::Owned(correction.frame(given)),
+            None => Cow::Borrowed(given),
         }
     }
 
-    /// One random training view for each time.
-    pub(super) fn one_view_per_time(&self, purpose: Purpose, iteration: usize) -> Vec<&Frame> {
-        let mut by_time: BTreeMap<u32, Vec<&Frame>> = BTreeMap::new();
-        for frame in &self.data.train {
-            by_time.entry(frame.time.to_bits()).or_default().push(frame);
+    /// Every training view, or one random view for each time, by their indices in the training split.
+    fn pruning_views(&self, iteration: usize) -> Vec<usize> {
+        match self.config.train.prune.one_camera_per_time {
+            true => self.one_view_per_time(Purpose::PruningViews, iteration),
+            false => (0..self.data.train.len()).collect(),
+        }
+    }
+
+    /// One random training view for each time, by their indices in the training split.
+    pub(super) fn one_view_per_time(&self, purpose: Purpose, iteration: usize) -> Vec<usize> {
+        let mut by_time: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+        for (index, frame) in self.data.train.iter().enumerate() {
+            by_time.entry(frame.time.to_bits()).or_default().push(index);
         }
         let mut generator = generator(self.config.seed, purpose, Stage::Fine, iteration);
         by_time.into_values().map(|views| views[generator.random_range(0..views.len())]).collect()

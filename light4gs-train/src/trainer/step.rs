@@ -8,6 +8,7 @@ use super::Trainer;
 use super::learning_rates::GroupRates;
 use super::views::{View, ViewPass};
 use crate::compression::{EntropyModels, NoisyScene};
+use crate::corrections::ViewCorrection;
 use crate::density::{GaussianEditor, TrainingPosition, ViewStatistics};
 use crate::divergence::{NotFinite, not_finite_in};
 use crate::error::TrainError;
@@ -28,20 +29,36 @@ struct Differentiated {
 }
 
 impl Differentiated {
-    /// Reads the loss and the number of intersections of each view, in one transfer: the host waits for each. A plain
-    /// iteration reads nothing else from the device.
+    /// Reads the loss, and what the host needs of each view, in one transfer: the host waits for each. A plain iteration reads
+    /// nothing else from the device.
     ///
     /// # Errors
     /// An operation of the step that failed on the GPU.
-    fn read(&self) -> Result<(f32, Vec<usize>), GpuError> {
+    fn read(&self) -> Result<Read, GpuError> {
         let read = Transaction::default().register(self.loss.clone());
         let read = self.views.iter().fold(read, |read, view| read.register(view.intersections.clone()));
+        let corrections = self.views.iter().flat_map(|view| view.corrections.clone());
+        let read = corrections.fold(read, |read, gradient| read.register(gradient));
         let read = GpuError::read("a training step", read)?;
-        let (loss, intersections) = read.split_first().expect("the loss was registered");
-        let loss = loss.iter::<f32>().next().expect("a loss is one number");
+        let (loss, views) = read.split_first().expect("the loss was registered");
+        let (intersections, corrections) = views.split_at(self.views.len());
         let intersections = intersections.iter().flat_map(|data| data.iter::<i64>()).map(|count| count as usize);
-        Ok((loss, intersections.collect()))
+        Ok(Read {
+            loss: loss.iter::<f32>().next().expect("a loss is one number"),
+            intersections: intersections.collect(),
+            corrections: corrections.iter().map(|data| data.iter::<f32>().collect()).collect(),
+        })
     }
+}
+
+/// What the host reads of a step.
+#[derive(Debug, PartialEq)]
+struct Read {
+    loss: f32,
+    /// By view.
+    intersections: Vec<usize>,
+    /// The gradient of each view's corrections; empty where nothing is learned.
+    corrections: Vec<Vec<f32>>,
 }
 
 /// Iterations ahead for which images are decoded.
@@ -59,11 +76,11 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         self.prefetch(stage, iteration)?;
         let noisy = self.quantization_noise(stage, iteration)?;
         self.profile.lap("quantization noise");
-        let (Differentiated { views, mut gradients, .. }, loss) = loop {
+        let (Differentiated { views, mut gradients, .. }, Read { loss, corrections, .. }) = loop {
             let step = self.differentiate(stage, iteration, &indices, noisy.as_ref())?;
-            let (loss, intersections) = step.read()?;
-            if self.list_room.learn(&intersections) {
-                break (step, loss);
+            let read = step.read()?;
+            if self.list_room.learn(&read.intersections) {
+                break (step, read);
             }
         };
         if !loss.is_finite() {
@@ -88,6 +105,7 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
                 compression.bound_steps(&self.config);
             }
         }
+        self.learn_corrections(stage, iteration, &indices, &corrections);
         self.profile.lap("Adam");
         Ok(StepReport { stage, iteration, loss, image, truth, frame, gaussians: 0, seconds: 0.0 })
     }
@@ -100,7 +118,8 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         indices: &[usize],
         noisy: Option<&NoisyScene<F>>,
     ) -> Result<Differentiated, TrainError> {
-        let frames: Vec<&Frame> = indices.iter().map(|frame| &self.data.train[*frame]).collect();
+        let frames: Vec<_> =
+            indices.iter().map(|frame| (&self.data.train[*frame], self.correction(stage, iteration, *frame))).collect();
         let pass = self.view_pass(stage, iteration, indices.len());
         let pass = ViewPass { splatter: self.list_room.reserve(pass.splatter), ..pass };
         let seen = noisy.map_or(&self.state.scene, |noisy| &noisy.scene);
@@ -121,6 +140,26 @@ impl<F: DeformationField, E: EntropyModels> Trainer<F, E> {
         let terms = views.iter().map(|view| view.loss.clone()).chain(rate).chain(regularizers);
         let loss = terms.reduce(|sum, term| sum + term).expect("a batch has at least one view");
         Ok(Differentiated { views, gradients, loss })
+    }
+
+    /// The corrections of a training frame in an iteration of a stage, where there are any.
+    pub(super) fn correction(&self, stage: Stage, iteration: usize, frame: usize) -> Option<ViewCorrection> {
+        self.corrections.of_frame(frame, self.config.train.global_step(stage, iteration))
+    }
+
+    /// One step of the corrections, with the gradients of the views `indices`.
+    fn learn_corrections(&mut self, stage: Stage, iteration: usize, indices: &[usize], gradients: &[Vec<f32>]) {
+        // The loss is a mean over the batch; corrections are weighed against the loss of their view alone.
+        let batch = indices.len() as f32;
+        let views: Vec<_> = (indices.iter().zip(gradients))
+            .filter_map(|(frame, numbers)| {
+                Some((*frame, self.correction(stage, iteration, *frame)?.gradient(numbers, batch)))
+            })
+            .collect();
+        if !views.is_empty() {
+            let step = self.config.train.global_step(stage, iteration);
+            self.corrections.learn(views.iter().map(|(frame, gradient)| (*frame, gradient)), step);
+        }
     }
 
     /// Starts to decode the images of one later iteration in the background. Those of earlier iterations are there already.

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use burn::module::Module;
 use burn::tensor::{Device, Int, Tensor};
 use light4gs_data::{Frame, PixelMask, RgbImage8};
 use light4gs_model::parameters::on_a_new_tape;
@@ -12,6 +13,7 @@ use super::Trainer;
 use super::profile::Profile;
 use crate::compression::EntropyModels;
 use crate::config::CoarseToFineConfig;
+use crate::corrections::ViewCorrection;
 use crate::dataset::ImageSource;
 use crate::density::ViewStatistics;
 use crate::error::TrainError;
@@ -47,6 +49,8 @@ pub(super) struct View {
     pub(super) image: Tensor<3>,
     /// `[H, W, 3]`
     pub(super) truth: Tensor<3>,
+    /// `[13]`: the gradient of the view's corrections, where any are learned.
+    pub(super) corrections: Option<Tensor<1>>,
     /// `[1]`: see [`Rendering::intersections`](light4gs_model::Rendering::intersections).
     pub(super) intersections: Tensor<1, Int>,
 }
@@ -98,13 +102,13 @@ impl ViewPass<'_> {
     pub(super) fn run<'f, F: DeformationField, R>(
         &self,
         scene: &DynamicScene<F>,
-        frames: &[&'f Frame],
+        frames: &[(&'f Frame, Option<ViewCorrection>)],
         pools: &ViewPools,
         profile: &Profile,
         meanwhile: impl FnOnce() -> R,
     ) -> Result<(Vec<View>, R), TrainError> {
         // Copies share the scene's memory; each begins its own tape.
-        let with_copies = |frames: &[&'f Frame]| -> Vec<_> {
+        let with_copies = |frames: &[(&'f Frame, Option<ViewCorrection>)]| -> Vec<_> {
             frames.iter().map(|frame| (on_a_new_tape(scene.clone()), *frame)).collect()
         };
         let ViewPools(pools) = pools;
@@ -130,30 +134,42 @@ impl ViewPass<'_> {
 
     fn views<F: DeformationField>(
         &self,
-        tasks: Vec<(DynamicScene<F>, &Frame)>,
+        tasks: Vec<(DynamicScene<F>, (&Frame, Option<ViewCorrection>))>,
         profile: &Profile,
     ) -> Result<Vec<View>, TrainError> {
-        tasks.into_iter().map(|(scene, frame)| self.view(scene, frame, profile)).collect()
+        tasks.into_iter().map(|(scene, (frame, correction))| self.view(scene, frame, correction, profile)).collect()
     }
 
     fn view<F: DeformationField>(
         &self,
         scene: DynamicScene<F>,
         frame: &Frame,
+        correction: Option<ViewCorrection>,
         profile: &Profile,
     ) -> Result<View, TrainError> {
-        let gaussians = match self.stage {
+        let learned = correction.map(|correction| correction.on_tape(self.device));
+        let mut seen = correction.map_or_else(|| frame.clone(), |correction| correction.frame(frame));
+        let mut gaussians = match self.stage {
             Stage::Coarse => scene.gaussians.tensors(),
-            Stage::Fine => scene.at(frame.time),
+            Stage::Fine => scene.at(seen.time),
         };
+        if let Some(learned) = &learned {
+            if self.stage == Stage::Fine {
+                gaussians = learned.at_time(gaussians, seen.time, |time| scene.valid().at(time));
+            }
+            gaussians = learned.turned(gaussians, &frame.camera, &seen.camera);
+        }
         profile.lap("Gaussians at the time");
         let factor = self.coarse_to_fine.factor(self.progress, &frame.camera);
-        let seen = Frame { camera: frame.camera.reduced(factor), ..frame.clone() };
+        seen.camera = seen.camera.reduced(factor);
         let offsets = Tensor::<2>::zeros([scene.gaussians.len(), 2], self.device).require_grad();
         let rendering = self.splatter.render(gaussians, &seen.camera, Some(offsets.clone()));
         profile.lap("splatting");
         let mut truth = image_tensor(&reduced(self.images.image(frame)?, factor, RgbImage8::reduced), self.device);
-        let mut image = rendering.image;
+        let mut image = match &learned {
+            Some(learned) => learned.exposed(rendering.image, rendering.alpha.clone()),
+            None => rendering.image,
+        };
         if let Some(mask) = self.images.trained_pixels(frame)? {
             // Black in both images, so that these pixels are equal for any loss.
             let mask = mask_tensor(&reduced(mask, factor, PixelMask::reduced), self.device).unsqueeze_dim::<3>(2);
@@ -180,6 +196,7 @@ impl ViewPass<'_> {
         Ok(View {
             loss: value,
             gradients,
+            corrections: learned.and_then(|learned| learned.gradient(&mut tape)),
             // The loss is a mean over the batch; thresholds are those for a single view.
             statistics: ViewStatistics {
                 screen_gradient: offsets.grad_remove(&mut tape).map(|gradient| gradient * self.batch as f32),

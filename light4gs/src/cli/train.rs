@@ -287,7 +287,7 @@ impl Eval {
         let options = load_options(&config);
         let scene = Scene::open(&scene, &options)?;
         let images = image_store(&config);
-        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, &describe(name, &device))?;
+        let (evaluation, _) = decoded.evaluate(&scene, &images, &config.eval, None, &describe(name, &device))?;
         print_evaluation(&evaluation, self.json)
     }
 }
@@ -321,8 +321,14 @@ fn quality_table(evaluation: &Evaluation) -> Table {
     let names = [("split".to_owned(), Align::Left), ("views".to_owned(), Align::Right)];
     let mut table = Table::new(names.into_iter().chain(columns.iter().map(|column| (column.label(), Align::Right))));
     for split in &evaluation.splits {
-        let begin = [split.split.clone(), split.views.len().to_string()];
-        table.row(begin.into_iter().chain(columns.iter().map(|column| column.format(split.scores.get(*column)))));
+        let mut row = |name: String, scores: &Scores| {
+            let begin = [name, split.views.len().to_string()];
+            table.row(begin.into_iter().chain(columns.iter().map(|column| column.format(scores.get(*column)))));
+        };
+        row(split.split.clone(), &split.scores);
+        if let Some(fitted) = &split.fitted {
+            row(format!("{}, each view fitted", split.split), fitted);
+        }
     }
     table
 }

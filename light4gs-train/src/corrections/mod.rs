@@ -1,0 +1,358 @@
+//! Corrections of a capture: exposures, poses and times that are not quite what the dataset says.
+//!
+//! A camera that chooses its exposure by itself, poses that are off by a pixel, and a camera of a rig that runs late make the
+//! training views contradict each other, and the scene becomes a blur of all of them. So a few numbers for each frame or
+//! camera are learned beside the scene. They are applied to what is rendered for a training view; the file has only the
+//! scene, as its average camera sees it.
+//!
+//! | file | contents |
+//! |---|---|
+//! | this file | [`CorrectionsConfig`], and [`Corrections`]: the numbers of a run |
+//! | `rows` | a few numbers for each of several units, with their optimizer |
+//! | `exposure` | a gain and an offset of each color channel |
+//! | `poses` | a small turn and translation of a camera |
+//! | `view` | the corrections of one view, on the tape |
+//! | `fit` | the same few numbers fitted to a view that was not trained on |
+
+mod exposure;
+mod fit;
+mod poses;
+mod rows;
+mod view;
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+
+use light4gs_data::{Frame, Scene};
+use light4gs_keys::Bounds::{Flag, Number};
+use light4gs_keys::{ITERATION, WEIGHT, keys};
+use serde::Serialize;
+
+pub use exposure::{Exposure, ExposureUnit, exposed};
+pub use fit::{Fitted, ViewFit};
+pub use poses::Pose;
+pub use view::{GradientOfView, LearnedView, ViewCorrection};
+
+use crate::optimization::schedule::ExponentialDecay;
+use rows::{Rows, means, medians};
+
+/// A rate of a correction, and the largest that does not leave the range of corrections in one step.
+const CORRECTION_RATE: light4gs_keys::Bounds = Number { least: 1e-20, most: 0.1 };
+
+keys! {
+    /// What is corrected.
+    pub struct CorrectionsConfig {
+        /// What has a gain and an offset of its own for each color channel. They are learned and are not in the file.
+        exposure: ExposureUnit = ExposureUnit::None; ExposureUnit::BOUNDS, "ours";
+        /// The pose of each camera, or of each frame of a camera that moves, is corrected by a small turn and translation.
+        poses: bool = false; Flag, "ours";
+        /// The times of each camera of a rig are corrected by an offset.
+        time_offsets: bool = false; Flag, "ours";
+        /// How corrections are learned.
+        corrections: CorrectionRates;
+    }
+}
+
+keys! {
+    /// How corrections of exposures, poses and times are learned: Adam's rates at the beginning and at the end of a run, and
+    /// weights that hold them at what the dataset says.
+    pub struct CorrectionRates {
+        /// Poses and times are corrected from this iteration on, counted over both stages: before, there is no scene to compare with.
+        from: usize = 300; ITERATION, "ours";
+        /// Exposures, first step: logarithms of gains, and offsets in shares of white.
+        exposure_init: f64 = 5e-3; CORRECTION_RATE, "ours";
+        /// Exposures, end of the run.
+        exposure_final: f64 = 2e-4; CORRECTION_RATE, "ours";
+        /// Weight of the squares of the logarithms of gains, and of offsets.
+        exposure_weight: f32 = 0.02; WEIGHT, "ours";
+        /// Turns of cameras, first step, radians.
+        turn_init: f64 = 1e-3; CORRECTION_RATE, "ours";
+        /// Turns, end of the run.
+        turn_final: f64 = 1e-5; CORRECTION_RATE, "ours";
+        /// Translations of cameras, first step, as shares of the scene's extent.
+        translation_init: f64 = 1e-3; CORRECTION_RATE, "ours";
+        /// Translations, end of the run.
+        translation_final: f64 = 1e-5; CORRECTION_RATE, "ours";
+        /// Offsets of times, first step, in intervals between two frames.
+        time_init: f64 = 2e-2; CORRECTION_RATE, "ours";
+        /// Offsets of times, end of the run.
+        time_final: f64 = 2e-4; CORRECTION_RATE, "ours";
+    }
+}
+
+/// Largest offset of a time, either way, in intervals between two frames.
+const MOST_INTERVALS: f32 = 5.0;
+
+/// The corrections of a run, as learned so far. Rows belong to frames of the training split or to cameras.
+#[derive(Clone, Debug)]
+pub struct Corrections {
+    rates: CorrectionRates,
+    unit: ExposureUnit,
+    exposures: Option<Rows<6>>,
+    poses: Option<Rows<6>>,
+    times: Option<Rows<1>>,
+    /// From one time to the next.
+    interval: f32,
+    /// Of the scene, world units.
+    extent: f32,
+    background: [f32; 3],
+    /// The training frames as the dataset has them, without images; empty where nothing is corrected.
+    frames: Vec<Frame>,
+    /// Iterations of a run, over both stages.
+    iterations: usize,
+}
+
+/// The interval between two times of a split; 1 where there is one time.
+fn interval_of(frames: &[Frame]) -> f32 {
+    let mut times: Vec<f32> = frames.iter().map(|frame| frame.time).collect();
+    times.sort_by(f32::total_cmp);
+    times.dedup();
+    let span = times.last().copied().unwrap_or(0.0) - times.first().copied().unwrap_or(0.0);
+    if span > 0.0 { span / (times.len() - 1) as f32 } else { 1.0 }
+}
+
+/// Numbers that are equal if two poses are.
+fn bits_of_pose(frame: &Frame) -> Vec<u32> {
+    let rotation = frame.camera.rotation.to_cols_array();
+    rotation.into_iter().chain(frame.camera.translation.to_array()).map(f32::to_bits).collect()
+}
+
+impl Corrections {
+    /// None made yet, for a run of `iterations` over both stages. Where all frames are of one camera, it has no offset of
+    /// time and no exposure of its own, since it could differ from nothing.
+    pub fn new(config: &CorrectionsConfig, data: &Scene, iterations: usize) -> Self {
+        let frames = &data.train;
+        let camera = |frame: &Frame| frame.camera_id;
+        let exposures = match config.exposure {
+            ExposureUnit::None => None,
+            ExposureUnit::Camera => Rows::by(frames.iter().map(camera)),
+            ExposureUnit::Frame => Rows::by(0..frames.len()),
+        };
+        // One row for a camera that stands still, one a frame for one that moves.
+        let poses = config.poses.then(|| Rows::by(frames.iter().map(|frame| (frame.camera_id, bits_of_pose(frame)))));
+        let times = config.time_offsets.then(|| Rows::by(frames.iter().map(camera)));
+        let mut corrections = Self {
+            rates: config.corrections.clone(),
+            unit: config.exposure,
+            exposures,
+            poses: poses.flatten(),
+            times: times.flatten(),
+            interval: interval_of(frames),
+            extent: data.extent,
+            background: data.background,
+            frames: Vec::new(),
+            iterations,
+        };
+        if !corrections.is_off() {
+            corrections.frames.clone_from(frames);
+        }
+        corrections
+    }
+
+    /// Whether nothing is corrected.
+    pub fn is_off(&self) -> bool {
+        self.exposures.is_none() && self.poses.is_none() && self.times.is_none()
+    }
+
+    /// What is to be fitted to a view that was not trained on, so that it is measured as the training views were compared.
+    /// `None` where nothing is corrected.
+    pub fn fit(&self) -> Option<ViewFit> {
+        (!self.is_off()).then(|| ViewFit {
+            exposure: self.exposures.is_some(),
+            pose: self.poses.is_some(),
+            time: self.times.is_some(),
+            interval: self.interval,
+            background: self.background,
+        })
+    }
+
+    /// The corrections of a training frame in an iteration, counted over both stages; `None` where nothing is corrected.
+    pub fn of_frame(&self, frame: usize, iteration: usize) -> Option<ViewCorrection> {
+        let begun = iteration >= self.rates.from;
+        (!self.is_off()).then(|| ViewCorrection {
+            exposure: self.exposures.as_ref().map(|rows| rows.of(frame)),
+            pose: self.poses.as_ref().filter(|_| begun).map(|rows| Pose::of(rows.of(frame))),
+            intervals: self.times.as_ref().filter(|_| begun).map(|rows| rows.of(frame)[0]),
+            interval: self.interval,
+            background: self.background,
+        })
+    }
+
+    /// One step for the frames of an iteration, from the gradient of the loss of each alone. `iteration` counts from 1 over
+    /// both stages.
+    pub fn learn<'a>(&mut self, views: impl IntoIterator<Item = (usize, &'a GradientOfView)>, iteration: usize) {
+        let rates = &self.rates;
+        let rate = |first: f64, last: f64| {
+            ExponentialDecay::new(first, last, self.iterations.max(1)).at(iteration as f64) as f32
+        };
+        let exposure = [rate(rates.exposure_init, rates.exposure_final); 6];
+        let turn = rate(rates.turn_init, rates.turn_final);
+        let translation = self.extent * rate(rates.translation_init, rates.translation_final);
+        let pose = [turn, turn, turn, translation, translation, translation];
+        let time = [rate(rates.time_init, rates.time_final)];
+        let weight = 2.0 * rates.exposure_weight;
+        for (frame, gradient) in views {
+            if let (Some(rows), Some(gradient)) = (&mut self.exposures, gradient.exposure) {
+                let values = rows.of(frame);
+                let gradient = std::array::from_fn(|k| gradient[k] + weight * values[k]);
+                rows.step(frame, gradient, exposure);
+            }
+            if let (Some(rows), Some(gradient)) = (&mut self.poses, gradient.pose) {
+                rows.step(frame, gradient, pose);
+            }
+            if let (Some(rows), Some(gradient)) = (&mut self.times, gradient.time) {
+                rows.step(frame, [gradient], time);
+            }
+        }
+        self.keep_what_images_do_not_tell();
+    }
+
+    /// The scene could be brighter if all images were darker, turned if all cameras were, and earlier if all of them ran
+    /// late. So the middle of all corrections stays where it is: of frames the mean, of cameras the median, since one of
+    /// them may be far off where the others are right.
+    fn keep_what_images_do_not_tell(&mut self) {
+        fn shifted<const N: usize>(rows: &mut [[f32; N]], by: [f32; N], bounded: impl Fn([f32; N]) -> [f32; N]) {
+            for row in rows {
+                *row = bounded(std::array::from_fn(|k| row[k] - by[k]));
+            }
+        }
+        if let Some(Rows { values, .. }) = &mut self.exposures {
+            let middle = if self.unit == ExposureUnit::Frame { means(values) } else { medians(values) };
+            shifted(values, middle, exposure::bounded);
+        }
+        if let Some(rows) = &mut self.poses {
+            let cameras: Vec<_> = rows.first_frames().into_iter().map(|frame| self.frames[frame].camera).collect();
+            poses::without_common_motion(&mut rows.values, &cameras);
+            let extent = self.extent;
+            shifted(&mut rows.values, [0.0; 6], |values| poses::bounded(values, extent));
+        }
+        if let Some(Rows { values, .. }) = &mut self.times {
+            let middle = medians(values);
+            shifted(values, middle, |[value]| [value.clamp(-MOST_INTERVALS, MOST_INTERVALS)]);
+        }
+    }
+
+    /// The numbers for a checkpoint, by name.
+    pub fn state(&self) -> BTreeMap<String, Vec<f32>> {
+        let mut state = BTreeMap::new();
+        if let Some(rows) = &self.exposures {
+            rows.state("exposure", &mut state);
+        }
+        if let Some(rows) = &self.poses {
+            rows.state("pose", &mut state);
+        }
+        if let Some(rows) = &self.times {
+            rows.state("time", &mut state);
+        }
+        state
+    }
+
+    /// Takes the numbers of a checkpoint.
+    ///
+    /// # Errors
+    /// As text: a tensor that is missing or that nobody asks for, and one that does not fit the frames.
+    pub fn restore(&mut self, mut state: BTreeMap<String, Vec<f32>>) -> Result<(), String> {
+        if let Some(rows) = &mut self.exposures {
+            rows.restore("exposure", &mut state)?;
+        }
+        if let Some(rows) = &mut self.poses {
+            rows.restore("pose", &mut state)?;
+        }
+        if let Some(rows) = &mut self.times {
+            rows.restore("time", &mut state)?;
+        }
+        match state.keys().next() {
+            Some(name) => Err(format!("tensor `corrections.{name}` belongs to nothing that is corrected")),
+            None => Ok(()),
+        }
+    }
+
+    /// What was learned, for readers; `None` where nothing is corrected.
+    pub fn record(&self) -> Option<CorrectionsRecord> {
+        let name = |frame: usize| self.frames[frame].name.clone();
+        let camera = |frame: usize| self.frames[frame].camera_id;
+        (!self.is_off()).then(|| CorrectionsRecord {
+            exposures: self
+                .exposures
+                .iter()
+                .flat_map(|rows| {
+                    rows.first_frames().into_iter().map(|frame| ExposureRecord {
+                        frame: (self.unit == ExposureUnit::Frame).then(|| name(frame)),
+                        camera: camera(frame),
+                        exposure: Exposure::of(rows.of(frame)),
+                    })
+                })
+                .collect(),
+            poses: self
+                .poses
+                .iter()
+                .flat_map(|rows| {
+                    rows.first_frames().into_iter().map(|frame| PoseRecord {
+                        frame: name(frame),
+                        camera: camera(frame),
+                        pose: Pose::of(rows.of(frame)),
+                    })
+                })
+                .collect(),
+            times: self
+                .times
+                .iter()
+                .flat_map(|rows| {
+                    rows.first_frames()
+                        .into_iter()
+                        .map(|frame| TimeRecord { camera: camera(frame), frames: rows.of(frame)[0] })
+                })
+                .collect(),
+        })
+    }
+}
+
+/// `corrections.json`: what a run has learned about its capture.
+#[derive(Clone, Debug, Serialize)]
+pub struct CorrectionsRecord {
+    /// By frame or by camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub exposures: Vec<ExposureRecord>,
+    /// By camera, or by frame of a camera that moves.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub poses: Vec<PoseRecord>,
+    /// By camera.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub times: Vec<TimeRecord>,
+}
+
+/// The exposure of a frame or a camera.
+#[derive(Clone, Debug, Serialize)]
+pub struct ExposureRecord {
+    /// The frame's name, where each has its own.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub frame: Option<String>,
+    /// Number of the camera.
+    pub camera: u32,
+    /// As the camera shows the scene's radiance.
+    #[serde(flatten)]
+    pub exposure: Exposure,
+}
+
+/// The correction of a pose.
+#[derive(Clone, Debug, Serialize)]
+pub struct PoseRecord {
+    /// The frame's name; the first one of a camera that stands still.
+    pub frame: String,
+    /// Number of the camera.
+    pub camera: u32,
+    /// The correction.
+    #[serde(flatten)]
+    pub pose: Pose,
+}
+
+/// The offset of a camera's times.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimeRecord {
+    /// Number of the camera.
+    pub camera: u32,
+    /// How much later than its times say its frames were taken, in intervals between two frames.
+    pub frames: f32,
+}
