@@ -2,7 +2,10 @@
 
 use std::slice::from_ref;
 
-use crate::{AttributeValues, CodecError, GaussianArrays, SceneData, bytes::Section, scene::SH_REST};
+use crate::{
+    AttributeValues, CodecError, GaussianArrays, SceneCoordinateArrays, SceneData, SceneMeta, bytes::Section,
+    scene::SH_REST,
+};
 
 /// One array of numbers of a scene.
 struct Field<'a> {
@@ -17,21 +20,10 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     let mut fields = Vec::new();
     let mut add = |section, name: String, values| fields.push(Field { section, name, values });
 
-    add("meta", "fps".into(), from_ref(&meta.fps));
-    add("meta", "bounds".into(), meta.bounds.as_flattened());
-    add("meta", "background".into(), &meta.background);
-    add("meta", "fov_x".into(), from_ref(&meta.fov_x));
-
+    of_meta(meta).into_iter().for_each(|Field { section, name, values }| add(section, name, values));
     of_gaussians(gaussians).for_each(|Field { section, name, values }| add(section, name, values));
 
-    let section = Section::SceneCoordinates.name();
-    add(section, "mean".into(), &coordinates.mean);
-    add(section, "axes".into(), coordinates.axes.as_flattened());
-    add(section, "std".into(), &coordinates.std);
-    add(section, "scale".into(), &coordinates.mapping.scale);
-    add(section, "offset".into(), &coordinates.mapping.offset);
-    add(section, "time_scale".into(), from_ref(&coordinates.mapping.time_scale));
-    add(section, "time_offset".into(), from_ref(&coordinates.mapping.time_offset));
+    of_coordinates(coordinates).into_iter().for_each(|Field { section, name, values }| add(section, name, values));
 
     let section = Section::Motion.name();
     let layers = motion.network.iter().flat_map(|motion| motion.network.layers());
@@ -50,6 +42,30 @@ fn fields(scene: &SceneData) -> Vec<Field<'_>> {
     fields
 }
 
+fn of_meta(meta: &SceneMeta) -> [Field<'_>; 4] {
+    [
+        ("fps", from_ref(&meta.fps)),
+        ("bounds", meta.bounds.as_flattened()),
+        ("background", &meta.background),
+        ("fov_x", from_ref(&meta.fov_x)),
+    ]
+    .map(|(name, values)| Field { section: "meta", name: name.to_owned(), values })
+}
+
+fn of_coordinates(coordinates: &SceneCoordinateArrays) -> [Field<'_>; 7] {
+    let mapping = &coordinates.mapping;
+    [
+        ("mean", &coordinates.mean[..]),
+        ("axes", coordinates.axes.as_flattened()),
+        ("std", &coordinates.std),
+        ("scale", &mapping.scale),
+        ("offset", &mapping.offset),
+        ("time_scale", from_ref(&mapping.time_scale)),
+        ("time_offset", from_ref(&mapping.time_offset)),
+    ]
+    .map(|(name, values)| Field { section: Section::SceneCoordinates.name(), name: name.to_owned(), values })
+}
+
 fn of_gaussians(gaussians: &GaussianArrays) -> impl Iterator<Item = Field<'_>> {
     gaussians.attributes().map(|AttributeValues { name, values, .. }| {
         let section = if name == SH_REST { Section::Sh } else { Section::Gaussians };
@@ -60,6 +76,16 @@ fn of_gaussians(gaussians: &GaussianArrays) -> impl Iterator<Item = Field<'_>> {
 /// Refuses NaN and infinities.
 pub(crate) fn check_finite(scene: &SceneData) -> Result<(), CodecError> {
     check_all_finite(fields(scene))
+}
+
+/// As [`check_finite`], for the meta alone.
+pub(crate) fn check_finite_meta(meta: &SceneMeta) -> Result<(), CodecError> {
+    check_all_finite(of_meta(meta))
+}
+
+/// As [`check_finite`], for the scene coordinates alone.
+pub(crate) fn check_finite_coordinates(coordinates: &SceneCoordinateArrays) -> Result<(), CodecError> {
+    check_all_finite(of_coordinates(coordinates))
 }
 
 /// As [`check_finite`], for Gaussians alone.

@@ -1,15 +1,21 @@
 //! Streams in files.
 
 use std::{
-    fs::{self, File},
-    io::{self, Read},
+    fs::{self, File, Metadata},
+    io::{self, Read, Seek, SeekFrom},
     path::Path,
 };
 
 use crate::{
-    CodecError, Limits, SceneData, StreamInfo, decode_with_limits, info_with_limits,
-    stream::container::{PRELUDE, Prelude},
+    CodecError, Limits, OpenStream, SceneData, StreamInfo, decode_with_limits, info_with_limits,
+    stream::{
+        container::{Entry, Header, PRELUDE, Prelude},
+        describe,
+    },
 };
+
+/// Bytes of a file that are in memory while a checksum is computed.
+const PIECE: u64 = 1 << 16;
 
 /// Reads a scene from a file.
 ///
@@ -27,7 +33,8 @@ pub fn read_file_with_limits(path: &Path, limits: &Limits) -> Result<SceneData, 
     read_file_and(path, limits, |bytes| decode_with_limits(bytes, limits))
 }
 
-/// Reads what a file holds. See [`info`](crate::info).
+/// Reads what a file holds. See [`info`](crate::info). Memory is taken for the beginnings of the sections only, whatever the
+/// length of the file.
 ///
 /// # Errors
 /// What the system refuses to read, and what [`info`](crate::info) refuses; the message names the file.
@@ -40,11 +47,13 @@ pub fn read_info(path: &Path) -> Result<StreamInfo, CodecError> {
 /// # Errors
 /// As [`read_info`].
 pub fn read_info_with_limits(path: &Path, limits: &Limits) -> Result<StreamInfo, CodecError> {
-    read_file_and(path, limits, |bytes| info_with_limits(bytes, limits))
+    let file = OpenFile::open(path, limits)?;
+    file.info().map_err(|error| file.name(error))
 }
 
-/// Reads a file and passes its bytes to `parse`. A file that is no stream, or that claims to be too long, is not read to its
-/// end.
+/// Reads a file that is a stream, and passes its bytes to `parse`. Nothing beyond its header and the heads of its sections is
+/// read of a file that is no stream, that claims to be too long, that has another length than it claims, or whose sections are
+/// longer than their heads say.
 ///
 /// # Errors
 /// What the system refuses to read, and what `parse` refuses; the message names the file.
@@ -53,23 +62,119 @@ pub fn read_file_and<T>(
     limits: &Limits,
     parse: impl FnOnce(&[u8]) -> Result<T, CodecError>,
 ) -> Result<T, CodecError> {
-    let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
-    // Checked before the file is opened: opening a pipe would wait for its writer.
-    let kind = fs::metadata(path).map_err(io)?.file_type();
-    if kind.is_dir() {
-        return Err(io(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a .l4gs file")));
+    let file = OpenFile::open(path, limits)?;
+    file.bytes().and_then(|bytes| parse(&bytes)).map_err(|error| file.name(error))
+}
+
+/// The bytes of a file that is a stream, and what it holds: for programs that pass a file on.
+///
+/// # Errors
+/// As [`read_info`].
+pub fn read_stream(path: &Path, limits: &Limits) -> Result<(Vec<u8>, StreamInfo), CodecError> {
+    let file = OpenFile::open(path, limits)?;
+    let bytes = file.bytes().map_err(|error| file.name(error))?;
+    let info = info_with_limits(&bytes, limits).map_err(|error| file.name(error))?;
+    Ok((bytes, info))
+}
+
+/// A file whose header has been checked, and the length of each section with its head.
+#[derive(Debug)]
+struct OpenFile<'a> {
+    path: &'a Path,
+    file: File,
+    limits: Limits,
+    header: Header,
+}
+
+impl<'a> OpenFile<'a> {
+    fn open(path: &'a Path, limits: &Limits) -> Result<Self, CodecError> {
+        let io = |error| CodecError::Io { action: "read", path: path.to_owned(), error };
+        // Checked before the file is opened: opening a pipe would wait for its writer. Once more afterwards: it may be another
+        // file by then.
+        fs::metadata(path).and_then(|found| only_regular(&found)).map_err(io)?;
+        let file = File::open(path).map_err(io)?;
+        let found = file.metadata().map_err(io)?;
+        only_regular(&found).map_err(io)?;
+        let read = || {
+            let prelude = Prelude::read(&read_at(&file, path, 0, PRELUDE as u64)?, limits)?;
+            prelude.check_length(found.len())?;
+            let header = Header::read(&read_at(&file, path, 0, prelude.header_bytes())?, prelude, limits)?;
+            for entry in &header.entries {
+                entry.check_length(&read_at(&file, path, entry.offset, entry.head_bytes())?, limits)?;
+            }
+            Ok(header)
+        };
+        let header = read().map_err(|error| name(path, error))?;
+        Ok(Self { path, file, limits: *limits, header })
     }
-    if !kind.is_file() {
+
+    /// An error of this file.
+    fn name(&self, error: CodecError) -> CodecError {
+        name(self.path, error)
+    }
+
+    /// All bytes.
+    fn bytes(&self) -> Result<Vec<u8>, CodecError> {
+        let mut bytes = Vec::new();
+        let length = self.header.prelude.file_bytes;
+        let io = |error| CodecError::Io { action: "read", path: self.path.to_owned(), error };
+        let size = usize::try_from(length).map_err(|_| io(io::ErrorKind::OutOfMemory.into()))?;
+        bytes.try_reserve_exact(size).map_err(|_| io(io::ErrorKind::OutOfMemory.into()))?;
+        from(&self.file, 0).and_then(|file| file.take(length).read_to_end(&mut bytes)).map_err(io)?;
+        Ok(bytes)
+    }
+
+    /// What the beginnings of the sections say. The checksums of all bytes are checked.
+    fn info(&self) -> Result<StreamInfo, CodecError> {
+        // A stream of the beginnings alone.
+        let (mut beginnings, mut header) = (Vec::new(), self.header.clone());
+        for entry in &mut header.entries {
+            self.check_checksum(entry)?;
+            let beginning = read_at(&self.file, self.path, entry.offset, entry.head_bytes())?;
+            (entry.offset, entry.bytes) = (beginnings.len() as u64, beginning.len() as u64);
+            beginnings.extend(beginning);
+        }
+        let limits = self.limits.for_stream(self.header.prelude.file_bytes as usize);
+        describe(&OpenStream::beginning(&beginnings, &header, limits), &self.header, &limits)
+    }
+
+    fn check_checksum(&self, entry: &Entry) -> Result<(), CodecError> {
+        let mut sum = 0;
+        for offset in (entry.offset..entry.end()).step_by(PIECE as usize) {
+            sum = crc32c::crc32c_append(sum, &read_at(&self.file, self.path, offset, PIECE.min(entry.end() - offset))?);
+        }
+        entry.check(sum)
+    }
+}
+
+/// Puts the name of a file before what is wrong in it.
+fn name(path: &Path, error: CodecError) -> CodecError {
+    match error {
+        io @ CodecError::Io { .. } => io,
+        other => CodecError::InFile { path: path.to_owned(), error: Box::new(other) },
+    }
+}
+
+fn only_regular(found: &Metadata) -> io::Result<()> {
+    if found.is_dir() {
+        return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder, expected a .l4gs file"));
+    }
+    if !found.is_file() {
         let problem = "it is a pipe, a socket or a device, expected a .l4gs file";
-        return Err(io(io::Error::new(io::ErrorKind::InvalidInput, problem)));
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
     }
-    let file = File::open(path).map_err(io)?;
+    Ok(())
+}
+
+fn from(mut file: &File, offset: u64) -> io::Result<&File> {
+    file.seek(SeekFrom::Start(offset))?;
+    Ok(file)
+}
+
+/// Some bytes of a file; fewer at its end.
+fn read_at(file: &File, path: &Path, offset: u64, count: u64) -> Result<Vec<u8>, CodecError> {
     let mut bytes = Vec::new();
-    (&file).take(PRELUDE as u64).read_to_end(&mut bytes).map_err(io)?;
-    let in_file = |error| CodecError::InFile { path: path.to_owned(), error: Box::new(error) };
-    let prelude = Prelude::read(&bytes, limits).map_err(in_file)?;
-    // One byte more than the header claims, to notice bytes that were appended.
-    let rest = (prelude.file_bytes + 1).saturating_sub(bytes.len() as u64);
-    file.take(rest).read_to_end(&mut bytes).map_err(io)?;
-    parse(&bytes).map_err(in_file)
+    let read = from(file, offset).and_then(|file| file.take(count).read_to_end(&mut bytes));
+    read.map_err(|error| CodecError::Io { action: "read", path: path.to_owned(), error })?;
+    Ok(bytes)
 }

@@ -79,7 +79,7 @@
 //! promises.
 //!
 //! [`encode`], [`encode_compressed`], [`decode`] and [`info`] use no files and compile for `wasm32-unknown-unknown`. There
-//! `read_file`, `read_file_and` and `read_info` are absent, and one thread does all work. Elsewhere the threads of rayon's
+//! `read_file`, `read_file_and`, `read_info` and `read_stream` are absent, and one thread does all work. Elsewhere the threads of rayon's
 //! current pool code the planes; the bytes do not depend on their number.
 #![forbid(unsafe_code)]
 
@@ -115,7 +115,7 @@ pub use bytes::{
 pub use entropy::{Distributions, FrequencyTable};
 pub use error::CodecError;
 #[cfg(not(target_os = "unknown"))]
-pub use file::{read_file, read_file_and, read_file_with_limits, read_info, read_info_with_limits};
+pub use file::{read_file, read_file_and, read_file_with_limits, read_info, read_info_with_limits, read_stream};
 pub use format::{MAGIC, VERSION};
 pub use limits::Limits;
 pub use motion::MotionEvaluator;

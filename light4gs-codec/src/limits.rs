@@ -4,8 +4,8 @@ use crate::{CodecError, plane_layout::PlaneAxes};
 
 /// The most that a reader accepts, checked before memory and time are taken.
 ///
-/// The default is for files of strangers: a file takes at most [`Limits::memory_bytes`], and [`Limits::nanoseconds`] on
-/// one thread, or a small multiple of its own length if that is more. A program that knows its files may set lower or
+/// The default is for files of strangers: a file is at most 1 GiB long, and takes at most [`Limits::memory_bytes`], and
+/// [`Limits::nanoseconds`] on one thread, or a small multiple of its own length if that is more. A program that knows its files may set lower or
 /// higher limits:
 ///
 /// ```
@@ -19,7 +19,7 @@ use crate::{CodecError, plane_layout::PlaneAxes};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Limits {
-    /// Bytes of a whole stream.
+    /// Bytes of a whole stream. A section has at most the bytes that the counts in its head can take.
     pub file_bytes: u64,
     /// Bytes of the scene meta in the header.
     pub meta_bytes: u32,
@@ -68,7 +68,7 @@ pub struct Limits {
 impl Default for Limits {
     fn default() -> Self {
         Self {
-            file_bytes: 1 << 38,
+            file_bytes: 1 << 30,
             meta_bytes: 1 << 20,
             sections: 64,
             string_bytes: 1 << 16,
@@ -94,10 +94,11 @@ impl Default for Limits {
 }
 
 impl Limits {
-    /// For files that are trusted, such as your own. A file may take 64 GiB and half an hour. The encoder writes only
+    /// For files that are trusted, such as your own. A file may be 64 GiB long, and take 64 GiB and half an hour. The encoder writes only
     /// files within these limits.
     pub fn large() -> Self {
         Self {
+            file_bytes: 64 << 30,
             image_pixels: 1 << 28,
             layer_width: 1 << 19,
             layer_weights: 1 << 28,

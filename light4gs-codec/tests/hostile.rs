@@ -8,7 +8,7 @@ use std::{
 };
 
 use common::{ENTRY, forge_header, forge_section, payload, put, sample, start, table_at, u64_at, with_payload};
-use light4gs_codec::{CodecError, Limits, decode, decode_with_limits, encode, info};
+use light4gs_codec::{CodecError, Limits, StreamDecoder, decode, decode_with_limits, encode, info};
 
 /// Remembers the largest allocation.
 struct Watch;
@@ -94,7 +94,8 @@ fn huge_numbers_in_the_prelude() {
     assert!(matches!(forged_prelude(16, &huge), CodecError::OverLimit { .. }));
     assert!(matches!(forged_prelude(16, &(1u32 << 20).to_le_bytes()), CodecError::Truncated { .. }));
     assert!(matches!(forged_prelude(20, &u64::MAX.to_le_bytes()), CodecError::OverLimit { .. }));
-    assert!(matches!(forged_prelude(20, &(1u64 << 37).to_le_bytes()), CodecError::Truncated { .. }));
+    assert!(matches!(forged_prelude(20, &(1u64 << 36).to_le_bytes()), CodecError::OverLimit { .. }));
+    assert!(matches!(forged_prelude(20, &(1u64 << 29).to_le_bytes()), CodecError::Truncated { .. }));
     assert!(matches!(forged_prelude(20, &0u64.to_le_bytes()), CodecError::TrailingBytes { .. }));
 }
 
@@ -203,6 +204,37 @@ fn a_meta_that_lies() {
     assert!(matches!(forged_prelude(extra, &1u32.to_le_bytes()), CodecError::TrailingBytes { section: "meta", .. }));
     // "author" becomes "xuthor", which comes after "writer".
     assert!(forged_prelude(extra + 8, b"x").to_string().contains("rising keys"));
+}
+
+/// Every reader refuses them: one that decodes, one that does not, and one whose bytes are still coming.
+#[test]
+fn numbers_of_the_meta_that_are_not_finite() {
+    let fps = 32 + 4 + sample().meta.name.len() + 4;
+    let fov = fps + 4 + 24 + 12 + 32 + 8;
+    for (at, field) in [(fps, "fps"), (fps + 4 + 8, "bounds"), (fps + 28 + 4, "background"), (fov, "fov_x")] {
+        for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            let mut bytes = encode(&sample()).unwrap();
+            put(&mut bytes, at, &bad.to_le_bytes());
+            forge_header(&mut bytes);
+            let coming = StreamDecoder::new().push(&bytes).unwrap_err();
+            for error in [decode(&bytes).unwrap_err(), info(&bytes).unwrap_err(), coming] {
+                assert!(
+                    matches!(&error, CodecError::NonFinite { section: "meta", field: found, .. } if found == field),
+                    "{error}"
+                );
+            }
+        }
+    }
+}
+
+/// What stands in the heads and in the small sections is looked at without decoding.
+#[test]
+fn a_description_refuses_what_a_decoder_refuses() {
+    let mut bytes = encode(&sample()).unwrap();
+    let at = start(&bytes, 2) + 4;
+    put(&mut bytes, at, &f32::NAN.to_le_bytes());
+    forge_section(&mut bytes, 2);
+    assert!(info(&bytes).unwrap_err().to_string().starts_with("scene_coordinates: value 1 of mean is NaN"));
 }
 
 #[test]

@@ -14,6 +14,9 @@ use crate::{
     steps::{LEAST_STEP_IN_STREAM, plane_step},
 };
 
+/// A sub-stream in messages.
+const SUB_STREAM: &str = "sub-stream";
+
 /// Bytes of one plane.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlaneBytes {
@@ -102,20 +105,21 @@ pub(crate) fn write(
     let CodedPlanes { sub_streams, decoded } = coder::encode(planes, model, steps, latent_symbols, limits)?;
     sub_streams.iter().for_each(|stream| writer.varint(stream.len() as u64));
     sub_streams.iter().for_each(|stream| writer.bytes.extend_from_slice(stream));
-    Ok((decoded, plane_bytes(&sub_streams, model, &head.layout)))
+    let lengths: Vec<u64> = sub_streams.iter().map(|stream| stream.len() as u64).collect();
+    Ok((decoded, plane_bytes(&lengths, model, &head.layout)))
 }
 
-/// The parts of a section.
-struct Parts<'a> {
+/// The parts of a section before its sub-streams.
+struct Parts {
     head: Head,
     steps: Vec<PerGroup>,
-    sub_streams: Vec<&'a [u8]>,
+    /// Bytes of each sub-stream.
+    lengths: Vec<u64>,
 }
 
-impl<'a> Parts<'a> {
-    fn read(bytes: &'a [u8], model: &ContextModelArrays, limits: &Limits) -> Result<Self, CodecError> {
-        let mut reader = Reader::new(SECTION, bytes);
-        let head = Head::read(&mut reader, limits)?;
+impl Parts {
+    fn read(reader: &mut Reader<'_>, model: &ContextModelArrays, limits: &Limits) -> Result<Self, CodecError> {
+        let head = Head::read(reader, limits)?;
         check_model(&head, model)?;
         let scales = head.layout.scales();
         let count = reader.varint_at_most("number of steps", limits.scales)?;
@@ -124,17 +128,14 @@ impl<'a> Parts<'a> {
             .collect::<Result<Vec<_>, CodecError>>()?;
         check_steps(&steps, scales)?;
         let count: usize = (0..head.layout.len()).map(|plane| sub_streams(model, plane)).sum();
-        let lengths = (0..count).map(|_| reader.varint("length of a sub-stream")).collect::<Result<Vec<_>, _>>()?;
-        let take = |length| reader.take("sub-stream", length);
-        let sub_streams = lengths.into_iter().map(take).collect::<Result<_, _>>()?;
-        reader.finish()?;
-        Ok(Self { head, steps, sub_streams })
+        let lengths = (0..count).map(|_| reader.varint("length of a sub-stream")).collect::<Result<_, _>>()?;
+        Ok(Self { head, steps, lengths })
     }
 
     /// All but the values. `model` may be a description.
     fn summary(self, model: ContextModelArrays) -> Summary {
-        let Self { head, steps, sub_streams } = self;
-        let bytes = plane_bytes(&sub_streams, &model, &head.layout);
+        let Self { head, steps, lengths } = self;
+        let bytes = plane_bytes(&lengths, &model, &head.layout);
         Summary { head, bytes, steps, model: Some(model.into_description()) }
     }
 }
@@ -145,21 +146,43 @@ pub(crate) fn read(
     model: ContextModelArrays,
     budget: &Budget,
 ) -> Result<(FeaturePlaneArrays, Summary), CodecError> {
-    let parts = Parts::read(bytes, &model, &budget.limits)?;
-    let planes = coder::decode(&parts.head.layout, &model, &parts.steps, &parts.sub_streams, budget)?;
+    let mut reader = Reader::new(SECTION, bytes);
+    let parts = Parts::read(&mut reader, &model, &budget.limits)?;
+    let take = |&length| reader.take(SUB_STREAM, length);
+    let sub_streams = parts.lengths.iter().map(take).collect::<Result<Vec<_>, _>>()?;
+    reader.finish()?;
+    let planes = coder::decode(&parts.head.layout, &model, &parts.steps, &sub_streams, budget)?;
     Ok((planes, parts.summary(model)))
 }
 
-/// What the stream says of the planes, without decoding. The weights of the model are not needed.
-pub(crate) fn read_summary(bytes: &[u8], model: ContextModelArrays, limits: &Limits) -> Result<Summary, CodecError> {
-    Ok(Parts::read(bytes, &model, limits)?.summary(model))
+/// What the stream says of the planes, without decoding. `beginning` is that of the section, which has a `length` in bytes.
+/// The weights of the model are not needed.
+pub(crate) fn read_summary(
+    beginning: &[u8],
+    length: u64,
+    model: ContextModelArrays,
+    limits: &Limits,
+) -> Result<Summary, CodecError> {
+    let mut reader = Reader::new(SECTION, beginning);
+    let parts = Parts::read(&mut reader, &model, limits)?;
+    let mut available = length - (beginning.len() - reader.rest().len()) as u64;
+    for &needed in &parts.lengths {
+        available = available.checked_sub(needed).ok_or_else(|| {
+            let field = SUB_STREAM.to_owned();
+            CodecError::Truncated { section: SECTION, field, needed, available }
+        })?;
+    }
+    match available {
+        0 => Ok(parts.summary(model)),
+        bytes => Err(CodecError::TrailingBytes { section: SECTION, bytes }),
+    }
 }
 
-/// The bytes of each plane, in the order of the planes, from the sub-streams in the order of the stream.
-fn plane_bytes(sub_streams: &[impl AsRef<[u8]>], model: &ContextModelArrays, layout: &PlaneLayout) -> Vec<PlaneBytes> {
+/// The bytes of each plane, in the order of the planes, from those of the sub-streams in the order of the stream.
+fn plane_bytes(lengths: &[u64], model: &ContextModelArrays, layout: &PlaneLayout) -> Vec<PlaneBytes> {
     let of_plane = |(plane, first): (usize, usize)| {
         let prior = model.prior(plane);
-        let mut lengths = sub_streams[first..].iter().map(|stream| stream.as_ref().len() as u64);
+        let mut lengths = lengths[first..].iter().copied();
         let mut part = |present: bool| if present { lengths.next().unwrap_or(0) } else { 0 };
         let (latent, anchors) = (part(prior.has_latent()), part(prior.has_anchors()));
         PlaneBytes { plane, latent, anchors, others: part(true) }

@@ -204,7 +204,6 @@ impl MotionArrays {
             motion.check_structure(limits)?;
         }
         at_most(SECTION, "number of tensors", self.tensors.len() as u64, limits.nodes)?;
-        let mut total = self.network.as_ref().map_or(0, |motion| motion.network.weights());
         for (index, tensor) in self.tensors.iter().enumerate() {
             check_name(SECTION, "a tensor's name", &tensor.name, limits)?;
             at_most(SECTION, format!("axes of {}", tensor.name), tensor.shape.len() as u64, 8u32)?;
@@ -212,9 +211,14 @@ impl MotionArrays {
                 let found = format!("{:?} twice", tensor.name);
                 return Err(CodecError::invalid(SECTION, "tensors", found, "each name once"));
             }
-            total = total.saturating_add(tensor.length());
         }
-        at_most(SECTION, "number of weights", total, limits.layer_weights)
+        at_most(SECTION, "number of weights", self.weights(), limits.layer_weights)
+    }
+
+    /// Numbers of the network and of the tensors, as their shapes give them.
+    pub(crate) fn weights(&self) -> u64 {
+        let network = self.network.as_ref().map_or(0, |motion| motion.network.weights());
+        self.tensors.iter().fold(network, |sum, tensor| sum.saturating_add(tensor.length()))
     }
 
     /// Refuses a network that reads a number of features other than that of the planes, or attributes that these

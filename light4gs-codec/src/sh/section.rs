@@ -155,16 +155,39 @@ fn read_priors(reader: &mut Reader<'_>, limits: &Limits) -> Result<Vec<ShPrior>,
     (0..count as usize).map(read).collect()
 }
 
+/// The beginning of a section: its head, and its priors without weights where it has some.
+fn read_beginning(reader: &mut Reader<'_>, kind: Kind, limits: &Limits) -> Result<(Head, Vec<ShPrior>), CodecError> {
+    let head = Head::read(reader, limits)?;
+    if kind != Kind::ShNetworks {
+        return Ok((head, Vec::new()));
+    }
+    reader.f32("step")?;
+    Ok((head, read_priors(reader, limits)?))
+}
+
 /// Whether decoding needs the feature planes.
 pub(crate) fn reads_feature_planes(bytes: &[u8], kind: Kind, limits: &Limits) -> Result<bool, CodecError> {
-    if kind != Kind::ShNetworks {
-        return Ok(false);
-    }
-    let mut reader = Reader::new(SECTION, bytes);
-    Head::read(&mut reader, limits)?;
-    reader.f32("step")?;
-    let priors = read_priors(&mut reader, limits)?;
+    let (_, priors) = read_beginning(&mut Reader::new(SECTION, bytes), kind, limits)?;
     Ok(priors.iter().any(|prior| prior.sources.contains(&ShSource::SpaceFeatures)))
+}
+
+/// What the beginning of a section promises.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Promise {
+    /// Coefficients of all Gaussians.
+    pub(crate) values: u64,
+    /// Frequency tables.
+    pub(crate) tables: u64,
+    /// Weights of the networks.
+    pub(crate) weights: u64,
+}
+
+/// Reads what the beginning of a section promises.
+pub(crate) fn promise(reader: &mut Reader<'_>, kind: Kind, limits: &Limits) -> Result<Promise, CodecError> {
+    let (head, priors) = read_beginning(reader, kind, limits)?;
+    let tables = if kind == Kind::ShTables { 3 * sh_rest_coefficients(head.degree) as u64 } else { 0 };
+    let weights = priors.iter().fold(0_u64, |sum, prior| sum.saturating_add(prior.network.weights()));
+    Ok(Promise { values: head.values(), tables, weights })
 }
 
 /// What [`write`] and [`write_continued`] have written.

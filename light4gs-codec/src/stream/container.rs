@@ -91,6 +91,19 @@ impl Prelude {
         writer.bytes
     }
 
+    /// Refuses a stream of another length than the prelude says.
+    pub(crate) fn check_length(&self, there: u64) -> Result<(), CodecError> {
+        let stated = self.file_bytes;
+        if stated > there {
+            let field = "the whole".into();
+            return Err(CodecError::Truncated { section: "stream", field, needed: stated, available: there });
+        }
+        if stated < there {
+            return Err(CodecError::TrailingBytes { section: "stream", bytes: there - stated });
+        }
+        Ok(())
+    }
+
     /// Bytes before the first section.
     pub(crate) fn header_bytes(&self) -> u64 {
         PRELUDE as u64 + u64::from(self.meta_bytes) + u64::from(self.section_count) * ENTRY as u64
@@ -191,19 +204,12 @@ impl<'a> Container<'a> {
     /// Reads everything before the sections.
     pub(crate) fn read(bytes: &'a [u8], limits: &Limits) -> Result<Self, CodecError> {
         let prelude = Prelude::read(bytes, limits)?;
-        let (stated, there) = (prelude.file_bytes, bytes.len() as u64);
-        if stated > there {
-            return Err(CodecError::Truncated {
-                section: "stream",
-                field: "the whole".into(),
-                needed: stated,
-                available: there,
-            });
+        prelude.check_length(bytes.len() as u64)?;
+        let header = Header::read(bytes, prelude, limits)?;
+        for entry in &header.entries {
+            entry.check_length(&bytes[entry.offset as usize..][..entry.head_bytes() as usize], limits)?;
         }
-        if stated < there {
-            return Err(CodecError::TrailingBytes { section: "stream", bytes: there - stated });
-        }
-        Ok(Self { bytes, header: Cow::Owned(Header::read(bytes, prelude, limits)?), verified: false })
+        Ok(Self { bytes, header: Cow::Owned(header), verified: false })
     }
 
     /// The same, with the checksums of all sections checked.

@@ -42,6 +42,8 @@ pub struct StreamDecoder {
     header: Option<Header>,
     /// Sections, in the order of the stream, that have come and have their checksums.
     verified: usize,
+    /// Whether the length of the next section has been compared with its head.
+    length_checked: bool,
     /// Number of bytes that have gone into checksums, and the checksum of those of the next section.
     summed: u64,
     sum: u32,
@@ -76,6 +78,7 @@ impl StreamDecoder {
             bytes: Vec::new(),
             header: None,
             verified: 0,
+            length_checked: false,
             summed: 0,
             sum: 0,
             scene: None,
@@ -181,6 +184,7 @@ impl StreamDecoder {
     }
 
     fn take(&mut self, bytes: &[u8]) -> Result<(), CodecError> {
+        self.make_room(bytes.len());
         self.bytes.extend_from_slice(bytes);
         if self.header.is_none() {
             self.read_header()?;
@@ -191,6 +195,11 @@ impl StreamDecoder {
             return Err(CodecError::TrailingBytes { section: "stream", bytes: there - stated });
         }
         while let Some(entry) = header.entries.get(self.verified) {
+            if !self.length_checked && there >= entry.offset + entry.head_bytes() {
+                let beginning = &self.bytes[entry.offset as usize..][..entry.head_bytes() as usize];
+                entry.check_length(beginning, &self.limits)?;
+                self.length_checked = true;
+            }
             let until = entry.end().min(there);
             let new = &self.bytes[self.summed as usize..until as usize];
             self.sum = crc32c::crc32c_append(self.sum, new);
@@ -199,10 +208,21 @@ impl StreamDecoder {
                 break;
             }
             entry.check(self.sum)?;
-            self.sum = 0;
+            (self.sum, self.length_checked) = (0, false);
             self.verified += 1;
         }
         Ok(())
+    }
+
+    /// Makes room for more bytes: twice that of before, but no more than the stream has.
+    fn make_room(&mut self, more: usize) {
+        let needed = self.bytes.len() + more;
+        if let Some(header) = &self.header
+            && needed > self.bytes.capacity()
+        {
+            let doubled = (2 * self.bytes.capacity() as u64).min(header.prelude.file_bytes) as usize;
+            self.bytes.reserve_exact(doubled.max(needed) - self.bytes.len());
+        }
     }
 
     /// Reads the header, if all of it is there. Until then only its fixed part is looked at.

@@ -13,7 +13,7 @@ use crate::{
         Reader, Section,
         sections::{Encoding, Kind},
     },
-    motion,
+    fields, motion,
     plane_layout::PlaneLayout,
     planes,
 };
@@ -180,18 +180,26 @@ pub fn info(bytes: &[u8]) -> Result<StreamInfo, CodecError> {
 pub fn info_with_limits(bytes: &[u8], limits: &Limits) -> Result<StreamInfo, CodecError> {
     let opened = OpenStream::with_limits(bytes, limits)?;
     let stream = opened.verified()?;
-    let (heads, limits) = (stream.heads()?, limits.for_stream(bytes.len()));
+    describe(&stream, &stream.container.header, limits)
+}
+
+/// What the beginnings of the sections say, whose checksums have been checked. `header` is that of the whole stream.
+pub(crate) fn describe(stream: &OpenStream<'_>, header: &Header, limits: &Limits) -> Result<StreamInfo, CodecError> {
     let open = |section: Section| {
         let (kind, _, payload) = stream.container.section(section)?;
         Ok::<_, CodecError>((kind, Reader::new(section.name(), payload)))
     };
-    let motion = motion::section::read_description(&mut open(Section::Motion)?.1, &limits)?;
+    stream.check_sections()?;
+    fields::check_finite_coordinates(&stream.coordinates()?)?;
+    let heads = stream.heads()?;
+    let motion = motion::section::read_description(&mut open(Section::Motion)?.1, limits)?;
     let (kind, mut reader) = open(Section::FeaturePlanes)?;
     let planes = if kind == Kind::FeaturePlanesExplicit {
-        planes::Summary::explicit(planes::head::Head::read(&mut reader, &limits)?)
+        planes::Summary::explicit(planes::head::Head::read(&mut reader, limits)?)
     } else {
-        let model = planes::context_section::read_description(&mut open(Section::ContextModel)?.1, &limits)?;
-        planes::section::read_summary(reader.rest(), model, &limits)?
+        let model = planes::context_section::read_description(&mut open(Section::ContextModel)?.1, limits)?;
+        let length = header.entry(Section::FeaturePlanes, 0)?.bytes;
+        planes::section::read_summary(reader.rest(), length, model, limits)?
     };
-    Ok(StreamInfo::new(&stream.container.header, heads, planes, motion))
+    Ok(StreamInfo::new(header, heads, planes, motion))
 }

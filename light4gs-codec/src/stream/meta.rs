@@ -8,12 +8,13 @@ use crate::{
         Reader, Writer,
         names::{check_name, check_text},
     },
+    fields,
     limits::at_most,
 };
 
 const SECTION: &str = "meta";
 
-/// Refuses metadata that cannot be written or makes no sense. Another function checks that numbers are finite.
+/// Refuses metadata that cannot be written or makes no sense.
 pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError> {
     check_name(SECTION, "name", &meta.name, limits)?;
     at_most(SECTION, "number of extra entries", meta.extra.len() as u64, limits.extras)?;
@@ -24,8 +25,8 @@ pub(crate) fn check(meta: &SceneMeta, limits: &Limits) -> Result<(), CodecError>
     }
     at_most(SECTION, "frame_count", meta.frame_count.into(), limits.frames)?;
     limits.check_image(meta.width, meta.height)?;
-    // Another function checks that numbers are finite.
-    if meta.fov_x >= PI && meta.fov_x.is_finite() {
+    fields::check_finite_meta(meta)?;
+    if meta.fov_x >= PI {
         return Err(CodecError::invalid(SECTION, "fov_x", meta.fov_x, "an angle below π"));
     }
     for (field, value) in [("fps", meta.fps), ("fov_x", meta.fov_x)] {

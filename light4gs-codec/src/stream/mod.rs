@@ -3,6 +3,7 @@
 //! | file | what |
 //! |---|---|
 //! | `container.rs` | header and table |
+//! | `promise.rs` | the most bytes that a section can have, by its head |
 //! | `meta.rs`, `scene_coordinates.rs` | the simple sections; the others have modules of their own |
 //! | `input.rs`, `compressor.rs`, `parts.rs` | how a scene is to be compressed, and the compressor |
 //! | `encoded.rs` | what an encoder makes: the stream, and all that is known of it |
@@ -20,11 +21,14 @@ mod layers;
 mod meta;
 mod open;
 mod parts;
+mod promise;
 mod scene_coordinates;
 
 pub use compressor::{Compressor, encode_compressed, encode_compressed_with_limits};
 pub use encoded::Encoded;
 pub use incremental::StreamDecoder;
+#[cfg(not(target_os = "unknown"))]
+pub(crate) use info::describe;
 pub use info::{LayerInfo, SectionInfo, StreamInfo, info, info_with_limits};
 pub use input::{CompressionInput, Profile, WeightPrecisions};
 pub use layers::GaussianLayers;

@@ -302,7 +302,7 @@ impl<'a> OpenStream<'a> {
     }
 
     /// Refuses a context model without coded planes, and coded planes without a context model.
-    fn check_sections(&self) -> Result<(), CodecError> {
+    pub(super) fn check_sections(&self) -> Result<(), CodecError> {
         let coded = self.container.section(Section::FeaturePlanes)?.0 == Kind::FeaturePlanesContextCoded;
         if self.container.header.has(Section::ContextModel) && !coded {
             let section = Section::ContextModel.name();

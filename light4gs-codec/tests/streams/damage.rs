@@ -1,9 +1,9 @@
-//! Accidental damage is always found.
+//! Accidental damage is always found, and lengths that are only promised.
 
 use crate::common;
 
-use common::sample;
-use light4gs_codec::{CodecError, decode, encode, info};
+use common::{payload, sample, with_payload};
+use light4gs_codec::{CodecError, StreamDecoder, decode, encode, info};
 
 #[test]
 fn every_truncation_is_an_error() {
@@ -54,4 +54,18 @@ fn something_appended_is_an_error() {
 fn another_file_is_told_from_a_damaged_one() {
     assert!(matches!(decode(b"ply\nformat ascii 1.0\n"), Err(CodecError::NotL4gs { .. })));
     assert!(matches!(decode(b""), Err(CodecError::Truncated { .. })));
+}
+
+#[test]
+fn a_section_that_is_longer_than_its_head_says() {
+    let long = vec![0; 3 << 20];
+    for section in 0..5 {
+        let bytes = encode(&sample()).unwrap();
+        let bytes = with_payload(&bytes, section, &[payload(&bytes, section), &long].concat());
+        let mut decoder = StreamDecoder::new();
+        let error = decoder.push(&bytes[..2 << 20]).expect_err("refused before all of it has come");
+        for error in [error, decode(&bytes).unwrap_err(), info(&bytes).unwrap_err()] {
+            assert!(error.to_string().contains("length of the section is"), "{error}");
+        }
+    }
 }

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from .errors import Refused
 
-STREAM_BYTES = 1 << 38
+STREAM_BYTES = 1 << 30
 META_BYTES = 1 << 20
 SECTIONS = 64
 STRING_BYTES = 1 << 16
