@@ -1,4 +1,4 @@
-//! From videos to a dataset: frames by `ffmpeg`, poses by `colmap`, a folder that is read as layout `nerfstudio`.
+//! From videos to a dataset: frames by `ffmpeg`, poses by COLMAP, a folder that is read as layout `nerfstudio`.
 //!
 //! The folder holds `images/`, `transforms.json` and `points3D.ply`. `work/` holds COLMAP's database and models, and
 //! `prepare.json` records what has been done, so that a second call continues where the first was stopped.
@@ -14,7 +14,7 @@ pub use summary::PrepareSummary;
 
 use crate::error::DataError;
 use crate::layouts::shared::files;
-use crate::programs::colmap::COLMAP;
+use crate::programs::colmap::Colmap;
 use crate::programs::ffmpeg::{FFMPEG, Pace, VideoInfo, Wanted, extract_frames, video_info};
 use record::{Phase, Record, Settings};
 use std::fs;
@@ -63,39 +63,55 @@ impl PrepareOptions {
     }
 }
 
-/// The progress of [`prepare`], for its caller.
+/// What [`prepare`] tells its caller while it works.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct PrepareProgress {
-    /// The current phase, such as `features`.
-    pub phase: &'static str,
-    /// Steps that are done.
-    pub done: usize,
-    /// Steps in all; 0 where the number is not known.
-    pub total: usize,
+pub enum PrepareEvent {
+    /// The progress of a phase.
+    Progress {
+        /// The phase: `frames`, `features`, `matches`, `poses` or `dataset`.
+        phase: &'static str,
+        /// Steps that are done.
+        done: usize,
+        /// Steps in all.
+        total: usize,
+    },
+    /// All images were tried: so many have a pose.
+    Placed {
+        /// Images with a pose.
+        images: usize,
+        /// Images in all.
+        total: usize,
+    },
+    /// A sentence about what was found or changed.
+    Note(String),
 }
 
-/// Makes a dataset from videos, or continues one that was stopped. `progress` is called while it works.
+impl PrepareEvent {
+    fn progress(phase: &'static str, done: usize, total: usize) -> Self {
+        Self::Progress { phase, done, total }
+    }
+}
+
+/// Makes a dataset from videos, or continues one that was stopped. `tell` is called while it works.
 ///
 /// # Errors
-/// [`DataError::Program`] where ffmpeg or colmap are absent, too old or fail, with what to do; [`DataError::Exists`] where
-/// the folder holds something else; [`DataError::Options`] and [`DataError::Io`] as they say.
-pub fn prepare(
-    options: &PrepareOptions,
-    progress: &mut dyn FnMut(PrepareProgress),
-) -> Result<PrepareSummary, DataError> {
+/// [`DataError::Program`] where ffmpeg or COLMAP are absent, too old or fail, with what to do; [`DataError::Exists`] where
+/// the folder holds something else; [`DataError::Field`] where no poses are found, with the likely reason;
+/// [`DataError::Options`] and [`DataError::Io`] as they say.
+pub fn prepare(options: &PrepareOptions, tell: &mut dyn FnMut(PrepareEvent)) -> Result<PrepareSummary, DataError> {
     options.check()?;
     FFMPEG.version()?;
-    COLMAP.version()?;
+    let colmap = Colmap::find()?;
     let mut record = Record::open(&options.out, Settings::of(options)?)?;
     let cameras = camera_folders(options);
     if !record.is_done(Phase::Frames) {
-        frames(options, &cameras, progress)?;
+        frames(options, &cameras, &mut record, tell)?;
         record.done(Phase::Frames)?;
     }
-    poses::reconstruct(options, &cameras, &mut record, progress)?;
-    let summary = write::dataset(options, &cameras)?;
+    let model = poses::reconstruct(options, &cameras, &colmap, &mut record, tell)?;
+    let summary = write::dataset(options, &cameras, model, record.notes().to_vec())?;
     record.done(Phase::Dataset)?;
-    progress(PrepareProgress { phase: "dataset", done: 1, total: 1 });
+    tell(PrepareEvent::progress("dataset", 1, 1));
     Ok(summary)
 }
 
@@ -111,32 +127,58 @@ fn camera_folders(options: &PrepareOptions) -> Vec<String> {
 fn frames(
     options: &PrepareOptions,
     cameras: &[String],
-    progress: &mut dyn FnMut(PrepareProgress),
+    record: &mut Record,
+    tell: &mut dyn FnMut(PrepareEvent),
 ) -> Result<(), DataError> {
     let infos = options.videos.iter().map(|video| video_info(video)).collect::<Result<Vec<_>, _>>()?;
-    let total = options.frames * options.videos.len();
-    for (i, (video, camera)) in options.videos.iter().zip(cameras).enumerate() {
-        let before = i * options.frames;
-        progress(PrepareProgress { phase: "frames", done: before, total });
-        let folder = options.out.join("images").join(camera);
-        let count = Some(options.frames);
-        let wanted =
-            Wanted { max_width: Some(options.max_width), pace: pace(&infos, options.frames), count, jpeg: true };
-        if !folder.is_dir() || files::images(&folder)?.is_empty() {
-            let mut done =
-                |done: usize| progress(PrepareProgress { phase: "frames", done: (before + done).min(total), total });
-            extract_frames(video, &infos[i], &folder, &wanted, &mut done)?;
-        }
+    if let Some(note) = about_durations(&options.videos, &infos) {
+        tell(record.note(note)?);
     }
-    progress(PrepareProgress { phase: "frames", done: total, total });
+    let pace = pace(&infos, options.frames);
+    let of_video = |info: &VideoInfo| match pace {
+        // A video may have fewer frames than are asked for.
+        Pace::All if info.duration * info.rate >= 1.0 => {
+            options.frames.min((info.duration * info.rate).round() as usize)
+        }
+        _ => options.frames,
+    };
+    let total: usize = infos.iter().map(of_video).sum();
+    let mut before = 0;
+    for (i, (video, camera)) in options.videos.iter().zip(cameras).enumerate() {
+        tell(PrepareEvent::progress("frames", before, total));
+        let folder = options.out.join("images").join(camera);
+        let wanted = Wanted { max_width: Some(options.max_width), pace, count: Some(options.frames), jpeg: true };
+        if !folder.is_dir() || files::images(&folder)?.is_empty() {
+            let mut done = |done: usize| tell(PrepareEvent::progress("frames", (before + done).min(total), total));
+            let taken = extract_frames(video, &infos[i], &folder, &wanted, &mut done)?;
+            for note in taken.notes {
+                tell(record.note(format!("{}: {note}", taken.video))?);
+            }
+        }
+        before += of_video(&infos[i]);
+    }
+    tell(PrepareEvent::progress("frames", total, total));
     Ok(())
+}
+
+/// A note, if the videos of a rig last differently long: the shortest decides.
+fn about_durations(videos: &[PathBuf], infos: &[VideoInfo]) -> Option<String> {
+    let by_duration = |a: &usize, b: &usize| infos[*a].duration.total_cmp(&infos[*b].duration);
+    let shortest = (0..infos.len()).min_by(by_duration)?;
+    let longest = (0..infos.len()).max_by(by_duration)?;
+    let of = |i: usize| format!("{} lasts {:.2} s", files::name_of(&videos[i]), infos[i].duration);
+    let more = infos[longest].duration - infos[shortest].duration;
+    (more > 0.02 * infos[longest].duration && more > 0.1).then(|| {
+        format!("{}, {}: the first {:.2} s of all are used", of(shortest), of(longest), infos[shortest].duration)
+    })
 }
 
 /// Which frames to take. Those of a rig must be of the same times, so its videos are resampled to one rate, however few frames
 /// there are: even at equal nominal rates a phone drops frames. Those of a single camera are frames of the video, and have their
 /// own times.
 fn pace(infos: &[VideoInfo], frames: usize) -> Pace {
-    let shortest = infos.iter().map(|info| info.duration).fold(f64::INFINITY, f64::min);
+    let durations = infos.iter().map(|info| info.duration).filter(|duration| *duration > 0.0);
+    let shortest = durations.fold(f64::INFINITY, f64::min);
     let fastest = infos.iter().map(|info| info.rate).fold(0.0, f64::max);
     let needed = frames as f64 / shortest;
     if !(needed.is_finite() && needed > 0.0) {

@@ -1,52 +1,78 @@
-//! The phases that COLMAP does: features, matches, poses.
+//! The phases that COLMAP does: features, matches, poses. Where few images get a pose, they are done again with more pairs
+//! and features.
 
 use super::record::{Phase, Record};
-use super::{PrepareOptions, PrepareProgress, frame_names};
+use super::{PrepareEvent, PrepareOptions, frame_names};
 use crate::atomic::write_atomically;
 use crate::error::DataError;
-use crate::layouts::colmap::read_model;
+use crate::images::image_size;
+use crate::layouts::colmap::{model::Model, read_model};
 use crate::layouts::shared::files;
-use crate::programs::colmap::{Step, counted, path_argument, registered, run};
+use crate::programs::colmap::{Colmap, Effort, FILM_AGAIN, Job, Mapper};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Up to this many images all pairs are matched; with more images, neighbors in time.
-const EXHAUSTIVE: usize = 30;
-/// Number of neighbors in time that are matched; further ones at distances of powers of two.
-const OVERLAP: usize = 10;
-/// Features of an image: half of COLMAP's default, so that matching on a CPU takes a quarter of the time.
-const FEATURES: usize = 4096;
+/// Up to this many images all pairs are matched, in the first attempt and in the second.
+const ALL_PAIRS: [usize; 2] = [24, 90];
+/// With more images, those at distances in time that are powers of two: near ones overlap, far ones close loops.
+/// In the second attempt, each of so many neighbors as well.
+const NEIGHBORS: usize = 12;
+/// The pairs are matched in so many parts, for the progress.
+const PARTS: usize = 16;
+/// Images with a longer side below this number of pixels are doubled in size before features are searched.
+const SMALL: u32 = 800;
+/// If a smaller share of the images has a pose, there is a second attempt.
+pub(super) const LEAST_REGISTERED: f64 = 0.8;
+/// If so large a share of the pairs that moved shows nothing but a turn, and there are this many, the camera only turned.
+const TURNED: f64 = 0.9;
+const LEAST_MOVED: usize = 8;
+/// With a smaller parallax, in degrees, there is no depth.
+pub(super) const LEAST_PARALLAX: f64 = 1.5;
 
-/// COLMAP's files in the folder.
+/// The attempts.
+const ATTEMPTS: usize = 2;
+
+/// The files of the phases in the folder.
 pub(super) struct Work {
+    folder: PathBuf,
     images: PathBuf,
-    list: PathBuf,
-    database: PathBuf,
-    sparse: PathBuf,
 }
 
 impl Work {
     pub(super) fn of(out: &Path) -> Self {
-        let work = out.join("work");
-        Self {
-            images: out.join("images"),
-            list: work.join("images.txt"),
-            database: work.join("database.db"),
-            sparse: work.join("sparse"),
+        Self { folder: out.join("work"), images: out.join("images") }
+    }
+
+    /// What is worked on in an attempt, counted from 0.
+    fn job(&self, attempt: usize, names: Vec<String>, rig: bool) -> Job {
+        let numbered = |name: &str| if attempt == 0 { name.to_owned() } else { format!("{name}-{}", attempt + 1) };
+        Job {
+            images: self.images.clone(),
+            names,
+            list: self.folder.join("images.txt"),
+            database: self.folder.join(format!("{}.db", numbered("database"))),
+            sparse: self.folder.join(numbered("sparse")),
+            rig,
         }
     }
 
-    /// The model with the most images: COLMAP writes one for each group of images that it could connect.
-    pub(super) fn best_model(&self) -> Result<PathBuf, DataError> {
-        let models = files::entries(&self.sparse, |path| path.join("images.bin").is_file())?;
-        let mut counted = Vec::with_capacity(models.len());
-        for model in models {
-            counted.push((read_model(&model)?.images.len(), model));
+    /// The model with the most images of all attempts: COLMAP writes one for each group of images that it could connect.
+    pub(super) fn best_model(&self) -> Result<Option<Model>, DataError> {
+        let mut best: Option<Model> = None;
+        for attempt in 0..ATTEMPTS {
+            let sparse = self.job(attempt, Vec::new(), false).sparse;
+            if !sparse.is_dir() {
+                continue;
+            }
+            for folder in files::entries(&sparse, |path| path.join("images.bin").is_file())? {
+                let model = read_model(&folder)?;
+                if best.as_ref().is_none_or(|best| model.images.len() > best.images.len()) {
+                    best = Some(model);
+                }
+            }
         }
-        counted.into_iter().max_by_key(|(count, _)| *count).map(|(_, model)| model).ok_or_else(|| {
-            DataError::field(&self.sparse, "models", "0 found, expected at least one", "begin again in another folder")
-        })
+        Ok(best.filter(|model| model.images.len() >= 2))
     }
 }
 
@@ -59,13 +85,14 @@ pub(super) fn posed_images(options: &PrepareOptions, cameras: &[String]) -> Resu
     Ok(lists.into_iter().filter_map(|list| list.into_iter().next()).collect())
 }
 
-/// Runs the phases that have not been done yet.
+/// Runs the phases that have not been done yet, and returns the best model.
 pub(super) fn reconstruct(
     options: &PrepareOptions,
     cameras: &[String],
+    colmap: &Colmap,
     record: &mut Record,
-    progress: &mut dyn FnMut(PrepareProgress),
-) -> Result<(), DataError> {
+    tell: &mut dyn FnMut(PrepareEvent),
+) -> Result<Model, DataError> {
     let work = Work::of(&options.out);
     let images = posed_images(options, cameras)?;
     let total = images.len();
@@ -73,98 +100,126 @@ pub(super) fn reconstruct(
         let problem = format!("{total} image to find poses for, expected at least 2");
         return Err(DataError::field(&work.images, "images", problem, "use a longer video, or more cameras"));
     }
-    let folder = options.out.join("work");
-    fs::create_dir_all(&folder).map_err(DataError::io("create", &folder))?;
-    write_atomically(&work.list, |out| images.iter().try_for_each(|name| writeln!(out, "{name}")))?;
+    // Databases of other versions cannot be read.
+    if record.poses_by(&colmap.name())? && work.folder.exists() {
+        fs::remove_dir_all(&work.folder).map_err(DataError::io("remove", &work.folder))?;
+    }
+    fs::create_dir_all(&work.folder).map_err(DataError::io("create", &work.folder))?;
+    let rig = cameras.len() > 1;
+    let small = image_size(&work.images.join(&images[0])).is_ok_and(|(width, height)| width.max(height) < SMALL);
+    loop {
+        let attempt = record.attempt();
+        let job = work.job(attempt, images.clone(), rig);
+        write_atomically(&job.list, |out| job.names.iter().try_for_each(|name| writeln!(out, "{name}")))?;
+        // A rig that stands still has few images, and needs every point.
+        let careful = attempt > 0 || (rig && !options.moving_rig);
+        let features = if careful { 6000 } else { 1536 };
+        let effort = Effort { size: 1600, features, doubled: careful || small };
+        let pairs = pairs(&images, ALL_PAIRS[attempt], if attempt == 0 { 0 } else { NEIGHBORS });
+        let mapper = if careful || total <= ALL_PAIRS[0] { Mapper::Incremental } else { Mapper::Global };
+        attempt_at(&job, effort, &pairs, mapper, colmap, record, tell)?;
+        let best = work.best_model()?;
+        let registered = best.as_ref().map_or(0, |model| model.images.len());
+        let motion = record.motion();
+        let turned = motion.moved >= LEAST_MOVED && motion.turned as f64 >= TURNED * motion.moved as f64;
+        if turned && best.as_ref().is_none_or(|model| super::write::parallax(model) < LEAST_PARALLAX) {
+            let share = 100 * motion.turned / motion.moved;
+            let problem = format!(
+                "the camera only turns: in {share} % of the {} pairs of images that differ much, a turn explains all that \
+                 moved, so there is no depth to be found",
+                motion.moved
+            );
+            let remedy = "film again and walk sideways, in an arc around the scene; from one place, film with several \
+                          cameras side by side, `light4gs prepare LEFT.mp4 MIDDLE.mp4 RIGHT.mp4 --out DIR`";
+            return Err(DataError::field(&work.images, "images", problem, remedy));
+        }
+        if registered as f64 >= LEAST_REGISTERED * total as f64 || attempt + 1 == ATTEMPTS {
+            return best.ok_or_else(|| {
+                let problem = format!("{} could not connect any two of the {total} images", colmap.name());
+                DataError::field(&work.images, "images", problem, FILM_AGAIN)
+            });
+        }
+        let again = if total <= ALL_PAIRS[attempt + 1] { "all pairs of images" } else { "more pairs of images" };
+        tell(
+            record.note(format!(
+                "{registered} of {total} images got a pose: trying again with {again} and more features"
+            ))?,
+        );
+        record.try_again()?;
+    }
+}
+
+/// The pairs to match: all of up to `most` images, otherwise those at powers of two in time, and `neighbors`.
+fn pairs(images: &[String], most: usize, neighbors: usize) -> Vec<(&str, &str)> {
+    let count = images.len();
+    let wanted = |distance: usize| count <= most || distance <= neighbors || distance.is_power_of_two();
+    let distances = (1..count).filter(|distance| wanted(*distance));
+    distances.flat_map(|d| (0..count - d).map(move |i| (images[i].as_str(), images[i + d].as_str()))).collect()
+}
+
+/// One attempt: the phases that it has not done yet.
+fn attempt_at(
+    job: &Job,
+    effort: Effort,
+    pairs: &[(&str, &str)],
+    mapper: Mapper,
+    colmap: &Colmap,
+    record: &mut Record,
+    tell: &mut dyn FnMut(PrepareEvent),
+) -> Result<(), DataError> {
+    let total = job.names.len();
     if !record.is_done(Phase::Features) {
-        features(&work, cameras.len() > 1, total, progress)?;
+        let mut done = |done: usize| tell(PrepareEvent::progress("features", done.min(total), total));
+        done(0);
+        colmap.features(job, effort, &mut done)?;
+        done(total);
         record.done(Phase::Features)?;
     }
     if !record.is_done(Phase::Matches) {
-        matches(&work, cameras.len() > 1, total, progress)?;
+        let list = job.database.with_extension("pairs.txt");
+        tell(PrepareEvent::progress("matches", 0, pairs.len()));
+        let mut done = 0;
+        let mut motion = Default::default();
+        for part in pairs.chunks(pairs.len().div_ceil(PARTS).max(1)) {
+            write_atomically(&list, |out| part.iter().try_for_each(|(a, b)| writeln!(out, "{a} {b}")))?;
+            motion = colmap.matches(job, &list)?;
+            done += part.len();
+            tell(PrepareEvent::progress("matches", done, pairs.len()));
+        }
+        record.moved(motion);
         record.done(Phase::Matches)?;
     }
     if !record.is_done(Phase::Poses) {
-        poses(&work, total, progress)?;
+        // The results of a mapper that was stopped are useless.
+        if job.sparse.exists() {
+            fs::remove_dir_all(&job.sparse).map_err(DataError::io("remove", &job.sparse))?;
+        }
+        fs::create_dir_all(&job.sparse).map_err(DataError::io("create", &job.sparse))?;
+        let mut done = |done: usize| tell(PrepareEvent::progress("poses", done.min(total), total));
+        done(0);
+        colmap.poses(job, mapper, &mut done)?;
         record.done(Phase::Poses)?;
+        let models = files::entries(&job.sparse, |path| path.join("images.bin").is_file())?;
+        let counts = models.iter().map(|model| Ok(read_model(model)?.images.len()));
+        let most = counts.collect::<Result<Vec<usize>, DataError>>()?.into_iter().max().unwrap_or(0);
+        tell(PrepareEvent::Placed { images: most.min(total), total });
     }
     Ok(())
 }
 
-/// A function that reports the progress that a line shows.
-fn counting<'a>(
-    phase: &'static str,
-    total: usize,
-    progress: &'a mut dyn FnMut(PrepareProgress),
-    count: impl Fn(&str) -> Option<usize> + 'a,
-) -> impl FnMut(&str) + 'a {
-    progress(PrepareProgress { phase, done: 0, total });
-    move |line| {
-        if let Some(done) = count(line) {
-            progress(PrepareProgress { phase, done: done.min(total), total });
-        }
-    }
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
 
-fn features(work: &Work, rig: bool, total: usize, progress: &mut dyn FnMut(PrepareProgress)) -> Result<(), DataError> {
-    let step = Step {
-        command: "feature_extractor",
-        gpu_groups: &["SiftExtraction", "FeatureExtraction"],
-        attempt: "finding features",
-        remedy: "remove the folder `work` in the output and try again",
-    };
-    let arguments = |command: &mut std::process::Command| {
-        path_argument(command, "--database_path", &work.database);
-        path_argument(command, "--image_path", &work.images);
-        path_argument(command, "--image_list_path", &work.list);
-        // A phone's lens needs two coefficients. From the single image of a rig's camera only one can be estimated.
-        command.args(["--ImageReader.camera_model", if rig { "SIMPLE_RADIAL" } else { "OPENCV" }]);
-        let cameras = if rig { "--ImageReader.single_camera_per_folder" } else { "--ImageReader.single_camera" };
-        command.args([cameras, "1"]);
-        command.args(["--SiftExtraction.max_num_features", &FEATURES.to_string()]);
-    };
-    run(&step, arguments, &mut counting("features", total, progress, |line| Some(counted(line)?.0)))
-}
-
-fn matches(work: &Work, rig: bool, total: usize, progress: &mut dyn FnMut(PrepareProgress)) -> Result<(), DataError> {
-    let all_pairs = rig || total <= EXHAUSTIVE;
-    let step = Step {
-        command: if all_pairs { "exhaustive_matcher" } else { "sequential_matcher" },
-        gpu_groups: &["SiftMatching", "FeatureMatching"],
-        attempt: "matching features",
-        remedy: "remove the folder `work` in the output and try again",
-    };
-    let arguments = |command: &mut std::process::Command| {
-        path_argument(command, "--database_path", &work.database);
-        if !all_pairs {
-            command.args(["--SequentialMatching.overlap", &OVERLAP.to_string()]);
-        }
-    };
-    // With all pairs COLMAP counts blocks, with neighbors it counts images.
-    let count = move |line: &str| {
-        let (done, of) = counted(line)?;
-        Some(if of == total { done } else { total * done.saturating_sub(1) / of.max(1) })
-    };
-    run(&step, arguments, &mut counting("matches", total, progress, count))
-}
-
-fn poses(work: &Work, total: usize, progress: &mut dyn FnMut(PrepareProgress)) -> Result<(), DataError> {
-    // The results of a mapper that was stopped are useless.
-    if work.sparse.exists() {
-        fs::remove_dir_all(&work.sparse).map_err(DataError::io("remove", &work.sparse))?;
+    #[test]
+    fn pairs_are_near_in_time_or_all() {
+        let names: Vec<String> = (0..30).map(|i| format!("{i:02}")).collect();
+        assert_eq!(pairs(&names[..5], 24, 0).len(), 10);
+        let few = pairs(&names, 24, 0);
+        assert_eq!(few.len(), 29 + 28 + 26 + 22 + 14);
+        assert!(few.contains(&("00", "16")) && !few.contains(&("00", "03")));
+        let more = pairs(&names, 24, 12);
+        assert!(more.contains(&("00", "03")) && more.len() > few.len());
+        assert_eq!(pairs(&names, 90, 0).len(), 30 * 29 / 2);
     }
-    fs::create_dir_all(&work.sparse).map_err(DataError::io("create", &work.sparse))?;
-    let remedy = "film again: move sideways, slowly, past something with texture (see docs/data.md)";
-    let step = Step { command: "mapper", gpu_groups: &[], attempt: "finding poses", remedy };
-    let arguments = |command: &mut std::process::Command| {
-        path_argument(command, "--database_path", &work.database);
-        path_argument(command, "--image_path", &work.images);
-        path_argument(command, "--output_path", &work.sparse);
-    };
-    run(&step, arguments, &mut counting("poses", total, progress, registered))?;
-    if files::entries(&work.sparse, |path| path.join("images.bin").is_file())?.is_empty() {
-        let colmap = crate::programs::colmap::COLMAP;
-        return Err(colmap.error("no two of the images could be connected", remedy));
-    }
-    Ok(())
 }

@@ -1,8 +1,10 @@
 //! A record of the phases that are done, on disk, so that a second call can continue.
 
-use super::PrepareOptions;
+use super::{PrepareEvent, PrepareOptions};
 use crate::atomic::write_atomically;
+use crate::digest::Content;
 use crate::error::DataError;
+use crate::programs::colmap::Motion;
 use crate::regular_file::read_regular_text;
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -28,8 +30,8 @@ pub(super) enum Phase {
 /// The settings on which the phases depend.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Settings {
-    /// Path and bytes of each video.
-    videos: Vec<(String, u64)>,
+    /// Path and content of each video.
+    videos: Vec<(String, Content)>,
     frames: usize,
     max_width: u32,
     moving_rig: bool,
@@ -38,9 +40,8 @@ pub(super) struct Settings {
 impl Settings {
     pub(super) fn of(options: &PrepareOptions) -> Result<Self, DataError> {
         let video = |path: &PathBuf| {
-            let length = fs::metadata(path).map_err(DataError::io("read", path))?.len();
             let place = std::path::absolute(path).map_err(DataError::io("read", path))?;
-            Ok((place.to_string_lossy().into_owned(), length))
+            Ok((place.to_string_lossy().into_owned(), Content::of(path)?))
         };
         Ok(Self {
             videos: options.videos.iter().map(video).collect::<Result<_, DataError>>()?,
@@ -55,6 +56,17 @@ impl Settings {
 struct Contents {
     settings: Settings,
     done: Vec<Phase>,
+    /// The attempt at poses, counted from 0.
+    #[serde(default)]
+    attempt: usize,
+    /// The program that finds the poses.
+    #[serde(default)]
+    poses_by: String,
+    #[serde(default)]
+    motion: Motion,
+    /// What was said on the way.
+    #[serde(default)]
+    notes: Vec<String>,
 }
 
 /// The record of a folder.
@@ -70,8 +82,12 @@ impl Record {
         let path = out.join(FILE);
         if path.exists() {
             let text = read_regular_text(&path, MAX_BYTES).map_err(DataError::io("read", &path))?;
-            let contents: Contents =
+            let value: serde_json::Value =
                 serde_json::from_str(&text).map_err(|source| DataError::Json { path: path.clone(), source })?;
+            let contents: Contents = serde_json::from_value(value).map_err(|error| {
+                let problem = format!("the folder was begun by another version of the program ({error})");
+                DataError::field(&path, "settings", problem, "name another folder, or remove this one")
+            })?;
             if contents.settings != settings {
                 return Err(DataError::field(
                     &path,
@@ -87,7 +103,15 @@ impl Record {
             return Err(DataError::Exists { path: out.to_path_buf() });
         }
         fs::create_dir_all(out).map_err(DataError::io("create", out))?;
-        let record = Self { path, contents: Contents { settings, done: Vec::new() } };
+        let contents = Contents {
+            settings,
+            done: Vec::new(),
+            attempt: 0,
+            poses_by: String::new(),
+            motion: Motion::default(),
+            notes: Vec::new(),
+        };
+        let record = Self { path, contents };
         record.save()?;
         Ok(record)
     }
@@ -100,6 +124,56 @@ impl Record {
         if !self.is_done(phase) {
             self.contents.done.push(phase);
         }
+        self.save()
+    }
+
+    /// Keeps a note, and returns it for the caller.
+    pub(super) fn note(&mut self, note: String) -> Result<PrepareEvent, DataError> {
+        if !self.contents.notes.contains(&note) {
+            self.contents.notes.push(note.clone());
+            self.save()?;
+        }
+        Ok(PrepareEvent::Note(note))
+    }
+
+    pub(super) fn notes(&self) -> &[String] {
+        &self.contents.notes
+    }
+
+    pub(super) fn motion(&self) -> Motion {
+        self.contents.motion
+    }
+
+    pub(super) fn moved(&mut self, motion: Motion) {
+        self.contents.motion = motion;
+    }
+
+    pub(super) fn attempt(&self) -> usize {
+        self.contents.attempt.min(1)
+    }
+
+    /// Begins the next attempt at poses.
+    pub(super) fn try_again(&mut self) -> Result<(), DataError> {
+        self.contents.attempt += 1;
+        self.forget_poses()
+    }
+
+    /// Notes the program that finds the poses, and returns whether it is another one than that which began.
+    pub(super) fn poses_by(&mut self, program: &str) -> Result<bool, DataError> {
+        // Poses that are found need no program.
+        if self.is_done(Phase::Poses) || self.contents.poses_by == program {
+            return Ok(false);
+        }
+        let other = !self.contents.poses_by.is_empty();
+        program.clone_into(&mut self.contents.poses_by);
+        self.contents.attempt = 0;
+        self.forget_poses()?;
+        Ok(other)
+    }
+
+    fn forget_poses(&mut self) -> Result<(), DataError> {
+        self.contents.done.retain(|phase| *phase == Phase::Frames);
+        self.contents.motion = Motion::default();
         self.save()
     }
 
@@ -118,7 +192,10 @@ mod tests {
     fn a_folder_goes_on_with_the_same_settings_only() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("out");
-        let settings = Settings { videos: vec![("a.mp4".into(), 7)], frames: 10, max_width: 100, moving_rig: false };
+        let video = folder.path().join("a.mp4");
+        fs::write(&video, "one").unwrap();
+        let options = PrepareOptions { frames: 10, ..PrepareOptions::new(vec![video.clone()], out.clone()) };
+        let settings = Settings::of(&options).unwrap();
         let mut record = Record::open(&out, settings.clone()).unwrap();
         assert!(!record.is_done(Phase::Frames));
         record.done(Phase::Frames).unwrap();
@@ -126,6 +203,22 @@ mod tests {
         assert!(record.is_done(Phase::Frames) && !record.is_done(Phase::Poses));
         let other = Record::open(&out, Settings { frames: 11, ..settings.clone() }).err().unwrap().to_string();
         assert!(other.contains("other videos or options"), "{other}");
+        // A video of the same name and length.
+        fs::write(&video, "two").unwrap();
+        assert!(Record::open(&out, Settings::of(&options).unwrap()).is_err());
+        // A new attempt keeps the frames, and so does another program.
+        let mut record = Record::open(&out, settings.clone()).unwrap();
+        assert!(!record.poses_by("COLMAP 3.8").unwrap());
+        record.done(Phase::Features).unwrap();
+        record.try_again().unwrap();
+        assert!(record.is_done(Phase::Frames) && !record.is_done(Phase::Features) && record.attempt() == 1);
+        record.done(Phase::Features).unwrap();
+        assert!(!record.poses_by("COLMAP 3.8").unwrap() && record.is_done(Phase::Features));
+        assert!(record.poses_by("pycolmap 4.2.1").unwrap() && !record.is_done(Phase::Features));
+        assert_eq!(record.attempt(), 0);
+        fs::write(out.join(FILE), r#"{"settings": {"videos": [["a", 7]]}, "done": []}"#).unwrap();
+        let older = Record::open(&out, settings.clone()).err().unwrap().to_string();
+        assert!(older.contains("another version"), "{older}");
         fs::write(out.join(FILE), "{").unwrap();
         assert!(Record::open(&out, settings.clone()).err().unwrap().to_string().contains("not valid JSON"));
         fs::remove_file(out.join(FILE)).unwrap();

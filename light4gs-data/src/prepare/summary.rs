@@ -1,9 +1,8 @@
 //! The result, and advice if it is poor.
 
+use super::poses::{LEAST_PARALLAX, LEAST_REGISTERED};
 use std::fmt;
 
-/// If a smaller share of the images has a pose, something went wrong.
-const LEAST_REGISTERED: f64 = 0.8;
 /// If the mean reprojection error, in pixels, is larger, the poses blur the trained scene.
 const MOST_ERROR: f64 = 1.5;
 /// If there are fewer points, the images had too little texture.
@@ -24,6 +23,10 @@ pub struct PrepareSummary {
     pub frames: usize,
     /// Cameras of the dataset.
     pub cameras: usize,
+    /// The angle, in degrees, at which a point at the usual depth sees the two cameras that are farthest apart.
+    pub parallax: f64,
+    /// What was changed or tried on the way, and what is wrong with the videos: sentences.
+    pub notes: Vec<String>,
 }
 
 impl PrepareSummary {
@@ -38,6 +41,12 @@ impl PrepareSummary {
                 "Many frames have no pose: move more slowly and sideways, avoid blank walls and fast turns, or take more \
                  frames with --frames."
             });
+        }
+        if self.parallax < LEAST_PARALLAX {
+            advice.push(
+                "The camera hardly moved, so that depths are guesses: walk sideways, in an arc around the scene; turning on \
+                 the spot does not help.",
+            );
         }
         if self.reprojection_error > MOST_ERROR {
             advice.push(
@@ -61,6 +70,7 @@ impl fmt::Display for PrepareSummary {
         writeln!(f, "images with a pose      {} of {} ({share:.0} %)", self.registered, self.images)?;
         writeln!(f, "reprojection error      {:.2} pixels", self.reprojection_error)?;
         writeln!(f, "points                  {}", self.points)?;
+        writeln!(f, "parallax                {:.1} degrees", self.parallax)?;
         write!(f, "frames of the dataset   {} of {} camera", self.frames, self.cameras)?;
         f.write_str(if self.cameras == 1 { "" } else { "s" })?;
         for advice in self.advice() {
@@ -83,11 +93,13 @@ mod tests {
             points: 9000,
             frames: 98,
             cameras: 1,
+            parallax: 40.0,
+            notes: Vec::new(),
         };
         assert!(good.advice().is_empty());
         assert!(good.to_string().contains("98 of 100 (98 %)"));
-        let poor = PrepareSummary { registered: 40, reprojection_error: 2.5, points: 80, ..good };
-        assert_eq!(poor.advice().len(), 3);
+        let poor = PrepareSummary { registered: 40, reprojection_error: 2.5, points: 80, parallax: 0.4, ..good };
+        assert_eq!(poor.advice().len(), 4);
         assert!(poor.to_string().contains("sideways"));
     }
 }

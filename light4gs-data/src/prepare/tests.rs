@@ -15,7 +15,7 @@ const FOV: f32 = 1.0;
 
 fn installed() -> bool {
     let missing: Vec<String> =
-        [FFMPEG.version().err(), COLMAP.version().err()].into_iter().flatten().map(|e| e.to_string()).collect();
+        [FFMPEG.version().err(), Colmap::find().err()].into_iter().flatten().map(|e| e.to_string()).collect();
     for problem in &missing {
         println!("skipped: {problem}");
     }
@@ -100,9 +100,11 @@ fn a_moving_camera_becomes_a_dataset_and_a_second_call_goes_on() {
     let mut options = PrepareOptions::new(vec![video], folder.path().join("out"));
     options.frames = 16;
     let mut phases = Vec::new();
-    let summary = prepare(&options, &mut |progress| {
-        phases.push(progress.phase);
-        assert!(progress.done <= progress.total);
+    let summary = prepare(&options, &mut |event| {
+        if let PrepareEvent::Progress { phase, done, total } = event {
+            phases.push(phase);
+            assert!(done <= total);
+        }
     })
     .unwrap();
     phases.dedup();
@@ -131,8 +133,8 @@ fn a_moving_camera_becomes_a_dataset_and_a_second_call_goes_on() {
     // Nothing is done twice; a lost file is made again.
     fs::remove_file(options.out.join("transforms.json")).unwrap();
     let mut again = Vec::new();
-    assert_eq!(prepare(&options, &mut |progress| again.push(progress.phase)).unwrap(), summary);
-    assert_eq!(again, ["dataset"]);
+    assert_eq!(prepare(&options, &mut |event| again.push(event)).unwrap(), summary);
+    assert_eq!(again, [PrepareEvent::progress("dataset", 1, 1)]);
     options.frames = 8;
     assert!(prepare(&options, &mut |_| {}).unwrap_err().to_string().contains("other videos or options"));
 }

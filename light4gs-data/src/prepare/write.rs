@@ -1,13 +1,10 @@
 //! Writing the dataset: `transforms.json` and `points3D.ply`, from COLMAP's model.
 
-use super::poses::{Work, posed_images};
+use super::poses::posed_images;
 use super::{PrepareOptions, PrepareSummary, frame_names};
 use crate::atomic::write_atomically;
 use crate::error::DataError;
-use crate::layouts::colmap::{
-    model::{Model, ModelCamera, ModelImage},
-    read_model,
-};
+use crate::layouts::colmap::model::{Model, ModelCamera, ModelImage};
 use crate::lens::Distortion;
 use crate::ply::Encoding;
 use crate::programs::ffmpeg::Taken;
@@ -21,8 +18,12 @@ use std::io::Write;
 const CAMERA_DISTANCE: f64 = 4.0;
 
 /// Writes the dataset, and summarizes it.
-pub(super) fn dataset(options: &PrepareOptions, cameras: &[String]) -> Result<PrepareSummary, DataError> {
-    let mut model = read_model(&Work::of(&options.out).best_model()?)?;
+pub(super) fn dataset(
+    options: &PrepareOptions,
+    cameras: &[String],
+    mut model: Model,
+    notes: Vec<String>,
+) -> Result<PrepareSummary, DataError> {
     let wanted = posed_images(options, cameras)?.len();
     let registered = model.images.len();
     normalize(&mut model);
@@ -55,6 +56,8 @@ pub(super) fn dataset(options: &PrepareOptions, cameras: &[String]) -> Result<Pr
         points: model.points.len(),
         frames: frames.len(),
         cameras: used,
+        parallax: parallax(&model),
+        notes,
     };
     model.points.write_ply(&options.out.join("points3D.ply"), Encoding::BinaryLittleEndian)?;
     let document = json!({ "ply_file_path": "points3D.ply", "frames": frames });
@@ -83,18 +86,37 @@ fn frame(name: &str, time: f64, image: &ModelImage, camera: &ModelCamera) -> Val
     value
 }
 
-/// COLMAP's world has an arbitrary origin, orientation and size. Turns the mean upward direction of the cameras to z,
-/// moves the middle of the points to the origin, and scales to the usual distance of the cameras.
-fn normalize(model: &mut Model) {
-    let up = model.images.iter().map(|image| -image.rotation.row(1)).sum::<DVec3>().normalize_or(DVec3::Z);
-    let side = up.any_orthonormal_vector();
-    let turn = DMat3::from_cols(side, up.cross(side), up).transpose();
+/// The median of each coordinate of the points.
+fn middle(model: &Model) -> DVec3 {
     let mut middle = DVec3::ZERO;
     for axis in 0..3 {
         let mut values: Vec<f32> = model.points.positions.iter().map(|point| point[axis]).collect();
         values.sort_by(f32::total_cmp);
         middle[axis] = values.get(values.len() / 2).copied().unwrap_or(0.0).into();
     }
+    middle
+}
+
+/// The angle, in degrees, at which a point at the usual depth sees the two cameras that are farthest apart.
+pub(super) fn parallax(model: &Model) -> f64 {
+    let centers = model.images.iter().map(|image| image.center);
+    let between = centers.clone().flat_map(|a| model.images.iter().map(move |b| a.distance(b.center)));
+    let extent = between.fold(0.0, f64::max);
+    let mean = centers.sum::<DVec3>() / model.images.len().max(1) as f64;
+    let mut depths: Vec<f64> =
+        model.points.positions.iter().map(|point| mean.distance(DVec3::from(point.map(f64::from)))).collect();
+    depths.sort_by(f64::total_cmp);
+    let depth = depths.get(depths.len() / 2).copied().unwrap_or(0.0);
+    if extent > 0.0 { (2.0 * (extent / (2.0 * depth)).atan()).to_degrees() } else { 0.0 }
+}
+
+/// COLMAP's world has an arbitrary origin, orientation and size. Turns the mean upward direction of the cameras to z,
+/// moves the middle of the points to the origin, and scales to the usual distance of the cameras.
+fn normalize(model: &mut Model) {
+    let up = model.images.iter().map(|image| -image.rotation.row(1)).sum::<DVec3>().normalize_or(DVec3::Z);
+    let side = up.any_orthonormal_vector();
+    let turn = DMat3::from_cols(side, up.cross(side), up).transpose();
+    let middle = middle(model);
     let count = model.images.len().max(1) as f64;
     let distance = model.images.iter().map(|image| image.center.distance(middle)).sum::<f64>() / count;
     let scale = if distance > 1e-9 { CAMERA_DISTANCE / distance } else { 1.0 };

@@ -8,9 +8,22 @@ use std::collections::VecDeque;
 use std::ffi::OsStr;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::process::{Command, Output, Stdio};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
 
 /// Lines of a program's output that an error quotes.
 const QUOTED_LINES: usize = 6;
+
+/// What to do with a line of a program that runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Heard {
+    /// It is quoted, should the program fail.
+    Quote,
+    /// It is not.
+    Forget,
+    /// The program is stopped.
+    Stop,
+}
 
 /// A program that the user installs.
 pub(crate) struct Program {
@@ -86,21 +99,21 @@ impl Program {
         Err(self.error(format!("{attempt} failed ({}): {words}", output.status), remedy))
     }
 
-    /// As [`Self::run`], calling `line` with every line that the program prints while it runs. It says whether the line is
-    /// worth to be quoted, should the program fail.
+    /// As [`Self::run`], calling `line` with every line that the program prints while it runs, and with `None` once a second
+    /// while it prints none. Returns whether it ran to its end: `line` may stop it.
     ///
     /// # Errors
     /// As [`Self::run`].
     pub(crate) fn stream(
         &self,
         command: &mut Command,
-        line: &mut dyn FnMut(&str) -> bool,
+        line: &mut dyn FnMut(Option<&str>) -> Heard,
         attempt: &str,
         remedy: &str,
-    ) -> Result<(), DataError> {
+    ) -> Result<bool, DataError> {
         command.stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = command.spawn().map_err(|e| self.not_started(&e))?;
-        let (sender, lines) = std::sync::mpsc::channel::<String>();
+        let (sender, lines) = mpsc::channel::<String>();
         let streams: [Option<Box<dyn Read + Send>>; 2] = [
             child.stdout.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>),
             child.stderr.take().map(|stream| Box::new(stream) as Box<dyn Read + Send>),
@@ -118,9 +131,21 @@ impl Program {
         }
         drop(sender);
         let mut last: VecDeque<String> = VecDeque::new();
-        for text in lines {
-            if line(&text) {
-                last.push_back(text);
+        loop {
+            let text = match lines.recv_timeout(Duration::from_secs(1)) {
+                Ok(text) => Some(text),
+                Err(RecvTimeoutError::Timeout) => None,
+                Err(RecvTimeoutError::Disconnected) => break,
+            };
+            match (line(text.as_deref()), text) {
+                (Heard::Stop, _) => {
+                    // It may have ended by itself.
+                    let _ = child.kill();
+                    let _ = child.wait();
+                    return Ok(false);
+                }
+                (Heard::Quote, Some(text)) => last.push_back(text),
+                _ => {}
             }
             if last.len() > 4 * QUOTED_LINES {
                 last.pop_front();
@@ -128,7 +153,7 @@ impl Program {
         }
         let status = child.wait().map_err(|e| self.not_started(&e))?;
         if status.success() {
-            return Ok(());
+            return Ok(true);
         }
         let words = last_lines(last.make_contiguous().join("\n").as_bytes());
         Err(self.error(format!("{attempt} failed ({status}): {words}"), remedy))
@@ -183,15 +208,37 @@ mod tests {
         assert!(message.contains("is not installed") && message.contains("apt install nothing"), "{message}");
     }
 
+    const SHELL: Program = Program {
+        name: "sh",
+        variable: "LIGHT4GS_NO_SUCH_VARIABLE",
+        version_arguments: &[],
+        oldest: (0, 0),
+        install: "",
+    };
+
+    #[test]
+    fn lines_are_heard_and_may_stop_the_program() {
+        let mut command = SHELL.command();
+        command.args(["-c", "echo one; echo two >&2; echo three; exit 1"]);
+        let mut heard = Vec::new();
+        let mut line = |line: Option<&str>| {
+            heard.extend(line.map(str::to_owned));
+            if line == Some("two") { Heard::Quote } else { Heard::Forget }
+        };
+        let message = SHELL.stream(&mut command, &mut line, "counting", "rest").unwrap_err().to_string();
+        heard.sort();
+        assert_eq!(heard, ["one", "three", "two"]);
+        assert!(message.contains("counting failed") && message.ends_with(": two; rest"), "{message}");
+        let mut command = SHELL.command();
+        command.args(["-c", "echo begun; exec sleep 60"]);
+        let begun = std::time::Instant::now();
+        assert!(!SHELL.stream(&mut command, &mut |_| Heard::Stop, "waiting", "rest").unwrap());
+        assert!(begun.elapsed() < Duration::from_secs(30));
+    }
+
     #[test]
     fn failures_quote_the_last_words() {
-        let shell = Program {
-            name: "sh",
-            variable: "LIGHT4GS_NO_SUCH_VARIABLE",
-            version_arguments: &[],
-            oldest: (0, 0),
-            install: "",
-        };
+        let shell = SHELL;
         let script = "echo first; printf 'bad \\033[31mthing\\n' >&2; exit 3";
         let message = shell.run(shell.command().args(["-c", script]), "trying", "try again").unwrap_err().to_string();
         assert!(message.contains("trying failed") && message.contains("bad [31mthing"), "{message}");

@@ -1,10 +1,12 @@
-//! `prepare`.
+//! `prepare`, and its progress.
 
+use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use light4gs_data::{PrepareOptions, PrepareProgress, prepare};
+use light4gs_data::{PrepareEvent, PrepareOptions, prepare};
 use light4gs_train::error::TrainError;
 
 use super::output::{say, tell};
@@ -26,7 +28,7 @@ pub(super) struct Prepare {
     /// The cameras of a rig move, so every frame gets a pose of its own. Without this option they stand still.
     #[arg(long)]
     moving: bool,
-    /// No progress bars.
+    /// No progress.
     #[arg(long)]
     quiet: bool,
 }
@@ -40,9 +42,9 @@ impl Prepare {
             max_width: self.max_width,
             moving_rig: self.moving,
         };
-        let mut bars = PhaseBars { quiet: self.quiet, phase: "", bar: ProgressBar::hidden() };
-        let summary = prepare(&options, &mut |progress| bars.show(&progress))?;
-        bars.bar.finish();
+        let mut phases = Phases::new(self.quiet);
+        let summary = prepare(&options, &mut |event| phases.hear(event))?;
+        phases.end();
         say(&summary)?;
         let out = options.out.display();
         say(format_args!("\nnext: light4gs train {out} --out runs/my-scene"))?;
@@ -53,25 +55,81 @@ impl Prepare {
     }
 }
 
-/// A bar for each phase, one after the other.
-struct PhaseBars {
+/// How long a log is silent in a phase.
+const SILENCE: Duration = Duration::from_secs(30);
+
+/// The progress of `prepare`: a bar for each phase on a terminal, and a line for each in a log.
+pub(super) struct Phases {
     quiet: bool,
+    terminal: bool,
     phase: &'static str,
+    begun: Instant,
+    /// When the log has had its last line of this phase; `None` after the line about its end.
+    said: Option<Instant>,
     bar: ProgressBar,
 }
 
-impl PhaseBars {
-    fn show(&mut self, progress: &PrepareProgress) {
-        if self.quiet {
+impl Phases {
+    /// `quiet` shows notes only.
+    pub(super) fn new(quiet: bool) -> Self {
+        let terminal = std::io::stderr().is_terminal();
+        let now = Instant::now();
+        Self { quiet, terminal, phase: "", begun: now, said: None, bar: ProgressBar::hidden() }
+    }
+
+    pub(super) fn hear(&mut self, event: PrepareEvent) {
+        match event {
+            PrepareEvent::Note(note) => self.bar.suspend(|| tell(format_args!("note: {note}"))),
+            _ if self.quiet => {}
+            PrepareEvent::Progress { phase, done, total } => {
+                if phase != self.phase || self.said.is_none() {
+                    self.begin(phase, total);
+                }
+                self.bar.set_position(done as u64);
+                // When all images have a pose, the mapper goes on to improve them.
+                if done == total && phase != "poses" {
+                    self.finish(&total.to_string());
+                } else {
+                    self.still(done, total);
+                }
+            }
+            PrepareEvent::Placed { images, total } => self.finish(&format!("{images} of {total}")),
+        }
+    }
+
+    /// Removes the last bar.
+    pub(super) fn end(&self) {
+        self.bar.finish();
+    }
+
+    fn begin(&mut self, phase: &'static str, total: usize) {
+        self.bar.finish();
+        (self.phase, self.begun, self.said) = (phase, Instant::now(), Some(Instant::now()));
+        if self.terminal {
+            let template = "{prefix:>8} {wide_bar:.cyan/blue} {pos}/{len}  {elapsed}  ETA {eta}";
+            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+            self.bar = ProgressBar::new(total as u64).with_style(style).with_prefix(phase);
+            // The clock goes on while a program says nothing.
+            self.bar.enable_steady_tick(Duration::from_secs(1));
+        }
+    }
+
+    /// A line now and then, so that a log shows that work goes on.
+    fn still(&mut self, done: usize, total: usize) {
+        if self.terminal || self.said.is_none_or(|said| said.elapsed() < SILENCE) {
             return;
         }
-        if progress.phase != self.phase {
-            self.bar.finish();
-            self.phase = progress.phase;
-            let template = "{prefix:>8} {wide_bar:.cyan/blue} {pos}/{len}  {elapsed}";
-            let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-            self.bar = ProgressBar::new(progress.total as u64).with_style(style).with_prefix(progress.phase);
+        self.said = Some(Instant::now());
+        let left = self.begun.elapsed().as_secs_f64() * (total - done) as f64 / done.max(1) as f64;
+        let left = if done > 0 { format!(", about {left:.0} s left") } else { String::new() };
+        tell(format_args!("{}: {done} of {total}{left}", self.phase));
+    }
+
+    fn finish(&mut self, what: &str) {
+        self.bar.finish();
+        if !self.terminal && self.said.is_some() && self.phase != "dataset" {
+            tell(format_args!("{}: {what} in {:.0} s", self.phase, self.begun.elapsed().as_secs_f64()));
         }
-        self.bar.set_position(progress.done as u64);
+        self.said = None;
     }
 }

@@ -6,7 +6,7 @@ use super::taken::Taken;
 use super::{FFMPEG, FPS_MODE};
 use crate::atomic::make_folder_atomically;
 use crate::error::DataError;
-use crate::programs::argument;
+use crate::programs::{Heard, argument};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
@@ -72,11 +72,12 @@ pub(crate) fn extract_frames(
         let attempt = format!("extracting frames of {}", video.display());
         let remedy = "check that the video plays; convert it to MP4 with H.264";
         let mut times = Times::default();
-        let mut line = |line: &str| {
+        let mut line = |line: Option<&str>| {
+            let Some(line) = line else { return Heard::Forget };
             if times.hear(line) {
                 done(times.seconds.len());
             }
-            line.contains("[error]") || line.contains("[fatal]")
+            if line.contains("[error]") || line.contains("[fatal]") { Heard::Quote } else { Heard::Forget }
         };
         FFMPEG.stream(&mut extraction(version, &video, part, wanted, &filters), &mut line, &attempt, remedy)?;
         let written = fs::read_dir(part).map_err(DataError::io("read", part))?.count();
