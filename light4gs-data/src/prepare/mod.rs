@@ -15,7 +15,7 @@ pub use summary::PrepareSummary;
 use crate::error::DataError;
 use crate::layouts::shared::files;
 use crate::programs::colmap::Colmap;
-use crate::programs::ffmpeg::{FFMPEG, Pace, VideoInfo, Wanted, extract_frames, video_info};
+use crate::programs::ffmpeg::{FFMPEG, Pace, VideoInfo, Wanted, extract_frames, frame_count, video_info};
 use record::{Phase, Record, Settings};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -134,7 +134,11 @@ fn frames(
     if let Some(note) = about_durations(&options.videos, &infos) {
         tell(record.note(note)?);
     }
-    let pace = pace(&infos, options.frames);
+    let pace = match &options.videos[..] {
+        // As many as there are: none is left out.
+        [video] if frame_count(video)?.is_some_and(|count| count <= options.frames) => Pace::All,
+        _ => pace(&infos, options.frames),
+    };
     let of_video = |info: &VideoInfo| match pace {
         // A video may have fewer frames than are asked for.
         Pace::All if info.duration * info.rate >= 1.0 => {

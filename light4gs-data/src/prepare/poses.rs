@@ -8,30 +8,39 @@ use crate::error::DataError;
 use crate::images::image_size;
 use crate::layouts::colmap::{model::Model, read_model};
 use crate::layouts::shared::files;
-use crate::programs::colmap::{Colmap, Effort, FILM_AGAIN, Job, Mapper};
+use crate::programs::colmap::{Colmap, Effort, FILM_AGAIN, Job, Mapper, Motion};
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// Up to this many images all pairs are matched, in the first attempt and in the second.
-const ALL_PAIRS: [usize; 2] = [24, 90];
+const ALL_PAIRS: [usize; 2] = [24, 60];
 /// With more images, those at distances in time that are powers of two: near ones overlap, far ones close loops.
 /// In the second attempt, each of so many neighbors as well.
-const NEIGHBORS: usize = 12;
+const NEIGHBORS: usize = 8;
 /// The pairs are matched in so many parts, for the progress.
 const PARTS: usize = 16;
 /// Images with a longer side below this number of pixels are doubled in size before features are searched.
 const SMALL: u32 = 800;
 /// If a smaller share of the images has a pose, there is a second attempt.
 pub(super) const LEAST_REGISTERED: f64 = 0.8;
-/// If so large a share of the pairs that moved shows nothing but a turn, and there are this many, the camera only turned.
-const TURNED: f64 = 0.9;
+/// If so large a share of the pairs that moved shows nothing but a turn, and there are this many, and there is no model of a
+/// fair share of the images, the camera only turned.
+const TURNED: f64 = 0.5;
 const LEAST_MOVED: usize = 8;
+const FAIR_SHARE: f64 = 0.4;
+/// A model with fewer points than this an image is none: COLMAP has guessed the poses.
+const LEAST_POINTS: usize = 8;
 /// With a smaller parallax, in degrees, there is no depth.
 pub(super) const LEAST_PARALLAX: f64 = 1.5;
 
+/// If more than this share only turned, cameras are placed all at once: that needs less parallax, and takes longer.
+const OFTEN_TURNED: f64 = 0.3;
+
 /// The attempts.
 const ATTEMPTS: usize = 2;
+/// How the names of folders of models begin.
+const SPARSE: &str = "sparse";
 
 /// The files of the phases in the folder.
 pub(super) struct Work {
@@ -52,28 +61,41 @@ impl Work {
             names,
             list: self.folder.join("images.txt"),
             database: self.folder.join(format!("{}.db", numbered("database"))),
-            sparse: self.folder.join(numbered("sparse")),
+            sparse: self.folder.join(numbered(SPARSE)),
             rig,
         }
     }
 
-    /// The model with the most images of all attempts: COLMAP writes one for each group of images that it could connect.
+    /// The model with the most images of all attempts, if there is one: COLMAP writes one for each group of images that it
+    /// could connect.
     pub(super) fn best_model(&self) -> Result<Option<Model>, DataError> {
         let mut best: Option<Model> = None;
-        for attempt in 0..ATTEMPTS {
-            let sparse = self.job(attempt, Vec::new(), false).sparse;
-            if !sparse.is_dir() {
-                continue;
-            }
-            for folder in files::entries(&sparse, |path| path.join("images.bin").is_file())? {
-                let model = read_model(&folder)?;
-                if best.as_ref().is_none_or(|best| model.images.len() > best.images.len()) {
-                    best = Some(model);
-                }
+        for sparse in files::entries(&self.folder, |path| path.is_dir() && files::name_of(path).starts_with(SPARSE))? {
+            let model = best_of(&sparse)?;
+            if count(&model) > count(&best) {
+                best = model;
             }
         }
-        Ok(best.filter(|model| model.images.len() >= 2))
+        Ok(best)
     }
+}
+
+/// The number of images with a pose.
+fn count(model: &Option<Model>) -> usize {
+    model.as_ref().map_or(0, |model| model.images.len())
+}
+
+/// The model with the most images in a folder of models.
+fn best_of(sparse: &Path) -> Result<Option<Model>, DataError> {
+    let mut best: Option<Model> = None;
+    for folder in files::entries(sparse, |path| path.join("images.bin").is_file())? {
+        let model = read_model(&folder)?;
+        let guessed = model.points.len() < LEAST_POINTS * model.images.len();
+        if !guessed && model.images.len() >= 2 && count(&best) < model.images.len() {
+            best = Some(model);
+        }
+    }
+    Ok(best)
 }
 
 /// The images that need a pose: all images of a moving camera, or the first ones of a rig that stands still.
@@ -113,16 +135,18 @@ pub(super) fn reconstruct(
         write_atomically(&job.list, |out| job.names.iter().try_for_each(|name| writeln!(out, "{name}")))?;
         // A rig that stands still has few images, and needs every point.
         let careful = attempt > 0 || (rig && !options.moving_rig);
-        let features = if careful { 6000 } else { 1536 };
-        let effort = Effort { size: 1600, features, doubled: careful || small };
+        let features = if careful { 4096 } else { 1200 };
+        let effort = Effort { size: 1600, features, doubled: small || (careful && total <= ALL_PAIRS[0]) };
         let pairs = pairs(&images, ALL_PAIRS[attempt], if attempt == 0 { 0 } else { NEIGHBORS });
-        let mapper = if careful || total <= ALL_PAIRS[0] { Mapper::Incremental } else { Mapper::Global };
-        attempt_at(&job, effort, &pairs, mapper, colmap, record, tell)?;
+        features_and_matches(&job, effort, &pairs, colmap, record, tell)?;
+        if !record.is_done(Phase::Poses) {
+            poses(&work, &job, colmap, record.motion(), tell)?;
+            record.done(Phase::Poses)?;
+        }
         let best = work.best_model()?;
-        let registered = best.as_ref().map_or(0, |model| model.images.len());
+        let registered = count(&best);
         let motion = record.motion();
-        let turned = motion.moved >= LEAST_MOVED && motion.turned as f64 >= TURNED * motion.moved as f64;
-        if turned && best.as_ref().is_none_or(|model| super::write::parallax(model) < LEAST_PARALLAX) {
+        if only_turned(&best, total, motion) {
             let share = 100 * motion.turned / motion.moved;
             let problem = format!(
                 "the camera only turns: in {share} % of the {} pairs of images that differ much, a turn explains all that \
@@ -157,12 +181,18 @@ fn pairs(images: &[String], most: usize, neighbors: usize) -> Vec<(&str, &str)> 
     distances.flat_map(|d| (0..count - d).map(move |i| (images[i].as_str(), images[i + d].as_str()))).collect()
 }
 
-/// One attempt: the phases that it has not done yet.
-fn attempt_at(
+/// Whether the motion shows nothing but turns, and there is no model to prove the contrary.
+fn only_turned(best: &Option<Model>, total: usize, motion: Motion) -> bool {
+    let turned = motion.moved >= LEAST_MOVED && motion.turned as f64 >= TURNED * motion.moved as f64;
+    let few = (count(best) as f64) < FAIR_SHARE * total as f64;
+    turned && best.as_ref().is_none_or(|model| few || super::write::parallax(model) < LEAST_PARALLAX)
+}
+
+/// The first phases of an attempt, if it has not done them yet.
+fn features_and_matches(
     job: &Job,
     effort: Effort,
     pairs: &[(&str, &str)],
-    mapper: Mapper,
     colmap: &Colmap,
     record: &mut Record,
     tell: &mut dyn FnMut(PrepareEvent),
@@ -179,7 +209,7 @@ fn attempt_at(
         let list = job.database.with_extension("pairs.txt");
         tell(PrepareEvent::progress("matches", 0, pairs.len()));
         let mut done = 0;
-        let mut motion = Default::default();
+        let mut motion = Motion::default();
         for part in pairs.chunks(pairs.len().div_ceil(PARTS).max(1)) {
             write_atomically(&list, |out| part.iter().try_for_each(|(a, b)| writeln!(out, "{a} {b}")))?;
             motion = colmap.matches(job, &list)?;
@@ -189,20 +219,40 @@ fn attempt_at(
         record.moved(motion);
         record.done(Phase::Matches)?;
     }
-    if !record.is_done(Phase::Poses) {
+    Ok(())
+}
+
+/// The poses of an attempt. Where one mapper places few images, the other one is tried.
+fn poses(
+    work: &Work,
+    job: &Job,
+    colmap: &Colmap,
+    motion: Motion,
+    tell: &mut dyn FnMut(PrepareEvent),
+) -> Result<(), DataError> {
+    let total = job.names.len();
+    let often = motion.turned as f64 > OFTEN_TURNED * motion.moved as f64 && motion.moved >= LEAST_MOVED;
+    let mappers: &[Mapper] = match (colmap.has(Mapper::Global) && total > ALL_PAIRS[0], often) {
+        (false, _) => &[Mapper::Incremental],
+        (true, false) => &[Mapper::Incremental, Mapper::Global],
+        (true, true) => &[Mapper::Global, Mapper::Incremental],
+    };
+    for mapper in mappers {
+        let suffix = if *mapper == Mapper::Global { "-global" } else { "" };
+        let sparse = job.sparse.with_file_name(format!("{}{suffix}", files::name_of(&job.sparse)));
         // The results of a mapper that was stopped are useless.
-        if job.sparse.exists() {
-            fs::remove_dir_all(&job.sparse).map_err(DataError::io("remove", &job.sparse))?;
+        if sparse.exists() {
+            fs::remove_dir_all(&sparse).map_err(DataError::io("remove", &sparse))?;
         }
-        fs::create_dir_all(&job.sparse).map_err(DataError::io("create", &job.sparse))?;
+        fs::create_dir_all(&sparse).map_err(DataError::io("create", &sparse))?;
         let mut done = |done: usize| tell(PrepareEvent::progress("poses", done.min(total), total));
         done(0);
-        colmap.poses(job, mapper, &mut done)?;
-        record.done(Phase::Poses)?;
-        let models = files::entries(&job.sparse, |path| path.join("images.bin").is_file())?;
-        let counts = models.iter().map(|model| Ok(read_model(model)?.images.len()));
-        let most = counts.collect::<Result<Vec<usize>, DataError>>()?.into_iter().max().unwrap_or(0);
-        tell(PrepareEvent::Placed { images: most.min(total), total });
+        colmap.poses(job, &sparse, *mapper, &mut done)?;
+        tell(PrepareEvent::Placed { images: count(&best_of(&sparse)?).min(total), total });
+        let best = work.best_model()?;
+        if count(&best) as f64 >= LEAST_REGISTERED * total as f64 || only_turned(&best, total, motion) {
+            break;
+        }
     }
     Ok(())
 }
@@ -218,8 +268,8 @@ mod tests {
         let few = pairs(&names, 24, 0);
         assert_eq!(few.len(), 29 + 28 + 26 + 22 + 14);
         assert!(few.contains(&("00", "16")) && !few.contains(&("00", "03")));
-        let more = pairs(&names, 24, 12);
+        let more = pairs(&names, 24, NEIGHBORS);
         assert!(more.contains(&("00", "03")) && more.len() > few.len());
-        assert_eq!(pairs(&names, 90, 0).len(), 30 * 29 / 2);
+        assert_eq!(pairs(&names, 60, 0).len(), 30 * 29 / 2);
     }
 }

@@ -5,6 +5,7 @@ use super::*;
 use crate::camera::Camera;
 use crate::images::{ImageStore, RgbImage8};
 use crate::options::LoadOptions;
+use crate::programs::ffmpeg::tests::shown_at;
 use crate::scene::Scene;
 use glam::{IVec3, Vec3};
 use rayon::prelude::*;
@@ -62,7 +63,8 @@ fn camera(x: f32, y: f32) -> Camera {
     Camera::look_at(Vec3::new(x, y, 2.0), Vec3::new(0.2 * x, 0.0, -2.5), Vec3::Y, FOV, SIZE.0, SIZE.1)
 }
 
-fn film(folder: &Path, name: &str, cameras: &[Camera]) -> PathBuf {
+/// Films at ten frames a second, or so that the frames are shown at some times.
+fn film(folder: &Path, name: &str, cameras: &[Camera], times: Option<&[f64]>) -> PathBuf {
     let frames = folder.join(format!("{name}-frames"));
     fs::create_dir_all(&frames).unwrap();
     for (i, camera) in cameras.iter().enumerate() {
@@ -71,6 +73,9 @@ fn film(folder: &Path, name: &str, cameras: &[Camera]) -> PathBuf {
     let video = folder.join(format!("{name}.mp4"));
     let mut command = FFMPEG.command();
     command.args(["-loglevel", "error", "-framerate", "10", "-i"]).arg(frames.join("%04d.png"));
+    if let Some(times) = times {
+        command.args(["-vf", &shown_at(times), "-vsync", "0"]);
+    }
     command.args(["-c:v", "libx264", "-crf", "10", "-pix_fmt", "yuv420p"]).arg(&video);
     FFMPEG.run(&mut command, "writing the video", "").unwrap();
     video
@@ -96,7 +101,9 @@ fn a_moving_camera_becomes_a_dataset_and_a_second_call_goes_on() {
     }
     let folder = tempfile::tempdir().unwrap();
     let truth: Vec<Camera> = (0..16).map(|i| camera(-1.2 + 0.16 * i as f32, 0.3 * (i as f32 * 0.5).sin())).collect();
-    let video = film(folder.path(), "walk", &truth);
+    // The second half at half the rate.
+    let times: Vec<f64> = (0..16).map(|i| if i < 8 { i as f64 / 10.0 } else { (i - 4) as f64 / 5.0 }).collect();
+    let video = film(folder.path(), "walk", &truth, Some(&times));
     let mut options = PrepareOptions::new(vec![video], folder.path().join("out"));
     options.frames = 16;
     let mut phases = Vec::new();
@@ -116,7 +123,7 @@ fn a_moving_camera_becomes_a_dataset_and_a_second_call_goes_on() {
     let scene = Scene::open(&options.out, &load).unwrap();
     assert_eq!(scene.layout, "nerfstudio");
     let frames: Vec<_> = scene.video.iter().collect();
-    let index = |time: f32| (time * 15.0).round() as usize;
+    let index = |time: f32| times.iter().position(|t| (t / times[15] - f64::from(time)).abs() < 1e-3).unwrap();
     let found: Vec<Vec3> = frames.iter().map(|frame| frame.camera.center()).collect();
     let expected: Vec<Vec3> = frames.iter().map(|frame| truth[index(frame.time)].center()).collect();
     same_shape(&found, &expected);
@@ -147,7 +154,7 @@ fn a_rig_becomes_a_dataset() {
     let folder = tempfile::tempdir().unwrap();
     let truth: Vec<Camera> =
         (0..6).map(|i| camera(-1.2 + 0.48 * i as f32, if i % 2 == 0 { 0.2 } else { -0.2 })).collect();
-    let videos = truth.iter().enumerate().map(|(i, camera)| film(folder.path(), &format!("v{i}"), &[*camera; 3]));
+    let videos = truth.iter().enumerate().map(|(i, camera)| film(folder.path(), &format!("v{i}"), &[*camera; 3], None));
     let options = PrepareOptions::new(videos.collect(), folder.path().join("out"));
     let summary = prepare(&options, &mut |_| {}).unwrap();
     assert_eq!((summary.images, summary.cameras), (6, summary.registered));

@@ -9,7 +9,7 @@ mod python;
 pub(crate) use program::COLMAP;
 
 use crate::error::DataError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// The version of the program since which it is preferred to the package.
 const NEW: (u32, u32) = (4, 0);
@@ -33,7 +33,7 @@ pub(crate) struct Job {
     pub(crate) list: PathBuf,
     /// COLMAP's database.
     pub(crate) database: PathBuf,
-    /// The folder of the models.
+    /// How the folders of models are called: one for each mapper.
     pub(crate) sparse: PathBuf,
     /// Whether each folder of images is a camera of its own.
     pub(crate) rig: bool,
@@ -61,7 +61,7 @@ pub(crate) struct Effort {
 /// How cameras are placed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Mapper {
-    /// All at once. Programs before version 4 place them one by one.
+    /// All at once; since version 4.
     Global,
     /// One by one.
     Incremental,
@@ -116,22 +116,33 @@ impl Colmap {
     }
 
     /// Matches the features of the pairs in a file, which has two names a line. The program does not say how they moved.
-    pub(crate) fn matches(&self, job: &Job, pairs: &std::path::Path) -> Result<Motion, DataError> {
+    pub(crate) fn matches(&self, job: &Job, pairs: &Path) -> Result<Motion, DataError> {
         match self {
             Self::Program(_) => program::matches(job, pairs).map(|()| Motion::default()),
             Self::Package(_) => python::matches(job, pairs),
         }
     }
 
-    /// Finds the poses, and writes models into `job.sparse`, which may stay empty. `done` is called with the number of
-    /// images that have a pose.
-    pub(crate) fn poses(&self, job: &Job, mapper: Mapper, done: &mut dyn FnMut(usize)) -> Result<(), DataError> {
+    /// Whether it has a mapper. A program without a version may be old.
+    pub(crate) fn has(&self, mapper: Mapper) -> bool {
         match self {
-            Self::Program(version) => {
-                let global = mapper == Mapper::Global && *version >= NEW && *version != (u32::MAX, 0);
-                program::poses(job, global, done)
-            }
-            Self::Package(_) => python::poses(job, mapper, done),
+            Self::Program(version) => mapper == Mapper::Incremental || (*version >= NEW && version.0 != u32::MAX),
+            Self::Package(_) => true,
+        }
+    }
+
+    /// Finds the poses, and writes models into `sparse`, which may stay empty. `done` is called with the number of images
+    /// that have a pose.
+    pub(crate) fn poses(
+        &self,
+        job: &Job,
+        sparse: &Path,
+        mapper: Mapper,
+        done: &mut dyn FnMut(usize),
+    ) -> Result<(), DataError> {
+        match self {
+            Self::Program(_) => program::poses(job, sparse, mapper, done),
+            Self::Package(_) => python::poses(job, sparse, mapper, done),
         }
     }
 }

@@ -1,6 +1,6 @@
 //! COLMAP's program.
 
-use super::{AGAIN, Effort, FILM_AGAIN, Job, counted, registered};
+use super::{AGAIN, Effort, FILM_AGAIN, Job, Mapper, counted, registered};
 use crate::error::DataError;
 use crate::programs::{Heard, Program, argument};
 use std::path::Path;
@@ -79,7 +79,8 @@ pub(super) fn matches(job: &Job, pairs: &Path) -> Result<(), DataError> {
     COLMAP.run(&mut command, "matching features", AGAIN).map(drop)
 }
 
-pub(super) fn poses(job: &Job, global: bool, done: &mut dyn FnMut(usize)) -> Result<(), DataError> {
+pub(super) fn poses(job: &Job, sparse: &Path, mapper: Mapper, done: &mut dyn FnMut(usize)) -> Result<(), DataError> {
+    let global = mapper == Mapper::Global;
     if global {
         // It estimates focal lengths, which a global mapper needs to know beforehand. Without it the poses are less exact.
         let mut calibrate = command("view_graph_calibrator");
@@ -87,7 +88,7 @@ pub(super) fn poses(job: &Job, global: bool, done: &mut dyn FnMut(usize)) -> Res
     }
     let mut command = command(if global { "global_mapper" } else { "mapper" });
     command.arg("--database_path").arg(&job.database).arg("--image_path").arg(&job.images);
-    command.arg("--output_path").arg(&job.sparse);
+    command.arg("--output_path").arg(sparse);
     let begun = Instant::now();
     let (mut most, mut since) = (0, begun);
     let mut line = |line: Option<&str>| {

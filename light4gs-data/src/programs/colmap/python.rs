@@ -43,7 +43,6 @@ fn run(
         "stage": stage,
         "database": job.database,
         "images": job.images,
-        "sparse": job.sparse,
         "list": job.list,
         "rig": job.rig,
         "camera_model": job.camera_model(),
@@ -88,8 +87,9 @@ pub(super) fn matches(job: &Job, pairs: &Path) -> Result<Motion, DataError> {
     Ok(Motion { turned: number(1), moved: number(2) })
 }
 
-pub(super) fn poses(job: &Job, mapper: Mapper, done: &mut dyn FnMut(usize)) -> Result<(), DataError> {
+pub(super) fn poses(job: &Job, sparse: &Path, mapper: Mapper, done: &mut dyn FnMut(usize)) -> Result<(), DataError> {
     let options = json!({
+        "sparse": sparse,
         "global": mapper == Mapper::Global,
         "seconds": LEAST_SECONDS.max(SECONDS_AN_IMAGE * job.names.len()),
     });

@@ -3,7 +3,7 @@
 use super::filters::{Chain, chain};
 use super::info::VideoInfo;
 use super::taken::Taken;
-use super::{FFMPEG, FPS_MODE};
+use super::{FFMPEG, passthrough};
 use crate::atomic::make_folder_atomically;
 use crate::error::DataError;
 use crate::programs::{Heard, argument};
@@ -43,7 +43,7 @@ pub(crate) struct Wanted {
 
 impl Wanted {
     /// The suffix of the frames.
-    fn suffix(&self) -> &'static str {
+    pub(super) fn suffix(&self) -> &'static str {
         if self.jpeg { "jpg" } else { "png" }
     }
 }
@@ -88,7 +88,8 @@ pub(crate) fn extract_frames(
         notes.extend(times.cut_short(info, wanted, written));
         let record = Taken::of(&video, std::mem::take(&mut notes), times.relative(written, info))?;
         record.write(part)?;
-        taken = Some(record);
+        // As it will be read from now on: text rounds times.
+        taken = Taken::read(part, written);
         Ok(())
     })?;
     taken.ok_or_else(|| FFMPEG.error("wrote no frames", "try again"))
@@ -101,8 +102,7 @@ fn extraction(version: (u32, u32), video: &Path, folder: &Path, wanted: &Wanted,
     command.current_dir(folder).args(["-hide_banner", "-nostats", "-loglevel", "level+info", "-nostdin", "-i"]);
     // Of the video streams the first that is no cover picture.
     command.arg(video).args(["-map", "0:V:0", "-vf", filters]);
-    // No frame is doubled or dropped behind the filters, whatever rate the container says.
-    command.args(if version >= FPS_MODE { ["-fps_mode", "passthrough"] } else { ["-vsync", "0"] });
+    command.args(passthrough(version));
     if let Some(count) = wanted.count {
         command.arg("-frames:v").arg(argument(count));
     }

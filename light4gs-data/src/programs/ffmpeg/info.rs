@@ -61,6 +61,24 @@ pub(crate) fn video_info(video: &Path) -> Result<VideoInfo, DataError> {
     })
 }
 
+/// The number of frames in the file, without decoding them; `None` where ffmpeg does not say. Rates of containers are means, and
+/// not exact.
+///
+/// # Errors
+/// [`DataError::Program`] where ffmpeg cannot be started.
+pub(crate) fn frame_count(video: &Path) -> Result<Option<usize>, DataError> {
+    let place = std::path::absolute(video).map_err(DataError::io("read", video))?;
+    let mut command = FFMPEG.command();
+    command.args(["-hide_banner", "-nostdin", "-i"]).arg(place);
+    let output = FFMPEG.output(command.args(["-map", "0:V:0", "-c", "copy", "-f", "null", "-"]))?;
+    Ok(counted(&String::from_utf8_lossy(&output.stderr)))
+}
+
+/// The last number behind `frame=`.
+fn counted(text: &str) -> Option<usize> {
+    text.rsplit_once("frame=")?.1.split_whitespace().next()?.parse().ok()
+}
+
 fn parse(text: &str) -> Option<VideoInfo> {
     let of_video =
         |line: &&str| line.contains("Stream #") && line.contains("Video:") && !line.contains("(attached pic)");

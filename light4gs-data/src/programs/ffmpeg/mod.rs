@@ -4,9 +4,11 @@ mod filters;
 mod frames;
 mod info;
 mod taken;
+#[cfg(test)]
+pub(crate) mod tests;
 
 pub(crate) use frames::{Pace, Wanted, extract_frames};
-pub(crate) use info::{VideoInfo, video_info};
+pub(crate) use info::{VideoInfo, frame_count, video_info};
 pub(crate) use taken::Taken;
 
 use super::Program;
@@ -22,3 +24,8 @@ pub(crate) const FFMPEG: Program = Program {
 
 /// The version since which the option for frame rates is `-fps_mode`.
 const FPS_MODE: (u32, u32) = (5, 1);
+
+/// The option by which frames are written as they come: no frame is doubled or dropped, whatever rate the container says.
+fn passthrough(version: (u32, u32)) -> [&'static str; 2] {
+    if version >= FPS_MODE { ["-fps_mode", "passthrough"] } else { ["-vsync", "0"] }
+}
