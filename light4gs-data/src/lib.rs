@@ -94,7 +94,7 @@ pub use options::{LoadOptions, Resolution};
 pub use orbit::orbit_path;
 pub use ply::GaussianPly;
 pub use points::{PointCloud, SH_C0, SMALLEST_MEAN_SQUARED_DISTANCE, mean_squared_distance_to_3_nearest};
-pub use prepare::{PrepareOptions, PrepareProgress, PrepareSummary, prepare};
+pub use prepare::{PrepareEvent, PrepareOptions, PrepareSummary, prepare};
 pub use pytorch::{PlainTensor, read_pytorch};
 pub use regular_file::{open_regular_file, read_regular_file, read_regular_text};
 pub use scene::{Scene, Split, SplitFrames};

@@ -15,6 +15,7 @@ mod signals;
 mod study;
 mod synth;
 mod train;
+mod videos;
 mod view;
 mod wishes;
 
@@ -41,13 +42,13 @@ enum Command {
     /// Make a small synthetic scene, train on it, write the file and the report.
     #[command(after_help = "Example:\n  light4gs quickstart --out runs/quickstart")]
     Quickstart(quickstart::Quickstart),
-    /// Make a dataset from one or several videos: frames by ffmpeg, poses by colmap.
+    /// Make a dataset from one or several videos: frames by ffmpeg, poses by COLMAP (the program, or its package pycolmap).
     #[command(after_help = "Examples:\n  light4gs prepare walk.mp4 --out data/walk\n  light4gs prepare left.mp4 \
                             middle.mp4 right.mp4 --out data/stage\n  light4gs train data/walk --out runs/walk")]
     Prepare(prepare::Prepare),
-    /// Train on a dataset.
+    /// Train on a dataset, or on videos, which are prepared first.
     #[command(
-        after_help = "Example:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing"
+        after_help = "Examples:\n  light4gs train data/dnerf/bouncing --config dnerf-bouncing-cpu --out runs/bouncing\n  light4gs train walk.mp4 --out runs/walk"
     )]
     Train(train::Train),
     /// Continue a run from its last checkpoint, to the same result as if it had not been interrupted.

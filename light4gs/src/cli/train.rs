@@ -23,6 +23,7 @@ use super::limits::LimitsArgument;
 use super::output::progress::ProgressBars;
 use super::output::{say, say_json, tell};
 use super::signals::stop_flag;
+use super::videos;
 use super::wishes::Wishes;
 
 /// Options for the output of a run.
@@ -42,8 +43,10 @@ pub(super) struct RunOutput {
 
 #[derive(Debug, Args)]
 pub(super) struct Train {
-    /// Folder of the dataset.
-    scene: PathBuf,
+    /// Folder of the dataset, or videos: one of a moving camera, or one for each camera of a rig. Videos are prepared in the
+    /// folder OUT-prepared first (see `light4gs prepare`); both parts continue where they were stopped.
+    #[arg(required = true, value_name = "SCENE|VIDEO")]
+    scene: Vec<PathBuf>,
     /// A preset (see docs/configuration.md) or a TOML file. Without it: the preset of the dataset's layout, such as
     /// dnerf-cpu+nodes.
     #[arg(long, value_name = "PRESET|FILE")]
@@ -71,6 +74,12 @@ pub(super) struct Train {
 
 impl Train {
     pub(super) fn run(self) -> Result<(), TrainError> {
+        let scene = videos::dataset(&self.scene, &self.out, self.output.quiet)?;
+        if !self.overwrite && videos::was_begun(&scene, &self.out) {
+            let (run, output) = (self.out, self.output);
+            let (overrides, device, accept_changed_dataset) = (Vec::new(), None, false);
+            return Resume { run, overrides, device, accept_changed_dataset, output }.run();
+        }
         let mut overrides = self.overrides;
         overrides.extend(self.device.map(|device| format!("device={device}")));
         overrides.extend(self.format.as_ref().map(|layout| format!("data.layout={layout}")));
@@ -78,10 +87,10 @@ impl Train {
         let preset = match (self.config, self.format) {
             (Some(config), _) => config,
             (None, Some(layout)) => Config::preset_of(Layouts::default().by_name(&layout)?)?.to_owned(),
-            (None, None) => Config::preset_of(Layouts::default().detect(&self.scene)?)?.to_owned(),
+            (None, None) => Config::preset_of(Layouts::default().detect(&scene)?)?.to_owned(),
         };
-        let config = self.wishes.config(&preset, &overrides, &self.scene, automatic, self.output.quiet)?;
-        train(config, &self.scene, &self.out, self.overwrite, &self.output)
+        let config = self.wishes.config(&preset, &overrides, &scene, automatic, self.output.quiet)?;
+        train(config, &scene, &self.out, self.overwrite, &self.output)
     }
 }
 
