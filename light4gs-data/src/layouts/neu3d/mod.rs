@@ -9,6 +9,8 @@ mod cameras;
 mod frames;
 mod spiral;
 mod taking;
+#[cfg(test)]
+mod tests;
 
 use super::layout::DatasetLayout;
 use super::shared::npy::{self, Array2};
